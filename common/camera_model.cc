@@ -1,0 +1,29 @@
+#include "common/camera_model.h"
+
+#include <cmath>
+
+#include "common/status.h"
+
+namespace romap {
+
+absl::Status ValidateCameraModel(const CameraModel& camera) {
+  const auto bad_size = [](int n) { return n < 16 || n > 8192; };
+  if (bad_size(camera.width_px) || bad_size(camera.height_px)) {
+    return InvalidArgument("camera: size {}x{} px must lie in 16..8192", camera.width_px, camera.height_px);
+  }
+  const auto bad_focal = [](double f) { return !std::isfinite(f) || f <= 0; };
+  if (bad_focal(camera.fx_px) || bad_focal(camera.fy_px)) {
+    return InvalidArgument("camera: focal lengths fx={} fy={} px must be positive", camera.fx_px, camera.fy_px);
+  }
+  const auto bad_center = [](double c, int size) { return !std::isfinite(c) || c < -size || c > 2.0 * size; };
+  if (bad_center(camera.cx_px, camera.width_px) || bad_center(camera.cy_px, camera.height_px)) {
+    return InvalidArgument("camera: principal point cx={} cy={} px is far outside the {}x{} image", camera.cx_px,
+                           camera.cy_px, camera.width_px, camera.height_px);
+  }
+  for (double k : camera.distortion) {
+    if (!std::isfinite(k)) return InvalidArgument("camera: distortion (k1 k2 p1 p2 k3) must be finite numbers");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace romap

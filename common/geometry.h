@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace romap {
+
+// Tags of the frames. World: right-handed, map units, z up unless a session's `up_world` says otherwise.
+// Camera: x right, y down, z forward (OpenCV). Object: cuboid centre, axes along the cuboid's edges, z along up.
+struct World {};
+struct Camera {};
+struct Object {};
+
+// Rigid transform that maps points of frame `From` to frame `To`: p_to = T_to_from * p_from. The tags make a wrong
+// composition a compile error: SE3<A, B> * SE3<B, C> = SE3<A, C>.
+template <class To, class From>
+class SE3 {
+ public:
+  SE3() = default;
+  SE3(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
+      : rotation_(rotation.normalized()), translation_(translation) {}
+  SE3(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
+      : SE3(Eigen::Quaterniond(rotation), translation) {}
+
+  const Eigen::Quaterniond& rotation() const { return rotation_; }
+  const Eigen::Vector3d& translation() const { return translation_; }
+  Eigen::Matrix3d RotationMatrix() const { return rotation_.toRotationMatrix(); }
+
+  Eigen::Matrix4d Matrix() const {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+    matrix.topLeftCorner<3, 3>() = RotationMatrix();
+    matrix.topRightCorner<3, 1>() = translation_;
+    return matrix;
+  }
+
+  SE3<From, To> Inverse() const {
+    const Eigen::Quaterniond inverse = rotation_.conjugate();
+    return {inverse, -(inverse * translation_)};
+  }
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p_from) const { return rotation_ * p_from + translation_; }
+
+  template <class Other>
+  SE3<To, Other> operator*(const SE3<From, Other>& other) const {
+    return {rotation_ * other.rotation(), rotation_ * other.translation() + translation_};
+  }
+
+  bool IsFinite() const { return rotation_.coeffs().allFinite() && translation_.allFinite(); }
+
+ private:
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
+};
+
+// Shortest rotation that takes world +z to `up_world` (unit length): the orientation of a cuboid whose yaw is 0.
+inline Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world) {
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up_world);
+}
+
+}  // namespace romap

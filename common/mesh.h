@@ -1,0 +1,22 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace romap {
+
+using Rgb8 = std::array<uint8_t, 3>;  // sRGB as in the source images, order R G B
+
+// Triangle mesh; counter-clockwise triangles seen from outside. `normals` and `colors` are empty or as long as
+// `vertices`. The frame (Object or World) is the holder's to say.
+struct Mesh {
+  std::vector<Eigen::Vector3f> vertices;  // map units
+  std::vector<Eigen::Vector3f> normals;   // unit length
+  std::vector<Rgb8> colors;
+  std::vector<std::array<uint32_t, 3>> triangles;
+};
+
+}  // namespace romap

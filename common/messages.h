@@ -1,0 +1,248 @@
+#pragma once
+
+// Every arrow of the data path is a type in this file. All are plain values; a cv::Mat in a message is never written to
+// after the message was sent (its pixels may be shared by several messages).
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "common/camera_model.h"
+#include "common/geometry.h"
+#include "common/ids.h"
+#include "common/mesh.h"
+
+namespace romap {
+
+// ---------------------------------------------------------------------------------------------- client -> session
+
+enum class ImageEncoding { kJpeg, kPng, kRawRgb8, kRawBgr8, kRawGray8 };
+enum class MaskEncoding { kNone, kLabelPng, kRunLength };
+enum class DepthEncoding { kNone, kPng16, kRawUint16 };
+
+// What one label of a mask image means in this frame only. Labels need not be stable from frame to frame.
+struct Instance {
+  uint32_t label = 0;  // value in the mask image, 1..65535
+  std::string class_name;
+  double score = 1.0;                // detector's confidence, 0..1
+  std::optional<uint64_t> track_id;  // the detector's own tracker, if it has one; a hint, not a verdict
+};
+
+// One frame as a client sends it, still encoded.
+struct FrameInput {
+  uint64_t frame_id = 0;     // chosen by the client, strictly increasing within a session
+  int64_t timestamp_ns = 0;  // capture time, strictly increasing within a session
+  ImageEncoding image_encoding = ImageEncoding::kJpeg;
+  std::string image;       // JPEG, PNG or rows of raw pixels without padding
+  int raw_width_px = 0;    // raw encodings only
+  int raw_height_px = 0;
+  MaskEncoding mask_encoding = MaskEncoding::kNone;
+  std::string label_png;            // kLabelPng: 8 or 16 bit single channel, 0 = nothing, size of the image
+  std::vector<uint32_t> label_runs; // kRunLength: (label, length) pairs in row-major order, lengths sum to width*height
+  std::vector<Instance> instances;  // labels of the mask that are not listed get class "object", score 1
+  std::optional<SE3<World, Camera>> T_world_camera;
+  DepthEncoding depth_encoding = DepthEncoding::kNone;
+  std::string depth;           // z depth (not ray length) registered to the image, size of the image
+  double depth_scale_mu = 0;   // map units per depth unit
+  std::optional<Eigen::Vector3d> gravity_camera;  // direction of gravity (down) in the camera frame, any length > 0
+};
+
+// ---------------------------------------------------------------------------------------------- session -> slam
+
+// A decoded and validated frame.
+struct Frame {
+  uint64_t frame_id = 0;
+  int64_t timestamp_ns = 0;
+  CameraModel camera;   // after undistortion: distortion is all zero and all pixels below obey the pinhole model
+  cv::Mat image_bgr;    // CV_8UC3
+  bool has_masks = false;  // false: no detector ran on this frame (differs from "ran and found nothing")
+  cv::Mat labels;       // CV_16UC1, 0 = nothing; empty when !has_masks
+  std::vector<Instance> instances;
+  cv::Mat depth_mu;     // CV_32FC1 z depth in map units, 0 = unknown; empty when there is none
+  std::optional<SE3<World, Camera>> T_world_camera;
+  std::optional<Eigen::Vector3d> gravity_camera;  // unit length
+};
+
+// ---------------------------------------------------------------------------------------------- slam -> objects
+
+enum class TrackingState { kInitialising, kTracking, kLost, kRelocalised };
+
+// A sparse map point as of now.
+struct MapPoint {
+  MapPointId id;
+  Eigen::Vector3d position_world;  // map units
+  int observations = 0;            // keyframes that saw it
+  double max_parallax_rad = 0;     // largest angle between two rays to it
+};
+
+// Sight of a map point in one keyframe.
+struct PointObservation {
+  MapPointId point;
+  Eigen::Vector2f pixel_px;
+  uint16_t label = 0;  // of that keyframe's mask under the pixel, 0 = none
+};
+
+// A frame whose camera pose is known, handed to objects in frame order.
+struct TrackedFrame {
+  std::shared_ptr<const Frame> frame;
+  TrackingState state = TrackingState::kTracking;
+  SE3<World, Camera> T_world_camera;
+  Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();  // unit length, against gravity
+  bool is_keyframe = false;
+};
+
+// A keyframe with what the sparse map says about it. `points` holds the present position of every point in
+// `observations`; points move when later keyframes refine them.
+struct KeyframeView {
+  KeyframeId id;
+  std::shared_ptr<const Frame> frame;
+  SE3<World, Camera> T_world_camera;
+  Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
+  std::vector<PointObservation> observations;
+  std::vector<MapPoint> points;
+  std::vector<MapPointId> removed_points;  // culled since the last keyframe
+};
+
+// ---------------------------------------------------------------------------------------------- objects -> session
+
+enum class ObjectState { kProvisional, kConfirmed, kLost };
+
+// A cuboid: |x|,|y|,|z| <= half_extents in the Object frame.
+struct Cuboid {
+  SE3<World, Object> T_world_object;  // z axis = up_world; x axis = yaw
+  Eigen::Vector3d half_extents = Eigen::Vector3d::Zero();  // map units
+  double confidence = 0;                                   // 0..1
+};
+
+struct ObjectUpdate {
+  ObjectId id;
+  uint64_t revision = 0;  // grows with every update of this object, over cuboid and mesh alike
+  ObjectState state = ObjectState::kProvisional;
+  std::string class_name;
+  double class_score = 0;  // share of the evidence that says class_name, 0..1
+  Cuboid cuboid;
+  uint64_t observations = 0;  // frames in which it was seen
+};
+
+struct ObjectRemoved {
+  ObjectId id;
+  uint64_t revision = 0;
+  std::string reason;
+};
+
+// `from` was found to be `into` and is gone; its observations count for `into` from now on.
+struct ObjectMerged {
+  ObjectId from;
+  ObjectId into;
+  uint64_t revision = 0;  // of `into`
+};
+
+// ---------------------------------------------------------------------------------------------- objects -> nerf
+
+enum class RayKind : uint8_t { kBackground = 0, kObject = 1, kOccluder = 2 };
+
+// One training view of one object: a crop of a keyframe. Pixels outside the crop are unknown.
+struct ObjectView {
+  ObjectId object;
+  KeyframeId keyframe;
+  CameraModel camera;  // of the full image, no distortion
+  SE3<World, Camera> T_world_camera;
+  cv::Rect roi_px;      // the crop in the full image
+  cv::Mat color_bgr;    // CV_8UC3, size of roi
+  cv::Mat ray_kind;     // CV_8UC1 of RayKind, size of roi
+  cv::Mat depth_mu;     // CV_32FC1 z depth, 0 = none, size of roi; empty = none at all (dense depth)
+  std::vector<Eigen::Vector3f> sparse_depth;  // (u_px, v_px, z_mu) in full-image pixels: map points of this object seen here
+};
+
+// What objects tells nerf about one object: its box (always) and views that are new.
+struct ObjectViews {
+  ObjectId object;
+  Cuboid cuboid;  // training box before enlargement
+  std::vector<ObjectView> new_views;
+};
+
+// ---------------------------------------------------------------------------------------------- nerf -> mesh
+
+// A trained field that can be asked. Immutable and safe to share between threads.
+class FieldSampler {
+ public:
+  virtual ~FieldSampler() = default;
+  // raw[i] = pre-activation density at p_object[i] (Object frame, map units); the surface is where raw crosses
+  // FieldSnapshot::surface_level, larger = inside. Points outside the box get -inf-like -1e4. rgb may be empty (not
+  // asked for) or as long as p_object.
+  virtual void Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const = 0;
+};
+
+// Bits over a regular grid of the box: cell (x, y, z) at index (z * resolution + y) * resolution + x covers the box
+// evenly, from -box_half_extents to +box_half_extents.
+struct OccupancyBits {
+  int resolution = 0;
+  std::vector<uint8_t> bits;  // 1 = may hold matter
+};
+
+struct FieldSnapshot {
+  ObjectId object;
+  uint64_t steps = 0;              // optimisation steps done
+  double train_seconds = 0;        // wall time inside training slices
+  double loss = 0;                 // mean colour loss of the last slice
+  int views = 0;
+  bool converged = false;          // the pool will not train it further unless a new view comes
+  SE3<World, Object> T_world_object;
+  Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units
+  float surface_level = 0;
+  // A component of inside cells that hangs together through values above this lower level is one piece (thin parts).
+  float connect_level = 0;
+  OccupancyBits hull;              // visual hull of the masks: outside it nothing can be
+  std::vector<Eigen::Vector3f> view_centers_object;  // camera centres of the training views, Object frame
+  std::shared_ptr<const FieldSampler> field;
+};
+
+// ---------------------------------------------------------------------------------------------- mesh -> outbox
+
+struct MeshUpdate {
+  ObjectId id;
+  uint64_t revision = 0;  // of the object; the newest wins
+  uint64_t steps = 0;     // training steps behind it
+  double train_seconds = 0;
+  bool final = false;     // no better mesh comes unless the object is seen anew
+  uint32_t vertex_count = 0;
+  uint32_t triangle_count = 0;
+  std::string draco;      // Draco (edgebreaker) bytes; vertices in the Object frame, map units; see common/mesh_codec.h
+};
+
+// ---------------------------------------------------------------------------------------------- session -> client
+
+struct FrameAck {
+  uint64_t frame_id = 0;
+  bool accepted = true;
+  std::string error;  // why not accepted
+  TrackingState state = TrackingState::kInitialising;
+  std::optional<SE3<World, Camera>> T_world_camera;
+  bool is_keyframe = false;
+  double latency_s = 0;  // from arrival at the server to this acknowledgement
+};
+
+struct Statistics {
+  uint64_t frames_received = 0;
+  uint64_t frames_processed = 0;
+  uint64_t frames_dropped = 0;  // live mode under load
+  uint64_t frames_rejected = 0;
+  uint64_t keyframes = 0;
+  uint64_t map_points = 0;
+  uint64_t objects = 0;           // confirmed
+  uint64_t objects_training = 0;  // with training work left
+  uint64_t training_steps = 0;
+  double training_progress = 0;   // 0..1 over all objects
+  uint64_t resident_bytes = 0;    // of the server process
+};
+
+using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics>;
+
+}  // namespace romap
