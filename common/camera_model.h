@@ -1,10 +1,9 @@
 #pragma once
 
-#include <array>
+#include <absl/status/status.h>
 
 #include <Eigen/Core>
-
-#include <absl/status/status.h>
+#include <array>
 
 namespace romap {
 

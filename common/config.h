@@ -1,12 +1,12 @@
 #pragma once
 
+#include <absl/status/status.h>
+
 #include <functional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
-
-#include <absl/status/status.h>
 
 namespace romap {
 
@@ -20,11 +20,11 @@ namespace romap {
 //     }
 //   };
 struct FieldInfo {
-  std::string unit;  // "" for a pure number
+  std::string unit = {};  // "" for a pure number
   double min = -1e300;
   double max = 1e300;
   std::vector<std::string> choices = {};  // for strings; empty = any
-  std::string help;
+  std::string help = {};
 };
 
 using FieldPointer = std::variant<bool*, int*, double*, std::string*>;

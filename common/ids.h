@@ -19,9 +19,15 @@ struct Id {
   friend std::ostream& operator<<(std::ostream& os, const Id& id) { return os << id.ToString(); }
 };
 
-struct ObjectTag { static constexpr const char* kName = "object"; };
-struct KeyframeTag { static constexpr const char* kName = "keyframe"; };
-struct MapPointTag { static constexpr const char* kName = "point"; };
+struct ObjectTag {
+  static constexpr const char* kName = "object";
+};
+struct KeyframeTag {
+  static constexpr const char* kName = "keyframe";
+};
+struct MapPointTag {
+  static constexpr const char* kName = "point";
+};
 
 using ObjectId = Id<ObjectTag>;
 using KeyframeId = Id<KeyframeTag>;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -8,16 +11,16 @@
 #include <string>
 #include <vector>
 
-#include <absl/status/status.h>
-#include <absl/status/statusor.h>
-
 #include "common/camera_model.h"
 #include "common/messages.h"
 
 namespace romap {
 
 enum class SessionState { kOpen, kFinishing, kFinished, kFailed };
-enum class FrameMode { kReplay /* lossless: a full queue pushes back */, kLive /* the oldest waiting frame is dropped */ };
+enum class FrameMode {
+  kReplay /* lossless: a full queue pushes back */,
+  kLive /* the oldest waiting frame is dropped */
+};
 
 struct SessionOptions {
   std::string name;  // for people; may be empty
@@ -81,8 +84,8 @@ class MappingService {
   virtual absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) = 0;
   virtual absl::StatusOr<std::vector<SessionInfo>> ListSessions() = 0;
   virtual absl::StatusOr<SessionInfo> GetSession(const std::string& session_id) = 0;  // NOT_FOUND
-  // No more frames will come: processes what was accepted and trains every object to its end. Returns at once; the state
-  // goes kFinishing -> kFinished and open event streams end when it is reached.
+  // No more frames will come: processes what was accepted and trains every object to its end. Returns at once; the
+  // state goes kFinishing -> kFinished and open event streams end when it is reached.
   virtual absl::StatusOr<SessionInfo> FinishSession(const std::string& session_id) = 0;
   virtual absl::Status DeleteSession(const std::string& session_id) = 0;
   // NOT_FOUND; FAILED_PRECONDITION when the session has a Map stream already or is finished.

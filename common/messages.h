@@ -3,16 +3,15 @@
 // Every arrow of the data path is a type in this file. All are plain values; a cv::Mat in a message is never written to
 // after the message was sent (its pixels may be shared by several messages).
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
-
-#include <Eigen/Core>
-#include <opencv2/core/mat.hpp>
 
 #include "common/camera_model.h"
 #include "common/geometry.h"
@@ -40,17 +39,18 @@ struct FrameInput {
   uint64_t frame_id = 0;     // chosen by the client, strictly increasing within a session
   int64_t timestamp_ns = 0;  // capture time, strictly increasing within a session
   ImageEncoding image_encoding = ImageEncoding::kJpeg;
-  std::string image;       // JPEG, PNG or rows of raw pixels without padding
-  int raw_width_px = 0;    // raw encodings only
+  std::string image;     // JPEG, PNG or rows of raw pixels without padding
+  int raw_width_px = 0;  // raw encodings only
   int raw_height_px = 0;
   MaskEncoding mask_encoding = MaskEncoding::kNone;
-  std::string label_png;            // kLabelPng: 8 or 16 bit single channel, 0 = nothing, size of the image
-  std::vector<uint32_t> label_runs; // kRunLength: (label, length) pairs in row-major order, lengths sum to width*height
+  std::string label_png;  // kLabelPng: 8 or 16 bit single channel, 0 = nothing, size of the image
+  std::vector<uint32_t>
+      label_runs;                   // kRunLength: (label, length) pairs in row-major order, lengths sum to width*height
   std::vector<Instance> instances;  // labels of the mask that are not listed get class "object", score 1
   std::optional<SE3<World, Camera>> T_world_camera;
   DepthEncoding depth_encoding = DepthEncoding::kNone;
-  std::string depth;           // z depth (not ray length) registered to the image, size of the image
-  double depth_scale_mu = 0;   // map units per depth unit
+  std::string depth;                              // z depth (not ray length) registered to the image, size of the image
+  double depth_scale_mu = 0;                      // map units per depth unit
   std::optional<Eigen::Vector3d> gravity_camera;  // direction of gravity (down) in the camera frame, any length > 0
 };
 
@@ -60,12 +60,12 @@ struct FrameInput {
 struct Frame {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
-  CameraModel camera;   // after undistortion: distortion is all zero and all pixels below obey the pinhole model
-  cv::Mat image_bgr;    // CV_8UC3
+  CameraModel camera;      // after undistortion: distortion is all zero and all pixels below obey the pinhole model
+  cv::Mat image_bgr;       // CV_8UC3
   bool has_masks = false;  // false: no detector ran on this frame (differs from "ran and found nothing")
-  cv::Mat labels;       // CV_16UC1, 0 = nothing; empty when !has_masks
+  cv::Mat labels;          // CV_16UC1, 0 = nothing; empty when !has_masks
   std::vector<Instance> instances;
-  cv::Mat depth_mu;     // CV_32FC1 z depth in map units, 0 = unknown; empty when there is none
+  cv::Mat depth_mu;  // CV_32FC1 z depth in map units, 0 = unknown; empty when there is none
   std::optional<SE3<World, Camera>> T_world_camera;
   std::optional<Eigen::Vector3d> gravity_camera;  // unit length
 };
@@ -116,7 +116,7 @@ enum class ObjectState { kProvisional, kConfirmed, kLost };
 
 // A cuboid: |x|,|y|,|z| <= half_extents in the Object frame.
 struct Cuboid {
-  SE3<World, Object> T_world_object;  // z axis = up_world; x axis = yaw
+  SE3<World, Object> T_world_object;                       // z axis = up_world; x axis = yaw
   Eigen::Vector3d half_extents = Eigen::Vector3d::Zero();  // map units
   double confidence = 0;                                   // 0..1
 };
@@ -154,11 +154,12 @@ struct ObjectView {
   KeyframeId keyframe;
   CameraModel camera;  // of the full image, no distortion
   SE3<World, Camera> T_world_camera;
-  cv::Rect roi_px;      // the crop in the full image
-  cv::Mat color_bgr;    // CV_8UC3, size of roi
-  cv::Mat ray_kind;     // CV_8UC1 of RayKind, size of roi
-  cv::Mat depth_mu;     // CV_32FC1 z depth, 0 = none, size of roi; empty = none at all (dense depth)
-  std::vector<Eigen::Vector3f> sparse_depth;  // (u_px, v_px, z_mu) in full-image pixels: map points of this object seen here
+  cv::Rect roi_px;    // the crop in the full image
+  cv::Mat color_bgr;  // CV_8UC3, size of roi
+  cv::Mat ray_kind;   // CV_8UC1 of RayKind, size of roi
+  cv::Mat depth_mu;   // CV_32FC1 z depth, 0 = none, size of roi; empty = none at all (dense depth)
+  std::vector<Eigen::Vector3f>
+      sparse_depth;  // (u_px, v_px, z_mu) in full-image pixels: map points of this object seen here
 };
 
 // What objects tells nerf about one object: its box (always) and views that are new.
@@ -189,17 +190,17 @@ struct OccupancyBits {
 
 struct FieldSnapshot {
   ObjectId object;
-  uint64_t steps = 0;              // optimisation steps done
-  double train_seconds = 0;        // wall time inside training slices
-  double loss = 0;                 // mean colour loss of the last slice
+  uint64_t steps = 0;        // optimisation steps done
+  double train_seconds = 0;  // wall time inside training slices
+  double loss = 0;           // mean colour loss of the last slice
   int views = 0;
-  bool converged = false;          // the pool will not train it further unless a new view comes
+  bool converged = false;  // the pool will not train it further unless a new view comes
   SE3<World, Object> T_world_object;
   Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units
   float surface_level = 0;
   // A component of inside cells that hangs together through values above this lower level is one piece (thin parts).
   float connect_level = 0;
-  OccupancyBits hull;              // visual hull of the masks: outside it nothing can be
+  OccupancyBits hull;                                // visual hull of the masks: outside it nothing can be
   std::vector<Eigen::Vector3f> view_centers_object;  // camera centres of the training views, Object frame
   std::shared_ptr<const FieldSampler> field;
 };
@@ -211,10 +212,10 @@ struct MeshUpdate {
   uint64_t revision = 0;  // of the object; the newest wins
   uint64_t steps = 0;     // training steps behind it
   double train_seconds = 0;
-  bool final = false;     // no better mesh comes unless the object is seen anew
+  bool final = false;  // no better mesh comes unless the object is seen anew
   uint32_t vertex_count = 0;
   uint32_t triangle_count = 0;
-  std::string draco;      // Draco (edgebreaker) bytes; vertices in the Object frame, map units; see common/mesh_codec.h
+  std::string draco;  // Draco (edgebreaker) bytes; vertices in the Object frame, map units; see common/mesh_codec.h
 };
 
 // ---------------------------------------------------------------------------------------------- session -> client
@@ -239,8 +240,8 @@ struct Statistics {
   uint64_t objects = 0;           // confirmed
   uint64_t objects_training = 0;  // with training work left
   uint64_t training_steps = 0;
-  double training_progress = 0;   // 0..1 over all objects
-  uint64_t resident_bytes = 0;    // of the server process
+  double training_progress = 0;  // 0..1 over all objects
+  uint64_t resident_bytes = 0;   // of the server process
 };
 
 using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics>;

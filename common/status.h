@@ -1,10 +1,10 @@
 #pragma once
 
-#include <utility>
-
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <fmt/format.h>
+
+#include <utility>
 
 // Debian's Abseil has its own string_view; messages are made with fmt and handed over as std::string.
 
@@ -34,8 +34,8 @@ inline std::string Message(const absl::Status& status) { return std::string(stat
 
 #define ROMAP_CONCAT_INNER(a, b) a##b
 #define ROMAP_CONCAT(a, b) ROMAP_CONCAT_INNER(a, b)
-#define ROMAP_RETURN_IF_ERROR(expr)                        \
-  do {                                                     \
+#define ROMAP_RETURN_IF_ERROR(expr)                                   \
+  do {                                                                \
     if (absl::Status status_ = (expr); !status_.ok()) return status_; \
   } while (0)
 #define ROMAP_ASSIGN_OR_RETURN_IMPL(tmp, lhs, expr) \
