@@ -129,6 +129,9 @@ struct ObjectUpdate {
   double class_score = 0;  // share of the evidence that says class_name, 0..1
   Cuboid cuboid;
   uint64_t observations = 0;  // frames in which it was seen
+  // Where the newest mesh stands: the pose of the frame its vertices are in. It follows corrections of the map, so that
+  // a mesh that was sent once need not be sent again. None while there is no mesh.
+  std::optional<SE3<World, Object>> T_world_mesh;
 };
 
 struct ObjectRemoved {
