@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "common/camera_model.h"
+#include "common/status.h"
+
+namespace romap {
+
+// What a sequence says about its camera.
+struct CameraYaml {
+  CameraModel camera;
+  double fps = 30;         // nominal frames per second
+  double depth_scale = 0;  // map units per unit of the depth images; 0 = no depth
+};
+
+// Reads camera.yaml: width, height, fx, fy, cx, cy [px, integer pixel = pixel centre]; optional distortion (k1 k2 p1 p2
+// k3), fps and depth_scale. NOT_FOUND or INVALID_ARGUMENT naming file, line and what is missing or impossible.
+absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path);
+
+absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& camera);
+
+}  // namespace romap
