@@ -1,0 +1,111 @@
+#include "client/render/mesh_view.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace romap {
+namespace {
+
+constexpr int kSamplesAcross = 2;
+
+// All meshes in one set of arrays; attributes per vertex.
+struct MergedMeshes {
+  std::vector<Eigen::Vector3f> positions_world;
+  std::vector<Eigen::Vector3f> normals;     // zero: use the triangle's
+  std::vector<Eigen::Vector3f> colors_bgr;  // 0..255; negative: none
+  std::vector<std::array<uint32_t, 3>> triangles;
+  std::vector<uint16_t> ids;  // per triangle
+};
+
+MergedMeshes Merge(std::span<const MeshInstance> meshes) {
+  MergedMeshes merged;
+  for (const MeshInstance& instance : meshes) {
+    const Mesh& mesh = *instance.mesh_world;
+    const auto base = static_cast<uint32_t>(merged.positions_world.size());
+    const bool has_normals = mesh.normals.size() == mesh.vertices.size();
+    const bool has_colors = mesh.colors.size() == mesh.vertices.size();
+    for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+      merged.positions_world.push_back(mesh.vertices[i]);
+      merged.normals.push_back(has_normals ? mesh.normals[i] : Eigen::Vector3f(Eigen::Vector3f::Zero()));
+      merged.colors_bgr.push_back(has_colors ? Eigen::Vector3f(mesh.colors[i][2], mesh.colors[i][1], mesh.colors[i][0])
+                                             : Eigen::Vector3f(Eigen::Vector3f::Constant(-1)));
+    }
+    for (const auto& [a, b, c] : mesh.triangles) {
+      if (std::max({a, b, c}) >= mesh.vertices.size()) continue;
+      merged.triangles.push_back({base + a, base + b, base + c});
+      merged.ids.push_back(instance.id);
+    }
+  }
+  return merged;
+}
+
+// Colour of triangle `triangle` where the ray meets it. The light sits a little above and left of the camera: a light
+// at the camera itself would hide the shape of what faces it.
+Eigen::Vector3f ShadeBgr(const MergedMeshes& merged, int32_t triangle, const SE3<World, Camera>& T_world_camera,
+                         const Eigen::Vector3d& ray_world, MeshPaint paint) {
+  const auto& [a, b, c] = merged.triangles[triangle];
+  const std::array<Eigen::Vector3f, 3> corners = {merged.positions_world[a], merged.positions_world[b],
+                                                  merged.positions_world[c]};
+  const Eigen::Vector3f weights = Barycentrics(corners, T_world_camera.translation(), ray_world);
+  const Eigen::Vector3f color =
+      weights.x() * merged.colors_bgr[a] + weights.y() * merged.colors_bgr[b] + weights.z() * merged.colors_bgr[c];
+  if (paint == MeshPaint::kColored && merged.colors_bgr[a].x() >= 0) return color;
+
+  Eigen::Vector3f normal =
+      weights.x() * merged.normals[a] + weights.y() * merged.normals[b] + weights.z() * merged.normals[c];
+  if (normal.squaredNorm() < 1e-12F) normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  normal.normalize();
+  static const Eigen::Vector3d kToLightCamera = Eigen::Vector3d(-0.35, -0.6, -0.72).normalized();
+  const Eigen::Vector3f to_light = (T_world_camera.rotation() * kToLightCamera).cast<float>();
+  const bool faces_away = normal.cast<double>().dot(ray_world) > 0;
+  const float cosine = std::max(0.0F, (faces_away ? -1.0F : 1.0F) * normal.dot(to_light));
+  return Eigen::Vector3f::Constant(60.0F + 175.0F * cosine);
+}
+
+}  // namespace
+
+RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraModel& camera,
+                          const SE3<World, Camera>& T_world_camera, MeshPaint paint, const cv::Scalar& background_bgr) {
+  const MergedMeshes merged = Merge(meshes);
+  const TriangleSoup soup{merged.positions_world, merged.triangles};
+  const VisibilityImage centers = Rasterize(camera, T_world_camera, soup);
+  const CameraModel fine_camera = Supersampled(camera, kSamplesAcross);
+  const VisibilityImage fine = Rasterize(fine_camera, T_world_camera, soup);
+
+  RenderedView view;
+  view.color_bgr.create(camera.height_px, camera.width_px, CV_8UC3);
+  view.depth_mu.create(camera.height_px, camera.width_px, CV_32FC1);
+  view.ids.create(camera.height_px, camera.width_px, CV_16UC1);
+  const Eigen::Vector3f background(static_cast<float>(background_bgr[0]), static_cast<float>(background_bgr[1]),
+                                   static_cast<float>(background_bgr[2]));
+  tbb::parallel_for(0, camera.height_px, [&](int v) {
+    for (int u = 0; u < camera.width_px; ++u) {
+      const int32_t triangle = centers.triangle[centers.Index(u, v)];
+      view.depth_mu.at<float>(v, u) = centers.Depth(u, v);
+      view.ids.at<uint16_t>(v, u) = triangle == VisibilityImage::kNothing ? uint16_t{0} : merged.ids[triangle];
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (int j = 0; j < kSamplesAcross; ++j) {
+        for (int i = 0; i < kSamplesAcross; ++i) {
+          const int fine_u = u * kSamplesAcross + i;
+          const int fine_v = v * kSamplesAcross + j;
+          const int32_t hit = fine.triangle[fine.Index(fine_u, fine_v)];
+          const Eigen::Vector3d ray_world = T_world_camera.rotation() * fine_camera.Unproject(fine_u, fine_v);
+          sum +=
+              hit == VisibilityImage::kNothing ? background : ShadeBgr(merged, hit, T_world_camera, ray_world, paint);
+        }
+      }
+      for (int k = 0; k < 3; ++k) {
+        view.color_bgr.at<cv::Vec3b>(v, u)[k] =
+            cv::saturate_cast<uint8_t>(sum[k] / static_cast<float>(kSamplesAcross * kSamplesAcross));
+      }
+    }
+  });
+  return view;
+}
+
+}  // namespace romap
