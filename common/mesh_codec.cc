@@ -1,0 +1,191 @@
+#include "common/mesh_codec.h"
+
+#include <draco/compression/decode.h>
+#include <draco/compression/encode.h>
+#include <draco/core/varint_decoding.h>
+#include <draco/mesh/mesh.h>
+
+#include <exception>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+using draco::GeometryAttribute;
+
+bool IsDegenerate(const std::array<uint32_t, 3>& triangle) {
+  const auto& [a, b, c] = triangle;
+  return a == b || b == c || c == a;
+}
+
+absl::Status ValidateOptions(const DracoOptions& options) {
+  if (options.position_bits < 1 || options.position_bits > 30) {
+    return InvalidArgument("position_bits {} must be 1..30", options.position_bits);
+  }
+  if (options.normal_bits < 2 || options.normal_bits > 30) {
+    return InvalidArgument("normal_bits {} must be 2..30", options.normal_bits);
+  }
+  if (options.speed < 0 || options.speed > 10) return InvalidArgument("speed {} must be 0..10", options.speed);
+  return absl::OkStatus();
+}
+
+absl::Status ValidateMesh(const Mesh& mesh) {
+  const size_t vertices = mesh.vertices.size();
+  if (mesh.triangles.size() > kMaxCodecTriangles || vertices > 3 * kMaxCodecTriangles) {
+    return InvalidArgument("mesh of {} triangles and {} vertices, at most {} triangles can be encoded",
+                           mesh.triangles.size(), vertices, kMaxCodecTriangles);
+  }
+  if (!mesh.normals.empty() && mesh.normals.size() != vertices) {
+    return InvalidArgument("mesh has {} normals for {} vertices", mesh.normals.size(), vertices);
+  }
+  if (!mesh.colors.empty() && mesh.colors.size() != vertices) {
+    return InvalidArgument("mesh has {} colors for {} vertices", mesh.colors.size(), vertices);
+  }
+  for (size_t i = 0; i < vertices; ++i) {
+    if (!mesh.vertices[i].allFinite()) return InvalidArgument("vertex {} is not finite", i);
+    if (!mesh.normals.empty() && !mesh.normals[i].allFinite()) return InvalidArgument("normal {} is not finite", i);
+  }
+  for (size_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (const uint32_t index : mesh.triangles[i]) {
+      if (index >= vertices) return InvalidArgument("triangle {} names vertex {} of {}", i, index, vertices);
+    }
+  }
+  return absl::OkStatus();
+}
+
+// One value of three components per vertex.
+template <class Value>
+void AddAttribute(GeometryAttribute::Type type, draco::DataType data_type, const std::vector<Value>& values,
+                  draco::Mesh& target) {
+  GeometryAttribute description;
+  description.Init(type, nullptr, 3, data_type, /*normalized=*/data_type == draco::DT_UINT8, sizeof(Value),
+                   /*byte_offset=*/0);
+  const int id = target.AddAttribute(description, /*identity_mapping=*/true, static_cast<uint32_t>(values.size()));
+  for (size_t i = 0; i < values.size(); ++i) {
+    target.attribute(id)->SetAttributeValue(draco::AttributeValueIndex(static_cast<uint32_t>(i)), values[i].data());
+  }
+}
+
+void FillDraco(const Mesh& mesh, draco::Mesh& target) {
+  target.set_num_points(static_cast<uint32_t>(mesh.vertices.size()));
+  for (const auto& triangle : mesh.triangles) {
+    if (IsDegenerate(triangle)) continue;
+    target.AddFace({draco::PointIndex(triangle[0]), draco::PointIndex(triangle[1]), draco::PointIndex(triangle[2])});
+  }
+  AddAttribute(GeometryAttribute::POSITION, draco::DT_FLOAT32, mesh.vertices, target);
+  if (!mesh.normals.empty()) AddAttribute(GeometryAttribute::NORMAL, draco::DT_FLOAT32, mesh.normals, target);
+  if (!mesh.colors.empty()) AddAttribute(GeometryAttribute::COLOR, draco::DT_UINT8, mesh.colors, target);
+}
+
+// Draco allocates by the counts in the stream before it looks whether the data can be there, so they are read first.
+// Layout of a 2.2 stream: "DRACO", major, minor, geometry, method, flags (2 bytes), then for edgebreaker: traversal,
+// vertex count and triangle count (varints).
+absl::Status CheckHeader(const std::string& bytes) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(bytes.data(), bytes.size());
+  char magic[5];
+  uint8_t major = 0, minor = 0, geometry = 0, method = 0, traversal = 0;
+  uint16_t flags = 0;
+  uint32_t vertices = 0, triangles = 0;
+  if (!buffer.Decode(magic, sizeof(magic)) || std::string(magic, sizeof(magic)) != "DRACO") {
+    return InvalidArgument("not a Draco mesh: {} bytes that do not begin with DRACO", bytes.size());
+  }
+  const bool complete = buffer.Decode(&major) && buffer.Decode(&minor) && buffer.Decode(&geometry) &&
+                        buffer.Decode(&method) && buffer.Decode(&flags) && buffer.Decode(&traversal) &&
+                        draco::DecodeVarint(&vertices, &buffer) && draco::DecodeVarint(&triangles, &buffer);
+  if (!complete) return InvalidArgument("Draco mesh is cut off after {} bytes", bytes.size());
+  if (major != 2 || minor != 2 || geometry != draco::TRIANGULAR_MESH || method != draco::MESH_EDGEBREAKER_ENCODING ||
+      flags != 0) {
+    return InvalidArgument(
+        "Draco stream {}.{} of geometry {}, method {}, flags {}; want 2.2, 1 (mesh), 1 "
+        "(edgebreaker), 0",
+        major, minor, geometry, method, flags);
+  }
+  if (triangles > kMaxCodecTriangles || vertices > 3 * kMaxCodecTriangles) {
+    return InvalidArgument("Draco mesh claims {} triangles and {} vertices, at most {} triangles are read", triangles,
+                           vertices, kMaxCodecTriangles);
+  }
+  return absl::OkStatus();
+}
+
+// The values of an attribute by point; empty when the stream does not have it.
+template <class Value>
+absl::StatusOr<std::vector<Value>> ReadAttribute(const draco::Mesh& source, GeometryAttribute::Type type,
+                                                 draco::DataType data_type) {
+  std::vector<Value> values;
+  const draco::PointAttribute* attribute = source.GetNamedAttribute(type);
+  if (attribute == nullptr) return values;
+  if (attribute->num_components() != 3 || attribute->data_type() != data_type) {
+    return InvalidArgument("Draco mesh: {} has {} components of type {}, want 3 of type {}",
+                           GeometryAttribute::TypeToString(type), attribute->num_components(),
+                           static_cast<int>(attribute->data_type()), static_cast<int>(data_type));
+  }
+  values.resize(source.num_points());
+  for (uint32_t i = 0; i < source.num_points(); ++i) {
+    const draco::AttributeValueIndex index = attribute->mapped_index(draco::PointIndex(i));
+    if (index.value() >= attribute->size()) return InvalidArgument("Draco mesh: point {} has no value", i);
+    attribute->GetValue(index, values[i].data());
+  }
+  return values;
+}
+
+absl::StatusOr<Mesh> FromDraco(const draco::Mesh& source) {
+  Mesh mesh;
+  ROMAP_ASSIGN_OR_RETURN(mesh.vertices,
+                         ReadAttribute<Eigen::Vector3f>(source, GeometryAttribute::POSITION, draco::DT_FLOAT32));
+  ROMAP_ASSIGN_OR_RETURN(mesh.normals,
+                         ReadAttribute<Eigen::Vector3f>(source, GeometryAttribute::NORMAL, draco::DT_FLOAT32));
+  ROMAP_ASSIGN_OR_RETURN(mesh.colors, ReadAttribute<Rgb8>(source, GeometryAttribute::COLOR, draco::DT_UINT8));
+  for (uint32_t i = 0; i < source.num_faces(); ++i) {
+    const draco::Mesh::Face& face = source.face(draco::FaceIndex(i));
+    mesh.triangles.push_back({face[0].value(), face[1].value(), face[2].value()});
+  }
+  ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh));
+  return mesh;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> EncodeDraco(const Mesh& mesh, const DracoOptions& options) {
+  ROMAP_RETURN_IF_ERROR(ValidateOptions(options));
+  ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh));
+  try {
+    draco::Mesh source;
+    FillDraco(mesh, source);
+    if (source.num_faces() == 0) {
+      return InvalidArgument("mesh has no triangle with three different vertices ({} triangles)",
+                             mesh.triangles.size());
+    }
+    draco::Encoder encoder;
+    encoder.SetEncodingMethod(draco::MESH_EDGEBREAKER_ENCODING);
+    encoder.SetSpeedOptions(options.speed, options.speed);
+    encoder.SetAttributeQuantization(GeometryAttribute::POSITION, options.position_bits);
+    encoder.SetAttributeQuantization(GeometryAttribute::NORMAL, options.normal_bits);
+    draco::EncoderBuffer buffer;
+    const draco::Status status = encoder.EncodeMeshToBuffer(source, &buffer);
+    if (!status.ok()) return Internal("Draco encoder: {}", status.error_msg_string());
+    return std::string(buffer.data(), buffer.size());
+  } catch (const std::exception& e) {
+    return Internal("Draco encoder: {}", e.what());
+  }
+}
+
+absl::StatusOr<Mesh> DecodeDraco(const std::string& bytes) {
+  ROMAP_RETURN_IF_ERROR(CheckHeader(bytes));
+  try {
+    draco::DecoderBuffer buffer;
+    buffer.Init(bytes.data(), bytes.size());
+    draco::Decoder decoder;
+    auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
+    if (!mesh.ok()) return InvalidArgument("Draco decoder: {}", mesh.status().error_msg_string());
+    return FromDraco(*mesh.value());
+  } catch (const std::exception& e) {
+    return InvalidArgument("Draco decoder: {}", e.what());
+  }
+}
+
+}  // namespace romap
