@@ -1,0 +1,85 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+#include <google/protobuf/generated_enum_reflection.h>
+
+#include <array>
+#include <string>
+
+#include "common/mapping_service.h"
+#include "common/messages.h"
+#include "common/status.h"
+#include "romap/v1/mapping.pb.h"
+
+namespace romap::wire {
+
+// One table per enum serves both directions, so that they cannot disagree.
+template <class Plain, class Wire>
+struct EnumPair {
+  Plain plain;
+  Wire wire;
+};
+
+inline constexpr std::array<EnumPair<ImageEncoding, v1::ImageEncoding>, 5> kImageEncodings{{
+    {ImageEncoding::kJpeg, v1::IMAGE_ENCODING_JPEG},
+    {ImageEncoding::kPng, v1::IMAGE_ENCODING_PNG},
+    {ImageEncoding::kRawRgb8, v1::IMAGE_ENCODING_RAW_RGB8},
+    {ImageEncoding::kRawBgr8, v1::IMAGE_ENCODING_RAW_BGR8},
+    {ImageEncoding::kRawGray8, v1::IMAGE_ENCODING_RAW_GRAY8},
+}};
+
+inline constexpr std::array<EnumPair<DepthEncoding, v1::DepthEncoding>, 2> kDepthEncodings{{
+    {DepthEncoding::kPng16, v1::DEPTH_ENCODING_PNG16},
+    {DepthEncoding::kRawUint16, v1::DEPTH_ENCODING_RAW_UINT16},
+}};
+
+// FRAME_MODE_UNSPECIFIED may come in and means replay.
+inline constexpr std::array<EnumPair<FrameMode, v1::FrameMode>, 3> kFrameModes{{
+    {FrameMode::kReplay, v1::FRAME_MODE_REPLAY},
+    {FrameMode::kReplay, v1::FRAME_MODE_UNSPECIFIED},
+    {FrameMode::kLive, v1::FRAME_MODE_LIVE},
+}};
+
+inline constexpr std::array<EnumPair<SessionState, v1::SessionState>, 4> kSessionStates{{
+    {SessionState::kOpen, v1::SESSION_STATE_OPEN},
+    {SessionState::kFinishing, v1::SESSION_STATE_FINISHING},
+    {SessionState::kFinished, v1::SESSION_STATE_FINISHED},
+    {SessionState::kFailed, v1::SESSION_STATE_FAILED},
+}};
+
+inline constexpr std::array<EnumPair<TrackingState, v1::TrackingState>, 4> kTrackingStates{{
+    {TrackingState::kInitialising, v1::TRACKING_STATE_INITIALISING},
+    {TrackingState::kTracking, v1::TRACKING_STATE_TRACKING},
+    {TrackingState::kLost, v1::TRACKING_STATE_LOST},
+    {TrackingState::kRelocalised, v1::TRACKING_STATE_RELOCALISED},
+}};
+
+inline constexpr std::array<EnumPair<ObjectState, v1::ObjectState>, 3> kObjectStates{{
+    {ObjectState::kProvisional, v1::OBJECT_STATE_PROVISIONAL},
+    {ObjectState::kConfirmed, v1::OBJECT_STATE_CONFIRMED},
+    {ObjectState::kLost, v1::OBJECT_STATE_LOST},
+}};
+
+// The wire's value, or its value 0 (unspecified) for one that is not in the table.
+template <class Plain, class Wire, size_t N>
+Wire EnumToProto(const std::array<EnumPair<Plain, Wire>, N>& table, Plain plain) {
+  for (const auto& pair : table) {
+    if (pair.plain == plain) return pair.wire;
+  }
+  return Wire{};
+}
+
+// INVALID_ARGUMENT naming `where` and the values that are known.
+template <class Plain, class Wire, size_t N>
+absl::StatusOr<Plain> EnumFromProto(const std::array<EnumPair<Plain, Wire>, N>& table, Wire wire,
+                                    const std::string& where) {
+  std::string known;
+  for (const auto& pair : table) {
+    if (pair.wire == wire) return pair.plain;
+    const auto* value = google::protobuf::GetEnumDescriptor<Wire>()->FindValueByNumber(static_cast<int>(pair.wire));
+    known += (known.empty() ? "" : ", ") + value->name();
+  }
+  return InvalidArgument("{}: value {} is not known here, known are {}", where, static_cast<int>(wire), known);
+}
+
+}  // namespace romap::wire

@@ -1,0 +1,230 @@
+#include "common/wire/events.h"
+
+#include <utility>
+#include <variant>
+
+#include "common/status.h"
+#include "common/wire/enums.h"
+#include "common/wire/geometry.h"
+
+namespace romap::wire {
+namespace {
+
+// These overloads would hide the public ones otherwise.
+using wire::FromProto;
+using wire::ToProto;
+
+absl::StatusOr<ObjectId> ObjectIdFromProto(uint64_t value, const std::string& where) {
+  if (value == 0) return InvalidArgument("{}: missing (ids start at 1)", where);
+  return ObjectId{value};
+}
+
+v1::Cuboid ToProto(const Cuboid& cuboid) {
+  v1::Cuboid proto;
+  *proto.mutable_t_world_object() = ToProto(cuboid.T_world_object);
+  *proto.mutable_half_extents() = ToProto(cuboid.half_extents);
+  proto.set_confidence(cuboid.confidence);
+  return proto;
+}
+
+absl::StatusOr<Cuboid> FromProto(const v1::Cuboid& proto, const std::string& where) {
+  if (!proto.has_t_world_object()) return InvalidArgument("{}.t_world_object: missing", where);
+  if (!proto.has_half_extents()) return InvalidArgument("{}.half_extents: missing", where);
+  Cuboid cuboid;
+  ROMAP_ASSIGN_OR_RETURN(cuboid.T_world_object,
+                         (TransformFromProto<World, Object>(proto.t_world_object(), where + ".t_world_object")));
+  ROMAP_ASSIGN_OR_RETURN(cuboid.half_extents, VectorFromProto(proto.half_extents(), where + ".half_extents"));
+  if (cuboid.half_extents.minCoeff() < 0) return InvalidArgument("{}.half_extents: must not be negative", where);
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.confidence(), where + ".confidence"));
+  cuboid.confidence = proto.confidence();
+  return cuboid;
+}
+
+v1::ObjectRemoved ToProto(ObjectRemoved removed) {
+  v1::ObjectRemoved proto;
+  proto.set_id(removed.id.value);
+  proto.set_revision(removed.revision);
+  proto.set_reason(std::move(removed.reason));
+  return proto;
+}
+
+absl::StatusOr<ObjectRemoved> FromProto(v1::ObjectRemoved proto, const std::string& where) {
+  ObjectRemoved removed;
+  ROMAP_ASSIGN_OR_RETURN(removed.id, ObjectIdFromProto(proto.id(), where + ".id"));
+  removed.revision = proto.revision();
+  removed.reason = std::move(*proto.mutable_reason());
+  return removed;
+}
+
+v1::ObjectMerged ToProto(const ObjectMerged& merged) {
+  v1::ObjectMerged proto;
+  proto.set_from(merged.from.value);
+  proto.set_into(merged.into.value);
+  proto.set_revision(merged.revision);
+  return proto;
+}
+
+absl::StatusOr<ObjectMerged> FromProto(const v1::ObjectMerged& proto, const std::string& where) {
+  ObjectMerged merged;
+  ROMAP_ASSIGN_OR_RETURN(merged.from, ObjectIdFromProto(proto.from(), where + ".from"));
+  ROMAP_ASSIGN_OR_RETURN(merged.into, ObjectIdFromProto(proto.into(), where + ".into"));
+  merged.revision = proto.revision();
+  return merged;
+}
+
+// Puts each kind of event into its member of the oneof.
+struct EventWriter {
+  v1::MapEvent& proto;
+  void operator()(FrameAck&& ack) const { *proto.mutable_frame_ack() = ToProto(std::move(ack)); }
+  void operator()(ObjectUpdate&& update) const { *proto.mutable_object() = ToProto(std::move(update)); }
+  void operator()(MeshUpdate&& update) const { *proto.mutable_mesh() = ToProto(std::move(update)); }
+  void operator()(ObjectRemoved&& removed) const { *proto.mutable_removed() = ToProto(std::move(removed)); }
+  void operator()(ObjectMerged&& merged) const { *proto.mutable_merged() = ToProto(merged); }
+  void operator()(Statistics&& statistics) const { *proto.mutable_statistics() = ToProto(statistics); }
+};
+
+}  // namespace
+
+v1::MapEvent ToProto(MapEvent event) {
+  v1::MapEvent proto;
+  std::visit(EventWriter{proto}, std::move(event));
+  return proto;
+}
+
+absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where) {
+  switch (proto.event_case()) {
+    case v1::MapEvent::kFrameAck:
+      return FromProto(std::move(*proto.mutable_frame_ack()), where + ".frame_ack");
+    case v1::MapEvent::kObject:
+      return FromProto(std::move(*proto.mutable_object()), where + ".object");
+    case v1::MapEvent::kMesh:
+      return FromProto(std::move(*proto.mutable_mesh()), where + ".mesh");
+    case v1::MapEvent::kRemoved:
+      return FromProto(std::move(*proto.mutable_removed()), where + ".removed");
+    case v1::MapEvent::kMerged:
+      return FromProto(proto.merged(), where + ".merged");
+    case v1::MapEvent::kStatistics:
+      return FromProto(proto.statistics(), where + ".statistics");
+    default:
+      return InvalidArgument("{}: of a kind that is not known here", where);
+  }
+}
+
+v1::FrameAck ToProto(FrameAck ack) {
+  v1::FrameAck proto;
+  proto.set_frame_id(ack.frame_id);
+  proto.set_accepted(ack.accepted);
+  proto.set_error(std::move(ack.error));
+  proto.set_state(EnumToProto(kTrackingStates, ack.state));
+  if (ack.T_world_camera) *proto.mutable_t_world_camera() = ToProto(*ack.T_world_camera);
+  proto.set_is_keyframe(ack.is_keyframe);
+  proto.set_latency_s(ack.latency_s);
+  return proto;
+}
+
+absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where) {
+  FrameAck ack;
+  ack.frame_id = proto.frame_id();
+  ack.accepted = proto.accepted();
+  ack.error = std::move(*proto.mutable_error());
+  ROMAP_ASSIGN_OR_RETURN(ack.state, EnumFromProto(kTrackingStates, proto.state(), where + ".state"));
+  if (proto.has_t_world_camera()) {
+    ROMAP_ASSIGN_OR_RETURN(ack.T_world_camera,
+                           (TransformFromProto<World, Camera>(proto.t_world_camera(), where + ".t_world_camera")));
+  }
+  ack.is_keyframe = proto.is_keyframe();
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.latency_s(), where + ".latency_s"));
+  ack.latency_s = proto.latency_s();
+  return ack;
+}
+
+v1::ObjectUpdate ToProto(ObjectUpdate update) {
+  v1::ObjectUpdate proto;
+  proto.set_id(update.id.value);
+  proto.set_revision(update.revision);
+  proto.set_state(EnumToProto(kObjectStates, update.state));
+  proto.set_class_name(std::move(update.class_name));
+  proto.set_class_score(update.class_score);
+  *proto.mutable_cuboid() = ToProto(update.cuboid);
+  proto.set_observations(update.observations);
+  if (update.T_world_mesh) *proto.mutable_t_world_mesh() = ToProto(*update.T_world_mesh);
+  return proto;
+}
+
+absl::StatusOr<ObjectUpdate> FromProto(v1::ObjectUpdate proto, const std::string& where) {
+  ObjectUpdate update;
+  ROMAP_ASSIGN_OR_RETURN(update.id, ObjectIdFromProto(proto.id(), where + ".id"));
+  update.revision = proto.revision();
+  ROMAP_ASSIGN_OR_RETURN(update.state, EnumFromProto(kObjectStates, proto.state(), where + ".state"));
+  update.class_name = std::move(*proto.mutable_class_name());
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.class_score(), where + ".class_score"));
+  update.class_score = proto.class_score();
+  if (!proto.has_cuboid()) return InvalidArgument("{}.cuboid: missing", where);
+  ROMAP_ASSIGN_OR_RETURN(update.cuboid, FromProto(proto.cuboid(), where + ".cuboid"));
+  update.observations = proto.observations();
+  if (proto.has_t_world_mesh()) {
+    ROMAP_ASSIGN_OR_RETURN(update.T_world_mesh,
+                           (TransformFromProto<World, Object>(proto.t_world_mesh(), where + ".t_world_mesh")));
+  }
+  return update;
+}
+
+v1::MeshUpdate ToProto(MeshUpdate update) {
+  v1::MeshUpdate proto;
+  proto.set_id(update.id.value);
+  proto.set_revision(update.revision);
+  proto.set_steps(update.steps);
+  proto.set_train_seconds(update.train_seconds);
+  proto.set_is_final(update.final);
+  proto.set_vertex_count(update.vertex_count);
+  proto.set_triangle_count(update.triangle_count);
+  proto.set_draco(std::move(update.draco));
+  return proto;
+}
+
+absl::StatusOr<MeshUpdate> FromProto(v1::MeshUpdate proto, const std::string& where) {
+  MeshUpdate update;
+  ROMAP_ASSIGN_OR_RETURN(update.id, ObjectIdFromProto(proto.id(), where + ".id"));
+  update.revision = proto.revision();
+  update.steps = proto.steps();
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.train_seconds(), where + ".train_seconds"));
+  update.train_seconds = proto.train_seconds();
+  update.final = proto.is_final();
+  update.vertex_count = proto.vertex_count();
+  update.triangle_count = proto.triangle_count();
+  update.draco = std::move(*proto.mutable_draco());
+  return update;
+}
+
+v1::Statistics ToProto(const Statistics& statistics) {
+  v1::Statistics proto;
+  proto.set_frames_received(statistics.frames_received);
+  proto.set_frames_processed(statistics.frames_processed);
+  proto.set_frames_dropped(statistics.frames_dropped);
+  proto.set_frames_rejected(statistics.frames_rejected);
+  proto.set_keyframes(statistics.keyframes);
+  proto.set_map_points(statistics.map_points);
+  proto.set_objects(statistics.objects);
+  proto.set_objects_training(statistics.objects_training);
+  proto.set_training_steps(statistics.training_steps);
+  proto.set_training_progress(statistics.training_progress);
+  proto.set_resident_bytes(statistics.resident_bytes);
+  return proto;
+}
+
+absl::StatusOr<Statistics> FromProto(const v1::Statistics& proto, const std::string& where) {
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.training_progress(), where + ".training_progress"));
+  return Statistics{.frames_received = proto.frames_received(),
+                    .frames_processed = proto.frames_processed(),
+                    .frames_dropped = proto.frames_dropped(),
+                    .frames_rejected = proto.frames_rejected(),
+                    .keyframes = proto.keyframes(),
+                    .map_points = proto.map_points(),
+                    .objects = proto.objects(),
+                    .objects_training = proto.objects_training(),
+                    .training_steps = proto.training_steps(),
+                    .training_progress = proto.training_progress(),
+                    .resident_bytes = proto.resident_bytes()};
+}
+
+}  // namespace romap::wire

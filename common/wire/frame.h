@@ -1,0 +1,20 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include "common/messages.h"
+#include "romap/v1/mapping.pb.h"
+
+namespace romap::wire {
+
+// Both directions take their argument by value and move the image, mask and depth bytes instead of copying them.
+
+// Nothing is checked here: the receiver answers a bad frame.
+v1::Frame ToProto(FrameInput frame);
+
+// INVALID_ARGUMENT "frame.<field>: ..." for what the wire can break: a part that is missing or empty, an unknown enum
+// value, a number that is not finite or out of its range, a rotation that is none, an instance's label given twice.
+// Whether the bytes decode to images of the right size is not looked at.
+absl::StatusOr<FrameInput> FromProto(v1::Frame proto);
+
+}  // namespace romap::wire

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <absl/status/status.h>
+#include <grpcpp/support/status.h>
+
+#include "common/status.h"
+
+namespace romap::wire {
+
+// The codes of the two libraries are the same numbers; the message is kept.
+
+inline grpc::Status ToGrpc(const absl::Status& status) {
+  return status.ok() ? grpc::Status::OK : grpc::Status(static_cast<grpc::StatusCode>(status.code()), Message(status));
+}
+
+inline absl::Status FromGrpc(const grpc::Status& status) {
+  return status.ok() ? absl::OkStatus()
+                     : absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+}
+
+}  // namespace romap::wire
