@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Installs what romap needs to build, run and test on Debian 12: only packages of the distribution. Safe to run again:
+# when everything is there it changes nothing and needs no network.
+set -euo pipefail
+
+packages=(
+  ccache cmake g++ git ninja-build pkg-config
+  libgrpc++-dev libgrpc-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
+  libopencv-dev libopencv-contrib-dev libeigen3-dev libhwy-dev libtbb-dev libnanoflann-dev
+  libdraco-dev libspdlog-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
+  libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  exit 0
+fi
+
+sudo=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || { echo "setup: need root or sudo to install: ${missing[*]}" >&2; exit 1; }
+  sudo=(sudo)
+fi
+echo "setup: installing ${#missing[@]} packages: ${missing[*]}"
+log=$(mktemp)
+if ! { "${sudo[@]}" apt-get update -q &&
+       "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"; } \
+     >"$log" 2>&1; then
+  tail -n 20 "$log" >&2
+  echo "setup: apt-get failed (whole log: $log)" >&2
+  exit 1
+fi
+rm -f "$log"

@@ -1,0 +1,105 @@
+// Keeps the folders what they are: what each may include, how long files get, and that nothing names a machine.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SourceFile {
+  std::string path;  // relative to the source tree
+  std::vector<std::string> lines;
+};
+
+std::vector<SourceFile> SourceFiles() {
+  std::vector<SourceFile> files;
+  for (const char* top : {"common", "server", "client", "tests"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(ROMAP_SOURCE_DIR) / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".h" && extension != ".cc" && extension != ".cu" && extension != ".cuh") continue;
+      SourceFile file{fs::relative(entry.path(), ROMAP_SOURCE_DIR).string(), {}};
+      std::ifstream stream(entry.path());
+      for (std::string line; std::getline(stream, line);) file.lines.push_back(line);
+      files.push_back(std::move(file));
+    }
+  }
+  return files;
+}
+
+// The longest key that the path begins with decides.
+const std::map<std::string, std::vector<std::string>> kMayInclude = {
+    {"common/", {"common/"}},
+    {"common/wire/", {"common/", "romap/v1/"}},
+    {"server/slam/", {"server/slam/", "common/"}},
+    {"server/objects/", {"server/objects/", "common/"}},
+    {"server/nerf/", {"server/nerf/", "common/"}},
+    {"server/mesh/", {"server/mesh/", "common/"}},
+    {"server/session/", {"server/", "common/"}},
+    {"server/transport/", {"server/transport/", "server/session/", "common/", "romap/v1/"}},
+    {"server/main.cc", {"server/", "common/"}},
+    {"client/files/", {"client/files/", "common/"}},
+    {"client/eval/", {"client/eval/", "client/files/", "common/"}},
+    {"client/render/", {"client/render/", "common/"}},
+    {"client/synth/", {"client/synth/", "client/render/", "client/files/", "common/"}},
+    {"client/pictures/", {"client/pictures/", "client/render/", "common/"}},
+    {"client/sdk/", {"client/sdk/", "common/", "romap/v1/"}},
+    {"client/cli/", {"client/", "server/session/", "common/"}},
+    {"tests/", {"common/", "server/", "client/", "tests/", "romap/v1/"}},
+};
+
+const std::vector<std::string>& Allowed(const std::string& path) {
+  const std::vector<std::string>* best = nullptr;
+  size_t length = 0;
+  for (const auto& [prefix, allowed] : kMayInclude) {
+    if (path.starts_with(prefix) && prefix.size() > length) {
+      best = &allowed;
+      length = prefix.size();
+    }
+  }
+  static const std::vector<std::string> kNothing;
+  EXPECT_NE(best, nullptr) << path << " is in no known folder";
+  return best == nullptr ? kNothing : *best;
+}
+
+TEST(HouseTest, FoldersIncludeOnlyWhatTheyMay) {
+  const std::regex include(R"(^\s*#include\s+"([^"]+)\")");
+  for (const SourceFile& file : SourceFiles()) {
+    const std::vector<std::string>& allowed = Allowed(file.path);
+    for (const std::string& line : file.lines) {
+      std::smatch match;
+      if (!std::regex_search(line, match, include)) continue;
+      const std::string target = match[1];
+      if (target.find('/') == std::string::npos) continue;  // a file of the same folder
+      if (target.starts_with("hwy/") || target.starts_with("google/")) continue;
+      // The session's pipeline alone knows the stages; transport and the command line know the session only.
+      EXPECT_TRUE(
+          std::any_of(allowed.begin(), allowed.end(), [&](const std::string& a) { return target.starts_with(a); }))
+          << file.path << " must not include " << target;
+    }
+  }
+}
+
+TEST(HouseTest, FilesStayReadable) {
+  for (const SourceFile& file : SourceFiles()) EXPECT_LE(file.lines.size(), 500u) << file.path;
+}
+
+TEST(HouseTest, HeadersAreGuarded) {
+  for (const SourceFile& file : SourceFiles()) {
+    if (!file.path.ends_with(".h") || file.path.ends_with("-inl.h")) continue;
+    const bool guarded = std::any_of(file.lines.begin(), file.lines.end(),
+                                     [](const std::string& line) { return line.starts_with("#pragma once"); });
+    EXPECT_TRUE(guarded) << file.path;
+  }
+}
+
+}  // namespace
+}  // namespace romap
