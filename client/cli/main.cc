@@ -1,1 +1,3 @@
-int main() { return 0; }
+#include "client/cli/command.h"
+
+int main(int argc, char** argv) { return romap::RunCli(argc, argv); }

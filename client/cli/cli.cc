@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+
+#include "client/cli/command.h"
+#include "client/cli/interrupt.h"
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+constexpr int kExitFailure = 1, kExitUsage = 2, kExitInterrupted = 130;
+
+int ExitCode(const absl::Status& status) {
+  if (status.ok()) return 0;
+  switch (status.code()) {
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kNotFound:
+      return kExitUsage;
+    case absl::StatusCode::kCancelled:
+      return kExitInterrupted;
+    default:
+      return kExitFailure;
+  }
+}
+
+}  // namespace
+
+int RunCli(int argc, const char* const* argv) {
+  CLI::App app{"romap: turns a video with instance masks into a map of objects", "romap"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "romap 0.1.0");
+  std::string log_level = "warn";
+  app.add_option("--log-level", log_level, "What to log to stderr")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error"}))
+      ->capture_default_str();
+  Command chosen;
+  AddRunCommand(app, &chosen);
+  AddEvalCommand(app, &chosen);
+  AddSynthCommand(app, &chosen);
+  AddExportCommand(app, &chosen);
+  AddSessionsCommand(app, &chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
+    fmt::print(stderr, "romap: {} (romap --help says more)\n", e.what());
+    return kExitUsage;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt("romap"));
+  spdlog::set_level(spdlog::level::from_str(log_level));
+  CatchInterrupts();
+  const absl::Status status = chosen();
+  if (!status.ok()) fmt::print(stderr, "romap: {}\n", Message(status));
+  return ExitCode(status);
+}
+
+}  // namespace romap

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <opencv2/core/types.hpp>
+#include <optional>
+
+#include "common/messages.h"
+
+namespace romap {
+
+// Bounding box of the cuboid's eight corners in the image, in pixels; nullopt unless the whole cuboid lies in front of
+// the camera and inside the image.
+std::optional<cv::Rect2d> CuboidOutline(const Cuboid& cuboid, const CameraModel& camera,
+                                        const SE3<World, Camera>& T_world_camera);
+
+}  // namespace romap

@@ -1,0 +1,52 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "client/cli/command.h"
+#include "client/cli/map_files.h"
+#include "client/cli/service_options.h"
+#include "client/files/tum.h"
+
+namespace romap {
+namespace {
+
+struct ExportOptions {
+  ServiceOptions service;
+  std::string session;
+  std::string out;
+};
+
+absl::Status RunExport(const ExportOptions& options) {
+  ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
+  ROMAP_ASSIGN_OR_RETURN(const MapSnapshot snapshot, service->ExportMap(options.session));
+  std::vector<std::string> faults;
+  const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
+  for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", fault);
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+
+  std::vector<StampedPose> trajectory;
+  for (size_t i = 0; i < snapshot.trajectory.size(); ++i) {
+    if (snapshot.trajectory[i].T_world_camera) {
+      trajectory.push_back({snapshot.timestamps_ns[i], *snapshot.trajectory[i].T_world_camera});
+    }
+  }
+  ROMAP_RETURN_IF_ERROR(WriteTum((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
+  fmt::print("{} objects and {} camera poses of session {} written to {}\n", objects.size(), trajectory.size(),
+             snapshot.session_id, options.out);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddExportCommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* command = app.add_subcommand("export", "Write the map of a server's session to files, as it is now");
+  command->add_option("session", options->session, "The session's id (see: romap sessions)")->required();
+  command->add_option("--out", options->out, "Folder for the files")->required();
+  options->service.AddTo(*command, /*offer_local=*/false);
+  command->callback([options, chosen] { *chosen = [options] { return RunExport(*options); }; });
+}
+
+}  // namespace romap

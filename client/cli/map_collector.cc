@@ -1,0 +1,78 @@
+#include "client/cli/map_collector.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace romap {
+namespace {
+
+constexpr size_t kFaultsKept = 5;
+
+}  // namespace
+
+double MapCollector::Now_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+void MapCollector::NoteSent(uint64_t frame_id, int64_t timestamp_ns) {
+  if (sent_.empty()) first_sent_s_ = Now_s();
+  sent_[frame_id] = {timestamp_ns, Now_s()};
+}
+
+double MapCollector::SentAt_s(uint64_t frame_id) const {
+  const auto it = sent_.find(frame_id);
+  return it == sent_.end() ? 0 : it->second.time_s;
+}
+
+void MapCollector::ApplyAck(const FrameAck& ack) {
+  ++acknowledged_;
+  last_ack_s_ = Now_s();
+  latencies_s_.push_back(ack.latency_s);
+  if (!ack.accepted) {
+    ++rejected_;
+    if (faults_.size() < kFaultsKept) faults_.push_back(fmt::format("frame {}: {}", ack.frame_id, ack.error));
+    return;
+  }
+  if (ack.is_keyframe) ++keyframes_;
+  const auto sent = sent_.find(ack.frame_id);
+  if (ack.T_world_camera && sent != sent_.end()) {
+    trajectory_.push_back({sent->second.timestamp_ns, *ack.T_world_camera});
+  }
+}
+
+void MapCollector::Apply(MapEvent event) {
+  if (const auto* ack = std::get_if<FrameAck>(&event)) {
+    ApplyAck(*ack);
+  } else if (auto* update = std::get_if<ObjectUpdate>(&event)) {
+    Object& entry = objects_[update->id];
+    if (update->revision < entry.object.revision) return;
+    entry.object = std::move(*update);
+    if (entry.first_cuboid_s < 0 && entry.object.state != ObjectState::kProvisional) entry.first_cuboid_s = Now_s();
+  } else if (auto* mesh = std::get_if<MeshUpdate>(&event)) {
+    const auto it = objects_.find(mesh->id);
+    if (it == objects_.end() || mesh->revision < it->second.object.revision) return;
+    it->second.object.revision = mesh->revision;
+    it->second.object.T_world_mesh = mesh->T_world_mesh;
+    it->second.mesh = std::move(*mesh);
+    ++it->second.meshes;
+    if (it->second.first_mesh_s < 0) it->second.first_mesh_s = Now_s();
+  } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
+    objects_.erase(removed->id);
+  } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
+    objects_.erase(merged->from);
+  } else if (const auto* statistics = std::get_if<Statistics>(&event)) {
+    statistics_ = *statistics;
+    server_peak_bytes_ = std::max(server_peak_bytes_, statistics->resident_bytes);
+  }
+}
+
+size_t MapCollector::ConfirmedObjects() const {
+  return std::count_if(objects_.begin(), objects_.end(),
+                       [](const auto& entry) { return entry.second.object.state != ObjectState::kProvisional; });
+}
+
+std::vector<StampedPose> MapCollector::Trajectory() const { return trajectory_; }
+
+}  // namespace romap

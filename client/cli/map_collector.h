@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/files/tum.h"
+#include "common/messages.h"
+
+namespace romap {
+
+// What a client keeps of the map: applying all events in order leaves exactly the server's map. Also notes when things
+// arrived. Times are seconds on a steady clock, from construction.
+class MapCollector {
+ public:
+  struct Object {
+    ObjectUpdate object;
+    std::optional<MeshUpdate> mesh;
+    double first_cuboid_s = -1;  // confirmed, with a cuboid; -1 = not yet
+    double first_mesh_s = -1;
+    int meshes = 0;
+  };
+
+  // Call before the frame is handed over.
+  void NoteSent(uint64_t frame_id, int64_t timestamp_ns);
+  void Apply(MapEvent event);
+
+  double Now_s() const;
+  const std::map<ObjectId, Object>& objects() const { return objects_; }
+  size_t ConfirmedObjects() const;
+  // Accepted frames with a pose, in the order they were acknowledged.
+  std::vector<StampedPose> Trajectory() const;
+  const std::optional<Statistics>& statistics() const { return statistics_; }
+  size_t sent() const { return sent_.size(); }
+  size_t acknowledged() const { return acknowledged_; }
+  size_t rejected() const { return rejected_; }
+  size_t keyframes() const { return keyframes_; }
+  const std::vector<std::string>& faults() const { return faults_; }  // the first few, for people
+  // The most that a server's statistics reported; 0 = none came.
+  uint64_t server_peak_bytes() const { return server_peak_bytes_; }
+  double last_ack_s() const { return last_ack_s_; }
+  double first_sent_s() const { return first_sent_s_; }
+  double SentAt_s(uint64_t frame_id) const;
+  std::vector<double> latencies_s() const { return latencies_s_; }
+
+ private:
+  struct Sent {
+    int64_t timestamp_ns = 0;
+    double time_s = 0;
+  };
+
+  void ApplyAck(const FrameAck& ack);
+
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::map<uint64_t, Sent> sent_;
+  std::map<ObjectId, Object> objects_;
+  std::vector<StampedPose> trajectory_;
+  std::vector<double> latencies_s_;
+  std::vector<std::string> faults_;
+  std::optional<Statistics> statistics_;
+  size_t acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
+  uint64_t server_peak_bytes_ = 0;
+  double last_ack_s_ = 0, first_sent_s_ = 0;
+};
+
+}  // namespace romap

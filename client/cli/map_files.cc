@@ -1,0 +1,89 @@
+#include "client/cli/map_files.h"
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <filesystem>
+#include <utility>
+
+#include "client/files/glb.h"
+#include "client/files/objects_yaml.h"
+#include "client/files/ply.h"
+#include "common/mesh_codec.h"
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string FileStem(const ObjectUpdate& object) {
+  std::string stem = fmt::format("{}_", object.id.value);
+  for (const char c : object.class_name) {
+    stem += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
+  }
+  return stem;
+}
+
+void MoveToWorld(const SE3<World, Object>& T_world_mesh, Mesh& mesh) {
+  const Eigen::Matrix3f rotation = T_world_mesh.RotationMatrix().cast<float>();
+  for (Eigen::Vector3f& vertex : mesh.vertices) vertex = (T_world_mesh * vertex.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& normal : mesh.normals) normal = rotation * normal;
+}
+
+absl::Status MakeEmptyFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return InvalidArgument("cannot make the folder {}: {}", folder.string(), error.message());
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const fs::path extension = entry.path().extension();
+    if (extension == ".ply" || extension == ".glb") fs::remove(entry.path(), error);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects, std::vector<std::string>* faults) {
+  std::vector<MapObject> decoded;
+  for (const ObjectSnapshot& snapshot : objects) {
+    if (snapshot.object.state == ObjectState::kProvisional) continue;
+    MapObject entry;
+    entry.object = snapshot.object;
+    entry.file_stem = FileStem(snapshot.object);
+    if (snapshot.mesh) {
+      entry.train_seconds = snapshot.mesh->train_seconds;
+      entry.steps = snapshot.mesh->steps;
+      if (auto mesh = DecodeDraco(snapshot.mesh->draco); mesh.ok()) {
+        entry.mesh_world = *std::move(mesh);
+        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.mesh->T_world_mesh), entry.mesh_world);
+      } else {
+        faults->push_back(
+            fmt::format("{}: mesh cannot be decoded: {}", snapshot.object.id.ToString(), Message(mesh.status())));
+      }
+    }
+    decoded.push_back(std::move(entry));
+  }
+  return decoded;
+}
+
+absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects) {
+  const fs::path folder = fs::path(dir) / "objects";
+  ROMAP_RETURN_IF_ERROR(MakeEmptyFolder(folder));
+  ObjectsYaml cuboids;
+  for (const MapObject& entry : objects) {
+    const ObjectUpdate& object = entry.object;
+    cuboids.up_world = object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();
+    cuboids.objects.push_back({.id = static_cast<int64_t>(object.id.value),
+                               .name = entry.file_stem,
+                               .class_name = object.class_name,
+                               .T_world_object = object.cuboid.T_world_object,
+                               .half_extents = object.cuboid.half_extents,
+                               .confidence = object.cuboid.confidence});
+    if (entry.mesh_world.triangles.empty()) continue;
+    ROMAP_RETURN_IF_ERROR(WritePly((folder / (entry.file_stem + ".ply")).string(), entry.mesh_world));
+    ROMAP_RETURN_IF_ERROR(WriteGlb((folder / (entry.file_stem + ".glb")).string(), entry.mesh_world));
+  }
+  return WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
+}
+
+}  // namespace romap

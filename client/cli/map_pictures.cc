@@ -1,0 +1,88 @@
+#include "client/cli/map_pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+
+#include "client/cli/cuboid_outline.h"
+#include "client/cli/mapped_frames.h"
+#include "client/pictures/draw_cuboids.h"
+#include "client/pictures/mesh_beside_view.h"
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr size_t kCuboidFrames = 4;
+
+std::optional<MappedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
+                                    const std::vector<MappedFrame>& frames) {
+  double best_area_px = 0;
+  std::optional<MappedFrame> best;
+  for (const MappedFrame& frame : frames) {
+    const auto outline = CuboidOutline(cuboid, camera, frame.T_world_camera);
+    if (outline && outline->area() > best_area_px) {
+      best_area_px = outline->area();
+      best = frame;
+    }
+  }
+  return best;
+}
+
+// The map lives in undistorted images, so what is drawn over an image needs one too.
+cv::Mat Undistort(const cv::Mat& image, const CameraModel& camera) {
+  const cv::Matx33d k(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
+  cv::Mat undistorted;
+  cv::undistort(image, undistorted, k, cv::Mat(1, 5, CV_64F, const_cast<double*>(camera.distortion.data())));
+  return undistorted;
+}
+
+absl::StatusOr<cv::Mat> LoadImage(const Sequence& sequence, size_t index) {
+  ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(index));
+  const cv::Mat buffer(1, static_cast<int>(frame.image.size()), CV_8UC1, const_cast<char*>(frame.image.data()));
+  cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
+  if (image.empty()) return InvalidArgument("frame {}: image cannot be decoded", index);
+  return sequence.camera().HasDistortion() ? Undistort(image, sequence.camera()) : image;
+}
+
+absl::Status WriteImage(const fs::path& path, const cv::Mat& image) {
+  if (cv::imwrite(path.string(), image)) return absl::OkStatus();
+  return InvalidArgument("cannot write {}", path.string());
+}
+
+}  // namespace
+
+absl::Status WriteMapPictures(const std::string& dir, const Sequence& sequence,
+                              const std::vector<StampedPose>& trajectory, const std::vector<MapObject>& objects) {
+  const fs::path folder = fs::path(dir) / "pictures";
+  std::error_code error;
+  fs::remove_all(folder, error);
+  fs::create_directories(folder, error);
+  if (error) return InvalidArgument("cannot make the folder {}: {}", folder.string(), error.message());
+
+  const std::vector<MappedFrame> frames = MappedFrames(sequence, trajectory);
+  CameraModel camera = sequence.camera();
+  std::vector<ObjectUpdate> updates;
+  for (const MapObject& entry : objects) {
+    updates.push_back(entry.object);
+    const std::optional<MappedFrame> view = BestView(entry.object.cuboid, camera, frames);
+    if (!view) continue;
+    ROMAP_ASSIGN_OR_RETURN(const cv::Mat image, LoadImage(sequence, view->index));
+    ROMAP_RETURN_IF_ERROR(
+        WriteImage(folder / (entry.file_stem + ".png"),
+                   DrawMeshBesideView(entry.mesh_world, image, camera, view->T_world_camera, &entry.object.cuboid)));
+  }
+  for (size_t i = 0; i < std::min(kCuboidFrames, frames.size()); ++i) {
+    const MappedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * std::min(kCuboidFrames, frames.size()))];
+    ROMAP_ASSIGN_OR_RETURN(cv::Mat image, LoadImage(sequence, frame.index));
+    DrawCuboids(image, camera, frame.T_world_camera, updates);
+    ROMAP_RETURN_IF_ERROR(WriteImage(folder / fmt::format("frame_{:06d}.png", frame.index + 1), image));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace romap

@@ -1,0 +1,138 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/command.h"
+#include "client/cli/map_files.h"
+#include "client/cli/map_pictures.h"
+#include "client/cli/run_stream.h"
+#include "client/cli/run_summary.h"
+#include "client/cli/service_options.h"
+#include "client/eval/evaluate_run.h"
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RunOptions {
+  std::string sequence_dir;
+  std::string out;
+  std::string poses = "groundtruth";
+  SequenceOptions sequence;
+  StreamOptions stream;
+  ServiceOptions service;
+  bool no_pictures = false;
+  int64_t permute_labels_seed = -1;
+};
+
+absl::Status PrepareOutput(const std::string& out) {
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) return InvalidArgument("--out {}: cannot make the folder: {}", out, error.message());
+  return absl::OkStatus();
+}
+
+SequenceOptions ToSequenceOptions(const RunOptions& options) {
+  SequenceOptions sequence = options.sequence;
+  if (options.poses == "none") {
+    sequence.poses.clear();
+  } else if (options.poses != "groundtruth") {
+    sequence.poses = options.poses;
+  }
+  if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
+  return sequence;
+}
+
+std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
+  std::vector<ObjectSnapshot> snapshots;
+  for (const auto& [id, entry] : collector.objects()) snapshots.push_back({entry.object, entry.mesh});
+  return snapshots;
+}
+
+// Adds the figures against ground truth, where the sequence has any, to the summary and prints them.
+absl::Status Evaluate(const RunOptions& options, nlohmann::json& summary) {
+  const auto report = EvaluateRun(options.out, options.sequence_dir);
+  if (!report.ok()) {
+    if (report.status().code() == absl::StatusCode::kNotFound) return absl::OkStatus();  // no ground truth
+    return report.status();
+  }
+  summary["evaluation"] = ToJson(*report);
+  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, FormatTable(*report));
+  return absl::OkStatus();
+}
+
+absl::Status RunSequence(const RunOptions& options) {
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence_dir, ToSequenceOptions(options)));
+  ROMAP_RETURN_IF_ERROR(PrepareOutput(options.out));
+  ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
+
+  MapCollector collector;
+  ROMAP_ASSIGN_OR_RETURN(const StreamResult result, StreamSequence(sequence, *service, options.stream, collector));
+
+  std::vector<std::string> faults;
+  const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
+  const std::vector<StampedPose> trajectory = collector.Trajectory();
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+  ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
+  RunSummary summary = Summarise(sequence, result, collector, objects);
+  summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
+  if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));
+
+  fmt::print("{}", FormatSummary(summary));
+  nlohmann::json json = ToJson(summary);
+  if (options.stream.keep_session) json["session"] = result.session_id;
+  const absl::Status evaluated = objects.empty() ? absl::OkStatus() : Evaluate(options, json);
+  std::ofstream(fs::path(options.out) / "summary.json") << json.dump(1) << '\n';
+  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures/*.png\nfigures: {0}/summary.json\n",
+             options.out);
+  if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
+  ROMAP_RETURN_IF_ERROR(evaluated);
+  if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
+    return InvalidArgument("no frame of {} was accepted; the first: {}", options.sequence_dir,
+                           summary.faults.empty() ? "" : summary.faults.front());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command = app.add_subcommand("run", "Stream a recorded sequence through the mapping and write the map");
+  command->add_option("sequence", options->sequence_dir, "Folder of the sequence")->required();
+  command->add_option("--out", options->out, "Folder for meshes, cuboids, trajectory, pictures and figures")
+      ->required();
+  options->service.AddTo(*command, /*offer_local=*/true);
+  command
+      ->add_option("--poses", options->poses, "Camera poses to send: groundtruth, none, or a TUM file of the sequence")
+      ->capture_default_str();
+  command->add_option("--masks", options->sequence.masks, "List of mask images in the sequence")->capture_default_str();
+  command->add_option("--detections", options->sequence.detections, "What the labels of each frame mean")
+      ->capture_default_str();
+  command->add_flag("--depth", options->sequence.use_depth, "Send the depth images too");
+  command->add_flag("--realtime", options->stream.realtime,
+                    "Send at the recorded rate; frames that the server cannot keep up with are dropped and counted");
+  command
+      ->add_option("--permute-labels", options->permute_labels_seed,
+                   "Rename the labels of every frame at random with this seed, as a detector without a tracker does")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--first", options->stream.first_frame, "First frame to send (from 0)");
+  command->add_option("--frames", options->stream.frame_count, "How many frames to send")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--max-training", options->stream.max_training_s,
+                   "Longest wait for training after the last frame [s]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--name", options->stream.session_name, "Name of the session, for people");
+  command->add_flag("--keep-session", options->stream.keep_session, "Leave the session on the server");
+  command->add_flag("--no-pictures", options->no_pictures, "Do not draw pictures");
+  command->callback([options, chosen] { *chosen = [options] { return RunSequence(*options); }; });
+}
+
+}  // namespace romap

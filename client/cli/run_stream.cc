@@ -1,0 +1,189 @@
+#include "client/cli/run_stream.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "client/cli/interrupt.h"
+#include "client/cli/progress.h"
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kEventWait{50};
+// Share of the progress bar that the frames take; training has the rest.
+constexpr double kFrameShare = 0.6;
+
+double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// Loads and sends frames on a thread of its own, because Send() waits while the server pushes back.
+class Sender {
+ public:
+  Sender(const Sequence& sequence, const StreamOptions& options, MapStream& stream, MapCollector& collector,
+         std::mutex& collector_mutex)
+      : sequence_(sequence),
+        options_(options),
+        stream_(stream),
+        collector_(collector),
+        collector_mutex_(collector_mutex),
+        thread_([this] {
+          status_ = Run();
+          done_ = true;
+        }) {}
+
+  ~Sender() { Join(); }
+
+  void Join() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  bool done() const { return done_; }
+  // Valid once done().
+  const absl::Status& status() const { return status_; }
+
+ private:
+  absl::Status Run() {
+    const size_t end =
+        std::min(sequence_.size(), options_.first_frame + std::min(options_.frame_count, sequence_.size()));
+    const Clock::time_point start = Clock::now();
+    for (size_t i = options_.first_frame; i < end && !stop_ && !Interrupted(); ++i) {
+      ROMAP_ASSIGN_OR_RETURN(FrameInput frame, sequence_.Load(i));
+      if (options_.realtime) {
+        std::this_thread::sleep_until(
+            start + std::chrono::nanoseconds(sequence_.timestamp_ns(i) - sequence_.timestamp_ns(options_.first_frame)));
+      }
+      {
+        std::lock_guard lock(collector_mutex_);
+        collector_.NoteSent(frame.frame_id, frame.timestamp_ns);
+      }
+      ROMAP_RETURN_IF_ERROR(stream_.Send(std::move(frame)));
+    }
+    return absl::OkStatus();
+  }
+
+  const Sequence& sequence_;
+  const StreamOptions& options_;
+  MapStream& stream_;
+  MapCollector& collector_;
+  std::mutex& collector_mutex_;
+  std::atomic<bool> stop_ = false;
+  std::atomic<bool> done_ = false;
+  absl::Status status_;
+  std::thread thread_;
+};
+
+class Run {
+ public:
+  Run(const Sequence& sequence, MappingService& service, const StreamOptions& options, MapCollector& collector)
+      : sequence_(sequence), service_(service), options_(options), collector_(collector) {}
+
+  absl::StatusOr<StreamResult> Go() {
+    SessionOptions session;
+    session.name = options_.session_name;
+    session.camera = sequence_.camera();
+    session.mode = options_.realtime ? FrameMode::kLive : FrameMode::kReplay;
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
+    result_.session_id = info.id;
+    ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(info.id));
+    absl::Status status = SendFrames();
+    if (status.ok()) status = Train();
+    progress_.Done();
+    stream_.reset();
+    if (!options_.keep_session) {
+      // The map is here; a failure to tidy up on the server does not spoil it.
+      service_.DeleteSession(info.id).IgnoreError();
+    }
+    if (!status.ok()) return status;
+    return result_;
+  }
+
+ private:
+  absl::Status SendFrames() {
+    Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
+    while (!(sender.done() && AllAcknowledged())) {
+      TakeEvent();
+      ShowFrames();
+      if (stream_->Done()) {
+        sender.Join();
+        return StreamEnded();
+      }
+    }
+    result_.mapping_s = collector_.last_ack_s() - collector_.first_sent_s();
+    result_.interrupted = Interrupted();
+    return sender.status();
+  }
+
+  absl::Status Train() {
+    ROMAP_RETURN_IF_ERROR(service_.FinishSession(result_.session_id).status());
+    const Clock::time_point start = Clock::now();
+    while (!stream_->Done() && SecondsSince(start) < options_.max_training_s) {
+      TakeEvent();
+      ShowTraining();
+    }
+    result_.training_s = SecondsSince(start);
+    result_.training_complete = stream_->Done();
+    return stream_->Done() ? stream_->status() : absl::OkStatus();
+  }
+
+  void TakeEvent() {
+    std::optional<MapEvent> event = stream_->Next(kEventWait);
+    if (!event) return;
+    std::lock_guard lock(collector_mutex_);
+    collector_.Apply(std::move(*event));
+  }
+
+  bool AllAcknowledged() {
+    std::lock_guard lock(collector_mutex_);
+    return collector_.acknowledged() >= collector_.sent();
+  }
+
+  absl::Status StreamEnded() {
+    if (!stream_->status().ok()) return stream_->status();
+    return absl::UnavailableError("the server ended the stream before all frames were acknowledged");
+  }
+
+  size_t TotalFrames() const {
+    return std::min(options_.frame_count, sequence_.size() - std::min(sequence_.size(), options_.first_frame));
+  }
+
+  void ShowFrames() {
+    std::lock_guard lock(collector_mutex_);
+    const double fraction = static_cast<double>(collector_.acknowledged()) / std::max<size_t>(1, TotalFrames());
+    progress_.Show(kFrameShare * fraction, fmt::format("frame {}/{}, {} objects", collector_.acknowledged(),
+                                                       TotalFrames(), collector_.ConfirmedObjects()));
+  }
+
+  void ShowTraining() {
+    std::lock_guard lock(collector_mutex_);
+    const Statistics statistics = collector_.statistics().value_or(Statistics{});
+    progress_.Show(
+        kFrameShare + (1 - kFrameShare) * statistics.training_progress,
+        fmt::format("{} objects, {} still training", collector_.ConfirmedObjects(), statistics.objects_training));
+  }
+
+  const Sequence& sequence_;
+  MappingService& service_;
+  const StreamOptions& options_;
+  MapCollector& collector_;
+  std::mutex collector_mutex_;  // the sender notes what it sends
+  std::unique_ptr<MapStream> stream_;
+  StreamResult result_;
+  Progress progress_{"mapping"};
+};
+
+}  // namespace
+
+absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingService& service,
+                                            const StreamOptions& options, MapCollector& collector) {
+  if (options.first_frame >= sequence.size()) {
+    return InvalidArgument("--first {}: the sequence has only {} frames", options.first_frame, sequence.size());
+  }
+  return Run(sequence, service, options, collector).Go();
+}
+
+}  // namespace romap

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "client/cli/map_collector.h"
+#include "client/files/sequence.h"
+#include "common/mapping_service.h"
+
+namespace romap {
+
+struct StreamOptions {
+  std::string session_name;
+  bool realtime = false;  // send at the recorded rate and let the server drop what it cannot keep up with
+  size_t first_frame = 0;
+  size_t frame_count = SIZE_MAX;
+  double max_training_s = 600;  // longest wait for training after the last frame
+  bool keep_session = false;    // leave the session on the server
+};
+
+struct StreamResult {
+  std::string session_id;
+  bool interrupted = false;
+  bool training_complete = false;
+  double mapping_s = 0;   // from the first frame sent to the last acknowledged
+  double training_s = 0;  // from then to the end of training
+};
+
+// Streams a sequence through a mapping service and collects the map: creates a session, sends every frame, waits until
+// all are acknowledged, finishes the session and waits for the training. On Ctrl-C it stops sending and goes on from
+// there. Shows a progress bar.
+absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingService& service,
+                                            const StreamOptions& options, MapCollector& collector);
+
+}  // namespace romap

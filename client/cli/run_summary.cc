@@ -1,0 +1,139 @@
+#include "client/cli/run_summary.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "client/cli/trackable.h"
+
+namespace romap {
+namespace {
+
+uint64_t PeakBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+std::string SecondsText(double seconds) { return seconds < 0 ? "-" : fmt::format("{:.2f} s", seconds); }
+
+nlohmann::json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+}  // namespace
+
+RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
+                     const std::vector<MapObject>& objects) {
+  RunSummary summary;
+  summary.sequence = sequence.dir();
+  summary.frames_sent = collector.sent();
+  summary.frames_rejected = collector.rejected();
+  summary.frames_accepted = collector.acknowledged() - collector.rejected();
+  summary.keyframes = collector.keyframes();
+  summary.mapping_s = stream.mapping_s;
+  summary.training_s = stream.training_s;
+  summary.frames_per_s = stream.mapping_s > 0 ? static_cast<double>(collector.acknowledged()) / stream.mapping_s : 0;
+  summary.median_latency_ms = 1000 * Median(collector.latencies_s());
+  summary.interrupted = stream.interrupted;
+  summary.training_complete = stream.training_complete;
+  summary.client_peak_bytes = PeakBytes();
+  summary.server_peak_bytes = collector.server_peak_bytes();
+  if (collector.statistics()) {
+    summary.frames_dropped = collector.statistics()->frames_dropped;
+    summary.map_points = collector.statistics()->map_points;
+  }
+  summary.faults = collector.faults();
+
+  const std::map<ObjectId, size_t> trackable = FirstTrackableFrames(sequence, collector.Trajectory(), objects);
+  for (const MapObject& entry : objects) {
+    RunSummary::Object object;
+    object.name = entry.file_stem;
+    object.class_name = entry.object.class_name;
+    object.center_world = entry.object.cuboid.T_world_object.translation();
+    object.half_extents = entry.object.cuboid.half_extents;
+    object.observations = entry.object.observations;
+    object.steps = entry.steps;
+    object.train_s = entry.train_seconds;
+    object.vertices = entry.mesh_world.vertices.size();
+    object.triangles = entry.mesh_world.triangles.size();
+    const MapCollector::Object& events = collector.objects().at(entry.object.id);
+    if (const auto it = trackable.find(entry.object.id); it != trackable.end()) {
+      const double trackable_s = collector.SentAt_s(it->second + 1);  // frame ids count from 1
+      if (events.first_cuboid_s >= 0) object.first_cuboid_s = std::max(0.0, events.first_cuboid_s - trackable_s);
+      if (events.first_mesh_s >= 0) object.first_mesh_s = std::max(0.0, events.first_mesh_s - trackable_s);
+    }
+    summary.objects.push_back(object);
+  }
+  return summary;
+}
+
+nlohmann::json ToJson(const RunSummary& summary) {
+  nlohmann::json objects = nlohmann::json::array();
+  for (const RunSummary::Object& object : summary.objects) {
+    objects.push_back({{"name", object.name},
+                       {"class", object.class_name},
+                       {"center_world_mu", Vector(object.center_world)},
+                       {"half_extents_mu", Vector(object.half_extents)},
+                       {"observations", object.observations},
+                       {"training_steps", object.steps},
+                       {"training_s", object.train_s},
+                       {"vertices", object.vertices},
+                       {"triangles", object.triangles},
+                       {"first_cuboid_s", object.first_cuboid_s},
+                       {"first_mesh_s", object.first_mesh_s}});
+  }
+  return {{"sequence", summary.sequence},
+          {"frames",
+           {{"sent", summary.frames_sent},
+            {"accepted", summary.frames_accepted},
+            {"rejected", summary.frames_rejected},
+            {"dropped", summary.frames_dropped},
+            {"keyframes", summary.keyframes}}},
+          {"map_points", summary.map_points},
+          {"mapping_s", summary.mapping_s},
+          {"training_after_last_frame_s", summary.training_s},
+          {"frames_per_s", summary.frames_per_s},
+          {"median_latency_ms", summary.median_latency_ms},
+          {"interrupted", summary.interrupted},
+          {"training_complete", summary.training_complete},
+          {"server_peak_bytes", summary.server_peak_bytes},
+          {"client_peak_bytes", summary.client_peak_bytes},
+          {"objects", objects},
+          {"faults", summary.faults}};
+}
+
+std::string FormatSummary(const RunSummary& summary) {
+  std::string text = fmt::format(
+      "{} frames ({} keyframes, {} rejected, {} dropped) in {:.1f} s: {:.1f} frames/s; training went on for {:.1f} "
+      "s{}\n",
+      summary.frames_accepted, summary.keyframes, summary.frames_rejected, summary.frames_dropped, summary.mapping_s,
+      summary.frames_per_s, summary.training_s,
+      summary.interrupted         ? " (interrupted: the map of what was sent)"
+      : summary.training_complete ? ""
+                                  : " (not finished)");
+  text += fmt::format("memory: mapping {} MB, client {} MB\n", summary.server_peak_bytes >> 20,
+                      summary.client_peak_bytes >> 20);
+  text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", "object", "centre [map units]",
+                      "size [map units]", "training", "triangles", "first cuboid", "first mesh");
+  for (const RunSummary::Object& object : summary.objects) {
+    const Eigen::Vector3d& c = object.center_world;
+    const Eigen::Vector3d size = 2 * object.half_extents;
+    text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", object.name,
+                        fmt::format("{:.3f} {:.3f} {:.3f}", c.x(), c.y(), c.z()),
+                        fmt::format("{:.3f} x {:.3f} x {:.3f}", size.x(), size.y(), size.z()),
+                        fmt::format("{:.2f} s", object.train_s), object.triangles, SecondsText(object.first_cuboid_s),
+                        SecondsText(object.first_mesh_s));
+  }
+  if (summary.objects.empty()) text += "(no objects were mapped)\n";
+  for (const std::string& fault : summary.faults) text += "not accepted: " + fault + "\n";
+  return text;
+}
+
+}  // namespace romap

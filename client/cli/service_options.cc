@@ -1,0 +1,52 @@
+#include "client/cli/service_options.h"
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <sstream>
+
+#include "client/sdk/remote_mapping_service.h"
+#include "common/status.h"
+#include "server/session/local_mapping_service.h"
+
+namespace romap {
+namespace {
+
+constexpr std::chrono::seconds kConnectTimeout{3};
+
+absl::StatusOr<ServerConfig> LoadConfig(const ServiceOptions& options) {
+  ServerConfig config;
+  ConfigFields fields;
+  config.Fields(fields);
+  if (!options.config_file.empty()) {
+    std::ifstream file(options.config_file);
+    if (!file) return NotFound("--config {}: cannot be read", options.config_file);
+    std::stringstream text;
+    text << file.rdbuf();
+    ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text.str(), options.config_file));
+  }
+  ROMAP_RETURN_IF_ERROR(fields.Set(options.settings));
+  return config;
+}
+
+}  // namespace
+
+void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
+  auto* server_option = app.add_option("--server", server, "HOST:PORT of romap-server")->capture_default_str();
+  if (!offer_local) return;
+  auto* local_flag = app.add_flag("--local", local, "Map in this process, without a server");
+  local_flag->excludes(server_option);
+  app.add_option("--config", config_file, "YAML configuration of the mapping (with --local)")->needs(local_flag);
+  app.add_option("--set", settings, "section.field=value of the configuration (with --local), repeatable")
+      ->needs(local_flag);
+}
+
+absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
+  if (!local) {
+    ROMAP_ASSIGN_OR_RETURN(auto remote, RemoteMappingService::Connect(server, kConnectTimeout));
+    return std::unique_ptr<MappingService>(std::move(remote));
+  }
+  ROMAP_ASSIGN_OR_RETURN(const ServerConfig config, LoadConfig(*this));
+  return std::unique_ptr<MappingService>(std::make_unique<LocalMappingService>(config));
+}
+
+}  // namespace romap

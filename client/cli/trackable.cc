@@ -1,0 +1,68 @@
+#include "client/cli/trackable.h"
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "client/cli/cuboid_outline.h"
+#include "client/cli/mapped_frames.h"
+
+namespace romap {
+namespace {
+
+// A mask fits the cuboid when the boxes around both overlap by this much (intersection over union): the outline of a
+// cuboid is larger than that of the object in it.
+constexpr double kFit = 0.35;
+
+struct Region {
+  cv::Rect box;
+  int area_px = 0;
+};
+
+std::map<int, Region> MaskRegions(const Sequence& sequence, size_t index) {
+  std::map<int, Region> regions;
+  if (!sequence.has_mask(index)) return regions;
+  const auto frame = sequence.Load(index);
+  if (!frame.ok() || frame->label_png.empty()) return regions;
+  const cv::Mat buffer(1, static_cast<int>(frame->label_png.size()), CV_8UC1,
+                       const_cast<char*>(frame->label_png.data()));
+  cv::Mat labels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+  if (labels.empty() || labels.channels() != 1) return regions;
+  labels.convertTo(labels, CV_16U);
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      const int label = labels.at<uint16_t>(y, x);
+      if (label == 0) continue;
+      Region& region = regions[label];
+      region.box = region.area_px == 0 ? cv::Rect(x, y, 1, 1) : region.box | cv::Rect(x, y, 1, 1);
+      ++region.area_px;
+    }
+  }
+  return regions;
+}
+
+bool Fits(const Region& region, const cv::Rect2d& outline) {
+  const cv::Rect2d box(region.box);
+  const double shared = (box & outline).area();
+  return region.area_px >= kTrackableArea_px && shared > kFit * (box.area() + outline.area() - shared);
+}
+
+}  // namespace
+
+std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory,
+                                                const std::vector<MapObject>& objects) {
+  std::map<ObjectId, size_t> first;
+  for (const MappedFrame& frame : MappedFrames(sequence, trajectory)) {
+    if (first.size() == objects.size()) break;
+    const std::map<int, Region> regions = MaskRegions(sequence, frame.index);
+    for (const MapObject& entry : objects) {
+      if (first.contains(entry.object.id)) continue;
+      const auto outline = CuboidOutline(entry.object.cuboid, sequence.camera(), frame.T_world_camera);
+      if (!outline) continue;
+      for (const auto& [label, region] : regions) {
+        if (Fits(region, *outline)) first[entry.object.id] = frame.index;
+      }
+    }
+  }
+  return first;
+}
+
+}  // namespace romap

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "client/cli/map_files.h"
+#include "client/files/sequence.h"
+#include "client/files/tum.h"
+
+namespace romap {
+
+// For each object the index of the first mapped frame in which it could be tracked: its cuboid lies wholly in the image
+// and a mask of at least kTrackableArea_px pixels fits the cuboid's outline. Objects without such a frame are left out.
+std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory,
+                                                const std::vector<MapObject>& objects);
+
+inline constexpr int kTrackableArea_px = 300;
+
+}  // namespace romap

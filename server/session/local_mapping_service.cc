@@ -1,0 +1,165 @@
+#include "server/session/local_mapping_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+constexpr size_t kMaxNameLength = 200;
+
+int TrainingThreads(const ServerConfig& config) {
+  if (config.training_threads > 0) return config.training_threads;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+class LocalEventStream : public MapStream {
+ public:
+  LocalEventStream(std::shared_ptr<Session> session, std::shared_ptr<Outbox> outbox, bool sender)
+      : session_(std::move(session)), outbox_(std::move(outbox)), sending_(sender) {}
+
+  ~LocalEventStream() override { Cancel(); }
+
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
+  bool Done() const override { return outbox_->Done(); }
+  absl::Status status() const override { return outbox_->status(); }
+
+  absl::Status Send(FrameInput frame) override {
+    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    return session_->Offer(std::move(frame));
+  }
+
+  absl::Status CloseSend() override {
+    if (!StopSending()) return FailedPrecondition("this stream was closed for sending");
+    session_->WhenDrained([outbox = outbox_] { outbox->Close(); });
+    return absl::OkStatus();
+  }
+
+  void Cancel() override {
+    StopSending();
+    session_->map().Unsubscribe(outbox_);
+    outbox_->Close(absl::CancelledError("the stream was cancelled"));
+  }
+
+ private:
+  bool StopSending() {
+    if (!sending_.exchange(false)) return false;
+    session_->DetachSender();
+    return true;
+  }
+
+  const std::shared_ptr<Session> session_;
+  const std::shared_ptr<Outbox> outbox_;
+  std::atomic<bool> sending_;
+};
+
+}  // namespace
+
+LocalMappingService::LocalMappingService(const ServerConfig& config)
+    : config_(config), pool_(config.nerf, TrainingThreads(config)), mesher_(config.mesh) {}
+
+LocalMappingService::~LocalMappingService() {
+  // Sessions use the pool and the mesher, so they end first.
+  std::lock_guard lock(mutex_);
+  for (const auto& [id, session] : sessions_) session->Stop(absl::UnavailableError("the server is shutting down"));
+  sessions_.clear();
+}
+
+std::string LocalMappingService::NewId() {
+  std::string id;
+  do {
+    id = fmt::format("{:012x}", random_() >> 16);
+  } while (sessions_.contains(id));
+  return id;
+}
+
+absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
+  ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
+  if (options.name.size() > kMaxNameLength) {
+    return InvalidArgument("session name has {} bytes, at most {} are allowed", options.name.size(), kMaxNameLength);
+  }
+  std::lock_guard lock(mutex_);
+  if (sessions_.size() >= static_cast<size_t>(config_.session.max_sessions)) {
+    return absl::ResourceExhaustedError(
+        fmt::format("the server keeps {} sessions and takes no more; delete one first", sessions_.size()));
+  }
+  const std::string id = NewId();
+  auto session = std::make_shared<Session>(id, options, config_, &pool_, &mesher_);
+  sessions_[id] = session;
+  spdlog::info("session {}: created, {}x{} px", id, options.camera.width_px, options.camera.height_px);
+  return session->Info();
+}
+
+absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::Find(const std::string& session_id) const {
+  std::lock_guard lock(mutex_);
+  const auto it = sessions_.find(session_id);
+  if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+  return it->second;
+}
+
+absl::StatusOr<std::vector<SessionInfo>> LocalMappingService::ListSessions() {
+  std::vector<std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    for (const auto& [id, session] : sessions_) sessions.push_back(session);
+  }
+  std::vector<SessionInfo> infos;
+  for (const auto& session : sessions) infos.push_back(session->Info());
+  std::sort(infos.begin(), infos.end(),
+            [](const SessionInfo& a, const SessionInfo& b) { return a.created_unix_ns < b.created_unix_ns; });
+  return infos;
+}
+
+absl::StatusOr<SessionInfo> LocalMappingService::GetSession(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return session->Info();
+}
+
+absl::StatusOr<SessionInfo> LocalMappingService::FinishSession(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  session->Finish();
+  return session->Info();
+}
+
+absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
+  std::shared_ptr<Session> session;
+  {
+    std::lock_guard lock(mutex_);
+    const auto it = sessions_.find(session_id);
+    if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+    session = std::move(it->second);
+    sessions_.erase(it);
+  }
+  session->Stop(NotFound("session '{}' was deleted", session_id));
+  spdlog::info("session {}: deleted", session_id);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<MapStream>> LocalMappingService::OpenMap(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  if (session->Info().state != SessionState::kOpen) {
+    return FailedPrecondition("session '{}' takes no more frames: it is finished", session_id);
+  }
+  if (!session->AttachSender()) return FailedPrecondition("session '{}' has a Map stream already", session_id);
+  auto outbox =
+      session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue, /*with_snapshot=*/true);
+  return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/true);
+}
+
+absl::StatusOr<std::unique_ptr<EventStream>> LocalMappingService::Watch(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, 1, /*with_snapshot=*/true);
+  return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/false);
+}
+
+absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return session->Export();
+}
+
+}  // namespace romap

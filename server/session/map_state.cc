@@ -1,0 +1,116 @@
+#include "server/session/map_state.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace romap {
+
+void MapState::Send(const MapEvent& event) {
+  for (const auto& outbox : outboxes_) outbox->Put(event);
+}
+
+void MapState::Apply(MapEvent event) {
+  std::lock_guard lock(mutex_);
+  if (auto* update = std::get_if<ObjectUpdate>(&event)) {
+    ApplyUpdate(std::move(*update));
+  } else if (auto* removed = std::get_if<ObjectRemoved>(&event)) {
+    removed->revision = Forget(removed->id);
+    Send(event);
+  } else if (auto* merged = std::get_if<ObjectMerged>(&event)) {
+    Forget(merged->from);
+    const auto into = objects_.find(merged->into);
+    merged->revision = into == objects_.end() ? 0 : ++into->second.object.revision;
+    Send(event);
+  }
+}
+
+void MapState::ApplyUpdate(ObjectUpdate update) {
+  ObjectSnapshot& entry = objects_[update.id];
+  update.revision = entry.object.revision + 1;
+  if (entry.mesh) update.T_world_mesh = entry.mesh->T_world_mesh;
+  entry.object = std::move(update);
+  Send(entry.object);
+}
+
+// Drops the object and returns the revision that says so.
+uint64_t MapState::Forget(ObjectId id) {
+  const auto it = objects_.find(id);
+  if (it == objects_.end()) return 1;
+  const uint64_t revision = it->second.object.revision + 1;
+  objects_.erase(it);
+  return revision;
+}
+
+void MapState::PublishMesh(MeshUpdate mesh) {
+  std::lock_guard lock(mutex_);
+  const auto it = objects_.find(mesh.id);
+  if (it == objects_.end()) return;
+  ObjectSnapshot& entry = it->second;
+  mesh.revision = ++entry.object.revision;
+  entry.object.T_world_mesh = mesh.T_world_mesh;
+  entry.mesh = std::move(mesh);
+  Send(*entry.mesh);
+}
+
+void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns) {
+  std::lock_guard lock(mutex_);
+  if (ack.accepted && ack.T_world_camera) {
+    trajectory_.push_back(ack);
+    timestamps_ns_.push_back(timestamp_ns);
+  }
+  Send(ack);
+}
+
+void MapState::Publish(const Statistics& statistics) {
+  std::lock_guard lock(mutex_);
+  Send(statistics);
+}
+
+std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks, bool with_snapshot) {
+  auto outbox = std::make_shared<Outbox>(acks, max_acks);
+  std::lock_guard lock(mutex_);
+  if (with_snapshot) {
+    for (const auto& [id, entry] : objects_) {
+      outbox->Put(entry.object);
+      if (entry.mesh) outbox->Put(*entry.mesh);
+    }
+  }
+  if (closed_) {
+    outbox->Close(*closed_);
+  } else {
+    outboxes_.push_back(outbox);
+  }
+  return outbox;
+}
+
+void MapState::Unsubscribe(const std::shared_ptr<Outbox>& outbox) {
+  std::lock_guard lock(mutex_);
+  std::erase(outboxes_, outbox);
+}
+
+void MapState::Close(const absl::Status& status) {
+  std::lock_guard lock(mutex_);
+  if (closed_) return;
+  closed_ = status;
+  for (const auto& outbox : outboxes_) outbox->Close(status);
+  outboxes_.clear();
+}
+
+MapSnapshot MapState::Snapshot() const {
+  std::lock_guard lock(mutex_);
+  MapSnapshot snapshot;
+  for (const auto& [id, entry] : objects_) {
+    if (entry.object.state != ObjectState::kProvisional) snapshot.objects.push_back(entry);
+  }
+  snapshot.trajectory = trajectory_;
+  snapshot.timestamps_ns = timestamps_ns_;
+  return snapshot;
+}
+
+uint64_t MapState::ConfirmedObjects() const {
+  std::lock_guard lock(mutex_);
+  return std::count_if(objects_.begin(), objects_.end(),
+                       [](const auto& entry) { return entry.second.object.state != ObjectState::kProvisional; });
+}
+
+}  // namespace romap

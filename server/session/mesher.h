@@ -1,0 +1,48 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "common/messages.h"
+#include "server/mesh/mesh_config.h"
+
+namespace romap {
+
+// The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits.
+class Mesher {
+ public:
+  using Sink = std::function<void(MeshUpdate)>;
+
+  explicit Mesher(const MeshConfig& config);
+  ~Mesher();
+
+  uint64_t Register(Sink sink);
+  // Returns when no call of this client's sink is under way; none comes afterwards.
+  void Unregister(uint64_t client);
+  void Offer(uint64_t client, FieldSnapshot snapshot);
+  // Drops what waits of an object that is gone.
+  void Remove(uint64_t client, ObjectId object);
+  bool Idle(uint64_t client) const;
+
+ private:
+  using Key = std::pair<uint64_t, ObjectId>;
+
+  void Run();
+
+  const MeshConfig config_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<uint64_t, Sink> sinks_;
+  std::map<Key, std::pair<uint64_t, FieldSnapshot>> waiting_;  // with a ticket: the oldest is served first
+  uint64_t next_client_ = 1;
+  uint64_t next_ticket_ = 1;
+  uint64_t busy_client_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace romap

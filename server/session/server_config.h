@@ -1,0 +1,37 @@
+#pragma once
+
+#include "common/config.h"
+#include "server/mesh/mesh_config.h"
+#include "server/nerf/nerf_config.h"
+#include "server/objects/objects_config.h"
+#include "server/session/session_config.h"
+#include "server/slam/slam_config.h"
+
+namespace romap {
+
+// The whole configuration of a mapping service, one struct per stage. Frozen once the service is made.
+struct ServerConfig {
+  SlamConfig slam;
+  ObjectsConfig objects;
+  NerfConfig nerf;
+  MeshConfig mesh;
+  SessionConfig session;
+  int training_threads = 0;
+
+  void Fields(ConfigFields& fields) {
+    fields.Section("session");
+    session.Fields(fields);
+    fields.Section("slam");
+    slam.Fields(fields);
+    fields.Section("objects");
+    objects.Fields(fields);
+    fields.Section("nerf");
+    fields.Add("training_threads", &training_threads,
+               {.unit = "threads", .min = 0, .max = 1024, .help = "Workers of the training pool; 0 = one per core"});
+    nerf.Fields(fields);
+    fields.Section("mesh");
+    mesh.Fields(fields);
+  }
+};
+
+}  // namespace romap

@@ -1,0 +1,295 @@
+#include "server/session/session.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include "common/status.h"
+#include "server/slam/given_pose_tracker.h"
+
+namespace romap {
+namespace {
+
+uint64_t ResidentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  uint64_t pages_total = 0, pages_resident = 0;
+  statm >> pages_total >> pages_resident;
+  return pages_resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+int64_t UnixNow_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+}  // namespace
+
+Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
+                 Mesher* mesher)
+    : id_(std::move(id)),
+      options_(options),
+      config_(config),
+      created_unix_ns_(UnixNow_ns()),
+      pool_(pool),
+      mesher_(mesher),
+      ingest_(options.camera),
+      tracker_(std::make_unique<GivenPoseTracker>(config.slam)),
+      sparse_mapper_(config.slam),
+      object_mapper_(config.objects),
+      next_statistics_(Clock::now()),
+      frames_(config.session.frame_queue),
+      tracked_(config.session.mapping_queue) {
+  mesher_client_ = mesher_->Register([this](MeshUpdate mesh) { map_.PublishMesh(std::move(mesh)); });
+  pool_client_ =
+      pool_->Register([this](FieldSnapshot snapshot) { mesher_->Offer(mesher_client_, std::move(snapshot)); });
+  tracking_thread_ = std::thread([this] { RunTracking(); });
+  mapping_thread_ = std::thread([this] { RunMapping(); });
+}
+
+Session::~Session() {
+  Stop(absl::CancelledError("the session was closed"));
+  pool_->Unregister(pool_client_);
+  mesher_->Unregister(mesher_client_);
+}
+
+void Session::Stop(const absl::Status& status) {
+  stopping_ = true;
+  frames_.Close();
+  tracked_.Close();
+  map_.Close(status);
+  if (tracking_thread_.joinable()) tracking_thread_.join();
+  if (mapping_thread_.joinable()) mapping_thread_.join();
+}
+
+// ------------------------------------------------------------------------------------------------ the data path
+
+void Session::RunTracking() {
+  try {
+    while (std::optional<Arrival> arrival = frames_.Pop()) {
+      if (!stopping_) TrackFrame(*arrival);
+    }
+  } catch (const std::exception& e) {
+    Fail("tracking", e.what());
+  }
+  tracked_.Close();
+}
+
+void Session::TrackFrame(const Arrival& arrival) {
+  const FrameInput& input = arrival.input;
+  auto frame = ingest_.Accept(input);
+  if (!frame.ok()) return Reject(input, Message(frame.status()), arrival.time);
+  auto tracked = tracker_->Track(*frame);
+  if (!tracked.ok()) return Reject(input, Message(tracked.status()), arrival.time);
+
+  map_.Acknowledge({.frame_id = input.frame_id,
+                    .accepted = true,
+                    .error = "",
+                    .state = tracked->state,
+                    .T_world_camera = tracked->T_world_camera,
+                    .is_keyframe = tracked->is_keyframe,
+                    .latency_s = Seconds(Clock::now() - arrival.time)},
+                   input.timestamp_ns);
+  tracked_.Push(*std::move(tracked));
+}
+
+void Session::RunMapping() {
+  const auto period = std::chrono::milliseconds(static_cast<int64_t>(1000 * config_.session.statistics_period_s));
+  try {
+    while (!tracked_.Drained()) {
+      const std::optional<TrackedFrame> tracked = tracked_.PopFor(period);
+      if (tracked && !stopping_) MapFrame(*tracked);
+      PublishStatistics();
+    }
+    SettleAll();
+    if (state_ != SessionState::kFailed && !stopping_) TrainToTheEnd();
+  } catch (const std::exception& e) {
+    Fail("mapping", e.what());
+    SettleAll();
+  }
+}
+
+void Session::MapFrame(const TrackedFrame& tracked) {
+  Publish(object_mapper_.ObserveFrame(tracked));
+  if (tracked.is_keyframe) {
+    const KeyframeView keyframe = sparse_mapper_.AddKeyframe(tracked);
+    Publish(object_mapper_.ObserveKeyframe(keyframe));
+    ++keyframes_;
+    map_points_ = sparse_mapper_.points();
+  }
+  ++frames_processed_;
+  Settle();
+}
+
+void Session::Publish(ObjectMapper::Output output) {
+  for (MapEvent& event : output.events) {
+    ObjectId gone;
+    if (const auto* removed = std::get_if<ObjectRemoved>(&event)) gone = removed->id;
+    if (const auto* merged = std::get_if<ObjectMerged>(&event)) gone = merged->from;
+    if (gone) {
+      pool_->Remove(pool_client_, gone);
+      mesher_->Remove(mesher_client_, gone);
+    }
+    map_.Apply(std::move(event));
+  }
+  for (ObjectViews& views : output.views) pool_->Offer(pool_client_, std::move(views));
+}
+
+void Session::TrainToTheEnd() {
+  Publish(object_mapper_.Finish());
+  pool_->Finish(pool_client_);
+  while (!stopping_ && !(pool_->Idle(pool_client_) && mesher_->Idle(mesher_client_))) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    PublishStatistics();
+  }
+  if (stopping_) return;
+  map_.Publish(CurrentStatistics());
+  state_ = SessionState::kFinished;
+  map_.Close(absl::OkStatus());
+}
+
+// ------------------------------------------------------------------------------------------------ bookkeeping
+
+void Session::Reject(const FrameInput& input, const std::string& why, Clock::time_point arrival) {
+  ++frames_rejected_;
+  spdlog::info("session {}: frame {} not accepted: {}", id_, input.frame_id, why);
+  map_.Acknowledge({.frame_id = input.frame_id,
+                    .accepted = false,
+                    .error = why,
+                    .state = TrackingState::kLost,
+                    .T_world_camera = std::nullopt,
+                    .is_keyframe = false,
+                    .latency_s = Seconds(Clock::now() - arrival)},
+                   input.timestamp_ns);
+  Settle();
+}
+
+void Session::Fail(const char* stage, const std::string& what) {
+  spdlog::error("session {}: {} failed, the session ends: {}", id_, stage, what);
+  state_ = SessionState::kFailed;
+  frames_.Close();
+  tracked_.Close();
+  map_.Close(Internal("session {}: {} failed: {}", id_, stage, what));
+}
+
+absl::Status Session::Offer(FrameInput input) {
+  const auto closed = [&] { return FailedPrecondition("session {} takes no more frames: it is finished", id_); };
+  Arrival arrival{std::move(input), Clock::now()};
+  if (options_.mode == FrameMode::kReplay) {
+    if (!frames_.Push(std::move(arrival))) return closed();
+    ++frames_received_;
+    return absl::OkStatus();
+  }
+  bool accepted = false;
+  const std::optional<Arrival> dropped = frames_.PushDroppingOldest(std::move(arrival), &accepted);
+  if (!accepted) return closed();
+  ++frames_received_;
+  if (dropped) {
+    ++frames_dropped_;
+    map_.Acknowledge({.frame_id = dropped->input.frame_id,
+                      .accepted = false,
+                      .error = "dropped: the server is behind the live stream",
+                      .state = TrackingState::kTracking,
+                      .T_world_camera = std::nullopt,
+                      .is_keyframe = false,
+                      .latency_s = Seconds(Clock::now() - dropped->time)},
+                     dropped->input.timestamp_ns);
+    Settle();
+  }
+  return absl::OkStatus();
+}
+
+void Session::Finish() {
+  SessionState open = SessionState::kOpen;
+  state_.compare_exchange_strong(open, SessionState::kFinishing);
+  frames_.Close();
+}
+
+bool Session::AttachSender() { return !sender_attached_.exchange(true); }
+void Session::DetachSender() { sender_attached_ = false; }
+
+void Session::WhenDrained(std::function<void()> done) {
+  {
+    std::lock_guard lock(drain_mutex_);
+    const uint64_t target = frames_received_;
+    if (!all_settled_ && frames_settled_ < target) {
+      drain_waiters_.emplace(target, std::move(done));
+      return;
+    }
+  }
+  done();
+}
+
+void Session::Settle() {
+  std::vector<std::function<void()>> due;
+  {
+    std::lock_guard lock(drain_mutex_);
+    ++frames_settled_;
+    const auto end = drain_waiters_.upper_bound(frames_settled_);
+    for (auto it = drain_waiters_.begin(); it != end; ++it) due.push_back(std::move(it->second));
+    drain_waiters_.erase(drain_waiters_.begin(), end);
+  }
+  for (const auto& done : due) done();
+}
+
+void Session::SettleAll() {
+  std::multimap<uint64_t, std::function<void()>> due;
+  {
+    std::lock_guard lock(drain_mutex_);
+    all_settled_ = true;
+    due.swap(drain_waiters_);
+  }
+  for (const auto& [target, done] : due) done();
+}
+
+void Session::PublishStatistics() {
+  const Clock::time_point now = Clock::now();
+  if (now < next_statistics_) return;
+  next_statistics_ = now + std::chrono::duration_cast<Clock::duration>(
+                               std::chrono::duration<double>(config_.session.statistics_period_s));
+  map_.Publish(CurrentStatistics());
+}
+
+Statistics Session::CurrentStatistics() const {
+  const TrainingPool::Progress progress = pool_->GetProgress(pool_client_);
+  Statistics statistics;
+  statistics.frames_received = frames_received_;
+  statistics.frames_processed = frames_processed_;
+  statistics.frames_dropped = frames_dropped_;
+  statistics.frames_rejected = frames_rejected_;
+  statistics.keyframes = keyframes_;
+  statistics.map_points = map_points_;
+  statistics.objects = map_.ConfirmedObjects();
+  statistics.objects_training = static_cast<uint64_t>(std::max(0, progress.objects_training));
+  statistics.training_steps = progress.steps;
+  statistics.training_progress = progress.progress;
+  statistics.resident_bytes = ResidentBytes();
+  return statistics;
+}
+
+SessionInfo Session::Info() const {
+  SessionInfo info;
+  info.id = id_;
+  info.name = options_.name;
+  info.camera = options_.camera;
+  info.mode = options_.mode;
+  info.state = state_;
+  info.created_unix_ns = created_unix_ns_;
+  info.stream_open = sender_attached_;
+  info.statistics = CurrentStatistics();
+  return info;
+}
+
+MapSnapshot Session::Export() const {
+  MapSnapshot snapshot = map_.Snapshot();
+  snapshot.session_id = id_;
+  snapshot.state = state_;
+  snapshot.statistics = CurrentStatistics();
+  return snapshot;
+}
+
+}  // namespace romap

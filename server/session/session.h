@@ -1,0 +1,116 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "common/bounded_queue.h"
+#include "common/mapping_service.h"
+#include "server/nerf/training_pool.h"
+#include "server/objects/object_mapper.h"
+#include "server/session/ingest.h"
+#include "server/session/map_state.h"
+#include "server/session/mesher.h"
+#include "server/session/server_config.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+
+namespace romap {
+
+// One client's map. Owns the stages and wires the data path; two threads of its own:
+//
+//   frames -> [tracking thread: Ingest, Tracker] -> tracked -> [mapping thread: ObjectMapper, SparseMapper]
+//          -> TrainingPool (server's) -> Mesher (server's) -> MapState -> outboxes
+//
+// A frame that was accepted is never lost while the session lives; closing a stream closes nothing here.
+class Session {
+ public:
+  // `pool` and `mesher` outlive the session.
+  Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
+          Mesher* mesher);
+  ~Session();
+
+  SessionInfo Info() const;
+  MapSnapshot Export() const;
+
+  // Takes one frame. kReplay: waits while the queue is full; kLive: drops the oldest waiting frame instead.
+  // FAILED_PRECONDITION after Finish().
+  absl::Status Offer(FrameInput input);
+  // No more frames will come. Returns at once; the state tells when all is done.
+  void Finish();
+  // Ends the threads without training to the end, and every stream with `status`. Called before deletion.
+  void Stop(const absl::Status& status);
+
+  // Claims the right to send frames; false when another stream holds it.
+  bool AttachSender();
+  void DetachSender();  // gives it back
+  // Calls `done` (on a session thread, or at once) when every frame offered before this call has been mapped.
+  void WhenDrained(std::function<void()> done);
+
+  MapState& map() { return map_; }
+  const SessionConfig& config() const { return config_.session; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct Arrival {
+    FrameInput input;
+    Clock::time_point time;
+  };
+
+  void RunTracking();
+  void RunMapping();
+  void TrackFrame(const Arrival& arrival);
+  void MapFrame(const TrackedFrame& tracked);
+  void Publish(ObjectMapper::Output output);
+  void TrainToTheEnd();
+  void PublishStatistics();
+  void Settle();
+  void Fail(const char* stage, const std::string& what);
+  void Reject(const FrameInput& input, const std::string& why, Clock::time_point arrival);
+  void SettleAll();
+  Statistics CurrentStatistics() const;
+
+  const std::string id_;
+  const SessionOptions options_;
+  const ServerConfig config_;
+  const int64_t created_unix_ns_;
+  TrainingPool* const pool_;
+  Mesher* const mesher_;
+
+  MapState map_;
+  uint64_t mesher_client_ = 0;
+  uint64_t pool_client_ = 0;
+
+  Ingest ingest_;                      // tracking thread
+  std::unique_ptr<Tracker> tracker_;   // tracking thread
+  SparseMapper sparse_mapper_;         // mapping thread
+  ObjectMapper object_mapper_;         // mapping thread
+  Clock::time_point next_statistics_;  // mapping thread
+
+  BoundedQueue<Arrival> frames_;
+  BoundedQueue<TrackedFrame> tracked_;
+
+  std::atomic<SessionState> state_ = SessionState::kOpen;
+  std::atomic<bool> sender_attached_ = false;
+  std::atomic<bool> stopping_ = false;  // destruction: do not train to the end
+  std::atomic<uint64_t> frames_received_ = 0, frames_processed_ = 0, frames_dropped_ = 0, frames_rejected_ = 0;
+  std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
+
+  std::mutex drain_mutex_;
+  uint64_t frames_settled_ = 0;                                   // mapped, rejected or dropped
+  bool all_settled_ = false;                                      // no frame will come any more
+  std::multimap<uint64_t, std::function<void()>> drain_waiters_;  // by the number of frames that must be settled
+
+  std::thread tracking_thread_;
+  std::thread mapping_thread_;
+};
+
+}  // namespace romap

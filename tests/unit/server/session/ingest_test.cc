@@ -1,0 +1,217 @@
+#include "server/session/ingest.h"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+using ::testing::HasSubstr;
+
+const CameraModel kCamera{
+    .width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 31.5, .cy_px = 23.5, .distortion = {}};
+
+std::string Encode(const char* extension, const cv::Mat& image) {
+  std::vector<uint8_t> bytes;
+  cv::imencode(extension, image, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+cv::Mat Gradient(int width, int height) {
+  cv::Mat image(height, width, CV_8UC3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x)
+      image.at<cv::Vec3b>(y, x) = cv::Vec3b(10, static_cast<uint8_t>(3 * x), static_cast<uint8_t>(5 * y));
+  }
+  return image;
+}
+
+FrameInput GoodFrame(uint64_t id = 1) {
+  FrameInput input;
+  input.frame_id = id;
+  input.timestamp_ns = static_cast<int64_t>(id) * 40'000'000;
+  input.image_encoding = ImageEncoding::kPng;
+  input.image = Encode(".png", Gradient(64, 48));
+  input.T_world_camera = SE3<World, Camera>();
+  return input;
+}
+
+std::string Fault(Ingest& ingest, const FrameInput& input) {
+  const auto frame = ingest.Accept(input);
+  if (frame.ok()) return "accepted";
+  EXPECT_EQ(frame.status().code(), absl::StatusCode::kInvalidArgument);
+  return Message(frame.status());
+}
+
+TEST(IngestTest, DecodesEveryImageEncoding) {
+  const cv::Mat image = Gradient(64, 48);
+  Ingest ingest(kCamera);
+  FrameInput png = GoodFrame(1);
+  auto frame = ingest.Accept(png);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(cv::norm((*frame)->image_bgr, image, cv::NORM_INF), 0);
+
+  FrameInput jpeg = GoodFrame(2);
+  jpeg.image_encoding = ImageEncoding::kJpeg;
+  jpeg.image = Encode(".jpg", image);
+  frame = ingest.Accept(jpeg);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_LT(cv::norm((*frame)->image_bgr, image, cv::NORM_L1) / image.total(), 10);
+
+  FrameInput raw = GoodFrame(3);
+  raw.image_encoding = ImageEncoding::kRawRgb8;
+  raw.raw_width_px = 64;
+  raw.raw_height_px = 48;
+  cv::Mat rgb;
+  cv::cvtColor(image, rgb, cv::COLOR_BGR2RGB);
+  raw.image.assign(reinterpret_cast<const char*>(rgb.data), rgb.total() * 3);
+  frame = ingest.Accept(raw);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(cv::norm((*frame)->image_bgr, image, cv::NORM_INF), 0);
+}
+
+TEST(IngestTest, ReadsMasksAsPngAndAsRuns) {
+  cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
+  labels(cv::Rect(10, 10, 20, 8)) = 7;
+  FrameInput png = GoodFrame(1);
+  png.mask_encoding = MaskEncoding::kLabelPng;
+  png.label_png = Encode(".png", labels);
+  FrameInput runs = GoodFrame(2);
+  runs.mask_encoding = MaskEncoding::kRunLength;
+  for (int i = 0; i < 48 * 64;) {
+    const uint8_t label = labels.data[i];
+    int end = i;
+    while (end < 48 * 64 && labels.data[end] == label) ++end;
+    runs.label_runs.insert(runs.label_runs.end(), {label, static_cast<uint32_t>(end - i)});
+    i = end;
+  }
+  Ingest ingest(kCamera);
+  for (const FrameInput& input : {png, runs}) {
+    const auto frame = ingest.Accept(input);
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_TRUE((*frame)->has_masks);
+    EXPECT_EQ(cv::countNonZero((*frame)->labels == 7), 160);
+    ASSERT_EQ((*frame)->instances.size(), 1u) << "a label that is not listed is listed by ingest";
+    EXPECT_EQ((*frame)->instances[0].label, 7u);
+    EXPECT_EQ((*frame)->instances[0].class_name, "object");
+  }
+}
+
+TEST(IngestTest, DepthBecomesMapUnits) {
+  const cv::Mat depth(48, 64, CV_16UC1, cv::Scalar(1500));
+  FrameInput input = GoodFrame();
+  input.depth_encoding = DepthEncoding::kPng16;
+  input.depth = Encode(".png", depth);
+  input.depth_scale_mu = 0.001;
+  const auto frame = Ingest(kCamera).Accept(input);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_FLOAT_EQ((*frame)->depth_mu.at<float>(20, 20), 1.5f);
+}
+
+TEST(IngestTest, TruncatedImagesAreRefused) {
+  Ingest ingest(kCamera);
+  FrameInput png = GoodFrame();
+  png.image.resize(png.image.size() / 2);
+  EXPECT_THAT(Fault(ingest, png), HasSubstr("image: PNG file is truncated"));
+  FrameInput jpeg = GoodFrame();
+  jpeg.image_encoding = ImageEncoding::kJpeg;
+  jpeg.image = Encode(".jpg", Gradient(64, 48));
+  jpeg.image.resize(jpeg.image.size() / 2);
+  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("image: JPEG file is truncated"));
+  jpeg.image = "not an image";
+  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("image is not a JPEG file"));
+  jpeg.image.clear();
+  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("(0 bytes)"));
+  EXPECT_EQ(Fault(ingest, GoodFrame()), "accepted") << "a refused frame must not count";
+}
+
+TEST(IngestTest, WrongSizesAreNamed) {
+  Ingest ingest(kCamera);
+  FrameInput image = GoodFrame();
+  image.image = Encode(".png", Gradient(32, 48));
+  EXPECT_THAT(Fault(ingest, image), HasSubstr("image is 32x48 px, the session's camera says 64x48 px"));
+  FrameInput mask = GoodFrame();
+  mask.mask_encoding = MaskEncoding::kLabelPng;
+  mask.label_png = Encode(".png", cv::Mat(48, 65, CV_8UC1, cv::Scalar(0)));
+  EXPECT_THAT(Fault(ingest, mask), HasSubstr("mask is 65x48 px"));
+  FrameInput runs = GoodFrame();
+  runs.mask_encoding = MaskEncoding::kRunLength;
+  runs.label_runs = {0, 100};
+  EXPECT_THAT(Fault(ingest, runs), HasSubstr("do not add up to 64x48"));
+  runs.label_runs = {0, 4294967295u, 1, 2};
+  EXPECT_THAT(Fault(ingest, runs), HasSubstr("do not add up to 64x48"));
+  runs.label_runs = {0};
+  EXPECT_THAT(Fault(ingest, runs), HasSubstr("pairs"));
+  FrameInput raw = GoodFrame();
+  raw.image_encoding = ImageEncoding::kRawGray8;
+  raw.raw_width_px = 64;
+  raw.raw_height_px = 48;
+  raw.image = "abc";
+  EXPECT_THAT(Fault(ingest, raw), HasSubstr("3 bytes of raw pixels, 64x48x1 needs 3072"));
+}
+
+TEST(IngestTest, ASmallFileThatClaimsAHugeImageIsNotDecoded) {
+  FrameInput input = GoodFrame();
+  for (size_t at : {16, 20}) input.image.replace(at, 4, "\x00\x01\x00\x00", 4);
+  Ingest ingest(kCamera);
+  EXPECT_THAT(Fault(ingest, input), HasSubstr("65536x65536"));
+}
+
+TEST(IngestTest, NumbersThatAreNotFiniteAreRefused) {
+  Ingest ingest(kCamera);
+  FrameInput pose = GoodFrame();
+  pose.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, std::nan(""), 0));
+  EXPECT_THAT(Fault(ingest, pose), HasSubstr("T_world_camera"));
+  FrameInput gravity = GoodFrame();
+  gravity.gravity_camera = Eigen::Vector3d::Zero();
+  EXPECT_THAT(Fault(ingest, gravity), HasSubstr("gravity"));
+  FrameInput depth = GoodFrame();
+  depth.depth_encoding = DepthEncoding::kPng16;
+  depth.depth_scale_mu = -1;
+  EXPECT_THAT(Fault(ingest, depth), HasSubstr("depth: scale -1"));
+  FrameInput score = GoodFrame();
+  score.instances = {{.label = 3, .class_name = "cup", .score = std::nan(""), .track_id = std::nullopt}};
+  EXPECT_THAT(Fault(ingest, score), HasSubstr("label 3"));
+}
+
+TEST(IngestTest, TimeAndIdsOnlyGrow) {
+  Ingest ingest(kCamera);
+  ASSERT_EQ(Fault(ingest, GoodFrame(5)), "accepted");
+  EXPECT_THAT(Fault(ingest, GoodFrame(5)), HasSubstr("frame id does not grow: 5 after 5"));
+  FrameInput back = GoodFrame(6);
+  back.timestamp_ns = 10;
+  EXPECT_THAT(Fault(ingest, back), HasSubstr("timestamp goes back: 10 ns after 200000000 ns"));
+  EXPECT_EQ(Fault(ingest, GoodFrame(6)), "accepted");
+}
+
+TEST(IngestTest, DistortionIsTakenOut) {
+  CameraModel distorted = kCamera;
+  distorted.distortion = {-0.2, 0.05, 0.001, -0.001, 0};
+  // A white dot where the distorted camera sees the ray (0.2, -0.15, 1).
+  const double x = 0.2, y = -0.15, r2 = x * x + y * y;
+  const auto& d = distorted.distortion;
+  const double radial = 1 + d[0] * r2 + d[1] * r2 * r2;
+  const double xd = x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
+  const double yd = y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
+  cv::Mat image = cv::Mat::zeros(48, 64, CV_8UC3);
+  cv::circle(image,
+             cv::Point(static_cast<int>(std::lround(60 * xd + 31.5)), static_cast<int>(std::lround(60 * yd + 23.5))), 1,
+             cv::Scalar::all(255), -1);
+  FrameInput input = GoodFrame();
+  input.image = Encode(".png", image);
+  const auto frame = Ingest(distorted).Accept(input);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_FALSE((*frame)->camera.HasDistortion());
+  cv::Mat gray;
+  cv::cvtColor((*frame)->image_bgr, gray, cv::COLOR_BGR2GRAY);
+  const cv::Moments moments = cv::moments(gray);
+  EXPECT_NEAR(moments.m10 / moments.m00, 60 * x + 31.5, 0.8);
+  EXPECT_NEAR(moments.m01 / moments.m00, 60 * y + 23.5, 0.8);
+}
+
+}  // namespace
+}  // namespace romap
