@@ -6,9 +6,9 @@
 
 #include "common/status.h"
 #include "server/mesh/field_grid.h"
+#include "server/mesh/floaters.h"
+#include "server/mesh/hidden_space.h"
 #include "server/mesh/marching_cubes.h"
-#include "server/mesh/solid_parts.h"
-#include "server/mesh/unseen_space.h"
 
 namespace romap {
 namespace {
@@ -47,11 +47,9 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   const float connect_level = std::min(snapshot.connect_level, level);
 
   FieldGrid grid = SampleField(snapshot, config.resolution);
-  FillCavities(grid, level);  // first, because it is cheap and spares the search for unseen space most of its rays
-  if (config.fill_unseen) {
-    FillUnseenSpace(grid, level, snapshot.view_centers_object, config.unseen_optical_depth);
-    FillCavities(grid, level);
-  }
+  std::span<const Eigen::Vector3f> views;
+  if (config.fill_unseen) views = snapshot.view_centers_object;
+  FillHiddenSpace(grid, level, views, config.unseen_optical_depth);
   if (RemoveFloaters(grid, level, connect_level, config.min_component_share) == 0) {
     return FailedPrecondition("{}: no surface at this level", snapshot.object.ToString());
   }

@@ -28,6 +28,11 @@ struct FieldGrid {
   size_t StrideY() const { return nodes_per_side; }
   size_t StrideZ() const { return StrideY() * nodes_per_side; }
   size_t Index(int x, int y, int z) const { return z * StrideZ() + y * StrideY() + x; }
+  // The (x, y, z) of a node, as the inverse of Index().
+  Eigen::Vector3f NodeAt(size_t index) const {
+    return {static_cast<float>(index % StrideY()), static_cast<float>(index % StrideZ() / StrideY()),
+            static_cast<float>(index / StrideZ())};
+  }
   Eigen::Vector3f Position(const Eigen::Vector3f& node) const { return origin + node.cwiseProduct(spacing); }
 };
 

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <cstddef>
+
 #include "server/mesh/field_grid.h"
 
 namespace romap {
-
-// Makes empty space solid that the outside cannot reach through nodes at or below `level` (six neighbours).
-void FillCavities(FieldGrid& grid, float level);
 
 // Empties all nodes above `level` but those of the largest piece, and of pieces with at least `min_share` of its nodes.
 // What hangs together through nodes above `connect_level` (<= level; six neighbours) is one piece, so that a thin stem
