@@ -9,38 +9,39 @@
 namespace romap {
 namespace {
 
-absl::StatusOr<SE3<World, Object>> ReadPose(const YAML::Node& node, const std::string& where) {
+absl::StatusOr<SE3<World, Object>> ReadPose(const YAML::Node& node, const std::string& path) {
   if (!node["T_world_object"]) {
-    ROMAP_ASSIGN_OR_RETURN(const double yaw_rad, YamlNumber(node, "yaw", where));
-    ROMAP_ASSIGN_OR_RETURN(const std::vector<double> center, YamlNumbers(node, "center", 3, where));
+    ROMAP_ASSIGN_OR_RETURN(const double yaw_rad, YamlNumber(node, "yaw", path));
+    ROMAP_ASSIGN_OR_RETURN(const std::vector<double> center, YamlNumbers(node, "center", 3, path));
     return SE3<World, Object>(Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())),
                               Eigen::Vector3d(center.data()));
   }
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<double> numbers, YamlNumbers(node, "T_world_object", 16, where));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<double> numbers, YamlNumbers(node, "T_world_object", 16, path));
   const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   if ((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3 ||
       rotation.determinant() < 0) {
-    return InvalidArgument("{}: the rotation of T_world_object is not orthonormal and right-handed", where);
+    return InvalidArgument("{}:{}: the rotation of T_world_object is not orthonormal and right-handed", path,
+                           node["T_world_object"].Mark().line + 1);
   }
   return SE3<World, Object>(rotation, Eigen::Vector3d(matrix.topRightCorner<3, 1>()));
 }
 
 absl::StatusOr<ObjectRecord> ReadRecord(const YAML::Node& node, size_t index, const std::string& path) {
   if (!node.IsMap()) return InvalidArgument("{}: entry {} of 'objects' is not a map", path, index + 1);
-  const std::string where = fmt::format("{}: object {}", path, YamlText(node, "id", fmt::format("#{}", index + 1)));
   ObjectRecord record;
-  ROMAP_ASSIGN_OR_RETURN(const double id, YamlNumber(node, "id", where));
-  if (id < 0 || id > 9e15 || id != std::floor(id)) return InvalidArgument("{}: the id is not a whole number", where);
+  const std::string where = fmt::format("{}:{}: object {}", path, node.Mark().line + 1, YamlText(node, "id", ""));
+  ROMAP_ASSIGN_OR_RETURN(const double id, YamlNumber(node, "id", path));
+  if (id < 0 || id > 9e15 || id != std::floor(id)) return InvalidArgument("{}: the id should be a whole number", where);
   record.id = static_cast<int64_t>(id);
   record.class_name = YamlText(node, "class", "");
   record.name = YamlText(node, "name", record.class_name.empty() ? std::to_string(record.id) : record.class_name);
-  ROMAP_ASSIGN_OR_RETURN(record.T_world_object, ReadPose(node, where));
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<double> half_extents, YamlNumbers(node, "half_extents", 3, where));
+  ROMAP_ASSIGN_OR_RETURN(record.T_world_object, ReadPose(node, path));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<double> half_extents, YamlNumbers(node, "half_extents", 3, path));
   record.half_extents = Eigen::Vector3d(half_extents.data());
   if (record.half_extents.minCoeff() <= 0) return InvalidArgument("{}: half_extents should be positive", where);
   if (node["confidence"]) {
-    ROMAP_ASSIGN_OR_RETURN(record.confidence, YamlNumber(node, "confidence", where));
+    ROMAP_ASSIGN_OR_RETURN(record.confidence, YamlNumber(node, "confidence", path));
   }
   return record;
 }

@@ -27,7 +27,7 @@ absl::StatusOr<YAML::Node> LoadYamlMap(const std::string& path) {
 
 absl::StatusOr<double> YamlNumber(const YAML::Node& map, const std::string& key, const std::string& path) {
   const YAML::Node node = map[key];
-  if (!node) return InvalidArgument("{}: '{}' is missing", path, key);
+  if (!node) return InvalidArgument("{}:{}: '{}' is missing", path, LineOf(map), key);
   const std::optional<double> number = AsNumber(node);
   if (!number) return InvalidArgument("{}:{}: '{}' is not a finite number", path, LineOf(node), key);
   return *number;

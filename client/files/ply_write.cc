@@ -1,0 +1,80 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "client/files/ply.h"
+#include "client/files/text_file.h"
+
+namespace romap {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the writers copy native bytes");
+
+template <class T>
+void Append(const T& value, std::string* bytes) {
+  bytes->append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+bool FitsBytes(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return value >= 0 && value <= 255 && value == std::floor(value); });
+}
+
+// One scalar per vertex and the type it is written as.
+struct Column {
+  const std::vector<double>* values;
+  bool as_bytes;
+};
+
+std::string Header(const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars) {
+  std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
+      "property float x\nproperty float y\nproperty float z\n",
+      mesh.vertices.size());
+  if (!mesh.normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
+  if (!mesh.colors.empty()) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  for (const auto& [name, values] : scalars) {
+    header += fmt::format("property {} {}\n", FitsBytes(values) ? "uchar" : "float", name);
+  }
+  if (!mesh.triangles.empty()) {
+    header += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.size());
+  }
+  return header + "end_header\n";
+}
+
+}  // namespace
+
+absl::Status WritePly(const std::string& path, const Mesh& mesh,
+                      const std::map<std::string, std::vector<double>>& scalars) {
+  ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh, path));
+  const size_t count = mesh.vertices.size();
+  const auto fits = [count](size_t size) { return size == 0 || size == count; };
+  std::vector<Column> columns;
+  for (const auto& [name, values] : scalars) {
+    if (values.size() != count)
+      return InvalidArgument("{}: {} values of '{}' for {} vertices", path, values.size(), name, count);
+    columns.push_back({&values, FitsBytes(values)});
+  }
+  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size())) {
+    return InvalidArgument("{}: {} normals and {} colours for {} vertices", path, mesh.normals.size(),
+                           mesh.colors.size(), count);
+  }
+  std::string bytes = Header(mesh, scalars);
+  bytes.reserve(bytes.size() + 32 * count + 13 * mesh.triangles.size());
+  for (size_t k = 0; k < count; ++k) {
+    Append(mesh.vertices[k], &bytes);
+    if (!mesh.normals.empty()) Append(mesh.normals[k], &bytes);
+    if (!mesh.colors.empty()) Append(mesh.colors[k], &bytes);
+    for (const Column& column : columns) {
+      const double value = (*column.values)[k];
+      column.as_bytes ? Append(static_cast<uint8_t>(value), &bytes) : Append(static_cast<float>(value), &bytes);
+    }
+  }
+  for (const auto& triangle : mesh.triangles) {
+    Append(uint8_t{3}, &bytes);
+    Append(triangle, &bytes);
+  }
+  return WriteFile(path, bytes);
+}
+
+}  // namespace romap

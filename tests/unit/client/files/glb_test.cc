@@ -1,0 +1,110 @@
+#include "client/files/glb.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+namespace romap {
+namespace {
+
+uint32_t WordAt(const std::string& bytes, size_t offset) {
+  uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + offset, sizeof(word));
+  return word;
+}
+
+// A GLB taken apart by the rules of the specification.
+struct Glb {
+  explicit Glb(const std::string& bytes) {
+    EXPECT_EQ(bytes.substr(0, 4), "glTF");
+    EXPECT_EQ(WordAt(bytes, 4), 2u);
+    EXPECT_EQ(WordAt(bytes, 8), bytes.size());
+    const uint32_t json_bytes = WordAt(bytes, 12);
+    EXPECT_EQ(bytes.substr(16, 4), "JSON");
+    document = nlohmann::json::parse(bytes.substr(20, json_bytes));
+    EXPECT_EQ(WordAt(bytes, 20 + json_bytes), bytes.size() - 28 - json_bytes);
+    EXPECT_EQ(bytes.substr(24 + json_bytes, 4), std::string("BIN\0", 4));
+    binary = bytes.substr(28 + json_bytes);
+    EXPECT_EQ(json_bytes % 4, 0u);
+    EXPECT_GE(binary.size(), document["buffers"][0]["byteLength"].get<size_t>());
+  }
+
+  // Items of type T that accessor `index` describes.
+  template <class T>
+  std::vector<T> Read(int index, size_t scalars_per_item) const {
+    const auto& accessor = document["accessors"][index];
+    const auto& view = document["bufferViews"][accessor["bufferView"].get<int>()];
+    std::vector<T> items(accessor["count"].get<size_t>() * scalars_per_item);
+    EXPECT_EQ(view["byteLength"].get<size_t>(), items.size() * sizeof(T));
+    EXPECT_EQ(view["byteOffset"].get<size_t>() % 4, 0u);
+    std::memcpy(items.data(), binary.data() + view["byteOffset"].get<size_t>(), items.size() * sizeof(T));
+    return items;
+  }
+
+  nlohmann::json document;
+  std::string binary;
+};
+
+Mesh Triangle() {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, -1}, {2, 0, 0}, {0, 3, 0}};
+  mesh.normals = {{0, 0, 2}, {0, 0, 0}, {0, 1, 0}};
+  mesh.colors = {{255, 0, 188}, {0, 255, 0}, {1, 2, 3}};
+  mesh.triangles = {{0, 1, 2}};
+  return mesh;
+}
+
+TEST(Glb, HoldsTheMeshAsTheSpecificationSays) {
+  const auto bytes = EncodeGlb(Triangle(), "cup \"1\"");
+  ASSERT_TRUE(bytes.ok()) << bytes.status();
+  const Glb glb(*bytes);
+  EXPECT_EQ(glb.document["asset"]["version"], "2.0");
+  EXPECT_EQ(glb.document["nodes"][0]["name"], "cup \"1\"");
+  const auto& primitive = glb.document["meshes"][0]["primitives"][0];
+  const int position = primitive["attributes"]["POSITION"];
+  EXPECT_EQ(glb.Read<float>(position, 3), (std::vector<float>{0, 0, -1, 2, 0, 0, 0, 3, 0}));
+  EXPECT_EQ(glb.document["accessors"][position]["min"], nlohmann::json({0.0, 0.0, -1.0}));
+  EXPECT_EQ(glb.document["accessors"][position]["max"], nlohmann::json({2.0, 3.0, 0.0}));
+  EXPECT_EQ(glb.Read<uint32_t>(primitive["indices"], 1), (std::vector<uint32_t>{0, 1, 2}));
+  EXPECT_EQ(glb.Read<float>(primitive["attributes"]["NORMAL"], 3), (std::vector<float>{0, 0, 1, 0, 0, 1, 0, 1, 0}))
+      << "of unit length";
+  const int color = primitive["attributes"]["COLOR_0"];
+  EXPECT_TRUE(glb.document["accessors"][color]["normalized"].get<bool>());
+  const auto colors = glb.Read<uint16_t>(color, 4);
+  EXPECT_EQ(colors[0], 65535);
+  EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half the light";
+  EXPECT_EQ(colors[3], 65535) << "opaque";
+}
+
+TEST(Glb, TurnsWorldUpIntoGltfUp) {
+  const Glb glb(*EncodeGlb(Triangle(), "t"));
+  const auto q = glb.document["nodes"][0]["rotation"].get<std::vector<double>>();  // x y z w
+  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  EXPECT_TRUE((rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY(), 1e-12));
+  EXPECT_TRUE((rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitX(), 1e-12));
+}
+
+TEST(Glb, MeshWithoutTrianglesIsPoints) {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 1, 1}};
+  const Glb glb(*EncodeGlb(mesh, "points"));
+  const auto& primitive = glb.document["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 0);
+  EXPECT_FALSE(primitive.contains("indices"));
+  EXPECT_FALSE(primitive["attributes"].contains("COLOR_0"));
+}
+
+TEST(Glb, RefusesBrokenMeshes) {
+  EXPECT_FALSE(EncodeGlb(Mesh(), "empty").ok());
+  Mesh mesh = Triangle();
+  mesh.normals.pop_back();
+  EXPECT_EQ(EncodeGlb(mesh, "t").status().message(), "t: 2 normals and 3 colours for 3 vertices");
+  mesh = Triangle();
+  mesh.triangles[0][1] = 3;
+  EXPECT_FALSE(EncodeGlb(mesh, "t").ok());
+}
+
+}  // namespace
+}  // namespace romap

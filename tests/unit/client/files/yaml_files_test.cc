@@ -1,0 +1,127 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "client/files/camera_yaml.h"
+#include "client/files/objects_yaml.h"
+
+namespace romap {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string TempPath(const std::string& name) {
+  return testing::TempDir() + "romap_" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
+}
+
+std::string ErrorOf(const absl::Status& status) { return std::string(status.message()); }
+
+TEST(CameraYaml, WhatIsWrittenIsReadBack) {
+  const std::string path = TempPath("camera.yaml");
+  CameraYaml camera;
+  camera.camera = {640, 480, 888.888916015625, 525.7, 319.5, 239.5, {-0.1, 0.02, 1e-4, -2e-4, 3e-3}};
+  camera.fps = 29.97;
+  camera.depth_scale = 4.5777065690089265e-05;
+  ASSERT_TRUE(WriteCameraYaml(path, camera).ok());
+  const auto read = ReadCameraYaml(path);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->camera, camera.camera);
+  EXPECT_EQ(read->fps, camera.fps);
+  EXPECT_EQ(read->depth_scale, camera.depth_scale);
+  std::filesystem::remove(path);
+}
+
+TEST(CameraYaml, SaysWhatIsWrong) {
+  const std::string path = TempPath("camera.yaml");
+  const std::string good = "width: 64\nheight: 48\nfx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\n";
+  for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
+           {"width: 64\nheight: 48\nfy: 50\n", "'fx' is missing"},
+           {good + "fx: [1\n", "not YAML"},
+           {"just words\n", "not a YAML map"},
+           {"width: 64.5\nheight: 48\n", "'width' is 64.5, should be a whole number"},
+           {"width: 64\nheight: .nan\n", "camera.yaml:2: 'height' is not a finite number"},
+           {good + "distortion: [0, 0, 0]\n", "camera.yaml:7: 'distortion' should be a list of 5 numbers"},
+           {good + "fps: 0\n", "'fps' is 0, should be positive"}}) {
+    std::ofstream(path) << text;
+    EXPECT_THAT(ErrorOf(ReadCameraYaml(path).status()), HasSubstr(message));
+  }
+  std::filesystem::remove(path);
+  EXPECT_EQ(ReadCameraYaml(path).status().code(), absl::StatusCode::kNotFound);
+}
+
+ObjectsYaml TwoObjects() {
+  ObjectsYaml objects;
+  objects.up_world = Eigen::Vector3d(0, 0.6, 0.8);
+  objects.objects.push_back(
+      {1,
+       "the \"big\" cup: 1",
+       "cup",
+       {Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(1, -2, 0.5)},
+       Eigen::Vector3d(0.1, 0.2, 0.3),
+       0.75});
+  objects.objects.push_back({12, "plant", "potted plant", {}, Eigen::Vector3d(1, 1, 1), std::nullopt});
+  return objects;
+}
+
+class ObjectsFormat : public testing::TestWithParam<const char*> {};
+
+TEST_P(ObjectsFormat, WhatIsWrittenIsReadBack) {
+  const std::string path = testing::TempDir() + "romap_objects_roundtrip" + GetParam();
+  const ObjectsYaml objects = TwoObjects();
+  ASSERT_TRUE(WriteObjects(path, objects).ok());
+  const auto read = ReadObjects(path);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_TRUE(read->up_world.isApprox(objects.up_world, 1e-8));
+  ASSERT_EQ(read->objects.size(), 2u);
+  for (size_t k = 0; k < 2; ++k) {
+    const ObjectRecord& a = read->objects[k];
+    const ObjectRecord& b = objects.objects[k];
+    EXPECT_EQ(a.id, b.id);
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.class_name, b.class_name);
+    EXPECT_TRUE(a.T_world_object.Matrix().isApprox(b.T_world_object.Matrix(), 1e-8));
+    EXPECT_TRUE(a.half_extents.isApprox(b.half_extents, 1e-8));
+    EXPECT_EQ(a.confidence, b.confidence);
+  }
+  std::filesystem::remove(path);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, ObjectsFormat, testing::Values(".yaml", ".json"),
+                         [](const auto& info) { return std::string(info.param).substr(1); });
+
+TEST(ObjectsYaml, AcceptsAMapWithoutObjects) {
+  const std::string path = TempPath("cuboids.json");
+  ASSERT_TRUE(WriteObjects(path, {}).ok());
+  const auto read = ReadObjects(path);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_TRUE(read->objects.empty());
+  std::filesystem::remove(path);
+}
+
+TEST(ObjectsYaml, SaysWhichObjectIsWrong) {
+  const std::string path = TempPath("objects.yaml");
+  const std::string head = "objects:\n  - id: 3\n    yaw: 0\n    center: [0, 0, 0]\n";
+  const std::string matrix = "    T_world_object: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, ";
+  for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
+           {head, "objects.yaml:2: 'half_extents' is missing"},
+           {head + "    half_extents: [1, -1, 1]\n", "objects.yaml:2: object 3: half_extents should be positive"},
+           {head + "    half_extents: [1, 1]\n", "should be a list of 3 numbers"},
+           {head + "    half_extents: [1, .inf, 1]\n", "not a finite number"},
+           {head + matrix + "2, 0, 0, 0, 0, 1]\n", "objects.yaml:5: the rotation"},
+           {head + matrix + "-1, 0, 0, 0, 0, 1]\n", "right-handed"},
+           {"objects:\n  - half_extents: [1, 1, 1]\n", "objects.yaml:2: 'id' is missing"},
+           {"objects:\n  - 5\n", "entry 1 of 'objects' is not a map"},
+           {"world_up: [0, 0, 0]\nobjects:\n", "'world_up' has no direction"},
+           {"things: []\n", "should hold a list 'objects:'"},
+           {"\x01\x02\xff", "objects.yaml"}}) {
+    std::ofstream(path) << text;
+    EXPECT_THAT(ErrorOf(ReadObjects(path).status()), AllOf(HasSubstr("objects.yaml"), HasSubstr(message)));
+  }
+  std::filesystem::remove(path);
+}
+
+}  // namespace
+}  // namespace romap
