@@ -1,0 +1,64 @@
+#include "server/slam/keyframe_selector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace romap {
+namespace {
+
+constexpr size_t kSharpnessWindowFrames = 15;
+constexpr int kMaskMemoryFrames = 30;    // masks that last came longer ago are not waited for
+constexpr double kStandingStill = 0.15;  // progress below which passing time makes no keyframe
+
+}  // namespace
+
+bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
+  DepthView view = MakeDepthView(frame, T_world_camera);
+  const double sharpness = Sharpness(view);
+  if (last_keyframe_) {
+    if (const auto depth_mu = SceneDepth(*last_keyframe_, view)) scene_depth_mu_ = depth_mu;
+  }
+  const bool is_good = IsGood(frame, sharpness);
+  ++frames_since_keyframe_;
+
+  bool is_keyframe = !last_keyframe_;
+  if (!is_keyframe) {
+    const double progress = Progress(T_world_camera);
+    const bool timed_out = frames_since_keyframe_ >= config_.keyframe_max_gap_frames && progress > kStandingStill;
+    frames_due_ = progress >= 1 || timed_out ? frames_due_ + 1 : 0;
+    is_keyframe = frames_due_ > (is_good ? 0 : config_.keyframe_wait_frames);
+  }
+  if (is_keyframe) {
+    last_keyframe_ = std::move(view);
+    frames_since_keyframe_ = 0;
+    frames_due_ = 0;
+  }
+  return is_keyframe;
+}
+
+double KeyframeSelector::Progress(const SE3<World, Camera>& T_world_camera) const {
+  const SE3<World, Camera>& last = last_keyframe_->T_world_camera;
+  const double turn_deg = last.rotation().angularDistance(T_world_camera.rotation()) * 180 / std::numbers::pi;
+  double progress = turn_deg / config_.keyframe_rotation_deg;
+  if (scene_depth_mu_) {
+    const double way_mu = (last.translation() - T_world_camera.translation()).norm();
+    progress = std::max(progress, way_mu / (*scene_depth_mu_ * config_.keyframe_translation_ratio));
+  }
+  return progress;
+}
+
+bool KeyframeSelector::IsGood(const Frame& frame, double sharpness) {
+  frames_since_mask_ = frame.has_masks ? 0 : std::min(frames_since_mask_ + 1, kMaskMemoryFrames);
+  const bool has_what_comes = frame.has_masks || frames_since_mask_ >= kMaskMemoryFrames;
+
+  recent_sharpness_.push_back(sharpness);
+  if (recent_sharpness_.size() > kSharpnessWindowFrames) recent_sharpness_.pop_front();
+  std::vector<double> sorted(recent_sharpness_.begin(), recent_sharpness_.end());
+  std::sort(sorted.begin(), sorted.end());
+  return has_what_comes && sharpness >= config_.keyframe_sharpness_ratio * sorted[sorted.size() / 2];
+}
+
+}  // namespace romap

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <deque>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "common/messages.h"
+#include "server/slam/scene_depth.h"
+#include "server/slam/slam_config.h"
+
+namespace romap {
+
+// Chooses keyframes from camera poses: one is due when the camera has turned or moved enough since the last one, or
+// when it has moved at all and much time has passed; a camera that stands still gets no more. A due keyframe waits a
+// few frames for one that is sharp and, where masks come with some frames only, has masks.
+class KeyframeSelector {
+ public:
+  explicit KeyframeSelector(const SlamConfig& config) : config_(config) {}
+
+  // Is this frame a keyframe? Call once per frame, in order. The first frame always is.
+  bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera);
+
+ private:
+  // How far the camera has come towards the next keyframe; 1 = there.
+  double Progress(const SE3<World, Camera>& T_world_camera) const;
+  bool IsGood(const Frame& frame, double sharpness);
+
+  const SlamConfig config_;
+  std::optional<DepthView> last_keyframe_;
+  std::optional<double> scene_depth_mu_;
+  int frames_since_keyframe_ = 0;
+  int frames_due_ = 0;
+  int frames_since_mask_ = 1 << 20;
+  std::deque<double> recent_sharpness_;
+};
+
+}  // namespace romap

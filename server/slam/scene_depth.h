@@ -1,0 +1,29 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "common/messages.h"
+
+namespace romap {
+
+// A small grey copy of a frame with what is needed to measure depth against another one.
+struct DepthView {
+  CameraModel camera;  // of `grey`
+  SE3<World, Camera> T_world_camera;
+  cv::Mat grey = {};                           // CV_8UC1, about 160 px wide
+  std::optional<double> sensor_depth_mu = {};  // median of the frame's depth image
+};
+
+DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_camera);
+
+// Variance of the Laplacian, grey levels squared: comparable between frames of one scene.
+double Sharpness(const DepthView& view);
+
+// Typical depth of the scene in map units, seen from `first`. A depth image gives it directly. Otherwise it is the
+// median over image blocks of a plane sweep (Collins 1996): `second` is warped to `first` for planes at several depths
+// and each block keeps the depth under which it fits best. nullopt: the views are too close together, too different or
+// without texture.
+std::optional<double> SceneDepth(const DepthView& first, const DepthView& second);
+
+}  // namespace romap

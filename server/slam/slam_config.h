@@ -1,0 +1,93 @@
+#pragma once
+
+#include "common/config.h"
+
+namespace romap {
+
+// When a frame becomes a keyframe, and how keyframes become a sparse map.
+struct SlamConfig {
+  double keyframe_rotation_deg = 5.0;
+  double keyframe_translation_ratio = 0.06;
+  int keyframe_max_gap_frames = 30;
+  int keyframe_wait_frames = 3;
+  double keyframe_sharpness_ratio = 0.75;
+
+  int scene_features = 900;
+  int object_features = 600;
+  int scene_fast_threshold = 12;
+  int object_fast_threshold = 5;
+  int mask_erosion_px = 1;
+
+  int matched_keyframes = 4;
+  int kept_keyframes = 20;
+  int max_points = 20000;
+  double min_parallax_deg = 1.5;
+  double pixel_sigma_px = 1.0;
+  double search_radius_px = 4.0;
+  int max_descriptor_distance = 60;
+  double descriptor_ratio = 0.85;
+  int trial_keyframes = 3;
+  int trial_observations = 3;
+  double depth_sigma_ratio = 0.02;
+
+  void Fields(ConfigFields& fields) {
+    KeyframeFields(fields);
+    FeatureFields(fields);
+    MapFields(fields);
+  }
+
+ private:
+  void KeyframeFields(ConfigFields& fields) {
+    fields.Add("keyframe_rotation_deg", &keyframe_rotation_deg,
+               {.unit = "deg", .min = 0.1, .max = 90, .help = "Turn since the last keyframe that makes a new one due"});
+    fields.Add("keyframe_translation_ratio", &keyframe_translation_ratio,
+               {.min = 0.001, .max = 1, .help = "Way since the last keyframe, over the scene's depth, that does so"});
+    fields.Add(
+        "keyframe_max_gap_frames", &keyframe_max_gap_frames,
+        {.unit = "frames", .min = 1, .max = 10000, .help = "A moving camera gets a keyframe at least this often"});
+    fields.Add(
+        "keyframe_wait_frames", &keyframe_wait_frames,
+        {.unit = "frames", .min = 0, .max = 30, .help = "How long a due keyframe waits for a sharp, masked frame"});
+    fields.Add("keyframe_sharpness_ratio", &keyframe_sharpness_ratio,
+               {.min = 0, .max = 2, .help = "Sharp is what reaches this share of the recent frames' median sharpness"});
+  }
+
+  void FeatureFields(ConfigFields& fields) {
+    fields.Add("scene_features", &scene_features,
+               {.min = 50, .max = 10000, .help = "ORB features per keyframe, spread over the whole image"});
+    fields.Add("object_features", &object_features,
+               {.min = 0, .max = 10000, .help = "Further ORB features, spread over the instance masks only"});
+    fields.Add("scene_fast_threshold", &scene_fast_threshold,
+               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner anywhere"});
+    fields.Add("object_fast_threshold", &object_fast_threshold,
+               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner inside an instance mask"});
+    fields.Add("mask_erosion_px", &mask_erosion_px,
+               {.unit = "px", .min = 0, .max = 10, .help = "A feature this close to its mask's border gets no label"});
+  }
+
+  void MapFields(ConfigFields& fields) {
+    fields.Add("matched_keyframes", &matched_keyframes,
+               {.min = 1, .max = 20, .help = "Earlier keyframes that a new one is matched with to find new points"});
+    fields.Add("kept_keyframes", &kept_keyframes,
+               {.min = 2, .max = 200, .help = "Keyframes whose features are kept for matching"});
+    fields.Add("max_points", &max_points, {.min = 100, .max = 1e6, .help = "Map points; beyond, the stalest go"});
+    fields.Add("min_parallax_deg", &min_parallax_deg,
+               {.unit = "deg", .min = 0.1, .max = 30, .help = "Angle between two rays that makes a point of them"});
+    fields.Add("pixel_sigma_px", &pixel_sigma_px,
+               {.unit = "px", .min = 0.1, .max = 10, .help = "Standard deviation of a feature of the finest octave"});
+    fields.Add("search_radius_px", &search_radius_px,
+               {.unit = "px", .min = 1, .max = 50, .help = "How far from its projection a known point is looked for"});
+    fields.Add("max_descriptor_distance", &max_descriptor_distance,
+               {.unit = "bits", .min = 10, .max = 128, .help = "Hamming distance of two ORB descriptors of one point"});
+    fields.Add("descriptor_ratio", &descriptor_ratio,
+               {.min = 0.1, .max = 1, .help = "Best over second best distance of an unambiguous match"});
+    fields.Add("trial_keyframes", &trial_keyframes,
+               {.unit = "keyframes", .min = 1, .max = 100, .help = "Time a new point has to prove itself"});
+    fields.Add("trial_observations", &trial_observations,
+               {.min = 2, .max = 20, .help = "Observations it needs by then"});
+    fields.Add("depth_sigma_ratio", &depth_sigma_ratio,
+               {.min = 0.0001, .max = 1, .help = "Standard deviation of a depth image over the depth"});
+  }
+};
+
+}  // namespace romap
