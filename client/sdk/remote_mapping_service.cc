@@ -1,0 +1,142 @@
+#include "client/sdk/remote_mapping_service.h"
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/channel_arguments.h>
+
+#include <utility>
+
+#include "client/sdk/remote_streams.h"
+#include "common/status.h"
+#include "common/wire/sessions.h"
+#include "common/wire/status.h"
+#include "romap/v1/mapping.grpc.pb.h"
+
+namespace romap {
+namespace {
+
+using std::chrono::system_clock;
+
+grpc::ChannelArguments MakeChannelArguments(const RemoteOptions& options) {
+  constexpr int kKeepalive_ms = 20'000;
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(options.max_message_bytes);
+  arguments.SetMaxSendMessageSize(options.max_message_bytes);
+  // A server that vanished without a word (power, network) is noticed by pings.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepalive_ms);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+  // A server that is just starting is found soon after it listens.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
+  // Not shared with other channels of the process, whose failed attempts would delay ours.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return arguments;
+}
+
+// A context whose call must be over in `timeout`.
+struct TimedContext : grpc::ClientContext {
+  explicit TimedContext(std::chrono::milliseconds timeout) { set_deadline(system_clock::now() + timeout); }
+};
+
+}  // namespace
+
+struct RemoteMappingService::Connection {
+  RemoteOptions options;
+  std::shared_ptr<v1::Mapping::Stub> stub;
+};
+
+absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::Connect(const std::string& host_port,
+                                                                                    const RemoteOptions& options) {
+  const std::shared_ptr<grpc::Channel> channel =
+      grpc::CreateCustomChannel(host_port, grpc::InsecureChannelCredentials(), MakeChannelArguments(options));
+  if (!channel->WaitForConnected(system_clock::now() + options.connect_timeout)) {
+    return absl::UnavailableError(
+        fmt::format("no romap-server at {0} (start it with: romap-server --listen {0})", host_port));
+  }
+  std::unique_ptr<Connection> connection(new Connection{options, v1::Mapping::NewStub(channel)});
+  std::unique_ptr<RemoteMappingService> service(new RemoteMappingService(std::move(connection)));
+  // Something listens there; only an answer proves that it is a romap-server.
+  if (const absl::Status answer = service->ListSessions().status(); !answer.ok()) {
+    return absl::UnavailableError(
+        fmt::format("what listens at {} does not answer as a romap-server: {}", host_port, Message(answer)));
+  }
+  return service;
+}
+
+RemoteMappingService::RemoteMappingService(std::unique_ptr<Connection> connection)
+    : connection_(std::move(connection)) {}
+RemoteMappingService::~RemoteMappingService() = default;
+
+absl::StatusOr<SessionInfo> RemoteMappingService::CreateSession(const SessionOptions& options) {
+  TimedContext context(connection_->options.call_timeout);
+  v1::CreateSessionResponse response;
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(connection_->stub->CreateSession(&context, wire::ToProto(options), &response)));
+  return wire::FromProto(response.session(), "session");
+}
+
+absl::StatusOr<std::vector<SessionInfo>> RemoteMappingService::ListSessions() {
+  TimedContext context(connection_->options.call_timeout);
+  v1::ListSessionsResponse response;
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(connection_->stub->ListSessions(&context, {}, &response)));
+  std::vector<SessionInfo> infos;
+  for (const v1::SessionInfo& session : response.sessions()) {
+    ROMAP_ASSIGN_OR_RETURN(SessionInfo info, wire::FromProto(session, fmt::format("sessions[{}]", infos.size())));
+    infos.push_back(std::move(info));
+  }
+  return infos;
+}
+
+absl::StatusOr<SessionInfo> RemoteMappingService::GetSession(const std::string& session_id) {
+  TimedContext context(connection_->options.call_timeout);
+  v1::GetSessionRequest request;
+  request.set_session_id(session_id);
+  v1::GetSessionResponse response;
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(connection_->stub->GetSession(&context, request, &response)));
+  return wire::FromProto(response.session(), "session");
+}
+
+absl::StatusOr<SessionInfo> RemoteMappingService::FinishSession(const std::string& session_id) {
+  TimedContext context(connection_->options.call_timeout);
+  v1::FinishSessionRequest request;
+  request.set_session_id(session_id);
+  v1::FinishSessionResponse response;
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(connection_->stub->FinishSession(&context, request, &response)));
+  return wire::FromProto(response.session(), "session");
+}
+
+absl::Status RemoteMappingService::DeleteSession(const std::string& session_id) {
+  TimedContext context(connection_->options.call_timeout);
+  v1::DeleteSessionRequest request;
+  request.set_session_id(session_id);
+  v1::DeleteSessionResponse response;
+  return wire::FromGrpc(connection_->stub->DeleteSession(&context, request, &response));
+}
+
+absl::StatusOr<std::unique_ptr<MapStream>> RemoteMappingService::OpenMap(const std::string& session_id) {
+  return sdk::RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
+                                    connection_->options.max_message_bytes);
+}
+
+absl::StatusOr<std::unique_ptr<EventStream>> RemoteMappingService::Watch(const std::string& session_id) {
+  return sdk::RemoteWatchStream::Open(connection_->stub, session_id, connection_->options.call_timeout);
+}
+
+absl::StatusOr<MapSnapshot> RemoteMappingService::ExportMap(const std::string& session_id) {
+  TimedContext context(connection_->options.export_timeout);
+  v1::ExportMapRequest request;
+  request.set_session_id(session_id);
+  const auto reader = connection_->stub->ExportMap(&context, request);
+  wire::SnapshotAssembler assembler;
+  absl::Status assembled;
+  for (v1::ExportMapResponse part; assembled.ok() && reader->Read(&part);) assembled = assembler.Add(std::move(part));
+  if (!assembled.ok()) context.TryCancel();
+  const grpc::Status finished = reader->Finish();
+  ROMAP_RETURN_IF_ERROR(assembled);
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(finished));
+  return assembler.Take();
+}
+
+}  // namespace romap

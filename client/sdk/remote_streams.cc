@@ -1,0 +1,93 @@
+#include "client/sdk/remote_streams.h"
+
+#include <utility>
+
+#include "common/status.h"
+#include "common/wire/frame.h"
+
+namespace romap::sdk {
+
+absl::StatusOr<std::unique_ptr<EventStream>> RemoteWatchStream::Open(std::shared_ptr<v1::Mapping::Stub> stub,
+                                                                     const std::string& session_id,
+                                                                     std::chrono::milliseconds timeout) {
+  std::unique_ptr<RemoteWatchStream> stream(new RemoteWatchStream(std::move(stub)));
+  stream->request_.set_session_id(session_id);
+  stream->stub_->async()->Watch(stream->reactor_.context(), &stream->request_, &stream->reactor_);
+  ROMAP_RETURN_IF_ERROR(stream->reactor_.Begin(timeout));
+  return stream;
+}
+
+absl::StatusOr<std::unique_ptr<MapStream>> RemoteMapStream::Open(std::shared_ptr<v1::Mapping::Stub> stub,
+                                                                 const std::string& session_id,
+                                                                 std::chrono::milliseconds timeout,
+                                                                 int max_message_bytes) {
+  std::unique_ptr<RemoteMapStream> stream(new RemoteMapStream(std::move(stub), max_message_bytes));
+  stream->stub_->async()->Map(stream->reactor_.context(), &stream->reactor_);
+  stream->reactor_.QueueStart(session_id);
+  ROMAP_RETURN_IF_ERROR(stream->reactor_.Begin(timeout));
+  return stream;
+}
+
+void RemoteMapStream::Reactor::QueueStart(const std::string& session_id) {
+  request_.mutable_start()->set_session_id(session_id);
+  write_pending_ = true;
+  StartWrite(&request_);
+}
+
+absl::Status RemoteMapStream::Reactor::Send(FrameInput frame) {
+  const uint64_t frame_id = frame.frame_id;
+  std::lock_guard sending(send_mutex_);
+  if (send_closed_) return FailedPrecondition("this stream was closed for sending");
+  ROMAP_RETURN_IF_ERROR(WaitForWrite());
+  *request_.mutable_frame() = wire::ToProto(std::move(frame));
+  const size_t bytes = request_.ByteSizeLong();
+  if (bytes > static_cast<size_t>(max_message_bytes_)) {
+    FrameAck refusal;
+    refusal.frame_id = frame_id;
+    refusal.accepted = false;
+    refusal.error = fmt::format("frame: {} bytes, at most {} are allowed", bytes, max_message_bytes_);
+    Deliver(std::move(refusal));
+    return absl::OkStatus();
+  }
+  {
+    std::lock_guard lock(write_mutex_);
+    write_pending_ = true;
+  }
+  if (!HoldUnlessEnded()) {
+    OnWriteDone(false);
+    return WaitForWrite();
+  }
+  StartWrite(&request_);
+  RemoveHold();
+  return WaitForWrite();
+}
+
+absl::Status RemoteMapStream::Reactor::CloseSend() {
+  std::lock_guard sending(send_mutex_);
+  if (send_closed_) return FailedPrecondition("this stream was closed for sending");
+  ROMAP_RETURN_IF_ERROR(WaitForWrite());
+  if (!HoldUnlessEnded()) return EndStatus();
+  send_closed_ = true;
+  StartWritesDone();
+  RemoveHold();
+  return absl::OkStatus();
+}
+
+void RemoteMapStream::Reactor::OnWriteDone(bool ok) {
+  std::lock_guard lock(write_mutex_);
+  write_pending_ = false;
+  write_failed_ = write_failed_ || !ok;
+  write_changed_.notify_all();
+}
+
+absl::Status RemoteMapStream::Reactor::WaitForWrite() {
+  {
+    std::unique_lock lock(write_mutex_);
+    write_changed_.wait(lock, [&] { return !write_pending_; });
+    if (!write_failed_) return absl::OkStatus();
+  }
+  const absl::Status status = EndStatus();
+  return status.ok() ? FailedPrecondition("the server has ended the stream and takes no more frames") : status;
+}
+
+}  // namespace romap::sdk

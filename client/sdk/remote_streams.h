@@ -1,0 +1,92 @@
+#pragma once
+
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/sdk/event_reactor.h"
+#include "common/mapping_service.h"
+#include "romap/v1/mapping.grpc.pb.h"
+
+namespace romap::sdk {
+
+// Streams keep the stub, because it keeps the channel that their call runs on.
+
+class RemoteWatchStream : public EventStream {
+ public:
+  static absl::StatusOr<std::unique_ptr<EventStream>> Open(std::shared_ptr<v1::Mapping::Stub> stub,
+                                                           const std::string& session_id,
+                                                           std::chrono::milliseconds timeout);
+
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return reactor_.Next(timeout); }
+  bool Done() const override { return reactor_.Done(); }
+  absl::Status status() const override { return reactor_.status(); }
+  void Cancel() override { reactor_.Cancel(); }
+
+ private:
+  class Reactor : public EventReactor<grpc::ClientReadReactor<v1::WatchResponse>, v1::WatchResponse> {
+   public:
+    ~Reactor() override { Shut(); }
+  };
+
+  explicit RemoteWatchStream(std::shared_ptr<v1::Mapping::Stub> stub) : stub_(std::move(stub)) {}
+
+  const std::shared_ptr<v1::Mapping::Stub> stub_;
+  v1::WatchRequest request_;
+  Reactor reactor_;
+};
+
+class RemoteMapStream : public MapStream {
+ public:
+  static absl::StatusOr<std::unique_ptr<MapStream>> Open(std::shared_ptr<v1::Mapping::Stub> stub,
+                                                         const std::string& session_id,
+                                                         std::chrono::milliseconds timeout, int max_message_bytes);
+
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return reactor_.Next(timeout); }
+  bool Done() const override { return reactor_.Done(); }
+  absl::Status status() const override { return reactor_.status(); }
+  void Cancel() override { reactor_.Cancel(); }
+  absl::Status Send(FrameInput frame) override { return reactor_.Send(std::move(frame)); }
+  absl::Status CloseSend() override { return reactor_.CloseSend(); }
+
+ private:
+  // The sending half; one write is under way at a time.
+  class Reactor : public EventReactor<grpc::ClientBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
+   public:
+    explicit Reactor(int max_message_bytes) : max_message_bytes_(max_message_bytes) {}
+    ~Reactor() override { Shut(); }
+
+    // The first request goes out with the start of the call.
+    void QueueStart(const std::string& session_id);
+    absl::Status Send(FrameInput frame);
+    absl::Status CloseSend();
+    void OnWriteDone(bool ok) override;
+
+   private:
+    absl::Status WaitForWrite();
+
+    const int max_message_bytes_;
+    std::mutex send_mutex_;  // held by a sender from start to end
+    v1::MapRequest request_;
+    bool send_closed_ = false;
+
+    std::mutex write_mutex_;
+    std::condition_variable write_changed_;
+    bool write_pending_ = false;
+    bool write_failed_ = false;
+  };
+
+  RemoteMapStream(std::shared_ptr<v1::Mapping::Stub> stub, int max_message_bytes)
+      : stub_(std::move(stub)), reactor_(max_message_bytes) {}
+
+  const std::shared_ptr<v1::Mapping::Stub> stub_;
+  Reactor reactor_;
+};
+
+}  // namespace romap::sdk

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+
+#include "common/mapping_service.h"
+#include "romap/v1/mapping.grpc.pb.h"
+#include "server/transport/stream_reactor.h"
+
+namespace romap::transport {
+
+// One Map call: frames from the client to MapStream::Send, events from MapStream::Next to the client. The next frame is
+// read only when Send has taken the last one; that is what slows the client down.
+class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
+ public:
+  using StreamReactor::StreamReactor;
+
+  void OnReadDone(bool ok) override { read_.Complete(ok); }
+
+ private:
+  absl::Status Run() override;
+  void OnStop() override { read_.Abandon(); }
+
+  // Waits for the next request, into request_; false when the client has closed its side or the call is stopping.
+  bool Read();
+  void PumpFrames(MapStream& stream);
+  // What to answer to the request in request_: OK, or why the call must end.
+  absl::Status TakeFrame(MapStream& stream);
+  void Refuse(uint64_t frame_id, const absl::Status& why);
+
+  Completion read_;
+  v1::MapRequest request_;
+};
+
+}  // namespace romap::transport

@@ -1,0 +1,123 @@
+#include "server/transport/mapping_rpcs.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "common/status.h"
+#include "common/wire/sessions.h"
+#include "common/wire/status.h"
+#include "server/transport/map_reactor.h"
+#include "server/transport/stream_reactor.h"
+
+namespace romap::transport {
+namespace {
+
+class WatchReactor : public StreamReactor<grpc::ServerWriteReactor<v1::WatchResponse>, v1::WatchResponse> {
+ public:
+  WatchReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+
+ private:
+  absl::Status Run() override {
+    ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<EventStream> events, service().Watch(session_id_));
+    return ForwardEvents(session_id_, *events);
+  }
+
+  const std::string session_id_;
+};
+
+class ExportReactor : public StreamReactor<grpc::ServerWriteReactor<v1::ExportMapResponse>, v1::ExportMapResponse> {
+ public:
+  ExportReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+
+ private:
+  absl::Status Run() override {
+    ROMAP_ASSIGN_OR_RETURN(MapSnapshot snapshot, service().ExportMap(session_id_));
+    for (const v1::ExportMapResponse& part : wire::ToProto(std::move(snapshot))) {
+      if (stopping() || !Write(part)) return absl::CancelledError("the client is gone");
+    }
+    return absl::OkStatus();
+  }
+
+  const std::string session_id_;
+};
+
+template <class StreamReactor>
+StreamReactor* Started(StreamReactor* reactor) {
+  reactor->Start();
+  return reactor;
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* MappingRpcs::Answer(grpc::CallbackServerContext* context,
+                                              std::function<absl::Status()> body) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const absl::Status launched =
+      host_->Launch(nullptr, [reactor, body = std::move(body)] { reactor->Finish(wire::ToGrpc(Guarded(body))); });
+  if (!launched.ok()) reactor->Finish(wire::ToGrpc(launched));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::CreateSession(grpc::CallbackServerContext* context,
+                                                     const v1::CreateSessionRequest* request,
+                                                     v1::CreateSessionResponse* response) {
+  return Answer(context, [=, this]() -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionOptions options, wire::FromProto(*request));
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().CreateSession(options));
+    *response->mutable_session() = wire::ToProto(info);
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::ListSessions(grpc::CallbackServerContext* context,
+                                                    const v1::ListSessionsRequest* /*request*/,
+                                                    v1::ListSessionsResponse* response) {
+  return Answer(context, [=, this]() -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const std::vector<SessionInfo> infos, host_->service().ListSessions());
+    for (const SessionInfo& info : infos) *response->add_sessions() = wire::ToProto(info);
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::GetSession(grpc::CallbackServerContext* context,
+                                                  const v1::GetSessionRequest* request,
+                                                  v1::GetSessionResponse* response) {
+  return Answer(context, [=, this]() -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().GetSession(request->session_id()));
+    *response->mutable_session() = wire::ToProto(info);
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::FinishSession(grpc::CallbackServerContext* context,
+                                                     const v1::FinishSessionRequest* request,
+                                                     v1::FinishSessionResponse* response) {
+  return Answer(context, [=, this]() -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().FinishSession(request->session_id()));
+    *response->mutable_session() = wire::ToProto(info);
+    return absl::OkStatus();
+  });
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::DeleteSession(grpc::CallbackServerContext* context,
+                                                     const v1::DeleteSessionRequest* request,
+                                                     v1::DeleteSessionResponse* /*response*/) {
+  return Answer(context, [=, this] { return host_->service().DeleteSession(request->session_id()); });
+}
+
+grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>* MappingRpcs::Map(grpc::CallbackServerContext* /*context*/) {
+  return Started(new MapReactor(host_));
+}
+
+grpc::ServerWriteReactor<v1::WatchResponse>* MappingRpcs::Watch(grpc::CallbackServerContext* /*context*/,
+                                                                const v1::WatchRequest* request) {
+  return Started(new WatchReactor(host_, request->session_id()));
+}
+
+grpc::ServerWriteReactor<v1::ExportMapResponse>* MappingRpcs::ExportMap(grpc::CallbackServerContext* /*context*/,
+                                                                        const v1::ExportMapRequest* request) {
+  return Started(new ExportReactor(host_, request->session_id()));
+}
+
+}  // namespace romap::transport

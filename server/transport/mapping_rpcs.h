@@ -1,0 +1,40 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <functional>
+
+#include "romap/v1/mapping.grpc.pb.h"
+#include "server/transport/call_host.h"
+
+namespace romap::transport {
+
+// The gRPC service: one handler per method, each translates, asks the MappingService, and translates back.
+class MappingRpcs : public v1::Mapping::CallbackService {
+ public:
+  explicit MappingRpcs(CallHost* host) : host_(host) {}
+
+  grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context, const v1::CreateSessionRequest* request,
+                                          v1::CreateSessionResponse* response) override;
+  grpc::ServerUnaryReactor* ListSessions(grpc::CallbackServerContext* context, const v1::ListSessionsRequest* request,
+                                         v1::ListSessionsResponse* response) override;
+  grpc::ServerUnaryReactor* GetSession(grpc::CallbackServerContext* context, const v1::GetSessionRequest* request,
+                                       v1::GetSessionResponse* response) override;
+  grpc::ServerUnaryReactor* FinishSession(grpc::CallbackServerContext* context, const v1::FinishSessionRequest* request,
+                                          v1::FinishSessionResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context, const v1::DeleteSessionRequest* request,
+                                          v1::DeleteSessionResponse* response) override;
+  grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>* Map(grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<v1::WatchResponse>* Watch(grpc::CallbackServerContext* context,
+                                                     const v1::WatchRequest* request) override;
+  grpc::ServerWriteReactor<v1::ExportMapResponse>* ExportMap(grpc::CallbackServerContext* context,
+                                                             const v1::ExportMapRequest* request) override;
+
+ private:
+  // Answers with the status that `body` returns on a thread of its own. Request and response live until then.
+  grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, std::function<absl::Status()> body);
+
+  CallHost* const host_;
+};
+
+}  // namespace romap::transport

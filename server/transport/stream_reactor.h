@@ -1,0 +1,149 @@
+#pragma once
+
+#include <absl/status/status.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "common/mapping_service.h"
+#include "common/wire/events.h"
+#include "common/wire/status.h"
+#include "server/transport/call_host.h"
+
+namespace romap::transport {
+
+// Lets a thread wait for a gRPC operation that it has started. One operation at a time.
+class Completion {
+ public:
+  // From gRPC's thread: the operation is over.
+  void Complete(bool ok) {
+    std::lock_guard lock(mutex_);
+    result_ = ok;
+    changed_.notify_all();
+  }
+  // Waits for the operation; false when it failed or is not waited for any more.
+  bool Wait() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return abandoned_ || result_.has_value(); });
+    return !abandoned_ && std::exchange(result_, std::nullopt).value();
+  }
+  // Ends the present Wait() and all later ones with false.
+  void Abandon() {
+    std::lock_guard lock(mutex_);
+    abandoned_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<bool> result_;
+  bool abandoned_ = false;
+};
+
+// A streaming call whose work is done by Run() on a thread of its own: gRPC's threads only say what has completed. Made
+// with new, deletes itself when gRPC is done with it.
+// Reactor: grpc::ServerWriteReactor<Response>, or a ServerBidiReactor that writes Response.
+template <class Reactor, class Response>
+class StreamReactor : public Reactor, public StoppableCall {
+ public:
+  explicit StreamReactor(CallHost* host) : host_(host) {}
+
+  // Call once, when the object is complete.
+  void Start() {
+    const absl::Status launched = host_->Launch(this, [this] {
+      absl::Status status = Guarded([this] { return Run(); });
+      // Finish() lets gRPC delete this object, so that nothing may follow it.
+      this->Finish(wire::ToGrpc(StopReasonOr(std::move(status))));
+    });
+    if (!launched.ok()) this->Finish(wire::ToGrpc(launched));
+  }
+
+  void OnWriteDone(bool ok) final { write_.Complete(ok); }
+  void OnCancel() final { RequestStop(absl::CancelledError("the client is gone")); }
+  void OnDone() final {
+    host_->Forget(this);
+    delete this;
+  }
+
+  void RequestStop(const absl::Status& why) final {
+    std::lock_guard lock(mutex_);
+    if (!stop_reason_.ok()) return;
+    stop_reason_ = why;
+    if (events_ != nullptr) events_->Cancel();
+    OnStop();
+  }
+
+ protected:
+  // The whole call, from the first request to the last response; returns its status. May wait, but must return soon
+  // after RequestStop().
+  virtual absl::Status Run() = 0;
+  // Ends waits that Cancel() of the event stream does not end. Must not wait.
+  virtual void OnStop() {}
+
+  MappingService& service() const { return host_->service(); }
+
+  bool stopping() {
+    std::lock_guard lock(mutex_);
+    return !stop_reason_.ok();
+  }
+
+  // Waits until gRPC has taken the message; false when the client is gone. Any thread of this call may write.
+  bool Write(const Response& response) {
+    std::lock_guard lock(write_mutex_);
+    this->StartWrite(&response);
+    return write_.Wait();
+  }
+
+  // Says that the stream is open, then writes events until either side ends. While it runs, RequestStop() cancels
+  // `events`.
+  absl::Status ForwardEvents(const std::string& session_id, EventStream& events) {
+    // RequestStop() wakes Next(), so this only bounds how long a mistake there could go unnoticed.
+    constexpr std::chrono::milliseconds kLongWait{1000};
+    if (!Attach(&events)) return absl::CancelledError("stopped before it was open");
+    Response opened;
+    opened.mutable_opened()->set_session_id(session_id);
+    bool writable = Write(opened);
+    while (writable && !stopping()) {
+      std::optional<MapEvent> event = events.Next(kLongWait);
+      if (event) {
+        Response response;
+        *response.mutable_event() = wire::ToProto(*std::move(event));
+        writable = Write(response);
+      } else if (events.Done()) {
+        break;
+      }
+    }
+    Detach();
+    return writable ? events.status() : absl::CancelledError("the client is gone");
+  }
+
+ private:
+  bool Attach(EventStream* events) {
+    std::lock_guard lock(mutex_);
+    if (!stop_reason_.ok()) return false;
+    events_ = events;
+    return true;
+  }
+  void Detach() {
+    std::lock_guard lock(mutex_);
+    events_ = nullptr;
+  }
+  absl::Status StopReasonOr(absl::Status status) {
+    std::lock_guard lock(mutex_);
+    return stop_reason_.ok() ? status : stop_reason_;
+  }
+
+  CallHost* const host_;
+  std::mutex write_mutex_;
+  Completion write_;
+
+  std::mutex mutex_;
+  absl::Status stop_reason_;  // OK while the call may go on
+  EventStream* events_ = nullptr;
+};
+
+}  // namespace romap::transport

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include "common/config.h"
+
+namespace romap {
+
+struct TransportConfig {
+  std::string listen_address = "127.0.0.1:50051";
+  int max_message_bytes = 32 << 20;
+  int max_calls = 256;
+  double keepalive_s = 20;
+  double shutdown_grace_s = 2;
+
+  void Fields(ConfigFields& fields) {
+    fields.Add("listen_address", &listen_address, {.help = "HOST:PORT of the gRPC service; port 0 takes any free one"});
+    fields.Add("max_message_bytes", &max_message_bytes,
+               {.unit = "bytes", .min = 1 << 16, .max = 1 << 30, .help = "Largest message in either direction"});
+    fields.Add("max_calls", &max_calls,
+               {.unit = "calls", .min = 1, .max = 4096, .help = "Calls and streams served at once, each has a thread"});
+    fields.Add("keepalive_s", &keepalive_s,
+               {.unit = "s", .min = 1, .max = 3600, .help = "A client silent for so long is pinged, then dropped"});
+    fields.Add("shutdown_grace_s", &shutdown_grace_s,
+               {.unit = "s", .min = 0, .max = 60, .help = "How long a stop waits for clients to take what is written"});
+  }
+};
+
+}  // namespace romap
