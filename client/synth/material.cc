@@ -28,7 +28,7 @@ float Bands(float x, float blur) {
   const float width = std::clamp(blur, 1e-4F, 1.0F);
   const float triangle = 2 * std::abs(x - std::floor(x) - 0.5F) - 0.5F;  // -0.5..0.5, sign flips between bands
   const float sharp = std::clamp(0.5F - triangle / (2 * width), 0.0F, 1.0F);
-  return Mix(Rgb::Constant(sharp), Rgb::Constant(0.5F), SmoothStep(0.4F, 1.0F, width)).x();
+  return std::lerp(sharp, 0.5F, SmoothStep(0.4F, 1.0F, width));
 }
 
 Rgb Speckle(const Material& m, const Spot& s) {

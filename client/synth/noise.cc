@@ -8,6 +8,7 @@ namespace {
 
 float Fade(float t) { return t * t * t * (t * (t * 6 - 15) + 10); }
 
+// Without the care std::lerp takes at its ends: this is the innermost loop of all textures.
 float Lerp(float a, float b, float t) { return a + t * (b - a); }
 
 // Dot product with one of the twelve edge directions of a cube, picked by the low bits of `hash`.

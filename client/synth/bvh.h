@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace romap::synth {
+
+// Bounding volume hierarchy over triangles, split by the surface area heuristic in bins (Wald, "On fast construction of
+// SAH-based bounding volume hierarchies", 2007). Immutable after construction, safe to share between threads.
+class Bvh {
+ public:
+  Bvh(std::span<const Eigen::Vector3f> positions_m, std::span<const std::array<uint32_t, 3>> triangles);
+
+  // Whether any triangle meets origin + t * direction for some t in (t_min, t_max); t in lengths of `direction`.
+  bool Occluded(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_min, float t_max) const;
+  // Whether the point is inside the closed surface the triangles form: an odd number of them lies on a ray from it.
+  bool Contains(const Eigen::Vector3f& point_m) const;
+
+ private:
+  struct Triangle {
+    Eigen::Vector3f corner, edge1, edge2;
+  };
+  // Inner nodes: children at `first` and `first + 1`, count 0. Leaves: triangles [first, first + count).
+  struct Node {
+    Eigen::AlignedBox3f box;
+    uint32_t first = 0;
+    uint32_t count = 0;
+  };
+  struct Reference {  // a triangle while the tree is built
+    Eigen::AlignedBox3f box;
+    Eigen::Vector3f center;
+    uint32_t triangle;
+  };
+
+  void Split(uint32_t node, std::span<Reference> references, uint32_t offset, int depth);
+  static size_t Partition(std::span<Reference> references);
+  template <class Visit>
+  void Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_max, Visit visit) const;
+
+  std::vector<Node> nodes_;
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace romap::synth

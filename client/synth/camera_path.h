@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "client/synth/options.h"
+#include "client/synth/scene.h"
+#include "common/camera_model.h"
+#include "common/geometry.h"
+
+namespace romap::synth {
+
+// The pinhole camera of a sequence: focal length 0.9 * width, principal point in the middle, no distortion.
+CameraModel SynthCamera(const SynthOptions& options);
+
+// One camera pose per frame, looking at the objects from a distance that fits them into the image, inside the room.
+std::vector<SE3<World, Camera>> MakeCameraPath(const SynthOptions& options, const Scene& scene,
+                                               const CameraModel& camera);
+
+}  // namespace romap::synth

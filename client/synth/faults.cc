@@ -1,0 +1,108 @@
+#include "client/synth/faults.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "client/synth/noise.h"
+
+namespace romap::synth {
+namespace {
+
+constexpr float kJitterWavelength_px = 14;  // along the border, as of a network's coarse mask
+
+cv::Mat DisplaceBorders(const cv::Mat& labels, double jitter_px, uint32_t seed) {
+  cv::Mat displaced(labels.size(), CV_8UC1);
+  const auto reach = static_cast<float>(jitter_px);
+  for (int v = 0; v < labels.rows; ++v) {
+    for (int u = 0; u < labels.cols; ++u) {
+      const Eigen::Vector3f p(static_cast<float>(u), static_cast<float>(v), 0.5F);
+      const float du = reach * FractalNoise(p, kJitterWavelength_px, 2, 0.5F, 0.5F, seed);
+      const float dv = reach * FractalNoise(p, kJitterWavelength_px, 2, 0.5F, 0.5F, seed + 50);
+      const int from_u = std::clamp(u + static_cast<int>(std::lround(du)), 0, labels.cols - 1);
+      const int from_v = std::clamp(v + static_cast<int>(std::lround(dv)), 0, labels.rows - 1);
+      displaced.at<uint8_t>(v, u) = labels.at<uint8_t>(from_v, from_u);
+    }
+  }
+  return displaced;
+}
+
+// A line of `length_px` through the kernel's middle, its weights adding up to 1.
+cv::Mat SmearKernel(const cv::Vec2d& direction, double length_px) {
+  const int radius = static_cast<int>(std::ceil(0.5 * length_px));
+  cv::Mat kernel = cv::Mat::zeros(2 * radius + 1, 2 * radius + 1, CV_32FC1);
+  const double norm = std::hypot(direction[0], direction[1]);
+  const cv::Vec2d along = norm > 0 ? direction / norm : cv::Vec2d(1, 0);
+  const int steps = 8 * radius + 1;
+  for (int i = 0; i < steps; ++i) {
+    const double s = length_px * (static_cast<double>(i) / (steps - 1) - 0.5);
+    kernel.at<float>(radius + static_cast<int>(std::lround(s * along[1])),
+                     radius + static_cast<int>(std::lround(s * along[0]))) += 1.0F / static_cast<float>(steps);
+  }
+  return kernel;
+}
+
+}  // namespace
+
+FaultyMask SpoilMask(const cv::Mat& true_labels, int object_count, const SynthOptions& options, Random& random) {
+  // The same numbers are drawn whatever is asked for, so that switching one fault on does not change the others.
+  const auto jitter_seed = static_cast<uint32_t>(random.Bits());
+  std::vector<uint8_t> shuffled(static_cast<size_t>(object_count));
+  for (int i = 0; i < object_count; ++i) shuffled[static_cast<size_t>(i)] = static_cast<uint8_t>(i + 1);
+  for (int i = object_count; i > 1; --i)
+    std::swap(shuffled[static_cast<size_t>(i - 1)], shuffled[static_cast<size_t>(random.Below(i))]);
+
+  std::array<uint8_t, 256> new_label{};
+  std::array<uint8_t, 256> object_of{};
+  std::array<double, 256> score{};
+  for (int object = 1; object <= object_count; ++object) {
+    const bool dropped = random.Chance(options.mask_drop_share);
+    const double confidence = random.Uniform(0.55, 0.98);
+    if (dropped) continue;
+    const uint8_t label =
+        options.permute_labels ? shuffled[static_cast<size_t>(object - 1)] : static_cast<uint8_t>(object);
+    new_label[static_cast<size_t>(object)] = label;
+    object_of[label] = static_cast<uint8_t>(object);
+    score[label] = confidence;
+  }
+
+  FaultyMask mask;
+  const cv::Mat borders =
+      options.mask_jitter_px > 0 ? DisplaceBorders(true_labels, options.mask_jitter_px, jitter_seed) : true_labels;
+  mask.labels.create(borders.size(), CV_8UC1);
+  std::array<bool, 256> present{};
+  for (int v = 0; v < borders.rows; ++v) {
+    for (int u = 0; u < borders.cols; ++u) {
+      const uint8_t label = new_label[borders.at<uint8_t>(v, u)];
+      mask.labels.at<uint8_t>(v, u) = label;
+      present[label] = true;
+    }
+  }
+  for (size_t label = 1; label < present.size(); ++label) {
+    if (present[label]) mask.detections.push_back({static_cast<uint8_t>(label), object_of[label], score[label]});
+  }
+  return mask;
+}
+
+void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random) {
+  if (options.motion_blur_px > 0) {
+    cv::filter2D(color_bgr, color_bgr, -1, SmearKernel(motion_px, options.motion_blur_px), cv::Point(-1, -1), 0,
+                 cv::BORDER_REPLICATE);
+  }
+  if (options.defocus_px > 0) {
+    cv::GaussianBlur(color_bgr, color_bgr, cv::Size(), options.defocus_px, options.defocus_px, cv::BORDER_REPLICATE);
+  }
+  if (options.noise_sigma > 0) {
+    for (int v = 0; v < color_bgr.rows; ++v) {
+      for (int u = 0; u < color_bgr.cols; ++u) {
+        cv::Vec3b& pixel = color_bgr.at<cv::Vec3b>(v, u);
+        for (int k = 0; k < 3; ++k) {
+          pixel[k] = cv::saturate_cast<uint8_t>(pixel[k] + options.noise_sigma * random.Normal());
+        }
+      }
+    }
+  }
+}
+
+}  // namespace romap::synth

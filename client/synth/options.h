@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/status.h"
+
+namespace romap::synth {
+
+enum class PathKind {
+  kOrbit,     // a level circle around the table
+  kHandheld,  // an arc of 120 to 200 degrees with the unrest of a hand
+};
+
+enum class ImageFormat { kPng, kJpeg };
+
+// What sequence to make. Everything in it follows from these numbers.
+struct SynthOptions {
+  uint64_t seed = 1;
+  int objects = 6;          // 1..16
+  int identical_pairs = 0;  // so many pairs of objects are twins; 2 * pairs <= objects
+  int frames = 300;         // 1..100000
+  double fps = 25;          // frames per second, 0.1..1000
+  PathKind path = PathKind::kOrbit;
+  double rounds = 1;          // circles of the orbit, or passes along the arc (2 = there and back); 0.01..100
+  double elevation_deg = 35;  // of the camera above the table, 5..80; the hand wanders about it
+  int width_px = 640;         // 32..4096
+  int height_px = 480;        // 32..4096
+  ImageFormat format = ImageFormat::kPng;  // of the colour images
+  // Faults, all off by default.
+  double mask_jitter_px = 0;    // the masks' borders are displaced by up to about so much, 0..50
+  double mask_drop_share = 0;   // share of the objects' masks that are missing, each by chance, 0..1
+  bool permute_labels = false;  // a mask's labels are shuffled in every frame; detections.csv says what they mean
+  double noise_sigma = 0;       // of Gaussian image noise, in 8-bit levels, 0..100
+  double motion_blur_px = 0;    // length of the smear along the camera's motion, 0..100
+  double defocus_px = 0;        // sigma of a Gaussian blur, 0..20
+};
+
+// INVALID_ARGUMENT naming each option that is out of its range.
+absl::Status ValidateSynthOptions(const SynthOptions& options);
+
+}  // namespace romap::synth
