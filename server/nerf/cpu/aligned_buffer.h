@@ -1,0 +1,39 @@
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+namespace romap::nerf {
+
+// Zeroed array of T aligned for vector loads, with a fixed length.
+template <class T>
+class AlignedBuffer {
+ public:
+  AlignedBuffer() = default;
+  explicit AlignedBuffer(size_t count) : data_(hwy::AllocateAligned<T>(count)), count_(count) { Clear(); }
+  AlignedBuffer(AlignedBuffer&&) noexcept = default;
+  AlignedBuffer& operator=(AlignedBuffer&&) noexcept = default;
+
+  AlignedBuffer Clone() const {
+    AlignedBuffer copy(count_);
+    std::copy_n(data(), count_, copy.data());
+    return copy;
+  }
+  void Clear() { std::fill_n(data(), count_, T()); }
+
+  T* data() { return data_.get(); }
+  const T* data() const { return data_.get(); }
+  size_t size() const { return count_; }
+  T& operator[](size_t i) { return data_[i]; }
+  const T& operator[](size_t i) const { return data_[i]; }
+  std::span<const T> span() const { return {data(), count_}; }
+
+ private:
+  hwy::AlignedFreeUniquePtr<T[]> data_;
+  size_t count_ = 0;
+};
+
+}  // namespace romap::nerf

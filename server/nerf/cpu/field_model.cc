@@ -1,0 +1,94 @@
+#include "server/nerf/cpu/field_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/nerf/math/random.h"
+
+namespace romap::nerf {
+
+GridLayout MakeGridLayout(const NerfConfig& config) {
+  GridLayout layout;
+  layout.levels = config.levels;
+  layout.features = (kFeaturesPerLevel * config.levels + 15) / 16 * 16;
+  const double ratio = static_cast<double>(config.finest_resolution) / config.base_resolution;
+  const double growth = config.levels > 1 ? std::pow(ratio, 1.0 / (config.levels - 1)) : 1.0;
+  const uint64_t table_entries = uint64_t{1} << config.log2_table_entries;
+  for (int l = 0; l < config.levels; ++l) {
+    const double scale = config.base_resolution * std::pow(growth, l) - 1.0;
+    const uint64_t side = static_cast<uint64_t>(std::ceil(scale)) + 2;  // corners a shifted lattice can reach
+    layout.scale[l] = static_cast<float>(scale);
+    layout.offset[l] = layout.entries;
+    uint64_t count = side * side * side;
+    if (count <= table_entries) {
+      layout.stride_y[l] = static_cast<uint32_t>(side);
+      layout.stride_z[l] = static_cast<uint32_t>(side * side);
+      layout.mask[l] = 0xffffffffu;
+    } else {
+      count = table_entries;
+      layout.stride_y[l] = 2654435761u;  // large odd numbers spread rows over the table
+      layout.stride_z[l] = 805459861u;
+      layout.mask[l] = static_cast<uint32_t>(table_entries - 1);
+    }
+    // One entry more for the pair at the end, then on to a cache line of its own.
+    layout.entries += static_cast<uint32_t>((count + 1 + 7) / 8 * 8);
+  }
+  return layout;
+}
+
+MlpWeights::MlpWeights(int inputs_, int hidden_)
+    : inputs(inputs_),
+      hidden(hidden_),
+      parameters(static_cast<size_t>((inputs_ + kOutputs) * hidden_)),
+      in_transposed(static_cast<size_t>(inputs_ * hidden_)),
+      out_transposed(static_cast<size_t>(kOutputs * hidden_)) {}
+
+void MlpWeights::UpdateTransposed() {
+  for (int i = 0; i < inputs; ++i) {
+    for (int h = 0; h < hidden; ++h) in_transposed[h * inputs + i] = in_weights()[i * hidden + h];
+  }
+  for (int o = 0; o < kOutputs; ++o) {
+    for (int h = 0; h < hidden; ++h) out_transposed[h * kOutputs + o] = out_weights()[o * hidden + h];
+  }
+}
+
+MlpWeights MlpWeights::Clone() const {
+  MlpWeights copy(inputs, hidden);
+  copy.parameters = parameters.Clone();
+  copy.UpdateTransposed();
+  return copy;
+}
+
+FieldModel::FieldModel(const NerfConfig& config, uint64_t seed)
+    : layout(MakeGridLayout(config)),
+      table(static_cast<size_t>(layout.entries) * kFeaturesPerLevel),
+      mlp(layout.features, config.hidden_width),
+      density_bias(static_cast<float>(config.density_bias)) {
+  for (size_t i = 0; i < table.size(); ++i) table[i] = 1e-4f * (2.0f * RandomUniform(seed, 0, i) - 1.0f);
+  const int used_inputs = kFeaturesPerLevel * layout.levels;
+  const float in_bound = std::sqrt(6.0f / static_cast<float>(used_inputs + mlp.hidden));
+  const float out_bound = std::sqrt(6.0f / static_cast<float>(mlp.hidden + kOutputs));
+  const size_t in_used = static_cast<size_t>(used_inputs * mlp.hidden);
+  const size_t out_begin = static_cast<size_t>(mlp.inputs * mlp.hidden);
+  for (size_t i = 0; i < mlp.parameters.size(); ++i) {
+    const float bound = i < in_used ? in_bound : i >= out_begin ? out_bound : 0.0f;
+    mlp.parameters[i] = bound * (2.0f * RandomUniform(seed, 1, i) - 1.0f);
+  }
+  mlp.UpdateTransposed();
+}
+
+FieldModel FieldModel::Clone() const {
+  FieldModel copy;
+  copy.layout = layout;
+  copy.table = table.Clone();
+  copy.mlp = mlp.Clone();
+  copy.density_bias = density_bias;
+  return copy;
+}
+
+bool FieldModel::IsFinite() const {
+  const auto finite = [](float x) { return std::isfinite(x); };
+  return std::ranges::all_of(table.span(), finite) && std::ranges::all_of(mlp.parameters.span(), finite);
+}
+
+}  // namespace romap::nerf

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/nerf/cpu/field_model.h"
+#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/cpu/occupancy.h"
+#include "server/nerf/nerf_config.h"
+#include "server/nerf/train_stats.h"
+
+namespace romap::nerf {
+
+// What a step trains on. `ray` must be thread-safe and depend on its arguments only.
+struct StepSource {
+  std::function<Ray(uint64_t step, int index)> ray;
+  std::function<float(uint64_t step)> learning_rate;
+  std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
+};
+
+// Optimises a FieldModel by stochastic gradient descent on rays: render chunks of rays, collect gradients per thread,
+// one Adam step. The work is divided by ray index and gradients are added in thread order, so the result depends on the
+// number of threads, but never on timing.
+class FieldTrainer {
+ public:
+  FieldTrainer(const NerfConfig& config, uint64_t seed, const KernelTable& kernels = SimdKernels());
+  ~FieldTrainer();
+  FieldTrainer(FieldTrainer&&) noexcept;
+  FieldTrainer& operator=(FieldTrainer&&) noexcept;
+
+  // `steps` more steps on `threads` threads (the caller is one of them). Nothing is allocated within a step.
+  TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads);
+
+  // Gives back the memory that only Run() needs; the next Run() takes it again.
+  void ReleaseScratch();
+
+  const FieldModel& model() const { return model_; }
+  uint64_t steps_done() const { return steps_done_; }
+
+ private:
+  struct Worker;
+  struct StepShare;
+
+  void RunSteps(const StepSource& source, Occupancy& occupancy, int steps, int thread, StepShare& share);
+  void RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray, Worker& worker);
+  void CompositeRays(Worker& worker);
+  int CompactActive(Worker& worker);
+  void Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, int thread, int threads);
+
+  NerfConfig config_;
+  LossWeights loss_weights_;
+  const KernelTable* kernels_;
+  FieldModel model_;
+  AlignedBuffer<float> table_first_, table_second_, mlp_first_, mlp_second_;  // Adam's moments
+  std::vector<std::unique_ptr<Worker>> workers_;
+  uint64_t steps_done_ = 0;
+};
+
+}  // namespace romap::nerf

@@ -1,0 +1,277 @@
+// The inner loops as templates over lane types: memory and loops here, formulas in math/. Included by plain_kernels.cc
+// with floats and by simd_kernels.cc once per instruction set with vectors.
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/math/activation.h"
+#include "server/nerf/math/adam.h"
+#include "server/nerf/math/dense.h"
+#include "server/nerf/math/hash_grid.h"
+#include "server/nerf/math/ray.h"
+
+#if defined(ROMAP_NERF_CPU_KERNELS_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef HWY_TARGET_TOGGLE
+#undef ROMAP_NERF_CPU_KERNELS_INL
+#else
+#define ROMAP_NERF_CPU_KERNELS_INL
+#endif
+
+ROMAP_MATH_BEGIN
+
+// ----------------------------------------------------------------------------------------------------------- sampling
+
+// Bit i: the cell at probe i of the ray is occupied. Probes sit in the middle of kRayProbes equal pieces of the ray
+// between entry and exit, each at most 1.8 cells long.
+template <class Wide>
+uint64_t ProbeOccupancy(const Ray& ray, const SamplingRule& rule, float entry, float piece) {
+  using L = Lane<Wide>;
+  const Wide to_x = L::Set(kOccupancyResolution / rule.extent[0]);
+  const Wide to_y = L::Set(kOccupancyResolution / rule.extent[1]);
+  const Wide to_z = L::Set(kOccupancyResolution / rule.extent[2]);
+  uint64_t occupied = 0;
+  for (int i = 0; i < kRayProbes; i += L::kLanes) {
+    const Wide t = MulAdd(L::Iota() + L::Set(static_cast<float>(i) + 0.5f), L::Set(piece), L::Set(entry));
+    const auto cell =
+        CellIndex(MulAdd(L::Set(ray.direction[0]), t, L::Set(ray.origin[0])) * to_x,
+                  MulAdd(L::Set(ray.direction[1]), t, L::Set(ray.origin[1])) * to_y,
+                  MulAdd(L::Set(ray.direction[2]), t, L::Set(ray.origin[2])) * to_z, kOccupancyResolution);
+    occupied |= L::TestBits(L::Gather(rule.occupied_bits, L::WordOfBit(cell)), cell) << i;
+  }
+  return occupied;
+}
+
+// Spreads `count` samples evenly over the occupied pieces of a ray, as if these were one stretch: t[count].
+inline void SpreadSamples(uint64_t occupied, float entry, float piece, float jitter, int count, float* t) {
+  const float pieces_per_sample = static_cast<float>(std::popcount(occupied)) / static_cast<float>(count);
+  int passed = 0;  // occupied pieces before the first one left in `occupied`
+  for (int i = 0; i < count; ++i) {
+    const float at = (static_cast<float>(i) + jitter) * pieces_per_sample;
+    while (static_cast<float>(passed + 1) <= at && (occupied & (occupied - 1)) != 0) {
+      occupied &= occupied - 1;
+      ++passed;
+    }
+    t[i] = entry + piece * (static_cast<float>(std::countr_zero(occupied)) + at - static_cast<float>(passed));
+  }
+}
+
+// Fills in position and cell of samples [begin, end) whose t is set.
+template <class Wide>
+void LocateSamples(const Ray& ray, const SamplingRule& rule, int begin, int end, float length, SampleChunk& chunk) {
+  using L = Lane<Wide>;
+  for (int i = begin; i < end; i += L::kLanes) {
+    const Wide t = L::Load(chunk.t.data() + i);
+    const Wide x = MulAdd(L::Set(ray.direction[0]), t, L::Set(ray.origin[0]));
+    const Wide y = MulAdd(L::Set(ray.direction[1]), t, L::Set(ray.origin[1]));
+    const Wide z = MulAdd(L::Set(ray.direction[2]), t, L::Set(ray.origin[2]));
+    // Rounding may put a point a hair outside the box; the encoding wants it inside.
+    L::Store(Min(Max(x, L::Zero()), L::Set(rule.extent[0])), chunk.x.data() + i);
+    L::Store(Min(Max(y, L::Zero()), L::Set(rule.extent[1])), chunk.y.data() + i);
+    L::Store(Min(Max(z, L::Zero()), L::Set(rule.extent[2])), chunk.z.data() + i);
+    L::Store(L::Set(length), chunk.length.data() + i);
+    const auto cell =
+        CellIndex(x * L::Set(kOccupancyResolution / rule.extent[0]), y * L::Set(kOccupancyResolution / rule.extent[1]),
+                  z * L::Set(kOccupancyResolution / rule.extent[2]), kOccupancyResolution);
+    L::StoreInt(cell, chunk.cell.data() + i);
+  }
+}
+
+template <class Wide>
+void PlaceSamples(const Ray* rays, int ray_count, const SamplingRule& rule, SampleChunk& chunk, RaySpan* spans) {
+  for (int r = 0; r < ray_count; ++r) {
+    const Ray& ray = rays[r];
+    spans[r] = {chunk.size, 0};
+    float entry, exit;
+    if (!IntersectBox(ray.origin, ray.direction, rule.extent.data(), entry, exit)) continue;
+    const float piece = (exit - entry) / kRayProbes;
+    const uint64_t occupied = rule.skip_empty ? ProbeOccupancy<Wide>(ray, rule, entry, piece) : ~uint64_t{0};
+    const float stretch = piece * static_cast<float>(std::popcount(occupied));
+    if (!(stretch > 1e-6f)) continue;
+    const int wanted = static_cast<int>(stretch / rule.finest_step) + 1;
+    const int count = rule.skip_empty ? std::clamp(wanted, rule.min_samples, rule.max_samples) : rule.max_samples;
+    SpreadSamples(occupied, entry, piece, ray.jitter, count, chunk.t.data() + chunk.size);
+    spans[r].count = count;
+    chunk.size += count;
+    LocateSamples<Wide>(ray, rule, spans[r].first, chunk.size, stretch / static_cast<float>(count), chunk);
+  }
+}
+
+// ----------------------------------------------------------------------------------------------------------- encoding
+
+// Cells of one point on Lane<Narrow>::kLanes levels from `level` on, in memory so that single lanes can be read.
+template <class Narrow>
+struct StoredCells {
+  static constexpr int kLanes = Lane<Narrow>::kLanes;
+  alignas(64) uint32_t pair[4 * kLanes];
+  alignas(64) float weight[4 * kLanes];
+  alignas(64) float along_x[kLanes];
+
+  StoredCells(const GridLayout& layout, int level, float x, float y, float z) {
+    using L = Lane<Narrow>;
+    const GridCell<Narrow> cell = LocateCell(L::Set(x), L::Set(y), L::Set(z), L::Load(layout.scale + level),
+                                             L::LoadInt(layout.stride_y + level), L::LoadInt(layout.stride_z + level),
+                                             L::LoadInt(layout.mask + level), L::LoadInt(layout.offset + level));
+    for (int c = 0; c < 4; ++c) {
+      L::StoreInt(cell.pair[c], pair + c * kLanes);
+      L::Store(cell.weight[c], weight + c * kLanes);
+    }
+    L::Store(cell.along_x, along_x);
+  }
+};
+
+template <class Narrow, class Q>
+void Encode(const GridLayout& layout, const float* table, int count, const float* x, const float* y, const float* z,
+            float* features) {
+  using Cells = StoredCells<Narrow>;
+  const int used = kFeaturesPerLevel * layout.levels;
+  for (int i = 0; i < count; ++i, features += layout.features) {
+    for (int level = 0; level < layout.levels; level += Cells::kLanes) {
+      const Cells cells(layout, level, x[i], y[i], z[i]);
+      const int lanes = std::min(Cells::kLanes, layout.levels - level);
+      for (int k = 0; k < lanes; ++k) {
+        InterpolateCell<Q>(table, cells.pair + k, cells.weight + k, cells.along_x[k], Cells::kLanes,
+                           features + kFeaturesPerLevel * (level + k));
+      }
+    }
+    for (int f = used; f < layout.features; ++f) features[f] = 0.0f;
+  }
+}
+
+template <class Narrow, class Q>
+void EncodeBackward(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
+                    const float* d_features, float* gradient) {
+  using Cells = StoredCells<Narrow>;
+  for (int i = 0; i < count; ++i, d_features += layout.features) {
+    for (int level = 0; level < layout.levels; level += Cells::kLanes) {
+      const Cells cells(layout, level, x[i], y[i], z[i]);
+      const int lanes = std::min(Cells::kLanes, layout.levels - level);
+      for (int k = 0; k < lanes; ++k) {
+        ScatterCell<Q>(gradient, cells.pair + k, cells.weight + k, cells.along_x[k], Cells::kLanes,
+                       d_features + kFeaturesPerLevel * (level + k));
+      }
+    }
+  }
+}
+
+// ---------------------------------------------------------------------------------------------------------------- MLP
+
+// out[rows][n] = a[rows][k_count] b[k_count][n], in register tiles.
+template <class F, DenseMode kMode, int kRows, int kGroups>
+void DenseInTiles(int rows, const float* a, int k_count, const float* b, int n, float* out) {
+  constexpr int kColumns = kGroups * Lane<F>::kLanes;
+  int row = 0;
+  for (; row + kRows <= rows; row += kRows) {
+    for (int c = 0; c < n; c += kColumns) {
+      DenseTile<F, kRows, kGroups, kMode>(a + row * k_count, k_count, k_count, b + c, n, out + row * n + c);
+    }
+  }
+  for (; row < rows; ++row) {
+    for (int c = 0; c < n; c += kColumns) {
+      DenseTile<F, 1, kGroups, kMode>(a + row * k_count, k_count, k_count, b + c, n, out + row * n + c);
+    }
+  }
+}
+
+template <class F, DenseMode kMode>
+void Dense(int rows, const float* a, int k_count, const float* b, int n, float* out) {
+  if (n % (2 * Lane<F>::kLanes) == 0) {
+    DenseInTiles<F, kMode, 6, 2>(rows, a, k_count, b, n, out);
+  } else {
+    DenseInTiles<F, kMode, 8, 1>(rows, a, k_count, b, n, out);
+  }
+}
+
+// out[k_count][n] += a[samples][k_count]^T b[samples][n]; k_count a multiple of 4.
+template <class F>
+void Outer(int samples, const float* a, int k_count, const float* b, int n, float* out) {
+  constexpr int kLanes = Lane<F>::kLanes;
+  const bool pairs = n % (2 * kLanes) == 0;
+  for (int k = 0; k < k_count; k += 4) {
+    for (int c = 0; c < n; c += pairs ? 2 * kLanes : kLanes) {
+      if (pairs) {
+        OuterTile<F, 4, 2>(samples, a + k, k_count, b + c, n, out + k * n + c);
+      } else {
+        OuterTile<F, 4, 1>(samples, a + k, k_count, b + c, n, out + k * n + c);
+      }
+    }
+  }
+}
+
+inline constexpr int kMlpBlock = 96;  // samples whose activations stay in the first-level cache
+
+template <class Wide, class Four>
+void MlpForward(const MlpWeights& mlp, int count, const float* features, float* hidden, float* raw) {
+  for (int begin = 0; begin < count; begin += kMlpBlock) {
+    const int n = std::min(kMlpBlock, count - begin);
+    float* block = hidden + begin * mlp.hidden;
+    Dense<Wide, DenseMode::kRelu>(n, features + begin * mlp.inputs, mlp.inputs, mlp.in_weights(), mlp.hidden, block);
+    Dense<Four, DenseMode::kLinear>(n, block, mlp.hidden, mlp.out_transposed.data(), kOutputs, raw + begin * kOutputs);
+  }
+}
+
+template <class Wide>
+void MlpBackward(const MlpWeights& mlp, int count, float* features, float* hidden, const float* d_raw,
+                 float* gradient) {
+  for (int begin = 0; begin < count; begin += kMlpBlock) {
+    const int n = std::min(kMlpBlock, count - begin);
+    float* x = features + begin * mlp.inputs;
+    float* h = hidden + begin * mlp.hidden;
+    const float* d = d_raw + begin * kOutputs;
+    Outer<Wide>(n, d, kOutputs, h, mlp.hidden, gradient + mlp.inputs * mlp.hidden);
+    Dense<Wide, DenseMode::kMaskedByOut>(n, d, kOutputs, mlp.out_weights(), mlp.hidden, h);
+    Outer<Wide>(n, x, mlp.inputs, h, mlp.hidden, gradient);
+    Dense<Wide, DenseMode::kLinear>(n, h, mlp.hidden, mlp.in_transposed.data(), mlp.inputs, x);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------- activation and Adam
+
+template <class Wide>
+void Activate(SampleChunk& chunk, float density_bias) {
+  using L = Lane<Wide>;
+  for (int i = 0; i < chunk.size; i += L::kLanes) {
+    Wide red, green, blue, raw;
+    L::Load4(chunk.raw.data() + kOutputs * i, red, green, blue, raw);
+    const Wide density = Density(raw + L::Set(density_bias));
+    L::Store(Sigmoid(red), chunk.red.data() + i);
+    L::Store(Sigmoid(green), chunk.green.data() + i);
+    L::Store(Sigmoid(blue), chunk.blue.data() + i);
+    L::Store(density, chunk.density.data() + i);
+    L::Store(StepOpacity(density, L::Load(chunk.length.data() + i)), chunk.alpha.data() + i);
+  }
+}
+
+template <class Wide>
+void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
+          float* const* gradients, int gradient_count) {
+  using L = Lane<Wide>;
+  for (size_t i = begin; i < end; i += L::kLanes) {
+    Wide gradient = L::Load(gradients[0] + i);
+    for (int g = 1; g < gradient_count; ++g) gradient = gradient + L::Load(gradients[g] + i);
+    if (L::AllZero(gradient)) continue;  // most entries of the fine levels, at any one step
+    for (int g = 0; g < gradient_count; ++g) L::Store(L::Zero(), gradients[g] + i);
+    Wide p = L::Load(parameters + i), m = L::Load(first + i), v = L::Load(second + i);
+    AdamUpdate(gradient, rates, p, m, v);
+    L::Store(p, parameters + i);
+    L::Store(m, first + i);
+    L::Store(v, second + i);
+  }
+}
+
+// Wide: as many lanes as there are. Narrow: at most 8, for loops over levels. Four: the MLP's outputs.
+template <class Wide, class Narrow, class Four, class Q>
+KernelTable MakeKernelTable(const char* name) {
+  return {.name = name,
+          .place_samples = PlaceSamples<Wide>,
+          .encode = Encode<Narrow, Q>,
+          .encode_backward = EncodeBackward<Narrow, Q>,
+          .mlp_forward = MlpForward<Wide, Four>,
+          .mlp_backward = MlpBackward<Wide>,
+          .activate = Activate<Wide>,
+          .adam = Adam<Wide>};
+}
+
+ROMAP_MATH_END
+
+#endif

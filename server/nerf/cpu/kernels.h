@@ -1,0 +1,92 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "server/nerf/cpu/field_model.h"
+#include "server/nerf/math/types.h"
+
+namespace romap::nerf {
+
+// Widest vector any kernel uses, in floats. Arrays handed to kernels have this many readable and writable values behind
+// their last sample; kernels work in whole vectors.
+inline constexpr int kMaxLanes = 16;
+
+inline constexpr int kOccupancyResolution = 64;  // one row of cells is one machine word (see occupancy.h)
+inline constexpr int kRayProbes = 64;            // probes of the occupancy grid along a ray, one bit each
+inline constexpr int kMaxSamplesPerRay = 64;
+
+// A ray in Unit space: lengths in units of the box's longest side, direction of unit length.
+struct Ray {
+  float origin[3];
+  float direction[3];
+  float jitter;  // 0..1, where in its stratum each sample lies
+  RayTarget target;
+};
+
+struct RaySpan {
+  int first = 0;  // sample
+  int count = 0;  // 0: the ray meets nothing occupied
+};
+
+struct SamplingRule {
+  const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
+  std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space, <= 1
+  float finest_step = 0.01f;                // samples are not set closer than this, down to min_samples
+  int min_samples = 4;
+  int max_samples = 16;
+  bool skip_empty = true;  // false: max_samples between entry and exit of the box
+};
+
+// Sample arrays of one chunk of rays, reused from chunk to chunk. `size` samples are in use.
+struct SampleChunk {
+  SampleChunk(int capacity, int features, int hidden);
+
+  int capacity;
+  int size = 0;
+  AlignedBuffer<float> x, y, z;           // Unit space
+  AlignedBuffer<float> t, length;         // along the ray and step, units of box side
+  AlignedBuffer<uint32_t> cell;           // of the occupancy grid
+  AlignedBuffer<float> features;          // [capacity][features]; backward: their gradient
+  AlignedBuffer<float> hidden;            // [capacity][hidden]
+  AlignedBuffer<float> raw;               // [capacity][kOutputs], before activation
+  AlignedBuffer<float> d_raw;             // [capacity][kOutputs]
+  AlignedBuffer<float> red, green, blue;  // 0..1
+  AlignedBuffer<float> density, alpha;    // per box side; opacity of the step
+  AlignedBuffer<float> weight, behind;    // see CompositeForward
+};
+
+// The inner loops, one table per instruction set and one in plain floats. All arrays are aligned to 64 bytes.
+struct KernelTable {
+  std::string name;
+
+  // Places samples on `rays` and appends them to `chunk` (x, y, z, t, length, cell); `spans` has one entry per ray.
+  void (*place_samples)(const Ray* rays, int ray_count, const SamplingRule& rule, SampleChunk& chunk, RaySpan* spans);
+
+  // features[count][layout.features] of points in Unit space.
+  void (*encode)(const GridLayout& layout, const float* table, int count, const float* x, const float* y,
+                 const float* z, float* features);
+  // Adds to gradient[entries][2].
+  void (*encode_backward)(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
+                          const float* d_features, float* gradient);
+
+  // hidden[count][hidden] after ReLU, raw[count][kOutputs] without density bias.
+  void (*mlp_forward)(const MlpWeights& mlp, int count, const float* features, float* hidden, float* raw);
+  // Adds to gradient (laid out as MlpWeights::parameters). Overwrites `features` with their gradient and `hidden`.
+  void (*mlp_backward)(const MlpWeights& mlp, int count, float* features, float* hidden, const float* d_raw,
+                       float* gradient);
+
+  // raw, length -> red, green, blue, density, alpha of the chunk's samples.
+  void (*activate)(SampleChunk& chunk, float density_bias);
+
+  // Sums `gradient_count` gradient arrays, zeroes them, and updates parameters [begin, end), multiples of kMaxLanes.
+  void (*adam)(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
+               float* const* gradients, int gradient_count);
+};
+
+const KernelTable& PlainKernels();
+// The best instruction set of this machine (Highway's dynamic dispatch).
+const KernelTable& SimdKernels();
+
+}  // namespace romap::nerf

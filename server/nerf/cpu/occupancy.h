@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/nerf_config.h"
+
+namespace romap::nerf {
+
+// Which cells of the training box are worth sampling: those of the visual hull near which samples have had weight.
+class Occupancy {
+ public:
+  explicit Occupancy(const NerfConfig& config);
+
+  // A new hull (kOccupancyResolution^3 cells, 1 = possible). Scores of cells stay.
+  void SetHull(std::vector<uint8_t> hull);
+  // Forgets the scores: all of the hull is occupied again.
+  void Reset();
+  // A sample in `cell` got `weight`: the score becomes the larger of that and the decayed score.
+  void Record(uint32_t cell, float weight) {
+    const float decayed = score_[cell] * decay_;
+    score_[cell] = weight > decayed ? weight : decayed;
+  }
+  // Occupied = in the hull, and within one cell of a hull cell whose score exceeds the threshold.
+  void Update();
+
+  const uint32_t* bits() const { return bits_.data(); }
+  const std::vector<uint8_t>& hull() const { return hull_; }
+
+ private:
+  float decay_;
+  float threshold_;
+  std::vector<uint8_t> hull_;
+  AlignedBuffer<float> score_;
+  AlignedBuffer<uint32_t> bits_;
+};
+
+}  // namespace romap::nerf

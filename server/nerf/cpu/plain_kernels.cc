@@ -1,0 +1,11 @@
+#include "server/nerf/cpu/kernels-inl.h"
+#include "server/nerf/cpu/kernels.h"
+
+namespace romap::nerf {
+
+const KernelTable& PlainKernels() {
+  static const KernelTable table = plain::MakeKernelTable<float, float, float, plain::Quad>("plain");
+  return table;
+}
+
+}  // namespace romap::nerf

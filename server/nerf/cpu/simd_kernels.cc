@@ -1,0 +1,41 @@
+// SSE4, AVX2, AVX-512, and plain floats for machines older than those.
+#define HWY_DISABLED_TARGETS HWY_SSSE3
+#define ROMAP_MATH_SIMD
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "server/nerf/cpu/simd_kernels.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "server/nerf/cpu/kernels-inl.h"
+#if HWY_TARGET != HWY_SCALAR
+#include "server/nerf/cpu/vector_lane-inl.h"
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace romap::nerf::HWY_NAMESPACE {
+
+const KernelTable& GetKernels() {
+#if HWY_TARGET == HWY_SCALAR
+  static const KernelTable table = MakeKernelTable<float, float, float, Quad>("SCALAR");
+#else
+  using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes>>;
+  using Narrow = hn::VFromD<hn::CappedTag<float, 8>>;
+  using Four = hn::VFromD<hn::FixedTag<float, 4>>;
+  static const KernelTable table = MakeKernelTable<Wide, Narrow, Four, VectorQuad>(hwy::TargetName(HWY_TARGET));
+#endif
+  return table;
+}
+
+}  // namespace romap::nerf::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace romap::nerf {
+
+HWY_EXPORT(GetKernels);
+
+const KernelTable& SimdKernels() { return HWY_DYNAMIC_DISPATCH(GetKernels)(); }
+
+}  // namespace romap::nerf
+#endif

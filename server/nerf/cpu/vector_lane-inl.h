@@ -1,0 +1,83 @@
+// Highway vectors as lane types of the formulas (see math/lane.h). Included once per instruction set, behind
+// ROMAP_MATH_SIMD and <hwy/highway.h>.
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "server/nerf/math/lane.h"
+
+#if defined(ROMAP_NERF_CPU_VECTOR_LANE) == defined(HWY_TARGET_TOGGLE)
+#ifdef HWY_TARGET_TOGGLE
+#undef ROMAP_NERF_CPU_VECTOR_LANE
+#else
+#define ROMAP_NERF_CPU_VECTOR_LANE
+#endif
+
+ROMAP_MATH_BEGIN
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class V>
+struct Lane {
+  using D = hn::DFromV<V>;
+  using DInt = hn::RebindToUnsigned<D>;
+  using DSigned = hn::RebindToSigned<D>;
+  using Int = hn::VFromD<DInt>;
+  static constexpr int kLanes = static_cast<int>(hn::MaxLanes(D()));
+
+  static HWY_INLINE V Set(float x) { return hn::Set(D(), x); }
+  static HWY_INLINE Int SetInt(uint32_t x) { return hn::Set(DInt(), x); }
+  static HWY_INLINE V Zero() { return hn::Zero(D()); }
+  static HWY_INLINE V Iota() { return hn::Iota(D(), 0.0f); }
+  static HWY_INLINE V Load(const float* p) { return hn::LoadU(D(), p); }
+  static HWY_INLINE Int LoadInt(const uint32_t* p) { return hn::LoadU(DInt(), p); }
+  static HWY_INLINE void Store(V x, float* p) { hn::StoreU(x, D(), p); }
+  static HWY_INLINE void StoreInt(Int x, uint32_t* p) { hn::StoreU(x, DInt(), p); }
+  static HWY_INLINE void Load4(const float* p, V& a, V& b, V& c, V& d) { hn::LoadInterleaved4(D(), p, a, b, c, d); }
+  static HWY_INLINE V Exp(V x) { return hn::Exp(D(), x); }
+  static HWY_INLINE Int Truncate(V x) { return hn::BitCast(DInt(), hn::ConvertTo(DSigned(), x)); }
+  static HWY_INLINE V ToFloat(Int x) { return hn::ConvertTo(D(), hn::BitCast(DSigned(), x)); }
+  static HWY_INLINE Int WordOfBit(Int bit) { return hn::ShiftRight<5>(bit); }
+  static HWY_INLINE Int Gather(const uint32_t* table, Int index) {
+    return hn::GatherIndex(DInt(), table, hn::BitCast(DSigned(), index));
+  }
+  static HWY_INLINE uint64_t TestBits(Int word, Int bit) {
+    const Int probe = hn::Shl(SetInt(1), bit & SetInt(31));
+    uint8_t packed[8] = {};
+    hn::StoreMaskBits(DInt(), hn::Ne(word & probe, SetInt(0)), packed);
+    uint64_t bits;
+    std::memcpy(&bits, packed, sizeof bits);
+    return bits;
+  }
+  static HWY_INLINE bool AllZero(V x) { return hn::AllTrue(D(), hn::Eq(x, Zero())); }
+  static HWY_INLINE V IfNonZero(V test, V yes, V no) { return hn::IfThenElse(hn::Ne(test, Zero()), yes, no); }
+  static HWY_INLINE V IfPositive(V test, V yes) { return hn::IfThenElseZero(hn::Gt(test, Zero()), yes); }
+};
+
+struct VectorQuad {
+  using D = hn::FixedTag<float, 4>;
+  using V = hn::VFromD<D>;
+  V v;
+
+  static HWY_INLINE VectorQuad Load(const float* p) { return {hn::LoadU(D(), p)}; }
+  HWY_INLINE void Store(float* p) const { hn::StoreU(v, D(), p); }
+  static HWY_INLINE VectorQuad Twice(const float* p) {
+    const hn::FixedTag<float, 2> half;
+    const auto pair = hn::LoadU(half, p);
+    return {hn::Combine(D(), pair, pair)};
+  }
+  static HWY_INLINE VectorQuad Halves(float a, float b) {
+    return {hn::ConcatLowerLower(D(), hn::Set(D(), b), hn::Set(D(), a))};
+  }
+  HWY_INLINE VectorQuad Times(float s) const { return {v * hn::Set(D(), s)}; }
+  HWY_INLINE VectorQuad Times(const VectorQuad& o) const { return {v * o.v}; }
+  HWY_INLINE VectorQuad Plus(const VectorQuad& o, float s) const { return {hn::MulAdd(o.v, hn::Set(D(), s), v)}; }
+  HWY_INLINE void StoreBlend(float s, float* p) const {
+    const hn::FixedTag<float, 2> half;
+    const auto low = hn::LowerHalf(half, v), high = hn::UpperHalf(half, v);
+    hn::StoreU(hn::MulAdd(high - low, hn::Set(half, s), low), half, p);
+  }
+};
+
+ROMAP_MATH_END
+
+#endif

@@ -1,0 +1,49 @@
+#include "server/nerf/math/lane.h"
+
+#if defined(ROMAP_NERF_MATH_RAY) == defined(HWY_TARGET_TOGGLE)
+#ifdef HWY_TARGET_TOGGLE
+#undef ROMAP_NERF_MATH_RAY
+#else
+#define ROMAP_NERF_MATH_RAY
+#endif
+
+ROMAP_MATH_BEGIN
+
+// Ray against the box [0, extent] by slabs (Kay and Kajiya, 1986). `origin`, `direction`, `extent`: 3 values each.
+// False when the ray misses the box or the box lies behind the origin; otherwise entry >= 0 and exit > entry along the
+// ray.
+template <class F>
+ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent, F& entry, F& exit) {
+  entry = 0;
+  exit = static_cast<F>(1e30);
+  for (int a = 0; a < 3; ++a) {
+    const F inverse = 1 / direction[a];  // an infinity is what the comparisons below want
+    F near = -origin[a] * inverse;
+    F far = (extent[a] - origin[a]) * inverse;
+    if (near > far) {
+      const F swap = near;
+      near = far;
+      far = swap;
+    }
+    // Written so that a NaN (origin on a slab, direction along it) leaves the bound as it is.
+    if (near > entry) entry = near;
+    if (far < exit) exit = far;
+    if (direction[a] == 0 && (origin[a] < 0 || origin[a] > extent[a])) return false;
+  }
+  return exit > entry;
+}
+
+// Index of the cell of a `resolution`^3 grid that holds a point; the point is in cells and is clamped into the grid.
+template <class F>
+ROMAP_HD typename Lane<F>::Int CellIndex(F x_cells, F y_cells, F z_cells, int resolution) {
+  const F zero = Lane<F>::Zero(), last = Lane<F>::Set(static_cast<float>(resolution - 1));
+  const auto x = Lane<F>::Truncate(Min(Max(x_cells, zero), last));
+  const auto y = Lane<F>::Truncate(Min(Max(y_cells, zero), last));
+  const auto z = Lane<F>::Truncate(Min(Max(z_cells, zero), last));
+  const auto r = Lane<F>::SetInt(static_cast<uint32_t>(resolution));
+  return (z * r + y) * r + x;
+}
+
+ROMAP_MATH_END
+
+#endif

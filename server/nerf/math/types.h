@@ -1,0 +1,49 @@
+#pragma once
+
+namespace romap::nerf {
+
+// Plain values that formulas take, the same for every lane type.
+
+// Weights of the loss terms, all >= 0, the same for every ray.
+struct LossWeights {
+  float opacity_object = 0;        // times (1 - sum w) on object rays
+  float opacity_background = 0;    // times sum w on background rays
+  float density = 0;               // times sum sigma_i on background rays (paper: L_density)
+  float depth = 0;                 // times |sum w_i (t_i - t*)| on rays with depth (paper: L_depth)
+  float depth_limit = 0;           // residual beyond which a depth is taken for an outlier, in units of box side
+  bool random_background = false;  // paper: L_rr; also lets object rays blend over the random colour
+};
+
+// What a ray should look like.
+struct RayTarget {
+  float rgb[3] = {0, 0, 0};         // 0..1
+  float background[3] = {0, 0, 0};  // random colour, used when LossWeights::random_background
+  float depth = -1;                 // along the ray, in units of box side; < 0: unknown
+  bool is_object = true;
+};
+
+// Samples of one ray, front to back: arrays of `count`.
+struct RaySamples {
+  int count;
+  const float* t;       // along the ray, units of box side
+  const float* length;  // delta of each sample, same units
+  const float* alpha;   // StepOpacity
+  const float* density;
+  const float* rgb[3];  // after Sigmoid
+};
+
+struct RayResult {
+  float rgb[3];
+  float opacity;       // sum of weights
+  float depth_excess;  // sum w_i (t_i - t*), 0 without depth
+  float loss;          // all terms
+  float color_loss;    // squared colour error alone
+};
+
+struct AdamRates {
+  float learning_rate = 0;
+  float beta1 = 0;
+  float beta2 = 0;
+};
+
+}  // namespace romap::nerf

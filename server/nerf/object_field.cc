@@ -1,0 +1,141 @@
+#include "server/nerf/object_field.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "common/status.h"
+#include "server/nerf/field_sampler.h"
+#include "server/nerf/math/random.h"
+#include "server/nerf/view_check.h"
+
+namespace romap {
+namespace {
+
+NerfConfig WithWholeWidths(NerfConfig config) {
+  config.hidden_width = (config.hidden_width + 15) / 16 * 16;
+  return config;
+}
+
+}  // namespace
+
+ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
+    : config_(WithWholeWidths(config)),
+      id_(id),
+      seed_(seed),
+      hull_(config_),
+      rays_(config_, seed),
+      occupancy_(config_),
+      plan_(config_),
+      trainer_(config_, seed) {}
+
+absl::Status ObjectField::SetBox(const Cuboid& cuboid) {
+  ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid));
+  if (has_box_ && box_.StillFits(cuboid)) return absl::OkStatus();
+  box_ = TrainingBox::Around(cuboid, config_.box_enlargement);
+  hull_.Reset(box_);
+  for (const ObjectView& view : views_) hull_.Add(view);
+  views_changed_ = !views_.empty();
+  if (has_box_) Restart();
+  has_box_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status ObjectField::AddView(ObjectView view) {
+  if (!has_box_) return FailedPrecondition("{}: a view came before the box", id_.ToString());
+  if (view.object != id_) {
+    return FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString());
+  }
+  ROMAP_RETURN_IF_ERROR(ValidateView(view, box_));
+  auto same = std::ranges::find(views_, view.keyframe, &ObjectView::keyframe);
+  if (same == views_.end() && views() >= config_.max_views) {
+    same = views_.begin() + static_cast<std::ptrdiff_t>(MostRedundantView(view));
+  }
+  hull_.Add(view);
+  if (same != views_.end()) {
+    hull_.Remove(*same);
+    *same = std::move(view);
+  } else {
+    views_.push_back(std::move(view));
+  }
+  views_changed_ = true;
+  plan_.OnNewView(steps());
+  return absl::OkStatus();
+}
+
+// The view whose direction to the object is nearest to that of `view`.
+size_t ObjectField::MostRedundantView(const ObjectView& view) const {
+  const Eigen::Vector3d center = box_.T_world_object.translation();
+  const auto direction = [&](const ObjectView& v) { return (v.T_world_camera.translation() - center).normalized(); };
+  const Eigen::Vector3d wanted = direction(view);
+  size_t best = 0;
+  double best_cosine = -std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < views_.size(); ++i) {
+    const double cosine = wanted.dot(direction(views_[i]));
+    if (cosine > best_cosine) {
+      best_cosine = cosine;
+      best = i;
+    }
+  }
+  return best;
+}
+
+void ObjectField::PrepareViews() {
+  if (!views_changed_) return;
+  rays_.Build(views_, box_);
+  occupancy_.SetHull(hull_.Carve());
+  views_changed_ = false;
+}
+
+void ObjectField::Restart() {
+  ++restarts_;
+  trainer_ = nerf::FieldTrainer(config_, nerf::RandomBits(seed_, 5, restarts_));
+  occupancy_.Reset();
+  plan_.Restart();
+  loss_ = 0;
+}
+
+TrainStats ObjectField::Train(int steps, int threads) {
+  if (!has_box_ || views_.empty()) return {};
+  PrepareViews();
+  if (rays_.empty()) return {};
+  const Eigen::Vector3f extent = box_.ExtentUnit();
+  const nerf::StepSource source{
+      .ray = [this](uint64_t step, int index) { return rays_.Get(step, index); },
+      .learning_rate = [this](uint64_t step) { return static_cast<float>(plan_.LearningRate(step)); },
+      .extent = {extent.x(), extent.y(), extent.z()}};
+  TrainStats stats = trainer_.Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
+  train_seconds_ += stats.wall_s;
+  loss_ = stats.color_loss;
+  if (!trainer_.model().IsFinite()) {
+    spdlog::warn("{}: training diverged after {} steps with {} views; starting anew", id_.ToString(),
+                 trainer_.steps_done(), views());
+    Restart();
+    stats.restarted = true;
+  }
+  return stats;
+}
+
+FieldSnapshot ObjectField::Snapshot() const {
+  FieldSnapshot snapshot;
+  snapshot.object = id_;
+  snapshot.steps = steps();
+  snapshot.train_seconds = train_seconds_;
+  snapshot.loss = loss_;
+  snapshot.views = views();
+  snapshot.T_world_object = box_.T_world_object;
+  snapshot.box_half_extents = box_.half_extents.cast<float>();
+  snapshot.surface_level = static_cast<float>(config_.surface_level);
+  snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
+  snapshot.hull = {nerf::kOccupancyResolution, occupancy_.hull()};
+  const SE3<Object, World> T_object_world = box_.T_world_object.Inverse();
+  for (const ObjectView& view : views_) {
+    snapshot.view_centers_object.push_back((T_object_world * view.T_world_camera.translation()).cast<float>());
+  }
+  snapshot.field = std::make_shared<TrainedField>(trainer_.model().Clone(), box_);
+  return snapshot;
+}
+
+}  // namespace romap

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/nerf/cpu/field_trainer.h"
+#include "server/nerf/cpu/occupancy.h"
+#include "server/nerf/nerf_config.h"
+#include "server/nerf/ray_set.h"
+#include "server/nerf/train_stats.h"
+#include "server/nerf/training_box.h"
+#include "server/nerf/training_plan.h"
+#include "server/nerf/visual_hull.h"
+
+namespace romap {
+
+// One object's neural field with its views and its training (paper, section on the NeRF model). Not thread-safe: one
+// owner at a time. Snapshots are independent of it.
+class ObjectField {
+ public:
+  // The same seed, inputs and thread counts give the same field.
+  ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed);
+
+  // The object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing; another one
+  // starts a new box and a new training. INVALID_ARGUMENT: pose or size that cannot be.
+  absl::Status SetBox(const Cuboid& cuboid);
+
+  // Adds a view, or replaces the one of the same keyframe (its pose was corrected). FAILED_PRECONDITION: no box yet, or
+  // the view is of another object. INVALID_ARGUMENT: see ValidateView.
+  absl::Status AddView(ObjectView view);
+
+  // `steps` steps of optimisation on `threads` (1..64) threads. Nothing happens without box and views.
+  TrainStats Train(int steps, int threads);
+
+  // The field as it is now. `converged` is left false; the caller knows whether more training is planned.
+  FieldSnapshot Snapshot() const;
+
+  // Memory that only Train() needs is given back until the next call.
+  void ReleaseScratch() { trainer_.ReleaseScratch(); }
+
+  ObjectId id() const { return id_; }
+  int views() const { return static_cast<int>(views_.size()); }
+  uint64_t steps() const { return trainer_.steps_done(); }
+  // Steps the training plan allows now; `complete`: no more views are expected.
+  uint64_t AllowedSteps(bool complete) const { return plan_.AllowedSteps(views(), complete); }
+
+ private:
+  void Restart();
+  void PrepareViews();
+  size_t MostRedundantView(const ObjectView& view) const;
+
+  NerfConfig config_;
+  ObjectId id_;
+  uint64_t seed_;
+  uint64_t restarts_ = 0;
+  TrainingBox box_;
+  bool has_box_ = false;
+  bool views_changed_ = false;
+  std::vector<ObjectView> views_;
+  VisualHull hull_;
+  RaySet rays_;
+  nerf::Occupancy occupancy_;
+  TrainingPlan plan_;
+  nerf::FieldTrainer trainer_;
+  double train_seconds_ = 0;
+  double loss_ = 0;
+};
+
+}  // namespace romap

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+#include "server/nerf/nerf_config.h"
+
+namespace romap {
+
+// How long an object is trained and how fast it learns, as views arrive one by one.
+//
+// The learning rate falls exponentially over the planned steps. It is a function of the steps that are left, so a view
+// that comes after the plan is fulfilled extends the plan and thereby warms the rate up a little. Training far beyond
+// the plan would make density drift behind textureless surfaces, hence `max_steps`.
+class TrainingPlan {
+ public:
+  explicit TrainingPlan(const NerfConfig& config) : config_(config) {}
+
+  void Restart() { planned_steps_ = config_.full_budget_steps; }
+  // A new or corrected view came when `steps_done` steps were done.
+  void OnNewView(uint64_t steps_done);
+
+  // Steps allowed so far. `complete`: no more views are expected, so train to the end of the plan.
+  uint64_t AllowedSteps(int views, bool complete) const;
+  double LearningRate(uint64_t step) const;
+
+ private:
+  NerfConfig config_;
+  int planned_steps_ = config_.full_budget_steps;
+};
+
+}  // namespace romap

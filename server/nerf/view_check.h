@@ -1,0 +1,15 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include "common/messages.h"
+#include "server/nerf/training_box.h"
+
+namespace romap {
+
+// INVALID_ARGUMENT, naming object, keyframe and fault, for a view that cannot be trained on: no keyframe, bad camera or
+// a distorted one, pose not finite, crop outside the image, an image of another size or type than the crop needs, no
+// object pixel, or a box that lies behind the camera.
+absl::Status ValidateView(const ObjectView& view, const TrainingBox& box);
+
+}  // namespace romap

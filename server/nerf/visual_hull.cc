@@ -1,0 +1,100 @@
+#include "server/nerf/visual_hull.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "server/nerf/cpu/kernels.h"
+
+namespace romap {
+namespace {
+
+constexpr int kCells = nerf::kOccupancyResolution;
+constexpr int kBlock = 8;  // cells per side of a block that is tested as a whole first
+
+size_t CellIndexOf(int x, int y, int z) { return (static_cast<size_t>(z) * kCells + y) * kCells + x; }
+
+enum class Verdict { kUnknown, kEmpty, kFull, kMixed };
+
+}  // namespace
+
+// One view's mask, ready to be asked about balls of the Object frame.
+struct VisualHull::Footprints {
+  SE3<Camera, Object> T_camera_object;
+  CameraModel camera;
+  cv::Rect roi_px;
+  cv::Mat occupied_sum;  // integral image of "not background"
+
+  Footprints(const ObjectView& view, const TrainingBox& box)
+      : T_camera_object(view.T_world_camera.Inverse() * box.T_world_object), camera(view.camera), roi_px(view.roi_px) {
+    const cv::Mat occupied = (view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255;
+    cv::integral(occupied, occupied_sum, CV_32S);
+  }
+
+  // The mask under a ball's footprint, taken as a square of its radius.
+  Verdict Ask(const Eigen::Vector3d& center_object, double radius_mu) const {
+    const Eigen::Vector3d p = T_camera_object * center_object;
+    if (p.z() <= radius_mu) return Verdict::kUnknown;
+    const Eigen::Vector2d pixel = camera.Project(p);
+    const double radius_px = radius_mu * std::max(camera.fx_px, camera.fy_px) / p.z();
+    const int x0 = static_cast<int>(std::floor(pixel.x() - radius_px + 0.5)) - roi_px.x;
+    const int y0 = static_cast<int>(std::floor(pixel.y() - radius_px + 0.5)) - roi_px.y;
+    const int x1 = static_cast<int>(std::floor(pixel.x() + radius_px + 0.5)) - roi_px.x + 1;
+    const int y1 = static_cast<int>(std::floor(pixel.y() + radius_px + 0.5)) - roi_px.y + 1;
+    if (x0 < 0 || y0 < 0 || x1 > roi_px.width || y1 > roi_px.height) return Verdict::kUnknown;
+    const int occupied = occupied_sum.at<int>(y1, x1) - occupied_sum.at<int>(y0, x1) - occupied_sum.at<int>(y1, x0) +
+                         occupied_sum.at<int>(y0, x0);
+    if (occupied == 0) return Verdict::kEmpty;
+    return occupied == (x1 - x0) * (y1 - y0) ? Verdict::kFull : Verdict::kMixed;
+  }
+};
+
+VisualHull::VisualHull(const NerfConfig& config)
+    : margin_(config.hull_margin), min_votes_(config.hull_min_votes), vote_share_(config.hull_vote_share) {}
+
+void VisualHull::Reset(const TrainingBox& box) {
+  box_ = box;
+  seen_.assign(CellIndexOf(0, 0, kCells), 0);
+  against_.assign(seen_.size(), 0);
+}
+
+void VisualHull::Vote(const ObjectView& view, int sign) {
+  const Footprints footprints(view, box_);
+  for (int z = 0; z < kCells; z += kBlock) {
+    for (int y = 0; y < kCells; y += kBlock) {
+      for (int x = 0; x < kCells; x += kBlock) VoteBlock(footprints, x, y, z, sign);
+    }
+  }
+}
+
+void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign) {
+  const Eigen::Vector3d cell = 2.0 * box_.half_extents / kCells;
+  const auto center = [&](int x, int y, int z, double half) -> Eigen::Vector3d {
+    return Eigen::Vector3d(x + half, y + half, z + half).cwiseProduct(cell) - box_.half_extents;
+  };
+  const double cell_radius_mu = 0.5 * cell.norm() * margin_;
+  const Verdict block = footprints.Ask(center(bx, by, bz, 0.5 * kBlock), 0.5 * kBlock * cell.norm());
+  const bool decided = block == Verdict::kEmpty || block == Verdict::kFull;
+  for (int z = bz; z < bz + kBlock; ++z) {
+    for (int y = by; y < by + kBlock; ++y) {
+      for (int x = bx; x < bx + kBlock; ++x) {
+        const Verdict verdict = decided ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
+        if (verdict == Verdict::kUnknown) continue;
+        const size_t i = CellIndexOf(x, y, z);
+        seen_[i] = static_cast<uint8_t>(seen_[i] + sign);
+        if (verdict == Verdict::kEmpty) against_[i] = static_cast<uint8_t>(against_[i] + sign);
+      }
+    }
+  }
+}
+
+std::vector<uint8_t> VisualHull::Carve() const {
+  std::vector<uint8_t> cells(seen_.size());
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const double needed = std::max<double>(min_votes_, vote_share_ * seen_[i]);
+    cells[i] = against_[i] < needed ? 1 : 0;
+  }
+  return cells;
+}
+
+}  // namespace romap

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/nerf/nerf_config.h"
+#include "server/nerf/training_box.h"
+
+namespace romap {
+
+// The cells of the training box that the masks leave possible (Laurentini, 1994). A view votes against a cell when the
+// cell's whole footprint is background in it. A cell outside the crop, or before which an occluder stands, is unknown
+// to the view. Votes instead of a plain intersection, because one bad mask would cut the object for good.
+class VisualHull {
+ public:
+  explicit VisualHull(const NerfConfig& config);
+
+  // Forgets all votes; the hull is the whole box.
+  void Reset(const TrainingBox& box);
+  // A view must be removed with the values with which it was added.
+  void Add(const ObjectView& view) { Vote(view, 1); }
+  void Remove(const ObjectView& view) { Vote(view, -1); }
+  // 1 = may hold matter, index as in OccupancyBits, kOccupancyResolution^3.
+  std::vector<uint8_t> Carve() const;
+
+ private:
+  struct Footprints;
+  void Vote(const ObjectView& view, int sign);
+  void VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign);
+
+  TrainingBox box_;
+  double margin_;
+  int min_votes_;
+  double vote_share_;
+  std::vector<uint8_t> seen_;     // views whose crop holds the cell's footprint
+  std::vector<uint8_t> against_;  // views that call it empty
+};
+
+}  // namespace romap

@@ -1,0 +1,184 @@
+// Trains the objects of a sequence with true cuboids, poses and masks, and says what it cost:
+//   field_bench SEQUENCE [OUT] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0] [--steps 0] [--threads 2]
+//               [--loosen 0] [--seed 1] [--depth] [--masks mask.txt]
+// Every `every`-th frame becomes a view. `loosen` 0.2 makes the cuboids 20 % longer. `steps` 0 = the plan's full
+// budget. With OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "client/files/ply.h"
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "server/mesh/extract_mesh.h"
+#include "server/nerf/object_field.h"
+
+namespace romap {
+namespace {
+
+struct Options {
+  std::string sequence;
+  std::string out;
+  std::string masks = "mask.txt";
+  std::vector<std::string> assignments;
+  int every = 4;
+  int offset = 0;
+  int steps = 0;
+  int threads = 2;
+  int seed = 1;
+  double loosen = 0;
+  bool depth = false;
+  NerfConfig nerf;
+  MeshConfig mesh;
+};
+
+struct DecodedFrame {
+  KeyframeId id;
+  CameraModel camera;
+  SE3<World, Camera> T_world_camera;
+  cv::Mat image_bgr, labels, depth_mu;
+};
+
+cv::Mat Decode(const std::string& bytes, int flags) {
+  return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())), flags);
+}
+
+absl::StatusOr<std::vector<DecodedFrame>> LoadFrames(const Sequence& sequence, const Options& options) {
+  std::vector<DecodedFrame> frames;
+  for (size_t i = static_cast<size_t>(options.offset); i < sequence.size(); i += static_cast<size_t>(options.every)) {
+    if (!sequence.has_mask(i)) continue;
+    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
+    if (!input.T_world_camera) continue;
+    DecodedFrame frame{KeyframeId{i + 1},
+                       sequence.camera(),
+                       *input.T_world_camera,
+                       Decode(input.image, cv::IMREAD_COLOR),
+                       Decode(input.label_png, cv::IMREAD_UNCHANGED),
+                       {}};
+    frame.labels.convertTo(frame.labels, CV_16U);
+    if (options.depth && !input.depth.empty()) {
+      Decode(input.depth, cv::IMREAD_UNCHANGED).convertTo(frame.depth_mu, CV_32F, input.depth_scale_mu);
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+// The crop around the projected cuboid, half as large again, and the mask.
+cv::Rect Crop(const DecodedFrame& frame, const ObjectRecord& object, const cv::Mat& is_object) {
+  const SE3<Camera, Object> T_camera_object = frame.T_world_camera.Inverse() * object.T_world_object;
+  std::vector<cv::Point2f> corners;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+    const Eigen::Vector3d p = T_camera_object * (1.5 * sign.cwiseProduct(object.half_extents));
+    if (p.z() <= 0) return {};
+    const Eigen::Vector2d pixel = frame.camera.Project(p);
+    corners.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+  }
+  const cv::Rect image(0, 0, frame.camera.width_px, frame.camera.height_px);
+  return (cv::boundingRect(corners) | cv::boundingRect(is_object)) & image;
+}
+
+std::optional<ObjectView> MakeView(const DecodedFrame& frame, const ObjectRecord& object) {
+  const cv::Mat is_object = frame.labels == static_cast<int>(object.id);
+  if (cv::countNonZero(is_object) < 100) return std::nullopt;
+  const cv::Rect roi = Crop(frame, object, is_object);
+  if (roi.empty()) return std::nullopt;
+  ObjectView view;
+  view.object = ObjectId{static_cast<uint64_t>(object.id)};
+  view.keyframe = frame.id;
+  view.camera = frame.camera;
+  view.T_world_camera = frame.T_world_camera;
+  view.roi_px = roi;
+  view.color_bgr = frame.image_bgr(roi).clone();
+  view.ray_kind = cv::Mat(roi.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kOccluder)));
+  view.ray_kind.setTo(static_cast<int>(RayKind::kObject), is_object(roi));
+  view.ray_kind.setTo(static_cast<int>(RayKind::kBackground), frame.labels(roi) == 0);
+  if (!frame.depth_mu.empty()) view.depth_mu = frame.depth_mu(roi).clone();
+  return view;
+}
+
+absl::Status WriteMesh(const FieldSnapshot& snapshot, const ObjectRecord& object, const Options& options) {
+  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ExtractMesh(snapshot, options.mesh));
+  for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& n : mesh.normals) n = (snapshot.T_world_object.rotation() * n.cast<double>()).cast<float>();
+  const std::string dir = options.out + "/objects";
+  std::filesystem::create_directories(dir);
+  return WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
+}
+
+void PrintRow(const std::string& name, int views, const TrainStats& stats, double setup_s) {
+  const double samples = static_cast<double>(std::max<uint64_t>(1, stats.samples));
+  std::printf("%-10s %5d %5d %8.3f %8.3f %8.3f %7.2f %6.2f %7.4f |", name.c_str(), views, stats.steps, setup_s,
+              stats.CpuSeconds(), stats.wall_s, samples / stats.CpuSeconds() * 1e-6,
+              static_cast<double>(stats.active_samples) / samples, stats.color_loss);
+  for (double s : stats.phase_cpu_s) std::printf(" %11.1f", s / samples * 1e9);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+absl::Status BenchObject(const std::vector<DecodedFrame>& frames, ObjectRecord object, const Options& options) {
+  object.half_extents *= 1.0 + options.loosen;
+  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
+  ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
+  const auto start = std::chrono::steady_clock::now();
+  for (const DecodedFrame& frame : frames) {
+    std::optional<ObjectView> view = MakeView(frame, object);
+    if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
+  }
+  if (field.views() == 0) return absl::OkStatus();
+  const double setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const int steps = options.steps > 0 ? options.steps : static_cast<int>(field.AllowedSteps(true));
+  PrintRow(object.name, field.views(), field.Train(steps, options.threads), setup_s);
+  return options.out.empty() ? absl::OkStatus() : WriteMesh(field.Snapshot(), object, options);
+}
+
+absl::Status Run(const Options& options) {
+  SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, sequence_options));
+  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence);
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<DecodedFrame> frames, LoadFrames(sequence, options));
+  std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
+              "Msam/s", "active", "loss");
+  for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);
+  std::printf("  [ns/sample]\n");
+  for (const ObjectRecord& object : sequence.objects()->objects) {
+    ROMAP_RETURN_IF_ERROR(BenchObject(frames, object, options));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) {
+  romap::Options options;
+  CLI::App app("Trains the objects of a sequence and reports cost");
+  app.add_option("sequence", options.sequence)->required();
+  app.add_option("out", options.out);
+  app.add_option("--set", options.assignments)->allow_extra_args(false);
+  app.add_option("--masks", options.masks);
+  app.add_option("--every", options.every)->check(CLI::PositiveNumber);
+  app.add_option("--offset", options.offset)->check(CLI::NonNegativeNumber);
+  app.add_option("--steps", options.steps);
+  app.add_option("--threads", options.threads);
+  app.add_option("--seed", options.seed);
+  app.add_option("--loosen", options.loosen);
+  app.add_flag("--depth", options.depth);
+  CLI11_PARSE(app, argc, argv);
+  romap::ConfigFields fields;
+  fields.Section("nerf");
+  options.nerf.Fields(fields);
+  fields.Section("mesh");
+  options.mesh.Fields(fields);
+  absl::Status status = fields.Set(options.assignments);
+  if (status.ok()) status = romap::Run(options);
+  if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
+  return status.ok() ? 0 : 1;
+}
