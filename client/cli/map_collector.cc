@@ -52,9 +52,8 @@ void MapCollector::Apply(MapEvent event) {
     if (entry.first_cuboid_s < 0 && entry.object.state != ObjectState::kProvisional) entry.first_cuboid_s = Now_s();
   } else if (auto* mesh = std::get_if<MeshUpdate>(&event)) {
     const auto it = objects_.find(mesh->id);
-    if (it == objects_.end() || mesh->revision < it->second.object.revision) return;
-    it->second.object.revision = mesh->revision;
-    it->second.object.T_world_mesh = mesh->T_world_mesh;
+    if (it == objects_.end()) return;
+    if (it->second.mesh && mesh->revision < it->second.mesh->revision) return;
     it->second.mesh = std::move(*mesh);
     ++it->second.meshes;
     if (it->second.first_mesh_s < 0) it->second.first_mesh_s = Now_s();

@@ -55,7 +55,7 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
       entry.steps = snapshot.mesh->steps;
       if (auto mesh = DecodeDraco(snapshot.mesh->draco); mesh.ok()) {
         entry.mesh_world = *std::move(mesh);
-        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.mesh->T_world_mesh), entry.mesh_world);
+        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object), entry.mesh_world);
       } else {
         faults->push_back(
             fmt::format("{}: mesh cannot be decoded: {}", snapshot.object.id.ToString(), Message(mesh.status())));

@@ -27,7 +27,7 @@ void MapState::Apply(MapEvent event) {
 void MapState::ApplyUpdate(ObjectUpdate update) {
   ObjectSnapshot& entry = objects_[update.id];
   update.revision = entry.object.revision + 1;
-  if (entry.mesh) update.T_world_mesh = entry.mesh->T_world_mesh;
+  update.T_world_mesh = entry.object.T_world_mesh;
   entry.object = std::move(update);
   Send(entry.object);
 }
@@ -41,15 +41,18 @@ uint64_t MapState::Forget(ObjectId id) {
   return revision;
 }
 
-void MapState::PublishMesh(MeshUpdate mesh) {
+void MapState::PublishMesh(MeshUpdate mesh, const SE3<World, Object>& T_world_mesh) {
   std::lock_guard lock(mutex_);
   const auto it = objects_.find(mesh.id);
   if (it == objects_.end()) return;
   ObjectSnapshot& entry = it->second;
   mesh.revision = ++entry.object.revision;
-  entry.object.T_world_mesh = mesh.T_world_mesh;
   entry.mesh = std::move(mesh);
   Send(*entry.mesh);
+  // Where the mesh stands travels with the object.
+  entry.object.T_world_mesh = T_world_mesh;
+  ++entry.object.revision;
+  Send(entry.object);
 }
 
 void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns) {

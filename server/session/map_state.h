@@ -20,8 +20,8 @@ class MapState {
  public:
   // What the objects stage says: updates, removals, merges.
   void Apply(MapEvent event);
-  // A new mesh. Ignored when its object is gone or a mesh with more training stands already.
-  void PublishMesh(MeshUpdate mesh);
+  // A new mesh and the pose of the frame its vertices are in. Ignored when its object is gone.
+  void PublishMesh(MeshUpdate mesh, const SE3<World, Object>& T_world_mesh);
   // Answer to one frame; kept in the trajectory when it has a pose.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns);
   void Publish(const Statistics& statistics);

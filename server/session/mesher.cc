@@ -20,7 +20,6 @@ absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const MeshCon
   update.final = snapshot.converged;
   update.vertex_count = static_cast<uint32_t>(mesh.vertices.size());
   update.triangle_count = static_cast<uint32_t>(mesh.triangles.size());
-  update.T_world_mesh = snapshot.T_world_object;
   ROMAP_ASSIGN_OR_RETURN(update.draco, EncodeDraco(mesh, DracoOptions{}));
   return update;
 }
@@ -85,7 +84,7 @@ void Mesher::Run() {
     waiting_.erase(oldest);
     lock.unlock();
     if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
-      sink(*std::move(mesh));
+      sink(*std::move(mesh), snapshot.T_world_object);
     } else {
       // Early in training there may be no surface yet; the next snapshot brings it.
       spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,

@@ -15,7 +15,8 @@ namespace romap {
 // The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits.
 class Mesher {
  public:
-  using Sink = std::function<void(MeshUpdate)>;
+  // The mesh and the pose of the frame its vertices are in.
+  using Sink = std::function<void(MeshUpdate, const SE3<World, Object>& T_world_mesh)>;
 
   explicit Mesher(const MeshConfig& config);
   ~Mesher();

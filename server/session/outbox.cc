@@ -5,11 +5,8 @@
 namespace romap {
 namespace {
 
-template <class T>
-constexpr size_t kIndex = MapEvent(T{}).index();
-
-const size_t kAck = kIndex<FrameAck>, kObject = kIndex<ObjectUpdate>, kMesh = kIndex<MeshUpdate>,
-             kStatistics = kIndex<Statistics>;
+const size_t kAck = MapEvent(FrameAck{}).index(), kObject = MapEvent(ObjectUpdate{}).index(),
+             kMesh = MapEvent(MeshUpdate{}).index(), kStatistics = MapEvent(Statistics{}).index();
 
 }  // namespace
 
@@ -42,10 +39,8 @@ void Outbox::Put(MapEvent event) {
 }
 
 void Outbox::Append(const Key& key, MapEvent event) {
-  if (const auto it = waiting_.find(key); it != waiting_.end()) {
-    *it->second = std::move(event);
-    return;
-  }
+  // The newer event goes to the end, not to the place of the older one, so that revisions arrive in their order.
+  Forget(key);
   events_.push_back(std::move(event));
   waiting_[key] = std::prev(events_.end());
 }

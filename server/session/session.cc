@@ -44,7 +44,9 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       next_statistics_(Clock::now()),
       frames_(config.session.frame_queue),
       tracked_(config.session.mapping_queue) {
-  mesher_client_ = mesher_->Register([this](MeshUpdate mesh) { map_.PublishMesh(std::move(mesh)); });
+  mesher_client_ = mesher_->Register([this](MeshUpdate mesh, const SE3<World, Object>& T_world_mesh) {
+    map_.PublishMesh(std::move(mesh), T_world_mesh);
+  });
   pool_client_ =
       pool_->Register([this](FieldSnapshot snapshot) { mesher_->Offer(mesher_client_, std::move(snapshot)); });
   tracking_thread_ = std::thread([this] { RunTracking(); });

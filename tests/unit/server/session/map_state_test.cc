@@ -14,12 +14,13 @@ ObjectUpdate Update(uint64_t id, ObjectState state = ObjectState::kConfirmed) {
   return update;
 }
 
-MeshUpdate MeshOf(uint64_t id, double x) {
+MeshUpdate MeshOf(uint64_t id) {
   MeshUpdate mesh;
   mesh.id = ObjectId{id};
-  mesh.T_world_mesh = SE3<World, Object>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0));
   return mesh;
 }
+
+SE3<World, Object> PoseAt(double x) { return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}; }
 
 std::shared_ptr<Outbox> Listen(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100, true); }
 
@@ -28,12 +29,13 @@ TEST(MapStateTest, RevisionsGrowOverCuboidsAndMeshes) {
   const auto outbox = Listen(map);
   map.Apply(Update(1));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 1u);
-  map.PublishMesh(MeshOf(1, 0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   EXPECT_EQ(std::get<MeshUpdate>(*outbox->Next(kNoWait)).revision, 2u);
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "the mesh's pose travels with the object";
   map.Apply(Update(1));
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u);
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 4u);
   map.Apply(ObjectRemoved{ObjectId{1}, 0, "ghost"});
-  EXPECT_EQ(std::get<ObjectRemoved>(*outbox->Next(kNoWait)).revision, 4u);
+  EXPECT_EQ(std::get<ObjectRemoved>(*outbox->Next(kNoWait)).revision, 5u);
 }
 
 TEST(MapStateTest, AMeshWhoseObjectIsGoneIsNotPublished) {
@@ -41,16 +43,16 @@ TEST(MapStateTest, AMeshWhoseObjectIsGoneIsNotPublished) {
   const auto outbox = Listen(map);
   map.Apply(Update(1));
   map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
-  map.PublishMesh(MeshOf(1, 0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   while (const auto event = outbox->Next(kNoWait)) EXPECT_FALSE(std::holds_alternative<MeshUpdate>(*event));
 }
 
 TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1, 5));
-  const auto outbox = Listen(map);
+  map.PublishMesh(MeshOf(1), PoseAt(5));
   map.Apply(Update(1));
+  const auto outbox = Listen(map);
   const auto update = std::get<ObjectUpdate>(*outbox->Next(kNoWait));
   ASSERT_TRUE(update.T_world_mesh.has_value());
   EXPECT_EQ(update.T_world_mesh->translation().x(), 5);
@@ -59,7 +61,7 @@ TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
 TEST(MapStateTest, ANewcomerGetsTheMapFirst) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1, 0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   map.Apply(Update(2));
   const auto outbox = Listen(map);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).id, ObjectId{1});

@@ -36,9 +36,9 @@ TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaits) {
   outbox.Put(Update(2, 1));
   outbox.Put(Update(1, 3));
   outbox.Put(NewMesh(1, 4));
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u);
-  EXPECT_EQ(std::get<MeshUpdate>(*outbox.Next(kNoWait)).revision, 4u);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).id, ObjectId{2});
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u) << "revisions come in their order";
+  EXPECT_EQ(std::get<MeshUpdate>(*outbox.Next(kNoWait)).revision, 4u);
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
   outbox.Put(Update(1, 5));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 5u) << "what was taken no longer coalesces";
