@@ -1,0 +1,207 @@
+#include "client/synth/synth.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "client/files/camera_yaml.h"
+#include "client/files/objects_yaml.h"
+#include "client/files/ply.h"
+#include "client/files/text_file.h"
+#include "client/files/tum.h"
+#include "client/synth/camera_path.h"
+#include "client/synth/faults.h"
+#include "client/synth/frame_renderer.h"
+#include "client/synth/ground_truth.h"
+#include "client/synth/lighting.h"
+#include "client/synth/scene.h"
+
+namespace romap::synth {
+namespace {
+
+constexpr double kDepthUnit_m = 1e-4;
+
+absl::Status MakeFolders(const std::string& dir) {
+  std::error_code error;
+  std::filesystem::create_directory(dir, error);
+  for (const char* name : {"rgb", "mask", "depth", "gt", "gt_mesh"}) {
+    if (!error) std::filesystem::create_directory(dir + "/" + name, error);
+  }
+  if (error) return InvalidArgument("{}: cannot make the folder: {}", dir, error.message());
+  return absl::OkStatus();
+}
+
+absl::Status WriteImage(const std::string& path, const cv::Mat& image, const std::vector<int>& parameters) {
+  std::vector<uint8_t> bytes;
+  const std::string extension = std::filesystem::path(path).extension();
+  try {
+    if (!cv::imencode(extension, image, bytes, parameters)) return Internal("{}: cannot encode the image", path);
+  } catch (const cv::Exception& e) {
+    return Internal("{}: cannot encode the image: {}", path, e.what());
+  }
+  return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+cv::Mat DepthUnits(const cv::Mat& depth_m) {
+  cv::Mat units(depth_m.size(), CV_16UC1);
+  for (int v = 0; v < depth_m.rows; ++v) {
+    for (int u = 0; u < depth_m.cols; ++u) {
+      const long value = std::lround(depth_m.at<float>(v, u) / kDepthUnit_m);
+      // Too far for 16 bits counts as unknown.
+      units.at<uint16_t>(v, u) = value > 65535 ? uint16_t{0} : static_cast<uint16_t>(value);
+    }
+  }
+  return units;
+}
+
+// Makes and writes the frames, in any order, on several threads.
+class SequenceMaker {
+ public:
+  SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
+      : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)) {
+    path_ = MakeCameraPath(options, scene, camera_);
+    detections_.resize(path_.size());
+    for (const SceneObject& object : scene.objects) {
+      surfaces_.push_back(std::make_unique<SurfacePoints>(object, options.seed));
+    }
+  }
+
+  absl::Status MakeFrames(const std::function<void(int, int)>& progress) {
+    std::mutex mutex;
+    absl::Status status;
+    int done = 0;
+    tbb::parallel_for(0, options_.frames, [&](int i) {
+      {
+        const std::lock_guard lock(mutex);
+        if (!status.ok()) return;
+      }
+      const absl::Status frame_status = MakeFrame(i);
+      const std::lock_guard lock(mutex);
+      status.Update(frame_status);
+      ++done;
+      if (progress && status.ok()) progress(done, options_.frames);
+    });
+    return status;
+  }
+
+  absl::Status WriteTables() const {
+    ROMAP_RETURN_IF_ERROR(WriteCameraYaml(dir_ + "/camera.yaml", {camera_, options_.fps, kDepthUnit_m}));
+    ROMAP_RETURN_IF_ERROR(WriteList("rgb", ImageExtension()));
+    ROMAP_RETURN_IF_ERROR(WriteList("mask", ".png"));
+    ROMAP_RETURN_IF_ERROR(WriteList("depth", ".png"));
+    std::vector<StampedPose> poses;
+    std::string detections = "timestamp,label,class,score\n";
+    for (size_t i = 0; i < path_.size(); ++i) {
+      poses.push_back({Timestamp_ns(i), path_[i]});
+      for (const SynthDetection& detection : detections_[i]) {
+        detections += fmt::format("{},{},{},{:.3f}\n", FormatSeconds(Timestamp_ns(i)), detection.label,
+                                  scene_.objects[detection.object - 1U].solid.class_name, detection.score);
+      }
+    }
+    ROMAP_RETURN_IF_ERROR(WriteFile(dir_ + "/detections.csv", detections));
+    return WriteTum(dir_ + "/groundtruth.txt", poses);
+  }
+
+  absl::Status WriteObjectTruth() const {
+    ObjectsYaml records;
+    for (const SceneObject& object : scene_.objects) {
+      records.objects.push_back(
+          {object.label, object.name, object.solid.class_name, object.T_world_object, object.half_extents_m, {}});
+      ROMAP_RETURN_IF_ERROR(WritePly(dir_ + "/gt_mesh/" + object.name + ".ply", TrueMesh(object)));
+      const SurfacePoints& surface = *surfaces_[object.label - 1U];
+      Mesh cloud;
+      cloud.vertices = surface.positions_world();
+      std::vector<double> seen(cloud.vertices.size());
+      std::vector<double> source(cloud.vertices.size());
+      for (size_t i = 0; i < seen.size(); ++i) {
+        seen[i] = surface.seen(i) ? 1 : 0;
+        source[i] = surface.underside(i) ? 2 : 0;
+      }
+      ROMAP_RETURN_IF_ERROR(
+          WritePly(dir_ + "/gt/" + object.name + ".ply", cloud, {{"seen", seen}, {"source", source}}));
+    }
+    return WriteObjects(dir_ + "/objects.yaml", records);
+  }
+
+ private:
+  absl::Status MakeFrame(int i) {
+    const SE3<World, Camera>& T_world_camera = path_[static_cast<size_t>(i)];
+    TrueFrame frame = RenderFrame(scene_, camera_, T_world_camera);
+    for (const auto& surface : surfaces_) surface->MarkSeen(frame, camera_, T_world_camera);
+
+    // One stream of random numbers per frame: frames are made in any order.
+    Random random(options_.seed, 100000U + static_cast<uint64_t>(i));
+    const FaultyMask mask = SpoilMask(frame.labels, static_cast<int>(scene_.objects.size()), options_, random);
+    SpoilImage(frame.color_bgr, SceneMotion(static_cast<size_t>(i)), options_, random);
+    detections_[static_cast<size_t>(i)] = mask.detections;
+
+    const std::vector<int> fast_png = {cv::IMWRITE_PNG_COMPRESSION, 2};
+    const std::vector<int> fine_jpeg = {cv::IMWRITE_JPEG_QUALITY, 95};
+    ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("rgb", i, ImageExtension()), frame.color_bgr,
+                                     options_.format == ImageFormat::kPng ? fast_png : fine_jpeg));
+    ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("mask", i, ".png"), mask.labels, fast_png));
+    return WriteImage(dir_ + "/" + FrameFile("depth", i, ".png"), DepthUnits(frame.depth_m), fast_png);
+  }
+
+  // How the middle of the table top moves through the image around frame i, pixels per frame.
+  cv::Vec2d SceneMotion(size_t i) const {
+    if (path_.size() < 2) return {0, 0};
+    const size_t from = i + 1 < path_.size() ? i : i - 1;
+    const Eigen::Vector3d middle_world(0, 0, scene_.table_height_m);
+    const Eigen::Vector2d before = camera_.Project(path_[from].Inverse() * middle_world);
+    const Eigen::Vector2d after = camera_.Project(path_[from + 1].Inverse() * middle_world);
+    // An orbit keeps the middle in place and turns the table under it: what is near the camera moves most.
+    const Eigen::Vector3d near_world = middle_world + 0.3 * (path_[from].translation() - middle_world);
+    const Eigen::Vector2d near_before = camera_.Project(path_[from].Inverse() * near_world);
+    const Eigen::Vector2d near_after = camera_.Project(path_[from + 1].Inverse() * near_world);
+    const Eigen::Vector2d motion = 0.5 * (after - before + near_after - near_before);
+    return {motion.x(), motion.y()};
+  }
+
+  int64_t Timestamp_ns(size_t i) const { return std::llround(static_cast<double>(i) * 1e9 / options_.fps); }
+
+  const char* ImageExtension() const { return options_.format == ImageFormat::kPng ? ".png" : ".jpg"; }
+
+  static std::string FrameFile(const char* folder, int i, const char* extension) {
+    return fmt::format("{}/{:06d}{}", folder, i + 1, extension);
+  }
+
+  absl::Status WriteList(const char* folder, const char* extension) const {
+    std::string lines = fmt::format("# {} images, synthetic, seed {}\n# timestamp filename\n", folder, options_.seed);
+    for (int i = 0; i < options_.frames; ++i) {
+      lines +=
+          fmt::format("{} {}\n", FormatSeconds(Timestamp_ns(static_cast<size_t>(i))), FrameFile(folder, i, extension));
+    }
+    return WriteFile(fmt::format("{}/{}.txt", dir_, folder), lines);
+  }
+
+  const SynthOptions& options_;
+  const std::string& dir_;
+  const Scene& scene_;
+  CameraModel camera_;
+  std::vector<SE3<World, Camera>> path_;
+  std::vector<std::vector<SynthDetection>> detections_;   // per frame
+  std::vector<std::unique_ptr<SurfacePoints>> surfaces_;  // per object
+};
+
+}  // namespace
+
+absl::Status MakeSequence(const SynthOptions& options, const std::string& dir,
+                          const std::function<void(int done, int total)>& progress) {
+  ROMAP_RETURN_IF_ERROR(ValidateSynthOptions(options));
+  ROMAP_RETURN_IF_ERROR(MakeFolders(dir));
+  Scene scene =
+      MakeScene({.seed = options.seed, .objects = options.objects, .identical_pairs = options.identical_pairs});
+  BakeLight(scene);
+  SequenceMaker maker(options, dir, scene);
+  ROMAP_RETURN_IF_ERROR(maker.MakeFrames(progress));
+  ROMAP_RETURN_IF_ERROR(maker.WriteTables());
+  return maker.WriteObjectTruth();
+}
+
+}  // namespace romap::synth
