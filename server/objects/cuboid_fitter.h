@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/objects/silhouette.h"
+#include "server/objects/visual_hull.h"
+
+namespace romap {
+
+// All that speaks for the box of one object. Points and cells are in the Grid frame of `region`.
+struct CuboidEvidence {
+  HullRegion region;
+  std::vector<Eigen::Vector3d> hull_cells;  // centres of the cells the silhouettes leave
+  Eigen::Vector3d cell_size = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> points;               // map points on the object, outliers removed
+  std::vector<Eigen::Vector3d> background;           // map points that belong to no object
+  std::vector<double> neighbour_bottoms;             // heights of what other objects stand on
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the masks' middles meet
+  double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
+  double margin_mu = 0;                              // padding on every side
+  int min_points = 8;                                // fewer points do not say how far the object reaches
+};
+
+// The upright box around an object. The hull bounds its sides; the support plane (or points, or the hull) its bottom;
+// the points, and the least height that covers every silhouette, its top. The hull alone would put a cone on every flat
+// top that is only seen from the side and above. Where the cameras stood on one side only, the hull is cut to the depth
+// of the points. Yaw: rectangle of least area around the footprint; `previous` wins over equally good ones and decides
+// which of the four names of the same box is used. nullopt when the evidence leaves no volume.
+std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
+                                const std::optional<Cuboid>& previous);
+
+// Height (Grid z) of the horizontal surface that the object stands on: the densest thin layer of background points
+// around its footprint, else the median bottom of its neighbours. nullopt when neither is there.
+std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
+
+}  // namespace romap

@@ -1,0 +1,69 @@
+#include "server/objects/footprint.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+namespace romap {
+namespace {
+
+constexpr double kQuarterTurn = std::numbers::pi / 2;
+
+Footprint RectangleAt(double yaw_rad, const std::vector<cv::Point2f>& outline) {
+  const Eigen::Rotation2Dd to_rectangle(-yaw_rad);
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300);
+  Eigen::Vector2d high = -low;
+  for (const cv::Point2f& point : outline) {
+    const Eigen::Vector2d p = to_rectangle * Eigen::Vector2d(point.x, point.y);
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return {yaw_rad, to_rectangle.inverse() * Eigen::Vector2d((low + high) / 2), (high - low) / 2};
+}
+
+}  // namespace
+
+std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
+                                      std::optional<double> previous_yaw_rad) {
+  if (cells.size() < 4) return std::nullopt;
+  std::vector<cv::Point2f> points;
+  points.reserve(cells.size());
+  for (const Eigen::Vector3d& cell : cells) {
+    points.emplace_back(static_cast<float>(cell.x()), static_cast<float>(cell.y()));
+  }
+  std::vector<cv::Point2f> outline;
+  cv::convexHull(points, outline);
+
+  const double pad = (cell_size.x() + cell_size.y()) / 4;
+  const auto area = [&](const Footprint& f) { return (f.half_extents.array() + pad).prod(); };
+  const double reference = previous_yaw_rad.value_or(0);
+  Footprint best = RectangleAt(reference, outline);
+  const double reference_area = area(best);
+  double smallest = reference_area;
+  double largest = reference_area;
+  constexpr int kSteps = 90;
+  for (int step = 1; step < kSteps; ++step) {
+    // Searched within 45 degrees of the reference, which picks the nearest of the four names of a rectangle.
+    const double offset = kQuarterTurn * (static_cast<double>(step) / kSteps - 0.5);
+    const Footprint candidate = RectangleAt(reference + offset, outline);
+    const double candidate_area = area(candidate);
+    largest = std::max(largest, candidate_area);
+    if (candidate_area >= smallest) continue;
+    smallest = candidate_area;
+    best = candidate;
+  }
+  constexpr double kRoundShare = 0.88;   // of the largest rectangle: nothing to choose between
+  constexpr double kNearlyBest = 1.015;  // below the noise of the cells
+  const bool keep = smallest > kRoundShare * largest || (previous_yaw_rad && reference_area < kNearlyBest * smallest);
+  if (keep) best = RectangleAt(reference, outline);
+  best.half_extents.array() += pad;
+  return best;
+}
+
+double YawInGrid(const Cuboid& cuboid, const Eigen::Matrix3d& R_world_grid) {
+  const Eigen::Vector3d x_grid = R_world_grid.transpose() * cuboid.T_world_object.RotationMatrix().col(0);
+  return std::atan2(x_grid.y(), x_grid.x());
+}
+
+}  // namespace romap

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/objects/object_shape.h"
+#include "server/objects/point_registry.h"
+#include "server/objects/view_picker.h"
+
+namespace romap {
+
+// An object of the map, or what may become one.
+struct Landmark {
+  Landmark(LandmarkKey new_key, const ObjectsConfig& config) : key(new_key), shape(config), views(config) {}
+
+  LandmarkKey key;
+  ObjectId id;  // given when it is confirmed
+  ObjectState state = ObjectState::kProvisional;
+  uint64_t revision = 0;
+
+  // Sightings.
+  uint64_t first_frame = 0;  // counted by the mapper, not the client's frame ids
+  uint64_t last_frame = 0;
+  uint64_t sightings = 0;
+  int keyframe_sightings = 0;
+  int missed_in_view = 0;  // frames without a sighting since the last one, though nothing hid it
+  cv::Rect last_box_px;
+  SE3<World, Camera> last_T_world_camera;
+  std::optional<uint64_t> last_track_id;
+  std::map<std::string, double> class_evidence;  // sum of detection scores
+  std::map<LandmarkKey, uint64_t> seen_beside;   // frames in which both had a mask: they are two things
+
+  // Geometry.
+  ObjectShape shape;
+  std::optional<Cuboid> cuboid;             // newest fit
+  double parallax_rad = 0;                  // of the silhouettes behind it
+  std::vector<Eigen::Vector3d> body_world;  // points spread over its volume; its map points while there is no cuboid
+  std::vector<MapPointId> points;           // its map points without outliers
+
+  ViewPicker views;
+  std::optional<ObjectUpdate> published;
+
+  // The class with most evidence and its share; ties go to the alphabet.
+  std::pair<std::string, double> BestClass() const {
+    std::pair<std::string, double> best{"object", 0};
+    double total = 0;
+    for (const auto& [name, evidence] : class_evidence) {
+      total += evidence;
+      if (evidence > best.second) best = {name, evidence};
+    }
+    if (total > 0) best.second /= total;
+    return best;
+  }
+};
+
+}  // namespace romap

@@ -1,0 +1,247 @@
+#include "server/objects/object_mapper.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <numbers>
+
+namespace romap {
+namespace {
+
+bool HasUsablePose(TrackingState state, const SE3<World, Camera>& T_world_camera) {
+  const bool tracked = state == TrackingState::kTracking || state == TrackingState::kRelocalised;
+  return tracked && T_world_camera.IsFinite();
+}
+
+std::vector<LandmarkKey> SortedUnique(std::vector<LandmarkKey> keys) {
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+void Append(ObjectMapper::Output&& from, ObjectMapper::Output* into) {
+  for (MapEvent& event : from.events) into->events.push_back(std::move(event));
+  for (ObjectViews& views : from.views) into->views.push_back(std::move(views));
+}
+
+}  // namespace
+
+Landmark* ObjectMapper::FindLandmark(LandmarkKey key) {
+  const auto found =
+      std::find_if(landmarks_.begin(), landmarks_.end(), [&](const auto& landmark) { return landmark->key == key; });
+  return found == landmarks_.end() ? nullptr : found->get();
+}
+
+ObjectMapper::Output ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
+  Output output;
+  current_ = {};
+  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
+  current_.frame_id = tracked.frame->frame_id;
+  // A frame on which no detector ran says nothing about what is or is not there.
+  if (!tracked.frame->has_masks) return output;
+  current_.usable = true;
+  ++frame_index_;
+  current_.detections = ExtractDetections(*tracked.frame, config_);
+  const Association association =
+      Associate(tracked, current_.detections, landmarks_, frame_index_, scene_depth_mu_, config_);
+  current_.ambiguous = association.ambiguous;
+  UpdateLost(association, &output);
+  for (size_t d = 0; d < current_.detections.size(); ++d) {
+    const int index = association.landmark_of_detection[d];
+    if (index < 0) {
+      landmarks_.push_back(std::make_unique<Landmark>(++last_key_, config_));
+      landmarks_.back()->first_frame = frame_index_;
+      spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id,
+                    current_.detections[d].label, current_.detections[d].class_name, last_key_);
+    }
+    Landmark& landmark = index < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(index)];
+    current_.keys.push_back(landmark.key);
+    RecordSighting(landmark, current_.detections[d], tracked);
+    if (landmark.state == ObjectState::kLost) {
+      landmark.state = ObjectState::kConfirmed;
+      Publish(landmark, /*force=*/true, &output);
+    }
+  }
+  RecordCompany();
+  BuryGhosts();
+  return output;
+}
+
+void ObjectMapper::RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked) {
+  landmark.last_frame = frame_index_;
+  landmark.missed_in_view = 0;
+  ++landmark.sightings;
+  landmark.last_box_px = detection.box_px;
+  landmark.last_T_world_camera = tracked.T_world_camera;
+  landmark.last_track_id = detection.track_id;
+  landmark.class_evidence[detection.class_name] += detection.score;
+}
+
+void ObjectMapper::RecordCompany() {
+  for (size_t i = 0; i < current_.keys.size(); ++i) {
+    for (size_t j = 0; j < current_.keys.size(); ++j) {
+      if (i != j) ++FindLandmark(current_.keys[i])->seen_beside[current_.keys[j]];
+    }
+  }
+}
+
+void ObjectMapper::UpdateLost(const Association& association, Output* output) {
+  constexpr double kPlainlyVisible = 0.6;
+  std::vector<bool> matched(landmarks_.size(), false);
+  for (int index : association.landmark_of_detection) {
+    if (index >= 0) matched[static_cast<size_t>(index)] = true;
+  }
+  for (size_t l = 0; l < landmarks_.size(); ++l) {
+    Landmark& landmark = *landmarks_[l];
+    if (matched[l] || association.visible_share[l] < kPlainlyVisible) continue;
+    ++landmark.missed_in_view;
+    if (landmark.state != ObjectState::kConfirmed || landmark.missed_in_view < config_.lost_after_frames) continue;
+    landmark.state = ObjectState::kLost;
+    spdlog::debug("objects: {} is lost: missed {} times in plain view", landmark.id.ToString(),
+                  landmark.missed_in_view);
+    Publish(landmark, /*force=*/true, output);
+  }
+}
+
+void ObjectMapper::BuryGhosts() {
+  std::erase_if(landmarks_, [&](const auto& landmark) {
+    if (landmark->state != ObjectState::kProvisional) return false;
+    // What was seen often and then left the view may come back; what was seen twice will not.
+    const uint64_t unseen = frame_index_ - landmark->last_frame;
+    const auto patience = static_cast<uint64_t>(config_.provisional_patience_frames);
+    const bool known_place = landmark->cuboid.has_value();
+    const bool dead = landmark->missed_in_view >= config_.provisional_patience_frames ||
+                      unseen > (known_place ? 10 * patience : patience);
+    if (dead) {
+      spdlog::debug("objects: landmark {} was a ghost: {} sightings, unseen for {} frames", landmark->key,
+                    landmark->sightings, unseen);
+    }
+    return dead;
+  });
+}
+
+ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
+  Output output;
+  registry_.UpdatePositions(view);
+  if (!current_.usable || !view.frame || view.frame->frame_id != current_.frame_id) return output;
+  if (!view.T_world_camera.IsFinite()) return output;
+  if (view.up_world.allFinite() && view.up_world.norm() > 0.5) up_world_ = view.up_world.normalized();
+  CountPointVotes(view);
+  UpdateSceneDepth(view);
+  CollectEvidence(view);
+  const std::vector<LandmarkKey> seen = SortedUnique(current_.keys);
+  FitShapes(seen);
+  ConfirmProven(seen);
+  MergeDuplicates(&output);
+  PublishAll(seen, &output);
+  return output;
+}
+
+ObjectMapper::Output ObjectMapper::Finish() {
+  Output output;
+  std::vector<LandmarkKey> keys;
+  for (const auto& landmark : landmarks_) keys.push_back(landmark->key);
+  FitShapes(keys);
+  ConfirmProven(keys);
+  MergeDuplicates(&output);
+  Output last;
+  PublishAll(keys, &last);
+  Append(std::move(last), &output);
+  return output;
+}
+
+void ObjectMapper::CountPointVotes(const KeyframeView& view) {
+  std::map<uint16_t, LandmarkKey> key_of_label{{0, kBackgroundKey}};
+  for (size_t d = 0; d < current_.detections.size(); ++d) {
+    if (!current_.ambiguous[d]) key_of_label[current_.detections[d].label] = current_.keys[d];
+  }
+  for (const PointObservation& observation : view.observations) {
+    const auto key = key_of_label.find(observation.label);
+    if (key != key_of_label.end()) registry_.Vote(observation.point, key->second);
+  }
+}
+
+void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
+  const SE3<Camera, World> T_camera_world = view.T_world_camera.Inverse();
+  std::vector<double> depths;
+  for (const MapPoint& point : view.points) {
+    const double z_mu = (T_camera_world * point.position_world).z();
+    if (z_mu > 0) depths.push_back(z_mu);
+  }
+  if (depths.empty()) return;
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
+  scene_depth_mu_ = depths[depths.size() / 2];
+}
+
+void ObjectMapper::CollectEvidence(const KeyframeView& view) {
+  if (current_.detections.empty()) return;
+  const ThinnedLabels thinned = ThinLabels(view.frame->labels);
+  for (size_t d = 0; d < current_.detections.size(); ++d) {
+    if (current_.ambiguous[d]) continue;
+    const Detection& detection = current_.detections[d];
+    Landmark& landmark = *FindLandmark(current_.keys[d]);
+    ++landmark.keyframe_sightings;
+    landmark.shape.AddSilhouette(MakeSilhouette(view, thinned, detection));
+    ViewCandidate candidate{.keyframe = view.id,
+                            .frame = view.frame,
+                            .T_world_camera = view.T_world_camera,
+                            .label = detection.label,
+                            .box_px = detection.box_px,
+                            .points = {},
+                            .pixels_px = {},
+                            .detected = current_.keys,
+                            .sharpness = MeasureSharpness(view.frame->image_bgr, detection.box_px)};
+    for (const PointObservation& observation : view.observations) {
+      if (observation.label != detection.label) continue;
+      candidate.points.push_back(observation.point);
+      candidate.pixels_px.push_back(observation.pixel_px);
+    }
+    landmark.views.Offer(std::move(candidate));
+  }
+}
+
+void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
+  const PointGroups groups = registry_.GroupByOwner();
+  std::vector<Eigen::Vector3d> background;
+  const auto found = groups.find(kBackgroundKey);
+  if (found != groups.end()) {
+    for (const PointRegistry::Member& member : found->second) background.push_back(member.position_world);
+  }
+  for (LandmarkKey key : keys) FitShape(*FindLandmark(key), groups, background);
+}
+
+void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
+                            const std::vector<Eigen::Vector3d>& background) {
+  if (landmark.shape.silhouettes().empty()) return;
+  std::vector<MapPointId> ids;
+  std::vector<Eigen::Vector3d> positions;
+  const auto members = groups.find(landmark.key);
+  if (members != groups.end()) {
+    for (const PointRegistry::Member& member : members->second) {
+      ids.push_back(member.id);
+      positions.push_back(member.position_world);
+    }
+  }
+  std::vector<double> neighbour_bottoms;
+  for (const auto& other : landmarks_) {
+    if (other->key == landmark.key || !other->published) continue;
+    const Cuboid& cuboid = other->published->cuboid;
+    neighbour_bottoms.push_back(up_world_.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z());
+  }
+  const auto fit = landmark.shape.Update(
+      {.up_world = up_world_, .points = positions, .background = background, .neighbour_bottoms = neighbour_bottoms},
+      landmark.cuboid);
+  if (!fit) {
+    if (!landmark.cuboid) landmark.body_world = positions;
+    return;
+  }
+  landmark.cuboid = fit->cuboid;
+  landmark.body_world = fit->body_world;
+  landmark.parallax_rad = fit->parallax_rad;
+  landmark.points.clear();
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (fit->point_is_inlier[i]) landmark.points.push_back(ids[i]);
+  }
+}
+
+}  // namespace romap

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/objects/association.h"
+#include "server/objects/detections.h"
+#include "server/objects/landmark.h"
+#include "server/objects/objects_config.h"
+#include "server/objects/point_registry.h"
+
+namespace romap {
+
+// Maps objects: follows instance masks from frame to frame, decides which are things, says where they are and how
+// large, and picks the pictures their fields train on. Source: section "Lightweight Object SLAM" of the RO-MAP paper;
+// what is different and why is said where it is done (association.h, cuboid_fitter.h, view_picker.h).
+//
+// Single-threaded and deterministic: equal input gives equal output. Frames with an uncertain pose (initialising, lost
+// or not finite) and masks that do not fit the image are passed over.
+class ObjectMapper {
+ public:
+  struct Output {
+    std::vector<MapEvent> events;    // ObjectUpdate, ObjectRemoved, ObjectMerged, in this order of happening
+    std::vector<ObjectViews> views;  // of confirmed objects; the cuboid is that of the last ObjectUpdate
+  };
+
+  explicit ObjectMapper(ObjectsConfig config) : config_(config) {}
+
+  // Every frame, in order.
+  Output ObserveFrame(const TrackedFrame& tracked);
+  // Right after ObserveFrame of the same frame, when it is a keyframe.
+  Output ObserveKeyframe(const KeyframeView& view);
+  // No more frames: the last fits and all views that still wait.
+  Output Finish();
+
+ private:
+  struct CurrentFrame {
+    bool usable = false;
+    uint64_t frame_id = 0;
+    std::vector<Detection> detections;
+    std::vector<LandmarkKey> keys;  // per detection; every detection has a landmark, if only a provisional one
+    std::vector<bool> ambiguous;
+  };
+  using PointGroups = std::map<LandmarkKey, std::vector<PointRegistry::Member>>;
+
+  // Per frame.
+  void RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked);
+  void RecordCompany();
+  void UpdateLost(const Association& association, Output* output);
+  void BuryGhosts();
+
+  // Per keyframe.
+  void CountPointVotes(const KeyframeView& view);
+  void UpdateSceneDepth(const KeyframeView& view);
+  void CollectEvidence(const KeyframeView& view);
+  void FitShapes(const std::vector<LandmarkKey>& keys);
+  void FitShape(Landmark& landmark, const PointGroups& groups, const std::vector<Eigen::Vector3d>& background);
+  bool IsProven(const Landmark& landmark) const;
+  void ConfirmProven(const std::vector<LandmarkKey>& keys);
+  void MergeDuplicates(Output* output);
+  void Merge(Landmark& from, Landmark& into, Output* output);
+  bool AreTheSame(const Landmark& a, const Landmark& b) const;
+  void Publish(Landmark& landmark, bool force, Output* output);
+  void SendViews(Landmark& landmark, bool cuboid_changed, Output* output);
+  void PublishAll(const std::vector<LandmarkKey>& keys, Output* output);
+
+  Landmark* FindLandmark(LandmarkKey key);
+
+  ObjectsConfig config_;
+  std::vector<std::unique_ptr<Landmark>> landmarks_;  // by key
+  PointRegistry registry_;
+  CurrentFrame current_;
+  Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
+  uint64_t frame_index_ = 0;
+  double scene_depth_mu_ = 0;  // median depth of the map points in the last keyframe; 0 = unknown
+  LandmarkKey last_key_ = 0;
+  uint64_t last_id_ = 0;
+};
+
+}  // namespace romap

@@ -1,0 +1,173 @@
+// The part of ObjectMapper that decides what is told to the world: confirmation, merging, updates and views.
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/objects/object_mapper.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegToRad = std::numbers::pi / 180;
+
+// Share of `points` inside the cuboid, its half extents enlarged a little.
+double ShareInside(const Cuboid& cuboid, const std::vector<Eigen::Vector3d>& points_world) {
+  if (points_world.empty()) return 0;
+  const SE3<Object, World> T_object_world = cuboid.T_world_object.Inverse();
+  const Eigen::Vector3d half_extents = 1.05 * cuboid.half_extents;
+  const auto inside = std::count_if(points_world.begin(), points_world.end(), [&](const Eigen::Vector3d& p) {
+    return ((T_object_world * p).cwiseAbs().array() <= half_extents.array()).all();
+  });
+  return static_cast<double>(inside) / static_cast<double>(points_world.size());
+}
+
+// Largest move of a face in terms of the size, and whether the yaw turned notably.
+bool DiffersNotably(const Cuboid& a, const Cuboid& b, const ObjectsConfig& config) {
+  const double size = 2 * a.half_extents.maxCoeff();
+  const double shift = (a.T_world_object.translation() - b.T_world_object.translation()).norm();
+  const double growth = 2 * (a.half_extents - b.half_extents).cwiseAbs().maxCoeff();
+  const double turn_rad = a.T_world_object.rotation().angularDistance(b.T_world_object.rotation());
+  return std::max(shift, growth) > config.update_change_share * size || turn_rad > config.update_yaw_deg * kDegToRad;
+}
+
+}  // namespace
+
+// Evidence that a landmark is a thing: seen often, from different sides, and with a box of believable form.
+bool ObjectMapper::IsProven(const Landmark& landmark) const {
+  if (!landmark.cuboid) return false;
+  constexpr double kMostElongated = 60;
+  const Eigen::Vector3d& half = landmark.cuboid->half_extents;
+  const bool believable = half.minCoeff() > 0 && half.maxCoeff() < kMostElongated * half.minCoeff();
+  // Without points the masks alone must say where it is, which takes a wider base.
+  const bool has_points = landmark.points.size() >= static_cast<size_t>(config_.min_object_points);
+  const double parallax_rad = (has_points ? 1.0 : 1.5) * config_.confirm_parallax_deg * kDegToRad;
+  return believable && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
+         landmark.keyframe_sightings >= config_.confirm_keyframes && landmark.parallax_rad >= parallax_rad;
+}
+
+void ObjectMapper::ConfirmProven(const std::vector<LandmarkKey>& keys) {
+  for (LandmarkKey key : keys) {
+    Landmark& landmark = *FindLandmark(key);
+    if (landmark.state != ObjectState::kProvisional || !IsProven(landmark)) continue;
+    // A duplicate is merged before it is ever announced.
+    const bool duplicate = std::any_of(landmarks_.begin(), landmarks_.end(), [&](const auto& other) {
+      return other->key != key && other->id && AreTheSame(landmark, *other);
+    });
+    if (duplicate) continue;
+    landmark.state = ObjectState::kConfirmed;
+    landmark.id = ObjectId{++last_id_};
+    spdlog::debug("objects: landmark {} is {} ({}): {} sightings, {} points, parallax {:.0f} deg", key,
+                  landmark.id.ToString(), landmark.BestClass().first, landmark.sightings, landmark.points.size(),
+                  landmark.parallax_rad / kDegToRad);
+  }
+}
+
+// Two landmarks are one thing when one's body lies in the other's box and they were hardly ever seen side by side.
+bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
+  if (!a.cuboid || !b.cuboid) return false;
+  const auto beside = a.seen_beside.find(b.key);
+  const double together = beside == a.seen_beside.end() ? 0 : static_cast<double>(beside->second);
+  const double fewer_sightings = static_cast<double>(std::min(a.sightings, b.sightings));
+  if (together > std::max(2.0, 0.15 * fewer_sightings)) return false;
+  const double overlap = std::max(ShareInside(*a.cuboid, b.body_world), ShareInside(*b.cuboid, a.body_world));
+  const bool same_class = a.BestClass().first == b.BestClass().first;
+  return overlap > (same_class ? 0.5 : 0.7);
+}
+
+void ObjectMapper::MergeDuplicates(Output* output) {
+  for (size_t i = 0; i < landmarks_.size(); ++i) {
+    for (size_t j = i + 1; j < landmarks_.size();) {
+      if (!AreTheSame(*landmarks_[i], *landmarks_[j])) {
+        ++j;
+        continue;
+      }
+      // The one that clients know longer stays.
+      const bool swap = !landmarks_[i]->id && landmarks_[j]->id;
+      if (swap) std::swap(landmarks_[i], landmarks_[j]);
+      Merge(*landmarks_[j], *landmarks_[i], output);
+      landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(j));
+    }
+  }
+}
+
+void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
+  spdlog::debug("objects: landmark {} merges into landmark {}", from.key, into.key);
+  registry_.Merge(from.key, into.key);
+  for (const Silhouette& silhouette : from.shape.silhouettes()) into.shape.AddSilhouette(silhouette);
+  for (const auto& [name, evidence] : from.class_evidence) into.class_evidence[name] += evidence;
+  for (const auto& [key, count] : from.seen_beside) into.seen_beside[key] += count;
+  into.seen_beside.erase(into.key);
+  into.sightings += from.sightings;
+  into.keyframe_sightings += from.keyframe_sightings;
+  if (from.last_frame > into.last_frame) {
+    into.last_frame = from.last_frame;
+    into.last_box_px = from.last_box_px;
+    into.last_T_world_camera = from.last_T_world_camera;
+    into.last_track_id = from.last_track_id;
+    into.missed_in_view = from.missed_in_view;
+  }
+  for (const auto& landmark : landmarks_) {
+    landmark->views.RenameNeighbour(from.key, into.key);
+    const auto beside = landmark->seen_beside.find(from.key);
+    if (beside == landmark->seen_beside.end() || landmark.get() == &from) continue;
+    if (landmark->key != into.key) landmark->seen_beside[into.key] += beside->second;
+    landmark->seen_beside.erase(from.key);
+  }
+  std::replace(current_.keys.begin(), current_.keys.end(), from.key, into.key);
+  const std::vector<ObjectView> adopted =
+      into.views.Adopt(std::move(from.views), into.id, into.cuboid->T_world_object.translation());
+  if (!from.published) return;
+  output->events.emplace_back(ObjectMerged{.from = from.id, .into = into.id, .revision = ++into.revision});
+  Publish(into, /*force=*/true, output);
+  if (!adopted.empty()) {
+    output->views.push_back({.object = into.id, .cuboid = into.published->cuboid, .new_views = adopted});
+  }
+}
+
+void ObjectMapper::PublishAll(const std::vector<LandmarkKey>& keys, Output* output) {
+  for (LandmarkKey key : keys) {
+    Landmark* landmark = FindLandmark(key);  // may have been merged away
+    if (landmark != nullptr && landmark->id) Publish(*landmark, /*force=*/false, output);
+  }
+}
+
+void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
+  if (!landmark.cuboid) return;
+  const auto [class_name, class_score] = landmark.BestClass();
+  const bool first = !landmark.published;
+  const bool cuboid_changed = first || DiffersNotably(landmark.published->cuboid, *landmark.cuboid, config_);
+  const bool text_changed =
+      first || landmark.published->class_name != class_name || landmark.published->state != landmark.state;
+  if (force || cuboid_changed || text_changed) {
+    landmark.published = ObjectUpdate{.id = landmark.id,
+                                      .revision = ++landmark.revision,
+                                      .state = landmark.state,
+                                      .class_name = class_name,
+                                      .class_score = class_score,
+                                      .cuboid = cuboid_changed ? *landmark.cuboid : landmark.published->cuboid,
+                                      .observations = landmark.sightings,
+                                      .T_world_mesh = {}};
+    output->events.emplace_back(*landmark.published);
+  }
+  SendViews(landmark, cuboid_changed, output);
+}
+
+void ObjectMapper::SendViews(Landmark& landmark, bool cuboid_changed, Output* output) {
+  std::vector<ViewContext::Neighbour> neighbours;
+  for (const auto& other : landmarks_) {
+    if (other->published && other->key != landmark.key) neighbours.push_back({other->key, other->published->cuboid});
+  }
+  ObjectViews views{.object = landmark.id, .cuboid = landmark.published->cuboid, .new_views = {}};
+  views.new_views = landmark.views.Take({.object = landmark.id,
+                                         .cuboid = landmark.published->cuboid,
+                                         .body_world = landmark.body_world,
+                                         .object_points = landmark.points,
+                                         .registry = &registry_,
+                                         .neighbours = neighbours});
+  if (cuboid_changed || !views.new_views.empty()) output->views.push_back(std::move(views));
+}
+
+}  // namespace romap

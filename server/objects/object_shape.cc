@@ -1,0 +1,264 @@
+#include "server/objects/object_shape.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "server/objects/cuboid_fitter.h"
+#include "server/objects/isolation_forest.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegToRad = std::numbers::pi / 180;
+
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d median;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& p : points) values.push_back(p[axis]);
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    median[axis] = values[values.size() / 2];
+  }
+  return median;
+}
+
+// Without a centre, the optical axis stands for the direction to the object: good enough to compare cameras.
+Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
+  const double u_px = silhouette.box_px.x + silhouette.box_px.width / 2.0;
+  const double v_px = silhouette.box_px.y + silhouette.box_px.height / 2.0;
+  return silhouette.T_world_camera.rotation() * silhouette.camera.Unproject(u_px, v_px);
+}
+
+}  // namespace
+
+bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
+  const double limit = config_.silhouette_angle_deg * kDegToRad;
+  return std::any_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
+    return other.cut_by_border <= silhouette.cut_by_border &&
+           AngleBetween(ViewDirection(other), ViewDirection(silhouette)) < limit;
+  });
+}
+
+void ObjectShape::AddSilhouette(Silhouette silhouette) {
+  if (IsRedundant(silhouette)) return;
+  if (!hull_.empty()) hull_.Add(silhouette);
+  silhouettes_.push_back(std::move(silhouette));
+  if (silhouettes_.size() > static_cast<size_t>(config_.max_silhouettes)) MakeRoom();
+}
+
+// Drops the silhouette whose direction is nearest to another one's: it says least that the others do not.
+void ObjectShape::MakeRoom() {
+  size_t worst = 0;
+  double worst_angle = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < silhouettes_.size(); ++i) {
+    for (size_t j = 0; j < silhouettes_.size(); ++j) {
+      if (i == j) continue;
+      const double angle = AngleBetween(ViewDirection(silhouettes_[i]), ViewDirection(silhouettes_[j]));
+      if (angle >= worst_angle) continue;
+      worst_angle = angle;
+      worst = silhouettes_[i].cut_by_border || !silhouettes_[i].trusted ? i : j;
+    }
+  }
+  if (!hull_.empty() && silhouettes_[worst].trusted) hull_.Remove(silhouettes_[worst]);
+  silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(worst));
+}
+
+std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surroundings& surroundings) const {
+  constexpr double kGoodParallaxRad = 15 * kDegToRad;
+  constexpr double kLeastParallaxRad = 5 * kDegToRad;
+  const auto ray_center = IntersectCenterRays(silhouettes_, kLeastParallaxRad);
+  const bool enough_points = surroundings.points.size() >= static_cast<size_t>(config_.min_object_points);
+  if (!ray_center && !enough_points) return std::nullopt;
+  Extent extent;
+  extent.center_world = ray_center ? *ray_center : MedianOf(surroundings.points);
+  if (ray_center && enough_points && ParallaxRad(silhouettes_, *ray_center) < kGoodParallaxRad) {
+    extent.center_world = MedianOf(surroundings.points);
+  }
+  for (const Silhouette& silhouette : silhouettes_) {
+    const double depth_mu = (silhouette.T_world_camera.Inverse() * extent.center_world).z();
+    const double diagonal_px = std::hypot(silhouette.box_px.width, silhouette.box_px.height);
+    extent.size_mu = std::max(extent.size_mu, diagonal_px * depth_mu / silhouette.camera.fx_px);
+  }
+  if (!(extent.size_mu > 0) || !std::isfinite(extent.size_mu)) return std::nullopt;
+  return extent;
+}
+
+void ObjectShape::Carve(const HullRegion& region) {
+  hull_.Reset(region, config_.hull_cells);
+  for (const Silhouette& silhouette : silhouettes_) {
+    if (silhouette.trusted) hull_.Add(silhouette);
+  }
+}
+
+int ObjectShape::TrustedCount() const {
+  return static_cast<int>(
+      std::count_if(silhouettes_.begin(), silhouettes_.end(), [](const auto& s) { return s.trusted; }));
+}
+
+HullVotes ObjectShape::StrictVotes() const {
+  const int count = TrustedCount();
+  return {.max_outside = count < 8 ? 0 : std::max(1, count / 20), .min_inside = std::max(1, count * 3 / 10)};
+}
+
+HullVotes ObjectShape::LenientVotes() const {
+  const int count = TrustedCount();
+  return {.max_outside = std::max(1, count / 4), .min_inside = std::max(1, count * 3 / 10)};
+}
+
+// A truncated or misplaced mask denies much of what most others agree on. Such silhouettes lose their vote; they get it
+// back when later ones side with them.
+void ObjectShape::JudgeSilhouettes() {
+  constexpr size_t kFewestToJudge = 5;
+  if (silhouettes_.size() < kFewestToJudge) return;
+  const std::vector<Eigen::Vector3d> cells = hull_.Cells(LenientVotes());
+  const size_t step = cells.size() / 1000 + 1;
+  std::vector<double> denied_shares;
+  for (const Silhouette& silhouette : silhouettes_) {
+    int denied = 0;
+    int judged = 0;
+    for (size_t i = 0; i < cells.size(); i += step) {
+      const Sight sight = silhouette.Look(hull_.region().ToWorld(cells[i]));
+      judged += sight != Sight::kUnknown ? 1 : 0;
+      denied += sight == Sight::kOutside ? 1 : 0;
+    }
+    denied_shares.push_back(judged > 0 ? static_cast<double>(denied) / judged : 0);
+  }
+  std::vector<double> sorted = denied_shares;
+  std::sort(sorted.begin(), sorted.end());
+  const double limit = std::max(0.15, 2.5 * sorted[sorted.size() / 2]);
+  for (size_t i = 0; i < silhouettes_.size(); ++i) {
+    Silhouette& silhouette = silhouettes_[i];
+    const bool trusted = denied_shares[i] <= limit;
+    if (trusted == silhouette.trusted) continue;
+    silhouette.trusted = trusted;
+    spdlog::debug("objects: silhouette of {} {}: it denies {:.0f} % of the hull", silhouette.keyframe.ToString(),
+                  trusted ? "trusted again" : "distrusted", 100 * denied_shares[i]);
+    trusted ? hull_.Add(silhouette) : hull_.Remove(silhouette);
+  }
+}
+
+// Moves the grid to where the hull is once it fills too little of it or reaches its border. True when it moved.
+bool ObjectShape::RefocusRegion(const Extent& extent) {
+  const std::vector<Eigen::Vector3d> cells = hull_.Cells(StrictVotes());
+  if (cells.empty()) return false;
+  Eigen::Vector3d low = cells.front();
+  Eigen::Vector3d high = cells.front();
+  for (const Eigen::Vector3d& cell : cells) {
+    low = low.cwiseMin(cell);
+    high = high.cwiseMax(cell);
+  }
+  low -= hull_.CellSize() / 2;
+  high += hull_.CellSize() / 2;
+  const HullRegion& region = hull_.region();
+  const Eigen::Vector3d fill = ((high - low) / 2).cwiseQuotient(region.half_extents);
+  const Eigen::Vector3d reach = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
+  const double most_mu = 1.3 * extent.size_mu;
+  const bool may_grow = (region.half_extents.array() < 0.99 * most_mu).any() && reach.maxCoeff() > 0.97;
+  if (fill.minCoeff() > 0.5 && !may_grow) return false;
+  HullRegion next = region;
+  next.center_world = region.ToWorld((low + high) / 2);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double growth = reach[axis] > 0.97 ? 1.6 : 1.25;
+    next.half_extents[axis] = std::min(most_mu, growth * (high[axis] - low[axis]) / 2);
+  }
+  Carve(next);
+  return true;
+}
+
+std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) const {
+  std::vector<Eigen::Vector3d> inside;
+  std::vector<size_t> inside_index;
+  for (size_t i = 0; i < points_world.size(); ++i) {
+    const Eigen::Vector3d p_grid = hull_.region().ToGrid(points_world[i]);
+    if (!hull_.Contains(p_grid, LenientVotes())) continue;
+    inside.push_back(p_grid);
+    inside_index.push_back(i);
+  }
+  constexpr double kLonelyScore = 0.65;
+  const std::vector<double> scores = IsolationScores(inside, {});
+  std::vector<bool> is_inlier(points_world.size(), false);
+  for (size_t i = 0; i < inside.size(); ++i) is_inlier[inside_index[i]] = scores[i] < kLonelyScore;
+  return is_inlier;
+}
+
+std::vector<Eigen::Vector3d> ObjectShape::SampleBody(const Cuboid& cuboid,
+                                                     std::span<const Eigen::Vector3d> points_world,
+                                                     const std::vector<bool>& is_inlier) const {
+  constexpr size_t kSamplesPerSource = 60;
+  const SE3<Object, World> T_object_world = cuboid.T_world_object.Inverse();
+  std::vector<Eigen::Vector3d> cells;
+  for (const Eigen::Vector3d& cell : hull_.Cells(StrictVotes())) {
+    const Eigen::Vector3d p_world = hull_.region().ToWorld(cell);
+    if (((T_object_world * p_world).cwiseAbs().array() <= cuboid.half_extents.array()).all()) cells.push_back(p_world);
+  }
+  std::vector<Eigen::Vector3d> inliers;
+  for (size_t i = 0; i < points_world.size(); ++i) {
+    if (is_inlier[i]) inliers.push_back(points_world[i]);
+  }
+  std::vector<Eigen::Vector3d> body;
+  for (const auto* source : {&cells, &inliers}) {
+    const size_t count = std::min(kSamplesPerSource, source->size());
+    for (size_t i = 0; i < count; ++i) body.push_back((*source)[i * source->size() / count]);
+  }
+  return body;
+}
+
+std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surroundings,
+                                                    const std::optional<Cuboid>& previous) {
+  const auto extent = EstimateExtent(surroundings);
+  if (!extent) return std::nullopt;
+  const auto start_over = [&] {
+    Carve({RotationFromZTo(surroundings.up_world).toRotationMatrix(), extent->center_world,
+           Eigen::Vector3d::Constant(0.85 * extent->size_mu)});
+  };
+  if (hull_.empty()) start_over();
+  JudgeSilhouettes();
+  for (int attempt = 0; attempt < 2 && RefocusRegion(*extent); ++attempt) JudgeSilhouettes();
+
+  CuboidEvidence evidence;
+  evidence.region = hull_.region();
+  evidence.hull_cells = hull_.Cells(StrictVotes());
+  if (evidence.hull_cells.empty()) evidence.hull_cells = hull_.Cells(LenientVotes());
+  if (evidence.hull_cells.empty()) {
+    spdlog::debug("objects: no space is left by {} silhouettes, carving anew", silhouettes_.size());
+    start_over();
+    return std::nullopt;
+  }
+  Fit fit;
+  fit.point_is_inlier = JudgePoints(surroundings.points);
+  evidence.cell_size = hull_.CellSize();
+  for (size_t i = 0; i < surroundings.points.size(); ++i) {
+    if (fit.point_is_inlier[i]) evidence.points.push_back(evidence.region.ToGrid(surroundings.points[i]));
+  }
+  for (const Eigen::Vector3d& p : surroundings.background) {
+    if ((p - extent->center_world).norm() < 2 * extent->size_mu)
+      evidence.background.push_back(evidence.region.ToGrid(p));
+  }
+  const double center_height = surroundings.up_world.dot(evidence.region.center_world);
+  for (double bottom : surroundings.neighbour_bottoms) evidence.neighbour_bottoms.push_back(bottom - center_height);
+  evidence.center = evidence.region.ToGrid(extent->center_world);
+  evidence.object_size_mu = extent->size_mu;
+  const Silhouette& newest = silhouettes_.back();
+  evidence.margin_mu =
+      config_.cuboid_margin_px * (newest.CameraCenter() - extent->center_world).norm() / newest.camera.fx_px;
+  evidence.min_points = config_.min_object_points;
+  const auto cuboid = FitCuboid(evidence, silhouettes_, previous);
+  if (!cuboid) return std::nullopt;
+  fit.cuboid = *cuboid;
+  fit.body_world = SampleBody(*cuboid, surroundings.points, fit.point_is_inlier);
+  fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
+  const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kDegToRad));
+  const double seen_often = std::min(1.0, TrustedCount() / 10.0);
+  fit.cuboid.confidence = 0.5 * seen_around + 0.5 * seen_often;
+  return fit;
+}
+
+}  // namespace romap

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/objects/objects_config.h"
+#include "server/objects/silhouette.h"
+#include "server/objects/visual_hull.h"
+
+namespace romap {
+
+// What an object is made of according to its masks and points: its silhouettes, the hull they carve, and the box.
+class ObjectShape {
+ public:
+  struct Surroundings {
+    Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
+    std::span<const Eigen::Vector3d> points;      // map points that belong to the object, world
+    std::span<const Eigen::Vector3d> background;  // map points that belong to no object, world
+    std::span<const double> neighbour_bottoms;    // dot(up_world, p) of points p under other objects
+  };
+  struct Fit {
+    Cuboid cuboid;
+    std::vector<bool> point_is_inlier;        // as long as Surroundings::points
+    std::vector<Eigen::Vector3d> body_world;  // points spread over the object's volume, for association
+    double parallax_rad = 0;                  // between the directions it was seen from
+  };
+
+  explicit ObjectShape(const ObjectsConfig& config) : config_(config) {}
+
+  // Redundant silhouettes (direction close to another one's) are not kept, so that the cost of a fit stays bounded.
+  void AddSilhouette(Silhouette silhouette);
+  const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
+
+  // The box as of now; nullopt while masks and points do not say where the object is.
+  std::optional<Fit> Update(const Surroundings& surroundings, const std::optional<Cuboid>& previous);
+
+ private:
+  struct Extent {
+    Eigen::Vector3d center_world;
+    double size_mu = 0;  // largest diagonal of a mask's box at the object's distance
+  };
+
+  std::optional<Extent> EstimateExtent(const Surroundings& surroundings) const;
+  bool IsRedundant(const Silhouette& silhouette) const;
+  void MakeRoom();
+  void Carve(const HullRegion& region);
+  void JudgeSilhouettes();
+  bool RefocusRegion(const Extent& extent);
+  int TrustedCount() const;
+  HullVotes StrictVotes() const;
+  HullVotes LenientVotes() const;
+  std::vector<bool> JudgePoints(std::span<const Eigen::Vector3d> points_world) const;
+  std::vector<Eigen::Vector3d> SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> points_world,
+                                          const std::vector<bool>& is_inlier) const;
+
+  ObjectsConfig config_;
+  std::vector<Silhouette> silhouettes_;
+  VisualHull hull_;
+};
+
+}  // namespace romap

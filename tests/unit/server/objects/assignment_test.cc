@@ -1,0 +1,60 @@
+#include "server/objects/assignment.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+namespace romap {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+TEST(AssignMaximal, PrefersTheBestSumOverTheBestPair) {
+  Eigen::MatrixXd scores(2, 2);
+  scores << 0.9, 0.8,  //
+      0.8, 0.1;
+  EXPECT_THAT(AssignMaximal(scores, 0.05), ElementsAre(1, 0));
+}
+
+TEST(AssignMaximal, LeavesAloneWhatScoresTooLittle) {
+  Eigen::MatrixXd scores(3, 2);
+  scores << 0.1, 0.2,  //
+      0.9, 0.29,       //
+      0.3, 0.0;
+  EXPECT_THAT(AssignMaximal(scores, 0.3), ElementsAre(-1, 0, -1));
+}
+
+TEST(AssignMaximal, TakesEmptyMatrices) {
+  EXPECT_THAT(AssignMaximal(Eigen::MatrixXd(0, 3), 0.1), IsEmpty());
+  EXPECT_THAT(AssignMaximal(Eigen::MatrixXd(2, 0), 0.1), ElementsAre(-1, -1));
+}
+
+TEST(AssignMaximal, EqualsExhaustiveSearch) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int round = 0; round < 50; ++round) {
+    Eigen::MatrixXd scores(5, 5);
+    for (Eigen::Index i = 0; i < scores.size(); ++i) scores(i) = uniform(random);
+    std::vector<int> order(5);
+    std::iota(order.begin(), order.end(), 0);
+    double best = 0;
+    do {
+      double sum = 0;
+      for (int i = 0; i < 5; ++i) sum += scores(i, order[static_cast<size_t>(i)]);
+      best = std::max(best, sum);
+    } while (std::next_permutation(order.begin(), order.end()));
+    const std::vector<int> columns = AssignMaximal(scores, 0);
+    double sum = 0;
+    for (int i = 0; i < 5; ++i) {
+      if (columns[static_cast<size_t>(i)] >= 0) sum += scores(i, columns[static_cast<size_t>(i)]);
+    }
+    EXPECT_NEAR(sum, best, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,291 @@
+#include "server/objects/object_mapper.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "tests/support/synthetic_world.h"
+
+namespace romap {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+// What a client knows after a run.
+struct Told {
+  std::map<ObjectId, ObjectUpdate> objects;
+  std::map<ObjectId, std::vector<ObjectView>> views;
+  std::map<ObjectId, Cuboid> training_cuboid;
+  std::map<ObjectId, int> first_told_at;  // frame
+  std::vector<std::string> log;           // one line per event
+  int merged = 0;
+  int lost = 0;
+};
+
+void Take(const ObjectMapper::Output& output, int frame, Told* told) {
+  for (const MapEvent& event : output.events) {
+    if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
+      EXPECT_GT(update->revision, told->objects[update->id].revision);
+      told->objects[update->id] = *update;
+      told->first_told_at.try_emplace(update->id, frame);
+      told->lost += update->state == ObjectState::kLost ? 1 : 0;
+      const Eigen::Vector3d& p = update->cuboid.T_world_object.translation();
+      told->log.push_back(fmt::format("{} {} {} {:.9f} {:.9f} {:.9f}", update->id.ToString(), update->revision,
+                                      update->class_name, p.x(), p.y(), p.z()));
+    } else if (const auto* merge = std::get_if<ObjectMerged>(&event)) {
+      told->objects.erase(merge->from);
+      ++told->merged;
+    } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
+      told->objects.erase(removed->id);
+    }
+  }
+  for (const ObjectViews& views : output.views) {
+    auto& known = told->views[views.object];
+    known.insert(known.end(), views.new_views.begin(), views.new_views.end());
+    told->training_cuboid[views.object] = views.cuboid;
+  }
+}
+
+Told MapWorld(const SyntheticWorld& world, ObjectsConfig config = {}) {
+  ObjectMapper mapper(config);
+  Told told;
+  for (int i = 0; i < world.frame_count(); ++i) {
+    const TrackedFrame frame = world.MakeFrame(i);
+    Take(mapper.ObserveFrame(frame), i, &told);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)), i, &told);
+  }
+  Take(mapper.Finish(), world.frame_count(), &told);
+  return told;
+}
+
+// Finds for each true object the one told object nearest to it and checks class, overlap and containment. Returns the
+// mean intersection over union.
+double ExpectFound(const SyntheticWorld& world, const Told& told) {
+  EXPECT_EQ(told.objects.size(), world.objects().size());
+  double iou_sum = 0;
+  std::set<ObjectId> used;
+  for (int i = 0; i < static_cast<int>(world.objects().size()); ++i) {
+    const Cuboid truth = world.TrueCuboid(i);
+    const ObjectUpdate* best = nullptr;
+    for (const auto& [id, object] : told.objects) {
+      const auto distance = [&](const ObjectUpdate& o) {
+        return (o.cuboid.T_world_object.translation() - truth.T_world_object.translation()).norm();
+      };
+      if (best == nullptr || distance(object) < distance(*best)) best = &object;
+    }
+    if (best == nullptr) continue;
+    EXPECT_TRUE(used.insert(best->id).second) << best->id << " is nearest to two objects";
+    EXPECT_EQ(best->class_name, world.objects()[static_cast<size_t>(i)].class_name);
+    const double iou = CuboidIou(best->cuboid, truth);
+    EXPECT_GT(iou, 0.45) << world.objects()[static_cast<size_t>(i)].class_name << " half extents "
+                         << best->cuboid.half_extents.transpose() << " instead of " << truth.half_extents.transpose();
+    EXPECT_GT(ContainedShare(best->cuboid, world.SurfacePoints(i, 2000), 1.1), 0.99)
+        << world.objects()[static_cast<size_t>(i)].class_name << " half extents "
+        << best->cuboid.half_extents.transpose() << " instead of " << truth.half_extents.transpose();
+    iou_sum += iou;
+  }
+  return iou_sum / static_cast<double>(world.objects().size());
+}
+
+TEST(ObjectMapper, FindsEveryObjectOnceWithItsBox) {
+  const SyntheticWorld world({});
+  const Told told = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, told), 0.7);
+  EXPECT_EQ(told.merged, 0);
+}
+
+TEST(ObjectMapper, SendsTheFirstCuboidAfterAFewDegrees) {
+  SyntheticWorldOptions options;
+  options.frames = 15;
+  options.sweep_deg = 45;
+  const Told told = MapWorld(SyntheticWorld(options));
+  ASSERT_EQ(told.first_told_at.size(), 4u);
+  for (const auto& [id, frame] : told.first_told_at) EXPECT_LE(frame, 9) << id;
+}
+
+TEST(ObjectMapper, SurvivesNoiseAndOutliers) {
+  SyntheticWorldOptions options;
+  options.pixel_noise_px = 0.7;
+  options.point_noise_mu = 0.003;
+  options.outlier_share = 0.15;
+  options.mask_jitter_px = 1;
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
+}
+
+TEST(ObjectMapper, LivesWithMissingMasksAndWrongClasses) {
+  SyntheticWorldOptions options;
+  options.dropped_mask_share = 0.3;
+  options.wrong_class_share = 0.3;
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
+}
+
+TEST(ObjectMapper, MasksCarryTexturelessObjects) {
+  SyntheticWorldOptions options;
+  options.textureless = {0, 1, 2, 3};
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.5);
+}
+
+TEST(ObjectMapper, KeepsIdenticalNeighboursApart) {
+  SyntheticWorldOptions options;
+  for (int i = 0; i < 4; ++i) {
+    const Eigen::Vector3d center(0.13 * i - 0.2, 0.02 * i, 0.06);
+    options.objects.push_back({"cup", SyntheticShape::kEllipsoid, center, {0.05, 0.05, 0.06}, 0});
+  }
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
+}
+
+TEST(ObjectMapper, KnowsAnObjectAgainAfterALongAbsence) {
+  SyntheticWorldOptions options;
+  options.frames = 120;
+  options.sweep_deg = 240;
+  options.away_frames = {{40, 90}};
+  const SyntheticWorld world(options);
+  const Told told = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, told), 0.6);
+  EXPECT_EQ(told.lost, 0) << "out of view is not lost";
+}
+
+TEST(ObjectMapper, GhostsAreNeverTold) {
+  SyntheticWorldOptions options;
+  options.ghosts = {{10, {20, 20, 40, 40}}, {11, {22, 20, 40, 40}}, {30, {250, 150, 30, 60}}};
+  const SyntheticWorld world(options);
+  const Told told = MapWorld(world);
+  ExpectFound(world, told);
+  for (const auto& [id, object] : told.objects) EXPECT_NE(object.class_name, "ghost");
+}
+
+TEST(ObjectMapper, UpNeedNotBeZ) {
+  SyntheticWorldOptions options;
+  options.up_world = {0.3, -0.9, 0.2};
+  const SyntheticWorld world(options);
+  const Told told = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, told), 0.7);
+  for (const auto& [id, object] : told.objects) {
+    EXPECT_GT(object.cuboid.T_world_object.RotationMatrix().col(2).dot(options.up_world.normalized()), 0.9999) << id;
+  }
+}
+
+TEST(ObjectMapper, IsDeterministic) {
+  SyntheticWorldOptions options;
+  options.frames = 30;
+  options.outlier_share = 0.1;
+  const SyntheticWorld world(options);
+  const Told first = MapWorld(world);
+  EXPECT_THAT(first.log, Not(IsEmpty()));
+  EXPECT_EQ(first.log, MapWorld(world).log);
+}
+
+TEST(ObjectMapper, SaysLostWhenAnObjectIsTakenAway) {
+  SyntheticWorldOptions options;
+  options.frames = 60;
+  const SyntheticWorld with(options);
+  options.objects = DefaultSyntheticObjects();
+  options.objects.erase(options.objects.begin() + 1);
+  const SyntheticWorld without(options);
+  ObjectsConfig config;
+  config.lost_after_frames = 20;
+  ObjectMapper mapper(config);
+  Told told;
+  for (int i = 0; i < 120; ++i) {
+    const SyntheticWorld& world = i < 60 ? with : without;
+    TrackedFrame frame = world.MakeFrame(i % 60);
+    Take(mapper.ObserveFrame(frame), i, &told);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i % 60, frame)), i, &told);
+  }
+  EXPECT_EQ(told.lost, 1);
+  EXPECT_EQ(told.objects.size(), 4u) << "lost is not gone";
+}
+
+TEST(ObjectMapper, UpdatesOnlyOnNotableChange) {
+  SyntheticWorldOptions options;
+  options.frames = 90;
+  options.mask_jitter_px = 1;
+  const Told told = MapWorld(SyntheticWorld(options));
+  for (const auto& [id, object] : told.objects) EXPECT_LE(object.revision, 20u) << id << " of 30 keyframes";
+}
+
+TEST(ObjectMapper, NonsenseInputIsPassedOver) {
+  const SyntheticWorld world({});
+  ObjectMapper mapper({});
+  TrackedFrame frame = world.MakeFrame(0);
+
+  TrackedFrame nothing;
+  EXPECT_THAT(mapper.ObserveFrame(nothing).events, IsEmpty());
+  KeyframeView no_keyframe;
+  EXPECT_THAT(mapper.ObserveKeyframe(no_keyframe).events, IsEmpty());
+
+  TrackedFrame bad_pose = frame;
+  bad_pose.T_world_camera = {Eigen::Quaterniond::Identity(),
+                             Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())};
+  EXPECT_THAT(mapper.ObserveFrame(bad_pose).events, IsEmpty());
+
+  Frame broken = *frame.frame;
+  broken.labels = cv::Mat::ones(10, 10, CV_16UC1);
+  frame.frame = std::make_shared<Frame>(broken);
+  EXPECT_THAT(mapper.ObserveFrame(frame).events, IsEmpty());
+  broken.labels = cv::Mat::ones(broken.image_bgr.size(), CV_16UC1);  // one mask over everything
+  frame.frame = std::make_shared<Frame>(broken);
+  for (int i = 0; i < 10; ++i) {
+    mapper.ObserveFrame(frame);
+    KeyframeView view = world.MakeKeyframe(0, frame);
+    for (MapPoint& point : view.points) point.position_world.setConstant(std::numeric_limits<double>::infinity());
+    EXPECT_THAT(mapper.ObserveKeyframe(view).events, IsEmpty());
+  }
+  broken.labels.release();
+  frame.frame = std::make_shared<Frame>(broken);
+  EXPECT_THAT(mapper.ObserveFrame(frame).events, IsEmpty());
+  EXPECT_THAT(mapper.Finish().events, IsEmpty());
+
+  // And the mapper still works.
+  Told told;
+  for (int i = 0; i < world.frame_count(); ++i) {
+    const TrackedFrame good = world.MakeFrame(i);
+    Take(mapper.ObserveFrame(good), i, &told);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, good)), i, &told);
+  }
+  ExpectFound(world, told);
+}
+
+TEST(ObjectMapper, ViewsSurroundTheObjectAndSayWhatEachRayMeets) {
+  SyntheticWorldOptions options;
+  options.with_depth = true;
+  const SyntheticWorld world(options);
+  const Told told = MapWorld(world);
+  ASSERT_EQ(told.views.size(), 4u);
+  for (const auto& [id, views] : told.views) {
+    EXPECT_GE(views.size(), 17u) << id;
+    EXPECT_LE(views.size(), 30u) << id;
+    const Cuboid& cuboid = told.objects.at(id).cuboid;
+    EXPECT_EQ(told.training_cuboid.at(id).half_extents, cuboid.half_extents);
+    std::set<KeyframeId> keyframes;
+    for (const ObjectView& view : views) {
+      EXPECT_EQ(view.object, id);
+      EXPECT_TRUE(keyframes.insert(view.keyframe).second) << view.keyframe << " twice";
+      EXPECT_EQ(view.color_bgr.size(), view.roi_px.size());
+      EXPECT_EQ(view.ray_kind.size(), view.roi_px.size());
+      EXPECT_EQ(view.depth_mu.size(), view.roi_px.size());
+      EXPECT_FALSE(view.sparse_depth.empty());
+      const Eigen::Vector3d center = view.T_world_camera.Inverse() * cuboid.T_world_object.translation();
+      const Eigen::Vector2d pixel = view.camera.Project(center);
+      const cv::Point inside(static_cast<int>(pixel.x()) - view.roi_px.x, static_cast<int>(pixel.y()) - view.roi_px.y);
+      ASSERT_TRUE(cv::Rect({}, view.roi_px.size()).contains(inside));
+      EXPECT_NE(view.ray_kind.at<uint8_t>(inside), static_cast<uint8_t>(RayKind::kBackground));
+      for (const Eigen::Vector3f& sparse : view.sparse_depth) {
+        EXPECT_NEAR(sparse.z(), center.z(), 0.35);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace romap
