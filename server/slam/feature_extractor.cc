@@ -118,9 +118,11 @@ std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) const {
   features.reserve(keypoints.size());
   for (size_t i = 0; i < keypoints.size(); ++i) {
     const cv::KeyPoint& keypoint = keypoints[i];
-    Feature feature{.pixel_px = {keypoint.pt.x, keypoint.pt.y},
+    const double scale = std::pow(kOctaveFactor, keypoint.octave);
+    const auto shift_px = static_cast<float>(0.5 * (scale - 1));
+    Feature feature{.pixel_px = {keypoint.pt.x + shift_px, keypoint.pt.y + shift_px},
                     .octave = keypoint.octave,
-                    .octave_scale = std::pow(kOctaveFactor, keypoint.octave),
+                    .octave_scale = scale,
                     .label = LabelAt(frame.labels, keypoint.pt, config_.mask_erosion_px)};
     std::memcpy(feature.descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
     features.push_back(feature);

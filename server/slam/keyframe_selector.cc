@@ -12,31 +12,38 @@ namespace {
 constexpr size_t kSharpnessWindowFrames = 15;
 constexpr int kMaskMemoryFrames = 30;    // masks that last came longer ago are not waited for
 constexpr double kStandingStill = 0.15;  // progress below which passing time makes no keyframe
+constexpr double kVeryFast = 2.5;        // progress beyond which the minimum gap does not count
+constexpr double kWorthMeasuring = 0.5;  // progress before which the baseline is too short to measure depth
 
 }  // namespace
 
 bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
   DepthView view = MakeDepthView(frame, T_world_camera);
-  const double sharpness = Sharpness(view);
-  if (last_keyframe_) {
-    if (const auto depth_mu = SceneDepth(*last_keyframe_, view)) scene_depth_mu_ = depth_mu;
-  }
-  const bool is_good = IsGood(frame, sharpness);
+  const bool is_good = IsGood(frame, view.sharpness);
   ++frames_since_keyframe_;
+  if (last_keyframe_ && !IsDue(view)) return false;
+  if (last_keyframe_ && !is_good && frames_due_ <= config_.keyframe_wait_frames) return false;
+  last_keyframe_ = std::move(view);
+  frames_since_keyframe_ = 0;
+  frames_due_ = 0;
+  depth_is_of_keyframe_ = false;
+  return true;
+}
 
-  bool is_keyframe = !last_keyframe_;
-  if (!is_keyframe) {
-    const double progress = Progress(T_world_camera);
-    const bool timed_out = frames_since_keyframe_ >= config_.keyframe_max_gap_frames && progress > kStandingStill;
-    frames_due_ = progress >= 1 || timed_out ? frames_due_ + 1 : 0;
-    is_keyframe = frames_due_ > (is_good ? 0 : config_.keyframe_wait_frames);
+bool KeyframeSelector::IsDue(const DepthView& view) {
+  double progress = Progress(view.T_world_camera);
+  if (!depth_is_of_keyframe_ && (!scene_depth_mu_ || progress > kWorthMeasuring)) {
+    if (const auto depth_mu = SceneDepth(*last_keyframe_, view)) {
+      scene_depth_mu_ = depth_mu;
+      depth_is_of_keyframe_ = true;
+      progress = Progress(view.T_world_camera);
+    }
   }
-  if (is_keyframe) {
-    last_keyframe_ = std::move(view);
-    frames_since_keyframe_ = 0;
-    frames_due_ = 0;
-  }
-  return is_keyframe;
+  const bool moved = progress >= 1 && frames_since_keyframe_ >= config_.keyframe_min_gap_frames;
+  const bool timed_out = progress > kStandingStill && frames_since_keyframe_ >= config_.keyframe_max_gap_frames;
+  const bool is_due = moved || timed_out || progress > kVeryFast;
+  frames_due_ = is_due ? frames_due_ + 1 : 0;
+  return is_due;
 }
 
 double KeyframeSelector::Progress(const SE3<World, Camera>& T_world_camera) const {

@@ -23,11 +23,13 @@ class KeyframeSelector {
  private:
   // How far the camera has come towards the next keyframe; 1 = there.
   double Progress(const SE3<World, Camera>& T_world_camera) const;
+  bool IsDue(const DepthView& view);
   bool IsGood(const Frame& frame, double sharpness);
 
   const SlamConfig config_;
   std::optional<DepthView> last_keyframe_;
   std::optional<double> scene_depth_mu_;
+  bool depth_is_of_keyframe_ = false;  // scene_depth_mu_ was measured from the last keyframe, not from an earlier one
   int frames_since_keyframe_ = 0;
   int frames_due_ = 0;
   int frames_since_mask_ = 1 << 20;

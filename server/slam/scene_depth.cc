@@ -69,6 +69,17 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
   return *middle;
 }
 
+// At half the image's size: motion blur that matters is still seen, noise is not.
+double Sharpness(const cv::Mat& image_bgr) {
+  cv::Mat half, grey, laplacian;
+  cv::resize(image_bgr, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  cv::cvtColor(half, grey, cv::COLOR_BGR2GRAY);
+  cv::Laplacian(grey, laplacian, CV_16S);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(laplacian, mean, deviation);
+  return deviation[0] * deviation[0];
+}
+
 }  // namespace
 
 DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
@@ -85,16 +96,9 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
   view.camera.fy_px *= scale_y;
   view.camera.cx_px = (view.camera.cx_px + 0.5) * scale_x - 0.5;  // pixel centres are at integer coordinates
   view.camera.cy_px = (view.camera.cy_px + 0.5) * scale_y - 0.5;
+  view.sharpness = Sharpness(frame.image_bgr);
   if (!frame.depth_mu.empty()) view.sensor_depth_mu = MedianDepth(frame.depth_mu);
   return view;
-}
-
-double Sharpness(const DepthView& view) {
-  cv::Mat laplacian;
-  cv::Laplacian(view.grey, laplacian, CV_32F);
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(laplacian, mean, deviation);
-  return deviation[0] * deviation[0];
 }
 
 std::optional<double> SceneDepth(const DepthView& first, const DepthView& second) {

@@ -7,18 +7,16 @@
 
 namespace romap {
 
-// A small grey copy of a frame with what is needed to measure depth against another one.
+// A small grey copy of a frame with what is needed to measure depth against another one, and its sharpness.
 struct DepthView {
   CameraModel camera;  // of `grey`
   SE3<World, Camera> T_world_camera;
-  cv::Mat grey = {};                           // CV_8UC1, about 160 px wide
+  cv::Mat grey = {};     // CV_8UC1, about 160 px wide
+  double sharpness = 0;  // variance of the Laplacian, grey levels squared; compares frames of one scene
   std::optional<double> sensor_depth_mu = {};  // median of the frame's depth image
 };
 
 DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_camera);
-
-// Variance of the Laplacian, grey levels squared: comparable between frames of one scene.
-double Sharpness(const DepthView& view);
 
 // Typical depth of the scene in map units, seen from `first`. A depth image gives it directly. Otherwise it is the
 // median over image blocks of a plane sweep (Collins 1996): `second` is warped to `first` for planes at several depths

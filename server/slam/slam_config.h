@@ -6,8 +6,9 @@ namespace romap {
 
 // When a frame becomes a keyframe, and how keyframes become a sparse map.
 struct SlamConfig {
-  double keyframe_rotation_deg = 5.0;
-  double keyframe_translation_ratio = 0.06;
+  double keyframe_rotation_deg = 3.0;
+  double keyframe_translation_ratio = 0.04;
+  int keyframe_min_gap_frames = 2;
   int keyframe_max_gap_frames = 30;
   int keyframe_wait_frames = 3;
   double keyframe_sharpness_ratio = 0.75;
