@@ -57,10 +57,9 @@ absl::StatusOr<Instance> InstanceFromProto(v1::Instance& proto, const std::strin
   if (proto.label() < 1 || proto.label() > kMaxLabel) {
     return InvalidArgument("{}.label: {} must lie in 1..{}", where, proto.label(), kMaxLabel);
   }
-  if (proto.class_name().empty()) return InvalidArgument("{}.class_name: empty", where);
   Instance instance;
   instance.label = proto.label();
-  instance.class_name = std::move(*proto.mutable_class_name());
+  instance.class_name = proto.class_name().empty() ? "object" : std::move(*proto.mutable_class_name());
   if (proto.has_score()) {
     ROMAP_RETURN_IF_ERROR(CheckRange(proto.score(), 0, 1, where + ".score"));
     instance.score = proto.score();

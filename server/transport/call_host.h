@@ -17,7 +17,7 @@ namespace romap::transport {
 class StoppableCall {
  public:
   virtual ~StoppableCall() = default;
-  // Makes the call end soon, with `why` as its status. Does not wait. The first reason counts.
+  // Makes the call end soon, with `why` (which may be OK) as its status. Does not wait. The first reason counts.
   virtual void RequestStop(const absl::Status& why) = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "server/transport/map_reactor.h"
 
+#include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -9,14 +11,16 @@
 namespace romap::transport {
 
 absl::Status MapReactor::Run() {
-  if (!Read() || !request_.has_start()) return InvalidArgument("map: the first request must be `start`");
+  if (!Read().value_or(false) || !request_.has_start()) {
+    return InvalidArgument("map: the first request must be `start`");
+  }
   const std::string session_id = request_.start().session_id();
   ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MapStream> stream, service().OpenMap(session_id));
 
   std::thread frame_pump([&] { PumpFrames(*stream); });
-  absl::Status status = ForwardEvents(session_id, *stream);
-  stream->Cancel();
-  read_.Abandon();
+  const absl::Status status = ForwardEvents(session_id, *stream);
+  RequestStop(status);  // wakes the pump where it waits for a frame,
+  stream->Cancel();     // and where it waits for room
   frame_pump.join();
   // Only now, with the session free for another stream, may the client learn that this one is over.
   return status;
@@ -24,8 +28,15 @@ absl::Status MapReactor::Run() {
 
 void MapReactor::PumpFrames(MapStream& stream) {
   const absl::Status status = Guarded([&]() -> absl::Status {
-    while (Read()) ROMAP_RETURN_IF_ERROR(TakeFrame(stream));
-    return stopping() ? absl::OkStatus() : stream.CloseSend();
+    while (true) {
+      const std::optional<bool> read = Read();
+      if (!read) return absl::OkStatus();
+      if (!*read) break;
+      ROMAP_RETURN_IF_ERROR(TakeFrame(stream));
+    }
+    // Fails only when the stream is being closed anyway.
+    stream.CloseSend().IgnoreError();
+    return absl::OkStatus();
   });
   if (!status.ok()) RequestStop(status);
 }
@@ -49,7 +60,7 @@ void MapReactor::Refuse(uint64_t frame_id, const absl::Status& why) {
   Write(response);
 }
 
-bool MapReactor::Read() {
+std::optional<bool> MapReactor::Read() {
   StartRead(&request_);
   return read_.Wait();
 }

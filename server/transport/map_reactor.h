@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <optional>
 
 #include "common/mapping_service.h"
 #include "romap/v1/mapping.grpc.pb.h"
@@ -20,10 +20,11 @@ class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, 
   absl::Status Run() override;
   void OnStop() override { read_.Abandon(); }
 
-  // Waits for the next request, into request_; false when the client has closed its side or the call is stopping.
-  bool Read();
+  // Waits for the next request, into request_; false when the client has closed its side, nullopt when the call stops.
+  std::optional<bool> Read();
+  // Body of the frame thread.
   void PumpFrames(MapStream& stream);
-  // What to answer to the request in request_: OK, or why the call must end.
+  // Hands the frame in request_ on, or refuses it; otherwise why the call must end.
   absl::Status TakeFrame(MapStream& stream);
   void Refuse(uint64_t frame_id, const absl::Status& why);
 

@@ -24,13 +24,13 @@ class Completion {
     result_ = ok;
     changed_.notify_all();
   }
-  // Waits for the operation; false when it failed or is not waited for any more.
-  bool Wait() {
+  // Waits for the operation and says whether it succeeded; nullopt after Abandon().
+  std::optional<bool> Wait() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return abandoned_ || result_.has_value(); });
-    return !abandoned_ && std::exchange(result_, std::nullopt).value();
+    return abandoned_ ? std::nullopt : std::exchange(result_, std::nullopt);
   }
-  // Ends the present Wait() and all later ones with false.
+  // Ends the present Wait() and all later ones.
   void Abandon() {
     std::lock_guard lock(mutex_);
     abandoned_ = true;
@@ -71,7 +71,7 @@ class StreamReactor : public Reactor, public StoppableCall {
 
   void RequestStop(const absl::Status& why) final {
     std::lock_guard lock(mutex_);
-    if (!stop_reason_.ok()) return;
+    if (stop_reason_) return;
     stop_reason_ = why;
     if (events_ != nullptr) events_->Cancel();
     OnStop();
@@ -88,14 +88,14 @@ class StreamReactor : public Reactor, public StoppableCall {
 
   bool stopping() {
     std::lock_guard lock(mutex_);
-    return !stop_reason_.ok();
+    return stop_reason_.has_value();
   }
 
   // Waits until gRPC has taken the message; false when the client is gone. Any thread of this call may write.
   bool Write(const Response& response) {
     std::lock_guard lock(write_mutex_);
     this->StartWrite(&response);
-    return write_.Wait();
+    return write_.Wait().value_or(false);
   }
 
   // Says that the stream is open, then writes events until either side ends. While it runs, RequestStop() cancels
@@ -124,7 +124,7 @@ class StreamReactor : public Reactor, public StoppableCall {
  private:
   bool Attach(EventStream* events) {
     std::lock_guard lock(mutex_);
-    if (!stop_reason_.ok()) return false;
+    if (stop_reason_) return false;
     events_ = events;
     return true;
   }
@@ -134,7 +134,7 @@ class StreamReactor : public Reactor, public StoppableCall {
   }
   absl::Status StopReasonOr(absl::Status status) {
     std::lock_guard lock(mutex_);
-    return stop_reason_.ok() ? status : stop_reason_;
+    return stop_reason_.value_or(std::move(status));
   }
 
   CallHost* const host_;
@@ -142,7 +142,7 @@ class StreamReactor : public Reactor, public StoppableCall {
   Completion write_;
 
   std::mutex mutex_;
-  absl::Status stop_reason_;  // OK while the call may go on
+  std::optional<absl::Status> stop_reason_;  // none while the call may go on
   EventStream* events_ = nullptr;
 };
 

@@ -1,0 +1,42 @@
+#include "tests/contract/backends.h"
+
+#include <stdexcept>
+
+#include "client/sdk/remote_mapping_service.h"
+#include "common/status.h"
+#include "tests/support/fake_mapping_service.h"
+
+namespace romap::contract {
+namespace {
+
+template <class T>
+T Must(absl::StatusOr<T> result) {
+  if (!result.ok()) throw std::runtime_error(Message(result.status()));
+  return std::move(result).value();
+}
+
+}  // namespace
+
+std::vector<Backend> AllBackends() {
+  const std::vector<Backend> in_process = {
+      {"Fake", [] { return std::make_unique<testing::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
+  };
+  std::vector<Backend> all;
+  for (const Backend& backend : in_process) {
+    all.push_back(backend);
+    all.push_back(backend);
+    all.back().name += "OverGrpc";
+    all.back().over_grpc = true;
+  }
+  return all;
+}
+
+RunningBackend::RunningBackend(const Backend& backend) : local_(backend.make()) {
+  if (!backend.over_grpc) return;
+  TransportConfig config;
+  config.listen_address = "127.0.0.1:0";
+  server_ = Must(GrpcServer::Start(local_.get(), config));
+  remote_ = Must(RemoteMappingService::Connect(server_->address()));
+}
+
+}  // namespace romap::contract

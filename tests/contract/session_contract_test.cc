@@ -1,0 +1,122 @@
+// What every MappingService promises about sessions.
+
+#include "tests/contract/contract_fixture.h"
+
+namespace romap::contract {
+namespace {
+
+using absl::StatusCode;
+using ::testing::SizeIs;
+
+class SessionContract : public MappingServiceContract {};
+INSTANTIATE_TEST_SUITE_P(All, SessionContract, ::testing::ValuesIn(AllBackends()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(SessionContract, SessionsAreMadeListedAndDeleted) {
+  const std::string first = NewSession(), second = NewSession();
+  EXPECT_NE(first, second);
+  EXPECT_THAT(service().ListSessions().value(), SizeIs(2));
+  EXPECT_OK(service().DeleteSession(first));
+  const auto left = service().ListSessions();
+  ASSERT_THAT(left.value(), SizeIs(1));
+  EXPECT_EQ(left->front().id, second);
+}
+
+TEST_P(SessionContract, ASessionRemembersHowItWasMade) {
+  SessionOptions options;
+  options.name = "Küche, zweiter Versuch";
+  options.camera = SmallCamera();
+  options.camera.distortion = {0.1, -0.2, 0.001, 0.002, 0.05};
+  options.mode = FrameMode::kLive;
+  const auto made = service().CreateSession(options);
+  ASSERT_TRUE(made.ok());
+  const auto info = service().GetSession(made->id);
+  ASSERT_TRUE(info.ok());
+  EXPECT_EQ(info->name, options.name);
+  EXPECT_EQ(info->camera, options.camera);
+  EXPECT_EQ(info->mode, FrameMode::kLive);
+  EXPECT_EQ(info->state, SessionState::kOpen);
+  EXPECT_FALSE(info->stream_open);
+  EXPECT_GT(info->created_unix_ns, 0);
+}
+
+TEST_P(SessionContract, AnUnknownSessionIsNotFound) {
+  EXPECT_CODE(service().GetSession("nobody").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().FinishSession("nobody").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().DeleteSession("nobody"), StatusCode::kNotFound);
+  EXPECT_CODE(service().OpenMap("nobody").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().Watch("nobody").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().ExportMap("nobody").status(), StatusCode::kNotFound);
+}
+
+TEST_P(SessionContract, AnErrorSaysWhichSessionItIsAbout) {
+  EXPECT_THAT(Message(service().GetSession("nobody").status()), ::testing::HasSubstr("nobody"));
+}
+
+TEST_P(SessionContract, AnImpossibleCameraIsRefused) {
+  SessionOptions options;
+  options.camera = SmallCamera();
+  options.camera.fx_px = -1;
+  EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
+  options.camera = SmallCamera();
+  options.camera.width_px = 0;
+  EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
+  options.camera = SmallCamera();
+  options.camera.distortion[2] = std::nan("");
+  EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(service().ListSessions().value(), SizeIs(0));
+}
+
+TEST_P(SessionContract, AFinishedSessionStaysUntilItIsDeleted) {
+  const std::string session = NewSession();
+  const auto finishing = service().FinishSession(session);
+  ASSERT_TRUE(finishing.ok());
+  EXPECT_NE(finishing->state, SessionState::kOpen);
+  EXPECT_TRUE(Eventually([&] { return service().GetSession(session)->state == SessionState::kFinished; }));
+  EXPECT_OK(service().FinishSession(session).status());
+  EXPECT_OK(service().ExportMap(session).status());
+  EXPECT_OK(service().DeleteSession(session));
+  EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
+}
+
+TEST_P(SessionContract, AnExportHoldsTheTrajectory) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+  EXPECT_OK(stream->CloseSend());
+  ReadToEnd(*stream);
+  const auto map = service().ExportMap(session);
+  ASSERT_TRUE(map.ok()) << Message(map.status());
+  EXPECT_EQ(map->session_id, session);
+  ASSERT_THAT(map->trajectory, SizeIs(5));
+  ASSERT_THAT(map->timestamps_ns, SizeIs(5));
+  for (uint64_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(map->trajectory[i].frame_id, i + 1);
+    EXPECT_EQ(map->timestamps_ns[i], MakeFrame(i + 1).timestamp_ns);
+    ASSERT_TRUE(map->trajectory[i].T_world_camera.has_value());
+    EXPECT_NEAR(map->trajectory[i].T_world_camera->translation().x(), 0.01 * (i + 1), 1e-12);
+  }
+  EXPECT_EQ(map->statistics.frames_received, 5u);
+}
+
+TEST_P(SessionContract, AnExportHoldsTheObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(MakeFrame(2, "book")));
+  EXPECT_OK(stream->CloseSend());
+  ReadToEnd(*stream);
+  const auto map = service().ExportMap(session);
+  ASSERT_TRUE(map.ok());
+  ASSERT_THAT(map->objects, SizeIs(2));
+  EXPECT_EQ(map->objects[0].object.class_name, "mug");
+  EXPECT_EQ(map->objects[1].object.class_name, "book");
+  ASSERT_TRUE(map->objects[0].mesh.has_value());
+  EXPECT_EQ(map->objects[0].mesh->id, map->objects[0].object.id);
+  EXPECT_FALSE(map->objects[0].mesh->draco.empty());
+  EXPECT_TRUE(map->objects[0].object.T_world_mesh.has_value());
+}
+
+}  // namespace
+}  // namespace romap::contract

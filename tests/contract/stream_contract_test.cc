@@ -1,0 +1,235 @@
+// What every MappingService promises about its streams.
+
+#include <map>
+#include <thread>
+
+#include "tests/contract/contract_fixture.h"
+
+namespace romap::contract {
+namespace {
+
+using absl::StatusCode;
+using ::testing::SizeIs;
+
+class StreamContract : public MappingServiceContract {};
+INSTANTIATE_TEST_SUITE_P(All, StreamContract, ::testing::ValuesIn(AllBackends()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsCleanly) {
+  const auto stream = Open(NewSession());
+  constexpr uint64_t kFrames = 40;
+  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id)).ok());
+  EXPECT_OK(stream->CloseSend());
+  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  ASSERT_THAT(acks, SizeIs(kFrames));
+  for (uint64_t i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(acks[i].frame_id, i + 1);
+    EXPECT_TRUE(acks[i].accepted) << acks[i].error;
+  }
+  EXPECT_TRUE(stream->Done());
+  EXPECT_OK(stream->status());
+}
+
+TEST_P(StreamContract, ABadFrameIsRefusedAndTheStreamLivesOn) {
+  const auto stream = Open(NewSession());
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(stream->Send(MakeBadFrame(2)));
+  EXPECT_OK(stream->Send(MakeFrame(3)));
+  EXPECT_OK(stream->CloseSend());
+  std::map<uint64_t, FrameAck> acks;
+  for (const FrameAck& ack : Only<FrameAck>(ReadToEnd(*stream))) acks[ack.frame_id] = ack;
+  ASSERT_THAT(acks, SizeIs(3));
+  EXPECT_TRUE(acks[1].accepted);
+  EXPECT_FALSE(acks[2].accepted);
+  EXPECT_FALSE(acks[2].error.empty());
+  EXPECT_TRUE(acks[3].accepted) << acks[3].error;
+  EXPECT_OK(stream->status());
+}
+
+TEST_P(StreamContract, AFrameWithAPoseThatIsNoneIsRefused) {
+  const auto stream = Open(NewSession());
+  FrameInput frame = MakeFrame(1);
+  frame.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(std::nan(""), 0, 0));
+  EXPECT_OK(stream->Send(frame));
+  EXPECT_OK(stream->CloseSend());
+  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  if (acks.empty() || acks[0].accepted) {
+    // The fake does not look at poses; over the wire such a frame does not get as far as the fake.
+    EXPECT_EQ(GetParam().name, "Fake");
+  }
+}
+
+TEST_P(StreamContract, ASecondMapStreamIsRefused) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  EXPECT_TRUE(service().GetSession(session)->stream_open);
+  EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kFailedPrecondition);
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+}
+
+TEST_P(StreamContract, AStreamMayFollowAnother) {
+  const std::string session = NewSession();
+  for (uint64_t id = 1; id <= 3; ++id) {
+    const auto stream = Reopen(session);
+    ASSERT_NE(stream, nullptr);
+    EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->CloseSend());
+    ReadToEnd(*stream);
+    EXPECT_OK(stream->status());
+  }
+  EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(3));
+}
+
+TEST_P(StreamContract, AFinishedSessionTakesNoStream) {
+  const std::string session = NewSession();
+  EXPECT_OK(service().FinishSession(session).status());
+  EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kFailedPrecondition);
+}
+
+TEST_P(StreamContract, NothingIsSentAfterCloseSend) {
+  const auto stream = Open(NewSession());
+  EXPECT_OK(stream->CloseSend());
+  EXPECT_CODE(stream->Send(MakeFrame(1)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->CloseSend(), StatusCode::kFailedPrecondition);
+  ReadToEnd(*stream);
+  EXPECT_OK(stream->status());
+}
+
+TEST_P(StreamContract, DisconnectingKeepsTheSession) {
+  const std::string session = NewSession();
+  {
+    const auto stream = Open(session);
+    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  }
+  EXPECT_EQ(service().GetSession(session)->state, SessionState::kOpen);
+  const auto stream = Reopen(session);
+  ASSERT_NE(stream, nullptr);
+  EXPECT_OK(stream->Send(MakeFrame(4)));
+  EXPECT_OK(stream->CloseSend());
+  ReadToEnd(*stream);
+  EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(4));
+}
+
+TEST_P(StreamContract, FinishingEndsTheOpenStreams) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(service().FinishSession(session).status());
+  ReadToEnd(*stream);
+  ReadToEnd(**watch);
+  EXPECT_OK(stream->status());
+  EXPECT_OK((*watch)->status());
+  EXPECT_CODE(stream->Send(MakeFrame(2)), StatusCode::kFailedPrecondition);
+}
+
+TEST_P(StreamContract, DeletingEndsTheOpenStreams) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(service().DeleteSession(session));
+  ReadToEnd(*stream);
+  ReadToEnd(**watch);
+  EXPECT_CODE((*watch)->status(), StatusCode::kNotFound);
+  EXPECT_FALSE(stream->status().ok());
+  EXPECT_FALSE(stream->Send(MakeFrame(2)).ok());
+  EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kNotFound);
+}
+
+TEST_P(StreamContract, DeletingWhileFramesAreSentHangsNobody) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  std::thread sender([&] {
+    for (uint64_t id = 1; stream->Send(MakeFrame(id)).ok(); ++id) {
+    }
+  });
+  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(service().DeleteSession(session));
+  ReadToEnd(*stream);
+  sender.join();
+  EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
+}
+
+TEST_P(StreamContract, CancelWakesTheReader) {
+  const auto stream = Open(NewSession());
+  std::thread reader([&] { ReadToEnd(*stream); });
+  stream->Cancel();
+  reader.join();
+  EXPECT_TRUE(stream->Done());
+  EXPECT_CODE(stream->status(), StatusCode::kCancelled);
+  EXPECT_FALSE(stream->Send(MakeFrame(1)).ok());
+}
+
+TEST_P(StreamContract, AWatcherFollowsTheClient) {
+  const std::string session = NewSession();
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  const auto stream = Open(session);
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  const auto ack = NextOf<FrameAck>(**watch);
+  ASSERT_TRUE(ack.has_value());
+  EXPECT_EQ(ack->frame_id, 1u);
+  EXPECT_TRUE(ack->T_world_camera.has_value());
+}
+
+TEST_P(StreamContract, AWatchOfAFinishedSessionEndsByItself) {
+  const std::string session = NewSession();
+  EXPECT_OK(service().FinishSession(session).status());
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  ReadToEnd(**watch);
+  EXPECT_OK((*watch)->status());
+}
+
+TEST_P(StreamContract, AWatchBeginsWithTheObjectsThereAre) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
+  ASSERT_TRUE(NextOf<MeshUpdate>(*stream).has_value());
+
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  const auto object = NextOf<ObjectUpdate>(**watch);
+  const auto mesh = NextOf<MeshUpdate>(**watch);
+  ASSERT_TRUE(object && mesh);
+  EXPECT_EQ(object->class_name, "mug");
+  EXPECT_EQ(mesh->id, object->id);
+
+  EXPECT_OK(stream->Send(MakeFrame(2, "mug")));
+  const auto newer = NextOf<ObjectUpdate>(**watch);
+  ASSERT_TRUE(newer.has_value());
+  EXPECT_EQ(newer->id, object->id);
+  EXPECT_GT(newer->revision, object->revision);
+}
+
+TEST_P(StreamContract, TwoSessionsDoNotMix) {
+  constexpr uint64_t kFrames = 20;
+  const auto run = [&](uint64_t first_id, std::vector<FrameAck>* acks) {
+    const std::string session = NewSession();
+    const auto stream = Open(session);
+    for (uint64_t id = first_id; id < first_id + kFrames; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->CloseSend());
+    *acks = Only<FrameAck>(ReadToEnd(*stream));
+    EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(kFrames));
+  };
+  std::vector<FrameAck> a, b;
+  std::thread other([&] { run(1000, &b); });
+  run(1, &a);
+  other.join();
+  ASSERT_THAT(a, SizeIs(kFrames));
+  ASSERT_THAT(b, SizeIs(kFrames));
+  for (uint64_t i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(a[i].frame_id, 1 + i);
+    EXPECT_EQ(b[i].frame_id, 1000 + i);
+  }
+}
+
+}  // namespace
+}  // namespace romap::contract

@@ -1,0 +1,303 @@
+#include "tests/support/fake_mapping_service.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <set>
+#include <utility>
+
+#include "common/status.h"
+
+namespace romap::testing {
+namespace {
+
+// Events waiting for one subscriber.
+class Mailbox {
+ public:
+  void Put(MapEvent event) {
+    std::lock_guard lock(mutex_);
+    if (closed_) return;
+    events_.push_back(std::move(event));
+    changed_.notify_all();
+  }
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, timeout, [&] { return closed_ || !events_.empty(); });
+    if (events_.empty()) return std::nullopt;
+    std::optional<MapEvent> event(std::move(events_.front()));
+    events_.pop_front();
+    return event;
+  }
+  void Close(const absl::Status& status) {
+    std::lock_guard lock(mutex_);
+    if (closed_) return;
+    closed_ = true;
+    status_ = status;
+    changed_.notify_all();
+  }
+  bool Done() {
+    std::lock_guard lock(mutex_);
+    return closed_ && events_.empty();
+  }
+  absl::Status status() {
+    std::lock_guard lock(mutex_);
+    return status_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<MapEvent> events_;
+  bool closed_ = false;
+  absl::Status status_;
+};
+
+MeshUpdate MeshOf(const ObjectUpdate& object) {
+  MeshUpdate mesh;
+  mesh.id = object.id;
+  mesh.revision = object.revision;
+  mesh.steps = 100 * object.observations;
+  mesh.vertex_count = 3;
+  mesh.triangle_count = 1;
+  mesh.draco = "mesh of " + object.class_name;
+  return mesh;
+}
+
+}  // namespace
+
+class FakeSession {
+ public:
+  FakeSession(SessionInfo info) : info_(std::move(info)) {}
+
+  SessionInfo Info() {
+    std::lock_guard lock(mutex_);
+    return info_;
+  }
+
+  // A subscriber that has been told of all objects there are.
+  std::shared_ptr<Mailbox> Subscribe() {
+    std::lock_guard lock(mutex_);
+    return SubscribeLocked();
+  }
+
+  absl::StatusOr<std::shared_ptr<Mailbox>> AttachSender() {
+    std::lock_guard lock(mutex_);
+    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
+    if (info_.stream_open) return FailedPrecondition("session '{}' has a Map stream already", info_.id);
+    info_.stream_open = true;
+    return SubscribeLocked();
+  }
+  void DetachSender() {
+    std::lock_guard lock(mutex_);
+    info_.stream_open = false;
+  }
+  void Unsubscribe(const std::shared_ptr<Mailbox>& mailbox) {
+    std::lock_guard lock(mutex_);
+    subscribers_.erase(mailbox);
+  }
+
+  absl::Status Take(const FrameInput& frame) {
+    std::lock_guard lock(mutex_);
+    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
+    Statistics& statistics = info_.statistics;
+    ++statistics.frames_received;
+    FrameAck ack{.frame_id = frame.frame_id,
+                 .accepted = !frame.image.empty(),
+                 .error = frame.image.empty() ? "frame.image: empty" : "",
+                 .state = TrackingState::kTracking,
+                 .T_world_camera = frame.T_world_camera,
+                 .is_keyframe = false,
+                 .latency_s = 0};
+    ++(ack.accepted ? statistics.frames_processed : statistics.frames_rejected);
+    Publish(ack);
+    if (!ack.accepted) return absl::OkStatus();
+    trajectory_.push_back(ack);
+    timestamps_ns_.push_back(frame.timestamp_ns);
+    for (const Instance& instance : frame.instances) See(instance);
+    return absl::OkStatus();
+  }
+
+  SessionInfo Finish() {
+    std::lock_guard lock(mutex_);
+    if (info_.state == SessionState::kOpen) Close(absl::OkStatus());
+    return info_;
+  }
+  void Delete() {
+    std::lock_guard lock(mutex_);
+    Close(NotFound("session '{}' was deleted", info_.id));
+  }
+
+  MapSnapshot Export() {
+    std::lock_guard lock(mutex_);
+    MapSnapshot snapshot;
+    snapshot.session_id = info_.id;
+    snapshot.state = info_.state;
+    for (const auto& [name, object] : objects_) snapshot.objects.push_back({object, MeshOf(object)});
+    std::sort(snapshot.objects.begin(), snapshot.objects.end(),
+              [](const auto& a, const auto& b) { return a.object.id < b.object.id; });
+    snapshot.trajectory = trajectory_;
+    snapshot.timestamps_ns = timestamps_ns_;
+    snapshot.statistics = info_.statistics;
+    return snapshot;
+  }
+
+ private:
+  std::shared_ptr<Mailbox> SubscribeLocked() {
+    auto mailbox = std::make_shared<Mailbox>();
+    for (const auto& [name, object] : objects_) {
+      mailbox->Put(object);
+      mailbox->Put(MeshOf(object));
+    }
+    if (info_.state == SessionState::kFinished) mailbox->Close(absl::OkStatus());
+    subscribers_.insert(mailbox);
+    return mailbox;
+  }
+
+  void Publish(const MapEvent& event) {
+    for (const auto& subscriber : subscribers_) subscriber->Put(event);
+  }
+
+  void See(const Instance& instance) {
+    const auto [it, is_new] = objects_.try_emplace(instance.class_name);
+    ObjectUpdate& object = it->second;
+    if (is_new) {
+      object.id = ObjectId{objects_.size()};
+      object.state = ObjectState::kConfirmed;
+      object.class_name = instance.class_name;
+      object.class_score = 1;
+      object.cuboid.half_extents = Eigen::Vector3d(0.1, 0.2, 0.3);
+      object.cuboid.confidence = 0.5;
+      object.T_world_mesh.emplace();
+      info_.statistics.objects = objects_.size();
+    }
+    ++object.observations;
+    ++object.revision;
+    Publish(object);
+    Publish(MeshOf(object));
+  }
+
+  void Close(const absl::Status& status) {
+    info_.state = SessionState::kFinished;
+    for (const auto& subscriber : subscribers_) subscriber->Close(status);
+  }
+
+  std::mutex mutex_;
+  SessionInfo info_;
+  std::set<std::shared_ptr<Mailbox>> subscribers_;
+  std::map<std::string, ObjectUpdate> objects_;  // by class name
+  std::vector<FrameAck> trajectory_;
+  std::vector<int64_t> timestamps_ns_;
+};
+
+namespace {
+
+using FrameHook = std::function<void(const FrameInput&)>;
+
+class FakeStream : public MapStream {
+ public:
+  FakeStream(std::shared_ptr<FakeSession> session, std::shared_ptr<Mailbox> mailbox, bool sender, FrameHook hook)
+      : session_(std::move(session)), mailbox_(std::move(mailbox)), hook_(std::move(hook)), sending_(sender) {}
+  ~FakeStream() override { Cancel(); }
+
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return mailbox_->Next(timeout); }
+  bool Done() const override { return mailbox_->Done(); }
+  absl::Status status() const override { return mailbox_->status(); }
+
+  absl::Status Send(FrameInput frame) override {
+    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    hook_(frame);
+    return session_->Take(frame);
+  }
+  absl::Status CloseSend() override {
+    if (!StopSending()) return FailedPrecondition("this stream was closed for sending");
+    mailbox_->Close(absl::OkStatus());
+    return absl::OkStatus();
+  }
+  void Cancel() override {
+    StopSending();
+    session_->Unsubscribe(mailbox_);
+    mailbox_->Close(absl::CancelledError("the stream was cancelled"));
+  }
+
+ private:
+  bool StopSending() {
+    if (!sending_.exchange(false)) return false;
+    session_->DetachSender();
+    return true;
+  }
+
+  const std::shared_ptr<FakeSession> session_;
+  const std::shared_ptr<Mailbox> mailbox_;
+  const FrameHook hook_;
+  std::atomic<bool> sending_;
+};
+
+}  // namespace
+
+FakeMappingService::FakeMappingService() = default;
+FakeMappingService::~FakeMappingService() = default;
+
+absl::StatusOr<SessionInfo> FakeMappingService::CreateSession(const SessionOptions& options) {
+  ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
+  std::lock_guard lock(mutex_);
+  SessionInfo info;
+  info.id = fmt::format("fake-{}", ++sessions_made_);
+  info.name = options.name;
+  info.camera = options.camera;
+  info.mode = options.mode;
+  info.created_unix_ns = static_cast<int64_t>(sessions_made_);
+  sessions_[info.id] = std::make_shared<FakeSession>(info);
+  return info;
+}
+
+absl::StatusOr<std::vector<SessionInfo>> FakeMappingService::ListSessions() {
+  std::lock_guard lock(mutex_);
+  std::vector<SessionInfo> infos;
+  for (const auto& [id, session] : sessions_) infos.push_back(session->Info());
+  return infos;
+}
+
+absl::StatusOr<SessionInfo> FakeMappingService::GetSession(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return session->Info();
+}
+
+absl::StatusOr<SessionInfo> FakeMappingService::FinishSession(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return session->Finish();
+}
+
+absl::Status FakeMappingService::DeleteSession(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  {
+    std::lock_guard lock(mutex_);
+    sessions_.erase(session_id);
+  }
+  session->Delete();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<MapStream>> FakeMappingService::OpenMap(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  ROMAP_ASSIGN_OR_RETURN(auto mailbox, session->AttachSender());
+  return std::make_unique<FakeStream>(session, std::move(mailbox), /*sender=*/true, frame_hook_);
+}
+
+absl::StatusOr<std::unique_ptr<EventStream>> FakeMappingService::Watch(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return std::make_unique<FakeStream>(session, session->Subscribe(), /*sender=*/false, frame_hook_);
+}
+
+absl::StatusOr<MapSnapshot> FakeMappingService::ExportMap(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  return session->Export();
+}
+
+absl::StatusOr<std::shared_ptr<FakeSession>> FakeMappingService::Find(const std::string& session_id) {
+  std::lock_guard lock(mutex_);
+  const auto it = sessions_.find(session_id);
+  if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+  return it->second;
+}
+
+}  // namespace romap::testing
