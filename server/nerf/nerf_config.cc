@@ -94,7 +94,8 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "steps", .min = 1, .max = 100000, .help = "Steps of a full training; more makes shapes drift"});
   fields.Add("refine_steps_per_view", &c.refine_steps_per_view,
              {.unit = "steps", .min = 0, .max = 10000, .help = "Steps added by a view that comes after that"});
-  fields.Add("max_steps", &c.max_steps, {.unit = "steps", .min = 1, .max = 1000000, .help = "Most steps of an object"});
+  fields.Add("max_refine_steps", &c.max_refine_steps,
+             {.unit = "steps", .min = 0, .max = 100000, .help = "Most such steps waiting at a time"});
   fields.Add("slice_steps", &c.slice_steps,
              {.unit = "steps", .min = 1, .max = 1000, .help = "Steps for which a worker holds an object"});
   fields.Add("snapshot_interval_steps", &c.snapshot_interval_steps,

@@ -59,7 +59,7 @@ struct NerfConfig {
   int budget_steps_per_view = 10;
   int full_budget_steps = 200;
   int refine_steps_per_view = 6;
-  int max_steps = 400;
+  int max_refine_steps = 100;
   int slice_steps = 20;
   int snapshot_interval_steps = 40;
   double snapshot_interval_s = 1.0;

@@ -6,19 +6,20 @@
 namespace romap {
 
 void TrainingPlan::OnNewView(uint64_t steps_done) {
-  if (steps_done < static_cast<uint64_t>(config_.full_budget_steps)) return;
-  const int from = std::max(planned_steps_, static_cast<int>(std::min<uint64_t>(steps_done, config_.max_steps)));
-  planned_steps_ = std::min(from + config_.refine_steps_per_view, std::max(config_.max_steps, planned_steps_));
+  const uint64_t full = static_cast<uint64_t>(config_.full_budget_steps);
+  if (steps_done < full) return;  // the plan still has room for it
+  const uint64_t extended = std::max(planned_steps_, steps_done) + static_cast<uint64_t>(config_.refine_steps_per_view);
+  planned_steps_ = std::min(extended, steps_done + static_cast<uint64_t>(config_.max_refine_steps));
 }
 
 uint64_t TrainingPlan::AllowedSteps(int views, bool complete) const {
   if (views == 0) return 0;
-  if (complete) return static_cast<uint64_t>(planned_steps_);
+  if (complete) return planned_steps_;
   if (views < config_.min_views) return 0;
   const int budget = config_.first_budget_steps + (views - config_.min_views) * config_.budget_steps_per_view;
   // Past the full budget every extension was earned by a view.
-  if (budget >= config_.full_budget_steps) return static_cast<uint64_t>(planned_steps_);
-  return static_cast<uint64_t>(std::min(budget, planned_steps_));
+  if (budget >= config_.full_budget_steps) return planned_steps_;
+  return std::min(static_cast<uint64_t>(budget), planned_steps_);
 }
 
 double TrainingPlan::LearningRate(uint64_t step) const {

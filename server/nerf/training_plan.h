@@ -13,9 +13,9 @@ namespace romap {
 // the plan would make density drift behind textureless surfaces, hence `max_steps`.
 class TrainingPlan {
  public:
-  explicit TrainingPlan(const NerfConfig& config) : config_(config) {}
+  explicit TrainingPlan(const NerfConfig& config) : config_(config) { Restart(); }
 
-  void Restart() { planned_steps_ = config_.full_budget_steps; }
+  void Restart() { planned_steps_ = static_cast<uint64_t>(config_.full_budget_steps); }
   // A new or corrected view came when `steps_done` steps were done.
   void OnNewView(uint64_t steps_done);
 
@@ -25,7 +25,7 @@ class TrainingPlan {
 
  private:
   NerfConfig config_;
-  int planned_steps_ = config_.full_budget_steps;
+  uint64_t planned_steps_ = 0;
 };
 
 }  // namespace romap
