@@ -1,0 +1,136 @@
+#include "client/eval/alignment.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "client/files/associate.h"
+
+namespace romap {
+namespace {
+
+using PointMatrix = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>;
+
+PointMatrix AsMatrix(const Points& points) {
+  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double), "points lie without gaps");
+  return {points.front().data(), 3, static_cast<Eigen::Index>(points.size())};
+}
+
+std::vector<int64_t> TimestampsOf(std::span<const StampedPose> poses, int64_t offset_ns) {
+  std::vector<int64_t> timestamps_ns;
+  timestamps_ns.reserve(poses.size());
+  for (const StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns + offset_ns);
+  return timestamps_ns;
+}
+
+// Pairs of source and target points that one ICP step fits to each other.
+struct Correspondences {
+  Points source;
+  Points target;
+  double rms = 0;
+};
+
+Correspondences FindCorrespondences(const Points& source, const Points& moved, const Points& target,
+                                    const NearestIndex& target_index, const Points& symmetric_target, double overlap) {
+  Correspondences result;
+  double squared_sum = 0;
+  const auto add = [&](const Eigen::Vector3d& x, const Eigen::Vector3d& y, double distance) {
+    result.source.push_back(x);
+    result.target.push_back(y);
+    squared_sum += distance * distance;
+  };
+  const Neighbours forward = target_index.Query(moved);
+  const double limit = overlap < 1 ? Quantile(forward.distance, overlap) : std::numeric_limits<double>::infinity();
+  for (size_t k = 0; k < source.size(); ++k) {
+    if (forward.distance[k] <= limit) add(source[k], target[forward.index[k]], forward.distance[k]);
+  }
+  if (!symmetric_target.empty()) {
+    const Neighbours backward = NearestIndex(moved).Query(symmetric_target);
+    for (size_t k = 0; k < symmetric_target.size(); ++k) {
+      add(source[backward.index[k]], symmetric_target[k], backward.distance[k]);
+    }
+  }
+  result.rms = std::sqrt(squared_sum / static_cast<double>(result.source.size()));
+  return result;
+}
+
+}  // namespace
+
+std::string ToString(Alignment alignment) {
+  switch (alignment) {
+    case Alignment::kNone:
+      return "none";
+    case Alignment::kSe3:
+      return "se3";
+    case Alignment::kSim3:
+      return "sim3";
+  }
+  return "unknown";
+}
+
+Points Similarity::operator*(const Points& points) const {
+  Points moved;
+  moved.reserve(points.size());
+  for (const Eigen::Vector3d& point : points) moved.push_back(*this * point);
+  return moved;
+}
+
+double Similarity::RotationAngle_rad() const { return Eigen::AngleAxisd(rotation).angle(); }
+
+std::optional<Similarity> FitSimilarity(const Points& x, const Points& y, bool with_scale) {
+  if (x.empty()) return std::nullopt;
+  const PointMatrix from = AsMatrix(x);
+  const Eigen::Vector3d mean = from.rowwise().mean();
+  if ((from.colwise() - mean).squaredNorm() / static_cast<double>(x.size()) < 1e-18) return std::nullopt;
+  const Eigen::Matrix4d matrix = Eigen::umeyama(from, AsMatrix(y), with_scale);
+  Similarity similarity;
+  similarity.scale = with_scale ? matrix.topLeftCorner<3, 1>().norm() : 1.0;
+  similarity.rotation = matrix.topLeftCorner<3, 3>() / similarity.scale;
+  similarity.translation = matrix.topRightCorner<3, 1>();
+  return similarity;
+}
+
+absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const StampedPose> estimated,
+                                                std::span<const StampedPose> ground_truth, Alignment alignment,
+                                                double max_dt_s, double offset_s) {
+  TrajectoryFit fit;
+  fit.pairs = AssociateTimestamps(TimestampsOf(estimated, std::llround(offset_s * 1e9)), TimestampsOf(ground_truth, 0),
+                                  std::llround(max_dt_s * 1e9));
+  const size_t needed = alignment == Alignment::kNone ? 1 : 3;
+  if (fit.pairs.size() < needed) {
+    return InvalidArgument("only {} of {} estimated poses have a ground-truth pose within {:.3f} s, {} are needed",
+                           fit.pairs.size(), estimated.size(), max_dt_s, needed);
+  }
+  if (alignment == Alignment::kNone) return fit;
+  Points x, y;
+  for (const auto& [i, j] : fit.pairs) {
+    x.push_back(estimated[i].T_world_camera.translation());
+    y.push_back(ground_truth[j].T_world_camera.translation());
+  }
+  const std::optional<Similarity> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
+  if (!similarity) return InvalidArgument("trajectories cannot be aligned: all estimated positions coincide");
+  fit.gt_from_est = *similarity;
+  return fit;
+}
+
+std::optional<IcpResult> Icp(const Points& source, const Points& target, const Points& symmetric_target,
+                             const IcpOptions& options) {
+  const NearestIndex target_index(target);
+  IcpResult result;
+  result.rms = std::numeric_limits<double>::infinity();
+  for (result.iterations = 1; result.iterations <= options.max_iterations; ++result.iterations) {
+    const Points moved = result.target_from_source * source;
+    const Correspondences pairs =
+        FindCorrespondences(source, moved, target, target_index, symmetric_target, options.overlap);
+    const bool settled = result.rms - pairs.rms < options.tolerance;
+    result.rms = std::min(result.rms, pairs.rms);
+    if (settled) return result;
+    const std::optional<Similarity> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
+    if (!fit || fit->scale <= 0.2 || fit->scale >= 5) return std::nullopt;
+    result.target_from_source = *fit;
+  }
+  result.iterations = options.max_iterations;
+  return result;
+}
+
+}  // namespace romap

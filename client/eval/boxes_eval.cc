@@ -1,0 +1,175 @@
+#include "client/eval/boxes_eval.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "client/eval/assignment.h"
+#include "client/files/objects_yaml.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegPerRad = 180 / std::numbers::pi;
+
+using Polygon = std::vector<Eigen::Vector2d>;
+
+// Corners of the footprint, counter-clockwise.
+Polygon Footprint(const UprightBox& box) {
+  Polygon corners;
+  const Eigen::Rotation2Dd turn(box.yaw_rad);
+  for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
+    corners.push_back(turn * Eigen::Vector2d(x * box.half_extents.x(), y * box.half_extents.y()) +
+                      box.center.head<2>());
+  }
+  return corners;
+}
+
+// Keeps what lies left of the line a -> b (Sutherland and Hodgman, CACM 1974).
+Polygon Clip(const Polygon& polygon, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  const auto side = [&](const Eigen::Vector2d& p) { return (b - a).x() * (p - a).y() - (b - a).y() * (p - a).x(); };
+  Polygon kept;
+  for (size_t k = 0; k < polygon.size(); ++k) {
+    const Eigen::Vector2d& p = polygon[k];
+    const Eigen::Vector2d& q = polygon[(k + 1) % polygon.size()];
+    const double side_p = side(p), side_q = side(q);
+    if (side_p >= 0) kept.push_back(p);
+    if ((side_p >= 0) != (side_q >= 0)) kept.push_back(p + (q - p) * (side_p / (side_p - side_q)));
+  }
+  return kept;
+}
+
+double Area(const Polygon& polygon) {
+  double doubled = 0;
+  for (size_t k = 0; k < polygon.size(); ++k) {
+    const Eigen::Vector2d& p = polygon[k];
+    const Eigen::Vector2d& q = polygon[(k + 1) % polygon.size()];
+    doubled += p.x() * q.y() - p.y() * q.x();
+  }
+  return std::abs(doubled) / 2;
+}
+
+std::vector<UprightBox> ToUpright(const ObjectsYaml& objects, const Eigen::Quaterniond& z_from_up,
+                                  const Similarity& gt_from_est) {
+  std::vector<UprightBox> boxes;
+  for (const ObjectRecord& object : objects.objects) {
+    const Eigen::Matrix3d rotation = z_from_up * (gt_from_est.rotation * object.T_world_object.RotationMatrix());
+    boxes.push_back(MakeUpright(rotation, z_from_up * (gt_from_est * object.T_world_object.translation()),
+                                gt_from_est.scale * object.half_extents));
+  }
+  return boxes;
+}
+
+BoxFigures Compare(const UprightBox& predicted, const UprightBox& truth, double iou) {
+  BoxFigures figures;
+  figures.iou = iou;
+  figures.center_cm = 100 * (predicted.center - truth.center).norm();
+  const double turn_deg = (predicted.yaw_rad - truth.yaw_rad) * kDegPerRad;
+  const double quarter_turns = std::floor((turn_deg + 45) / 90);
+  figures.yaw_deg = std::abs(turn_deg - 90 * quarter_turns);
+  figures.tilt_deg = predicted.tilt_deg;
+  Eigen::Vector3d half_extents = predicted.half_extents;
+  if (static_cast<int>(quarter_turns) % 2 != 0) std::swap(half_extents.x(), half_extents.y());
+  Eigen::Vector3d::Map(figures.size_ratio.data()) = half_extents.cwiseQuotient(truth.half_extents);
+  return figures;
+}
+
+void AddMeans(BoxesReport* report) {
+  for (const BoxRow& row : report->rows) {
+    if (!row.match) continue;
+    ++report->matched;
+    report->iou_matched += row.match->iou;
+    report->center_cm += row.match->center_cm;
+    report->yaw_deg += row.match->yaw_deg;
+  }
+  report->iou_all = report->iou_matched / static_cast<double>(report->rows.size());
+  if (report->matched == 0) return;
+  const double count = static_cast<double>(report->matched);
+  report->iou_matched /= count;
+  report->center_cm /= count;
+  report->yaw_deg /= count;
+}
+
+absl::StatusOr<Similarity> WorldAlignment(const BoxesEvalOptions& options) {
+  if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
+    return InvalidArgument("the estimated and the true trajectory go together; one is missing");
+  }
+  if (options.estimated_trajectory.empty()) return Similarity{};
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> estimated, ReadTum(options.estimated_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(options.true_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
+                         AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
+  return fit.gt_from_est;
+}
+
+}  // namespace
+
+UprightBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
+                       const Eigen::Vector3d& half_extents) {
+  Eigen::Index vertical = 0;
+  rotation.row(2).cwiseAbs().maxCoeff(&vertical);
+  const Eigen::Index x = (vertical + 1) % 3;
+  const Eigen::Index y = (vertical + 2) % 3;
+  UprightBox box;
+  box.center = center;
+  box.yaw_rad = std::atan2(rotation(1, x), rotation(0, x));
+  box.half_extents = {half_extents[x], half_extents[y], half_extents[vertical]};
+  box.tilt_deg = std::acos(std::min(std::abs(rotation(2, vertical)), 1.0)) * kDegPerRad;
+  return box;
+}
+
+double IntersectionOverUnion(const UprightBox& a, const UprightBox& b) {
+  Polygon overlap = Footprint(a);
+  const Polygon edges = Footprint(b);
+  for (size_t k = 0; k < edges.size() && !overlap.empty(); ++k) {
+    overlap = Clip(overlap, edges[k], edges[(k + 1) % edges.size()]);
+  }
+  const double top = std::min(a.center.z() + a.half_extents.z(), b.center.z() + b.half_extents.z());
+  const double bottom = std::max(a.center.z() - a.half_extents.z(), b.center.z() - b.half_extents.z());
+  const double intersection = Area(overlap) * std::max(top - bottom, 0.0);
+  return intersection / (8 * a.half_extents.prod() + 8 * b.half_extents.prod() - intersection);
+}
+
+absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
+  ROMAP_ASSIGN_OR_RETURN(const ObjectsYaml predicted, ReadObjects(options.predicted));
+  ROMAP_ASSIGN_OR_RETURN(const ObjectsYaml truth, ReadObjects(options.ground_truth));
+  if (predicted.objects.empty()) return InvalidArgument("{}: no objects in it", options.predicted);
+  if (truth.objects.empty()) return InvalidArgument("{}: no objects in it", options.ground_truth);
+  ROMAP_ASSIGN_OR_RETURN(const Similarity gt_from_est, WorldAlignment(options));
+  const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
+  const std::vector<UprightBox> p = ToUpright(predicted, z_from_up, gt_from_est);
+  const std::vector<UprightBox> g = ToUpright(truth, z_from_up, {});
+
+  Eigen::MatrixXd distance(g.size(), p.size()), iou(g.size(), p.size());
+  for (size_t i = 0; i < g.size(); ++i) {
+    for (size_t j = 0; j < p.size(); ++j) {
+      distance(i, j) = (p[j].center - g[i].center).norm() / (2 * g[i].half_extents.norm());
+      iou(i, j) = IntersectionOverUnion(p[j], g[i]);
+    }
+  }
+  // A distance beyond ten diagonals is no worse than another.
+  const std::vector<int> match = AssignRows(distance.cwiseMin(10) - iou);
+  BoxesReport report;
+  report.trajectory_scale = gt_from_est.scale;
+  std::vector<bool> used(p.size());
+  for (size_t i = 0; i < g.size(); ++i) {
+    const int j = match[i];
+    report.rows.push_back({truth.objects[i].name, std::nullopt});
+    if (j < 0 || (distance(i, j) > options.match_distance && iou(i, j) <= 0)) continue;
+    used[j] = true;
+    report.rows.back().match = Compare(p[j], g[i], iou(i, j));
+    report.rows.back().match->predicted = fmt::format("{}:{}", predicted.objects[j].id, predicted.objects[j].name);
+  }
+  for (size_t j = 0; j < p.size(); ++j) {
+    if (!used[j]) report.extra.push_back(predicted.objects[j].name);
+  }
+  AddMeans(&report);
+  if (report.matched == 0) {
+    return InvalidArgument("{}: no cuboid is near any true object (another world frame? give both trajectories)",
+                           options.predicted);
+  }
+  return report;
+}
+
+}  // namespace romap

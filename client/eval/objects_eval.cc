@@ -1,0 +1,328 @@
+#include "client/eval/objects_eval.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "client/eval/assignment.h"
+#include "client/eval/pcg64.h"
+#include "client/eval/points.h"
+#include "client/eval/seen_frames.h"
+#include "client/files/mesh_file.h"
+#include "client/files/tum.h"
+
+namespace romap {
+namespace {
+
+constexpr double kCmPerM = 100;
+constexpr double kMinBoxIou = 0.02;  // overlap from which two boxes may be a pair whatever their distance
+constexpr double kInferredSource = 2;
+
+// A surface as points, each seen by some camera or not.
+struct Surface {
+  std::string name;
+  Points points;
+  std::vector<bool> seen;  // as long as points; of true surfaces
+  size_t faces = 0;
+};
+
+// Box of a surface without its outermost percent at each side, along the world's axes.
+struct RobustBox {
+  Eigen::Vector3d low, high;
+  Eigen::Vector3d Center() const { return (low + high) / 2; }
+  double Volume() const { return (high - low).prod(); }
+};
+
+// A true and a predicted surface that belong together.
+struct Pair {
+  size_t predicted = 0;
+  double center_distance_m = 0;
+  double box_iou = 0;
+};
+
+absl::Status ValidateOptions(const ObjectsEvalOptions& options) {
+  if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
+    return InvalidArgument("the estimated and the true trajectory go together; one is missing");
+  }
+  if (options.icp_overlap < 0.1 || options.icp_overlap > 1) {
+    return InvalidArgument("icp_overlap is {}, should lie in 0.1..1", options.icp_overlap);
+  }
+  if (options.samples < 100 || options.icp_points < 100) {
+    return InvalidArgument("samples ({}) and icp_points ({}) should be at least 100", options.samples,
+                           options.icp_points);
+  }
+  if (options.dataset_every < 1)
+    return InvalidArgument("dataset_every is {}, should be positive", options.dataset_every);
+  for (const double threshold_cm : options.thresholds_cm) {
+    if (!(threshold_cm > 0)) return InvalidArgument("threshold {} cm should be positive", threshold_cm);
+  }
+  return absl::OkStatus();
+}
+
+// Removes the points of a cloud whose `source` says that nobody measured them.
+void DropCap(const std::vector<double>& source, Surface* surface) {
+  Surface kept{surface->name, {}, {}, surface->faces};
+  for (size_t k = 0; k < source.size(); ++k) {
+    if (source[k] == kInferredSource) continue;
+    kept.points.push_back(surface->points[k]);
+    kept.seen.push_back(surface->seen[k]);
+  }
+  *surface = std::move(kept);
+}
+
+absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const ObjectsEvalOptions& options,
+                                                  uint32_t seed, bool no_cap) {
+  ROMAP_ASSIGN_OR_RETURN(const auto files, ReadMeshFolder(dir));
+  std::vector<Surface> surfaces;
+  for (const auto& [name, file] : files) {
+    Surface surface{name, {}, {}, file.mesh.triangles.size()};
+    ROMAP_ASSIGN_OR_RETURN(surface.points, SampleSurface(file.mesh, options.samples, seed, dir + "/" + name));
+    surface.seen.assign(surface.points.size(), true);
+    const auto seen = file.scalars.find("seen");
+    const auto source = file.scalars.find("source");
+    if (surface.faces == 0 && seen != file.scalars.end()) {
+      std::transform(seen->second.begin(), seen->second.end(), surface.seen.begin(), [](double s) { return s > 0; });
+    }
+    if (surface.faces == 0 && no_cap && source != file.scalars.end()) DropCap(source->second, &surface);
+    if (surface.points.empty()) return InvalidArgument("{}/{}: nothing is left without the inferred cap", dir, name);
+    surfaces.push_back(std::move(surface));
+  }
+  return surfaces;
+}
+
+// Moves all predicted surfaces into the ground truth's world; returns the scale of that.
+absl::StatusOr<double> MoveByTrajectories(const ObjectsEvalOptions& options, std::vector<Surface>* predicted) {
+  if (options.estimated_trajectory.empty()) return 1.0;
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> estimated, ReadTum(options.estimated_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(options.true_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
+                         AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
+  for (Surface& surface : *predicted) surface.points = fit.gt_from_est * surface.points;
+  return fit.gt_from_est.scale;
+}
+
+RobustBox BoxOf(const Points& points) {
+  RobustBox box;
+  std::vector<double> values(points.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(points.begin(), points.end(), values.begin(), [&](const Eigen::Vector3d& p) { return p[axis]; });
+    box.low[axis] = Quantile(values, 0.01);
+    box.high[axis] = Quantile(values, 0.99);
+  }
+  return box;
+}
+
+double BoxIou(const RobustBox& a, const RobustBox& b) {
+  const double intersection = (a.high.cwiseMin(b.high) - a.low.cwiseMax(b.low)).cwiseMax(0).prod();
+  const double together = a.Volume() + b.Volume() - intersection;
+  return together > 0 ? intersection / together : 0;
+}
+
+// For each true surface its predicted one, by overlap and distance of their boxes.
+std::vector<std::optional<Pair>> MatchSurfaces(const std::vector<Surface>& truth, const std::vector<Surface>& predicted,
+                                               double match_distance) {
+  std::vector<RobustBox> true_boxes, predicted_boxes;
+  for (const Surface& surface : truth) true_boxes.push_back(BoxOf(surface.points));
+  for (const Surface& surface : predicted) predicted_boxes.push_back(BoxOf(surface.points));
+  Eigen::MatrixXd iou(truth.size(), predicted.size()), distance(truth.size(), predicted.size());
+  for (size_t i = 0; i < truth.size(); ++i) {
+    for (size_t j = 0; j < predicted.size(); ++j) {
+      iou(i, j) = BoxIou(predicted_boxes[j], true_boxes[i]);
+      distance(i, j) = (predicted_boxes[j].Center() - true_boxes[i].Center()).norm();
+    }
+  }
+  Eigen::MatrixXd relative = distance;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    relative.row(i) /= std::max((true_boxes[i].high - true_boxes[i].low).norm(), 1e-9);
+  }
+  // A distance beyond ten diagonals is no worse than another; overlap counts double.
+  const std::vector<int> match = AssignRows(relative.cwiseMin(10) - 2 * iou);
+  std::vector<std::optional<Pair>> pairs(truth.size());
+  for (size_t i = 0; i < truth.size(); ++i) {
+    const int j = match[i];
+    if (j < 0 || (iou(i, j) <= kMinBoxIou && relative(i, j) >= match_distance)) continue;
+    pairs[i] = Pair{static_cast<size_t>(j), distance(i, j), iou(i, j)};
+  }
+  return pairs;
+}
+
+Points Subset(const Points& points, size_t count, Pcg64* random) {
+  if (points.size() <= count) return points;
+  return Take(points, random->Choose(static_cast<uint32_t>(points.size()), static_cast<uint32_t>(count)));
+}
+
+Points SeenPoints(const Surface& surface) {
+  Points seen;
+  for (size_t k = 0; k < surface.points.size(); ++k) {
+    if (surface.seen[k]) seen.push_back(surface.points[k]);
+  }
+  return seen;
+}
+
+// Moves the predicted points onto the true ones by ICP.
+IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, Pcg64* random, Points* predicted) {
+  const Points source = Subset(*predicted, options.icp_points, random);
+  Points symmetric_target;
+  if (options.icp == IcpKind::kSymmetric) symmetric_target = Subset(SeenPoints(truth), options.icp_points, random);
+  const auto fit = Icp(source, truth.points, symmetric_target,
+                       {.with_scale = options.alignment == Alignment::kSim3, .overlap = options.icp_overlap});
+  if (!fit) return {.failed = true};
+  *predicted = fit->target_from_source * *predicted;
+  return {.failed = false,
+          .scale = fit->target_from_source.scale,
+          .rotation_deg = fit->target_from_source.RotationAngle_rad() * 180 / std::numbers::pi,
+          .rms_cm = kCmPerM * fit->rms,
+          .iterations = fit->iterations};
+}
+
+// Mean of the values whose flag is set, in cm; nullopt when there is none.
+std::optional<double> MeanOf(const std::vector<double>& values_m, const std::vector<bool>& chosen) {
+  double sum = 0;
+  size_t count = 0;
+  for (size_t k = 0; k < values_m.size(); ++k) {
+    if (!chosen[k]) continue;
+    sum += values_m[k];
+    ++count;
+  }
+  return count == 0 ? std::nullopt : std::optional(kCmPerM * sum / static_cast<double>(count));
+}
+
+double Share(const std::vector<bool>& flags) {
+  return static_cast<double>(std::count(flags.begin(), flags.end(), true)) / static_cast<double>(flags.size());
+}
+
+// Share of the chosen values below the threshold, in percent; nullopt when none is chosen.
+std::optional<double> PercentBelow(const std::vector<double>& values_m, const std::vector<bool>& chosen,
+                                   double threshold_cm) {
+  size_t below = 0, count = 0;
+  for (size_t k = 0; k < values_m.size(); ++k) {
+    if (!chosen[k]) continue;
+    ++count;
+    if (kCmPerM * values_m[k] < threshold_cm) ++below;
+  }
+  if (count == 0) return std::nullopt;
+  return 100 * static_cast<double>(below) / static_cast<double>(count);
+}
+
+// What of `truth` Completion is measured on: all of it, or a random subset when it is much finer than the prediction.
+Surface CompletionPoints(const Surface& truth, size_t predicted_faces, size_t samples, Pcg64* random) {
+  if (truth.points.size() <= samples || predicted_faces == 0) return truth;
+  Surface subset{truth.name, {}, {}, truth.faces};
+  for (const uint32_t k : random->Choose(static_cast<uint32_t>(truth.points.size()), static_cast<uint32_t>(samples))) {
+    subset.points.push_back(truth.points[k]);
+    subset.seen.push_back(truth.seen[k]);
+  }
+  return subset;
+}
+
+// Distances both ways. `predicted` must have been aligned; `frames` and `label` may say more about what was seen.
+void Measure(const Surface& truth, const Points& predicted, const SeenFrames* frames, int64_t label,
+             const ObjectsEvalOptions& options, Pcg64* random, ObjectMatch* match) {
+  const Neighbours to_truth = NearestIndex(truth.points).Query(predicted);
+  std::vector<bool> seen(predicted.size());
+  for (size_t k = 0; k < seen.size(); ++k) seen[k] = truth.seen[to_truth.index[k]];
+  if (frames != nullptr) {
+    const std::vector<bool> in_frames = frames->Seen(predicted, label);
+    for (size_t k = 0; k < seen.size(); ++k) seen[k] = seen[k] || in_frames[k];
+  }
+  const Surface target = CompletionPoints(truth, match->faces, options.samples, random);
+  const Neighbours to_predicted = NearestIndex(predicted).Query(target.points);
+  const std::vector<bool> all_predicted(predicted.size(), true), all_target(target.points.size(), true);
+  SurfaceFigures& figures = match->figures;
+  figures.accuracy_cm = *MeanOf(to_truth.distance, all_predicted);
+  figures.accuracy_seen_cm = MeanOf(to_truth.distance, seen);
+  figures.completion_cm = *MeanOf(to_predicted.distance, all_target);
+  figures.completion_seen_cm = MeanOf(to_predicted.distance, target.seen);
+  for (const double threshold_cm : options.thresholds_cm) {
+    figures.ratios.push_back({threshold_cm, *PercentBelow(to_predicted.distance, all_target, threshold_cm),
+                              PercentBelow(to_predicted.distance, target.seen, threshold_cm)});
+  }
+  match->predicted_seen_share = Share(seen);
+  match->true_seen_share = Share(target.seen);
+}
+
+// Mean of what `get` finds in the matched rows, over those that have it.
+template <class Get>
+std::optional<double> MeanOverRows(const std::vector<ObjectRow>& rows, Get get) {
+  double sum = 0;
+  int count = 0;
+  for (const ObjectRow& row : rows) {
+    const std::optional<double> value = row.match ? get(row.match->figures) : std::nullopt;
+    if (!value) continue;
+    sum += *value;
+    ++count;
+  }
+  return count == 0 ? std::nullopt : std::optional(sum / count);
+}
+
+void AddMeans(ObjectsReport* report) {
+  using Value = std::optional<double>;
+  const std::vector<ObjectRow>& rows = report->rows;
+  ObjectsReport::Mean& mean = report->mean;
+  mean.accuracy_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return Value(f.accuracy_cm); });
+  mean.accuracy_seen_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.accuracy_seen_cm; });
+  mean.completion_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return Value(f.completion_cm); });
+  mean.completion_seen_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.completion_seen_cm; });
+  for (size_t k = 0; k < report->options.thresholds_cm.size(); ++k) {
+    ObjectsReport::Mean::MeanRatio ratio;
+    ratio.threshold_cm = report->options.thresholds_cm[k];
+    ratio.all_percent = MeanOverRows(rows, [k](const SurfaceFigures& f) { return Value(f.ratios[k].all_percent); });
+    ratio.seen_percent = MeanOverRows(rows, [k](const SurfaceFigures& f) { return f.ratios[k].seen_percent; });
+    ratio.all_percent_with_missing =
+        ratio.all_percent.value_or(0) * static_cast<double>(report->matched) / static_cast<double>(rows.size());
+    mean.ratios.push_back(ratio);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
+  ObjectsEvalOptions options = given;
+  std::sort(options.thresholds_cm.begin(), options.thresholds_cm.end());
+  ROMAP_RETURN_IF_ERROR(ValidateOptions(options));
+  // Another seed for the truth: samples in common would flatter a mesh compared with itself.
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<Surface> truth,
+                         LoadSurfaces(options.ground_truth_dir, options, options.seed + 1, options.no_cap));
+  ROMAP_ASSIGN_OR_RETURN(std::vector<Surface> predicted,
+                         LoadSurfaces(options.predicted_dir, options, options.seed, /*no_cap=*/false));
+  ObjectsReport report;
+  report.options = options;
+  ROMAP_ASSIGN_OR_RETURN(report.trajectory_scale, MoveByTrajectories(options, &predicted));
+  std::optional<SeenFrames> frames;
+  if (!options.dataset_dir.empty()) {
+    ROMAP_ASSIGN_OR_RETURN(frames, SeenFrames::Load(options.dataset_dir, options.dataset_every));
+  }
+  const std::vector<std::optional<Pair>> pairs = MatchSurfaces(truth, predicted, options.match_distance);
+  Pcg64 random(options.seed);
+  std::vector<bool> used(predicted.size());
+  for (size_t i = 0; i < truth.size(); ++i) {
+    report.rows.push_back({truth[i].name, std::nullopt});
+    if (!pairs[i]) continue;
+    const std::optional<int64_t> label = frames ? frames->LabelOf(truth[i].name) : 0;
+    if (!label)
+      return InvalidArgument("{}: its objects.yaml has no object named {}", options.dataset_dir, truth[i].name);
+    Surface& surface = predicted[pairs[i]->predicted];
+    ObjectMatch match;
+    match.predicted = surface.name;
+    match.center_distance_cm = kCmPerM * pairs[i]->center_distance_m;
+    match.box_iou = pairs[i]->box_iou;
+    match.faces = surface.faces;
+    if (options.alignment != Alignment::kNone) match.icp = AlignByIcp(options, truth[i], &random, &surface.points);
+    Measure(truth[i], surface.points, frames ? &*frames : nullptr, *label, options, &random, &match);
+    report.rows.back().match = std::move(match);
+    used[pairs[i]->predicted] = true;
+    ++report.matched;
+  }
+  for (size_t j = 0; j < predicted.size(); ++j) {
+    if (!used[j]) report.extra.push_back(predicted[j].name);
+  }
+  if (report.matched == 0) {
+    return InvalidArgument("{}: no mesh overlaps a true object (another world frame? give both trajectories)",
+                           options.predicted_dir);
+  }
+  AddMeans(&report);
+  return report;
+}
+
+}  // namespace romap

@@ -1,0 +1,112 @@
+#include "client/eval/points.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <nanoflann.hpp>
+#include <numeric>
+
+#include "client/eval/pcg64.h"
+
+namespace romap {
+namespace {
+
+std::array<Eigen::Vector3d, 3> Corners(const Mesh& mesh, size_t triangle) {
+  const auto& index = mesh.triangles[triangle];
+  return {mesh.vertices[index[0]].cast<double>(), mesh.vertices[index[1]].cast<double>(),
+          mesh.vertices[index[2]].cast<double>()};
+}
+
+// Area of all triangles up to and including each.
+std::vector<double> CumulativeAreas(const Mesh& mesh) {
+  std::vector<double> areas(mesh.triangles.size());
+  for (size_t k = 0; k < areas.size(); ++k) {
+    const auto [a, b, c] = Corners(mesh, k);
+    areas[k] = 0.5 * (b - a).cross(c - a).norm();
+  }
+  std::partial_sum(areas.begin(), areas.end(), areas.begin());
+  return areas;
+}
+
+}  // namespace
+
+absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t seed, const std::string& name) {
+  Points points;
+  if (mesh.triangles.empty()) {
+    for (const Eigen::Vector3f& vertex : mesh.vertices) points.push_back(vertex.cast<double>());
+    return points;
+  }
+  const std::vector<double> areas = CumulativeAreas(mesh);
+  if (!(areas.back() > 0)) return InvalidArgument("{}: the mesh has no area", name);
+  Pcg64 random(seed);
+  const auto draw = [&] {
+    std::vector<double> numbers(count);
+    std::generate(numbers.begin(), numbers.end(), [&] { return random.NextUniform(); });
+    return numbers;
+  };
+  const std::vector<double> area = draw(), across = draw(), along = draw();
+  points.reserve(count);
+  for (size_t k = 0; k < count; ++k) {
+    const auto found = std::lower_bound(areas.begin(), areas.end(), area[k] * areas.back());
+    const auto [a, b, c] = Corners(mesh, std::min<size_t>(found - areas.begin(), areas.size() - 1));
+    const double r1 = std::sqrt(across[k]);  // makes the density even instead of dense around corner a
+    const double r2 = along[k];
+    points.push_back((1 - r1) * a + r1 * (1 - r2) * b + r1 * r2 * c);
+  }
+  return points;
+}
+
+Points Take(const Points& points, const std::vector<uint32_t>& indices) {
+  Points taken;
+  taken.reserve(indices.size());
+  for (const uint32_t index : indices) taken.push_back(points[index]);
+  return taken;
+}
+
+double Quantile(std::vector<double> values, double share) {
+  const double position = share * static_cast<double>(values.size() - 1);
+  const auto low = values.begin() + static_cast<ptrdiff_t>(position);
+  std::nth_element(values.begin(), low, values.end());
+  if (low + 1 == values.end()) return *low;
+  const double next = *std::min_element(low + 1, values.end());
+  return *low + (position - std::floor(position)) * (next - *low);
+}
+
+struct NearestIndex::Tree {
+  explicit Tree(const Points& points)
+      : points(points), index(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(/*leaf_max_size=*/12)) {}
+
+  // What nanoflann asks of a data set.
+  size_t kdtree_get_point_count() const { return points.size(); }
+  double kdtree_get_pt(size_t k, size_t axis) const { return points[k][static_cast<Eigen::Index>(axis)]; }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;  // nanoflann computes it
+  }
+
+  const Points& points;
+  nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Tree>, Tree, 3, uint32_t> index;
+};
+
+NearestIndex::NearestIndex(const Points& points) : tree_(std::make_unique<Tree>(points)) {}
+NearestIndex::~NearestIndex() = default;
+NearestIndex::NearestIndex(NearestIndex&&) noexcept = default;
+
+Neighbours NearestIndex::Query(const Points& queries) const {
+  Neighbours result{std::vector<uint32_t>(queries.size()), std::vector<double>(queries.size())};
+  constexpr size_t kGrain = 512;  // queries worth a task of their own
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, queries.size(), kGrain),
+                    [&](const tbb::blocked_range<size_t>& range) {
+                      for (size_t k = range.begin(); k < range.end(); ++k) {
+                        double squared_distance = 0;
+                        tree_->index.knnSearch(queries[k].data(), 1, &result.index[k], &squared_distance);
+                        result.distance[k] = std::sqrt(squared_distance);
+                      }
+                    });
+  return result;
+}
+
+}  // namespace romap

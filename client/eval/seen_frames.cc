@@ -1,0 +1,86 @@
+#include "client/eval/seen_frames.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "client/files/sequence.h"
+
+namespace romap {
+namespace {
+
+constexpr double kMaxBehind_m = 0.02;
+
+// One channel of 8 or 16 bit as it is in the file; empty when it is something else.
+cv::Mat DecodePng(std::string bytes) {
+  try {
+    cv::Mat image =
+        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, bytes.data()), cv::IMREAD_UNCHANGED);
+    return image.type() == CV_8UC1 || image.type() == CV_16UC1 ? image : cv::Mat();
+  } catch (const cv::Exception&) {
+    return {};
+  }
+}
+
+int ValueAt(const cv::Mat& image, int u_px, int v_px) {
+  return image.type() == CV_8UC1 ? image.at<uint8_t>(v_px, u_px) : image.at<uint16_t>(v_px, u_px);
+}
+
+}  // namespace
+
+absl::StatusOr<SeenFrames> SeenFrames::Load(const std::string& sequence_dir, int every) {
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(sequence_dir, {.detections = "", .use_depth = true}));
+  if (!sequence.objects()) return NotFound("{}: no objects.yaml there, which says whose label is whose", sequence_dir);
+  SeenFrames frames;
+  frames.camera_ = sequence.camera();
+  frames.depth_scale_m_ = sequence.depth_scale();
+  for (const ObjectRecord& object : sequence.objects()->objects) frames.labels_[object.name] = object.id;
+  int masks = 0;
+  for (size_t k = 0; k < sequence.size(); ++k) {
+    if (!sequence.has_mask(k) || masks++ % every != 0) continue;
+    ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(k));
+    if (!frame.T_world_camera || frame.depth.empty()) continue;
+    View view{frame.T_world_camera->Inverse(), DecodePng(frame.label_png), DecodePng(frame.depth)};
+    const cv::Size size(frames.camera_.width_px, frames.camera_.height_px);
+    if (view.labels.size() != size || view.depth.size() != size) {
+      return InvalidArgument("{}: mask or depth at {:.6f} s is not a one-channel PNG of {} x {}", sequence_dir,
+                             static_cast<double>(frame.timestamp_ns) * 1e-9, size.width, size.height);
+    }
+    frames.views_.push_back(std::move(view));
+  }
+  if (frames.views_.empty()) return NotFound("{}: no frame has mask, depth and pose", sequence_dir);
+  return frames;
+}
+
+std::optional<int64_t> SeenFrames::LabelOf(const std::string& object_name) const {
+  const auto found = labels_.find(object_name);
+  return found == labels_.end() ? std::nullopt : std::optional(found->second);
+}
+
+bool SeenFrames::SeenIn(const View& view, const Eigen::Vector3d& p_world, int64_t label) const {
+  const Eigen::Vector3d p_camera = view.T_camera_world * p_world;
+  if (p_camera.z() <= 1e-6) return false;
+  const Eigen::Vector2d pixel_px = camera_.Project(p_camera);
+  const double u_px = std::nearbyint(pixel_px.x());
+  const double v_px = std::nearbyint(pixel_px.y());
+  if (!(u_px >= 0 && v_px >= 0 && u_px < camera_.width_px && v_px < camera_.height_px)) return false;
+  const int u = static_cast<int>(u_px), v = static_cast<int>(v_px);
+  const double depth_m = depth_scale_m_ * ValueAt(view.depth, u, v);
+  return ValueAt(view.labels, u, v) == label && depth_m > 0 && p_camera.z() <= depth_m + kMaxBehind_m;
+}
+
+std::vector<bool> SeenFrames::Seen(const Points& points, int64_t label) const {
+  std::vector<char> seen(points.size());  // char: neighbouring bits of vector<bool> share a byte between threads
+  tbb::parallel_for(size_t{0}, points.size(), [&](size_t k) {
+    for (const View& view : views_) {
+      if (SeenIn(view, points[k], label)) {
+        seen[k] = 1;
+        return;
+      }
+    }
+  });
+  return {seen.begin(), seen.end()};
+}
+
+}  // namespace romap
