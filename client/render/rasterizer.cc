@@ -71,26 +71,33 @@ class TileRasterizer {
   }
 
   PixelBox Bound(const std::array<uint32_t, 3>& triangle) const {
-    const Eigen::Vector3d& p0 = positions_camera_[triangle[0]];
-    const Eigen::Vector3d& p1 = positions_camera_[triangle[1]];
-    const Eigen::Vector3d& p2 = positions_camera_[triangle[2]];
-    const double nearest_mu = std::min({p0.z(), p1.z(), p2.z()});
-    if (std::max({p0.z(), p1.z(), p2.z()}) <= options_.near_mu) return {};
-    if (options_.cull_back_faces && p0.dot(p1.cross(p2)) >= 0) return {};
-    PixelBox box{0, 0, camera_.width_px - 1, camera_.height_px - 1};
-    // A corner behind the camera has no projection; such a triangle may cover anything.
-    if (nearest_mu <= options_.near_mu) return box;
-    const Eigen::Vector2d q0 = camera_.Project(p0);
-    const Eigen::Vector2d q1 = camera_.Project(p1);
-    const Eigen::Vector2d q2 = camera_.Project(p2);
-    const Eigen::Vector2d low = q0.cwiseMin(q1).cwiseMin(q2);
-    const Eigen::Vector2d high = q0.cwiseMax(q1).cwiseMax(q2);
-    if (!(low.x() <= box.u_max && low.y() <= box.v_max && high.x() >= 0 && high.y() >= 0)) return {};
-    box.u_min = std::max(box.u_min, static_cast<int>(std::ceil(std::max(low.x(), 0.0) - 1e-6)));
-    box.v_min = std::max(box.v_min, static_cast<int>(std::ceil(std::max(low.y(), 0.0) - 1e-6)));
-    box.u_max = static_cast<int>(std::floor(std::min<double>(high.x() + 1e-6, box.u_max)));
-    box.v_max = static_cast<int>(std::floor(std::min<double>(high.y() + 1e-6, box.v_max)));
-    return box;
+    const std::array<const Eigen::Vector3d*, 3> p = {&positions_camera_[triangle[0]], &positions_camera_[triangle[1]],
+                                                     &positions_camera_[triangle[2]]};
+    if (options_.cull_back_faces && p[0]->dot(p[1]->cross(*p[2])) >= 0) return {};
+    // Bounds of what lies beyond the near plane: its corners, and where edges pierce the plane.
+    Eigen::AlignedBox2d bounds;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d& from = *p[k];
+      const Eigen::Vector3d& to = *p[(k + 1) % 3];
+      if (from.z() > options_.near_mu) bounds.extend(camera_.Project(from));
+      if ((from.z() > options_.near_mu) != (to.z() > options_.near_mu)) {
+        const double share = (options_.near_mu - from.z()) / (to.z() - from.z());
+        bounds.extend(camera_.Project(from + share * (to - from)));
+      }
+    }
+    // Also refuses what is empty or not finite.
+    const double right_px = camera_.width_px - 1;
+    const double bottom_px = camera_.height_px - 1;
+    if (!(bounds.min().x() <= right_px && bounds.min().y() <= bottom_px && bounds.max().x() >= 0 &&
+          bounds.max().y() >= 0)) {
+      return {};
+    }
+    // A rounding error must not cost a pixel that lies right on the border.
+    constexpr double kSlack_px = 1e-6;
+    return {static_cast<int>(std::ceil(std::max(bounds.min().x() - kSlack_px, 0.0))),
+            static_cast<int>(std::ceil(std::max(bounds.min().y() - kSlack_px, 0.0))),
+            static_cast<int>(std::floor(std::min(bounds.max().x() + kSlack_px, right_px))),
+            static_cast<int>(std::floor(std::min(bounds.max().y() + kSlack_px, bottom_px)))};
   }
 
   template <class Visit>

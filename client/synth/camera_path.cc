@@ -83,7 +83,7 @@ std::vector<SE3<World, Camera>> MakeCameraPath(const SynthOptions& options, cons
   const double half_view_rad = std::atan(half_side_px / camera.fx_px);
   // The sphere around all objects fills most of the smaller side; a single small object is not approached too closely.
   const double radius_m = std::hypot(scene.layout_radius_m, 0.4 * tallest_m);
-  const double distance_m = std::clamp(0.95 * radius_m / std::sin(half_view_rad), 0.4, 0.8 * scene.room_half_m);
+  const double distance_m = std::clamp(0.88 * radius_m / std::sin(half_view_rad), 0.4, 0.8 * scene.room_half_m);
   const Eigen::Vector3d target_m(0, 0, scene.table_height_m + 0.35 * tallest_m);
 
   Random random(options.seed, 3);

@@ -19,7 +19,7 @@ void AddBook(Solid& solid, Random& random, float half_x_m, float half_y_m, float
              float turn_rad) {
   constexpr float kCover_m = 0.0025F;
   Material cover = RandomMaterial(Pattern::kPrint, In(random, 0.03, 0.045), random);
-  cover.colors[0] = FromHsv(random.Uniform(), random.Uniform(0.4, 0.9), random.Uniform(0.35, 0.85));
+  cover.colors[0] = FromHsv(random.Uniform(), random.Uniform(0.2, 0.75), random.Uniform(0.35, 0.8));
   cover.colors[1] = FromHsv(random.Uniform(), 0.2, random.Chance(0.5) ? 0.95 : 0.12);
   Material pages;
   pages.pattern = Pattern::kPages;

@@ -156,7 +156,7 @@ Rgb Print(const Material& m, const Spot& s) {
   if (kind < 0.3F) {  // picture
     const uint32_t picture = seed + CellHash(column, row, 6, seed);
     const float tone = FractalNoise(s.p_m, 0.6F * block_m, 5, 0.65F, s.footprint_m, picture);
-    const Rgb tint = FromHsv(CellUniform(column, row, 7, seed), 0.6, 0.8);
+    const Rgb tint = FromHsv(CellUniform(column, row, 7, seed), 0.45, 0.7);
     return Mix(Mix(m.colors[1], tint, SmoothStep(-0.4F, 0.1F, tone)), Rgb::Constant(0.85F),
                SmoothStep(0.1F, 0.6F, tone));
   }
@@ -257,9 +257,9 @@ Material RandomMaterial(Pattern pattern, float scale_m, Random& random) {
   material.scale_m = scale_m;
   material.seed = static_cast<uint32_t>(random.Bits());
   const double hue = random.Uniform();
-  material.colors[0] = FromHsv(hue, random.Uniform(0.25, 0.8), random.Uniform(0.65, 0.95));
-  material.colors[1] = FromHsv(hue + random.Uniform(0.3, 0.7), random.Uniform(0.4, 0.9), random.Uniform(0.3, 0.6));
-  material.colors[2] = FromHsv(hue + random.Uniform(0.05, 0.25), random.Uniform(0.2, 0.7), random.Uniform(0.15, 0.9));
+  material.colors[0] = FromHsv(hue, random.Uniform(0.1, 0.65), random.Uniform(0.55, 0.92));
+  material.colors[1] = FromHsv(hue + random.Uniform(0.3, 0.7), random.Uniform(0.2, 0.7), random.Uniform(0.2, 0.55));
+  material.colors[2] = FromHsv(hue + random.Uniform(0.05, 0.25), random.Uniform(0.2, 0.6), random.Uniform(0.15, 0.9));
   return material;
 }
 

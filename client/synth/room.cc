@@ -73,7 +73,7 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
     const float half_height_m = In(random, 0.2, 0.38);
     add(RoundedBox(Point(half_m - 0.005F, y_m + half_width_m, In(random, 1.25, 1.8)),
                    Point(0.008F, half_width_m, half_height_m), 0.002F, 0.1F),
-        RandomMaterial(Pattern::kPrint, In(random, 0.06, 0.14), random));
+        Backdrop(Pattern::kPrint, In(random, 0.06, 0.14), random));
     y_m += 2 * half_width_m + In(random, 0.05, 0.25);
   }
   y_m = -half_m + 0.5F;
@@ -82,7 +82,7 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
     constexpr Pattern kFronts[] = {Pattern::kTiles, Pattern::kPrint, Pattern::kChecks, Pattern::kFabric};
     add(RoundedBox(Point(half_m - half.x(), y_m + half.y(), half.z()), half, 0.01F, 0.08F),
         random.Chance(0.4) ? WoodMaterial(random, 0.03F)
-                           : RandomMaterial(kFronts[random.Below(4)], In(random, 0.06, 0.12), random));
+                           : Backdrop(kFronts[random.Below(4)], In(random, 0.06, 0.12), random));
     y_m += 2 * half.y() + In(random, 0.02, 0.5);
   }
 }
