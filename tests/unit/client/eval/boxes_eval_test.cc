@@ -1,0 +1,139 @@
+#include "client/eval/boxes_eval.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+#include "tests/unit/client/eval/eval_world.h"
+
+namespace romap {
+namespace {
+
+using eval_world::TempFolder;
+using eval_world::UprightCuboid;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double kRadPerDeg = std::numbers::pi / 180;
+
+class BoxesEval : public testing::Test {
+ protected:
+  BoxesEval() { Write("gt.yaml", {First(), Second()}); }
+
+  static ObjectRecord First() { return UprightCuboid(1, {0, 0, 0}, 0.3, {0.1, 0.2, 0.05}); }
+  static ObjectRecord Second() { return UprightCuboid(2, {1, 0, 0.1}, -0.5, {0.15, 0.1, 0.2}); }
+
+  void Write(const std::string& name, const std::vector<ObjectRecord>& objects) {
+    EXPECT_TRUE(WriteObjects(folder_ / name, {.objects = objects}).ok());
+  }
+  absl::StatusOr<BoxesReport> Evaluate(const std::vector<ObjectRecord>& predicted) {
+    Write("cuboids.json", predicted);
+    BoxesEvalOptions options;
+    options.predicted = folder_ / "cuboids.json";
+    options.ground_truth = folder_ / "gt.yaml";
+    return EvaluateBoxes(options);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(BoxesEval, BoxesAgainstThemselvesAreExactInAnyOrder) {
+  const auto report = Evaluate({Second(), First()});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->matched, 2u);
+  EXPECT_NEAR(report->iou_all, 1, 1e-7);
+  EXPECT_EQ(report->rows[0].match->predicted, "1:b1");
+  EXPECT_NEAR(report->center_cm, 0, 1e-6);
+}
+
+TEST_F(BoxesEval, HalfALengthAlongXGivesAThird) {
+  ObjectRecord moved = UprightCuboid(1, 0.1 * Eigen::Vector3d(std::cos(0.3), std::sin(0.3), 0), 0.3, {0.1, 0.2, 0.05});
+  const auto report = Evaluate({moved, Second()});
+  EXPECT_NEAR(report->rows[0].match->iou, 1.0 / 3, 1e-7);
+  EXPECT_NEAR(report->rows[0].match->center_cm, 10, 1e-6);
+}
+
+TEST_F(BoxesEval, AQuarterTurnWithSwappedSidesIsTheSameBox) {
+  const auto report = Evaluate({UprightCuboid(1, {0, 0, 0}, 0.3 + std::numbers::pi / 2, {0.2, 0.1, 0.05}),
+                                UprightCuboid(2, {1, 0, 0.1}, -0.5 + 10 * kRadPerDeg, {0.15, 0.1, 0.2})});
+  const BoxFigures& turned = *report->rows[0].match;
+  EXPECT_NEAR(turned.iou, 1, 1e-7);
+  EXPECT_NEAR(turned.yaw_deg, 0, 1e-6);
+  for (const double ratio : turned.size_ratio) EXPECT_NEAR(ratio, 1, 1e-7);
+  EXPECT_NEAR(report->rows[1].match->yaw_deg, 10, 1e-6);
+}
+
+TEST_F(BoxesEval, TenPercentTooLargeInAllDirections) {
+  EXPECT_NEAR(Evaluate({UprightCuboid(1, {0, 0, 0}, 0.3, {0.11, 0.22, 0.055})})->iou_matched, 1 / 1.331, 1e-7);
+}
+
+TEST_F(BoxesEval, CountsMissingAndExtraBoxes) {
+  const auto report = Evaluate({First(), UprightCuboid(9, {50, 0, 0}, 0, {1, 1, 1})});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_FALSE(report->rows[1].match.has_value());
+  EXPECT_NEAR(report->iou_matched, 1, 1e-7);
+  EXPECT_NEAR(report->iou_all, 0.5, 1e-7);
+  EXPECT_THAT(report->extra, ElementsAre("b9"));
+}
+
+TEST_F(BoxesEval, MovesBoxesThroughTheTrajectories) {
+  const Similarity other = eval_world::OtherWorld();
+  std::vector<ObjectRecord> moved{First(), Second()};
+  for (ObjectRecord& object : moved) {
+    object.T_world_object = {Eigen::Matrix3d(other.rotation * object.T_world_object.RotationMatrix()),
+                             other * object.T_world_object.translation()};
+    object.half_extents *= other.scale;
+  }
+  EXPECT_THAT(std::string(Evaluate(moved).status().message()), HasSubstr("another world frame?"));
+  ASSERT_TRUE(WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
+  ASSERT_TRUE(WriteTum(folder_ / "est.txt", eval_world::Moved(eval_world::Orbit(), other)).ok());
+  BoxesEvalOptions options;
+  options.predicted = folder_ / "cuboids.json";
+  options.ground_truth = folder_ / "gt.yaml";
+  options.estimated_trajectory = folder_ / "est.txt";
+  EXPECT_THAT(std::string(EvaluateBoxes(options).status().message()), HasSubstr("go together"));
+  options.true_trajectory = folder_ / "gt.txt";
+  const auto report = EvaluateBoxes(options);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_NEAR(report->iou_all, 1, 1e-5);
+  EXPECT_NEAR(report->trajectory_scale, 1 / 0.37, 1e-6);
+}
+
+TEST_F(BoxesEval, RefusesEmptyFiles) {
+  EXPECT_THAT(std::string(Evaluate({}).status().message()), HasSubstr("no objects in it"));
+}
+
+TEST(IntersectionOverUnion, AgreesWithCountingRandomPoints) {
+  const UprightBox a{{0, 0, 0}, -0.5, {0.15, 0.1, 0.2}, 0};
+  const UprightBox b{{0.04, -0.03, 0.05}, 0.2, {0.12, 0.13, 0.15}, 0};
+  const auto inside = [](const UprightBox& box, const Eigen::Vector3d& p) {
+    const Eigen::AngleAxisd turn(-box.yaw_rad, Eigen::Vector3d::UnitZ());
+    return ((turn * (p - box.center)).cwiseAbs().array() < box.half_extents.array()).all();
+  };
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  int both = 0, either = 0;
+  for (int k = 0; k < 300000; ++k) {
+    const Eigen::Vector3d p(uniform(random), uniform(random), uniform(random));
+    const bool in_a = inside(a, p), in_b = inside(b, p);
+    both += in_a && in_b;
+    either += in_a || in_b;
+  }
+  EXPECT_NEAR(IntersectionOverUnion(a, b), static_cast<double>(both) / either, 0.01);
+  EXPECT_EQ(IntersectionOverUnion(a, {{5, 0, 0}, 0, {1, 1, 1}, 0}), 0);
+}
+
+TEST(MakeUpright, TakesTheAxisClosestToUpAndReportsTheTilt) {
+  // A box lying on its side: its own x axis points up, tilted by 5 degrees.
+  const Eigen::Matrix3d rotation = (Eigen::AngleAxisd(5 * kRadPerDeg, Eigen::Vector3d::UnitX()) *
+                                    Eigen::AngleAxisd(-90 * kRadPerDeg, Eigen::Vector3d::UnitY()))
+                                       .toRotationMatrix();
+  const UprightBox box = MakeUpright(rotation, {0, 0, 0}, {3, 1, 2});
+  EXPECT_EQ(box.half_extents.z(), 3);
+  EXPECT_NEAR(box.tilt_deg, 5, 1e-9);
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,185 @@
+// Compares our figures with those of the reference evaluators (Python scripts eval_objects.py, eval_boxes.py and
+// eval_traj.py in ROMAP_TOOLS_DIR), on made-up files and, with ROMAP_DATA_DIR, on a sequence's ground truth.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "client/eval/eval.h"
+#include "client/files/mesh_file.h"
+#include "tests/unit/client/eval/eval_world.h"
+
+namespace romap {
+namespace {
+
+using eval_world::Moved;
+using eval_world::TempFolder;
+using nlohmann::ordered_json;
+
+constexpr double kRelativeTolerance = 5e-4;  // agreement in the first three digits
+
+// Every number of `expected` is in `actual` and agrees.
+void ExpectAgrees(const ordered_json& actual, const ordered_json& expected, const std::string& where) {
+  if (expected.is_object()) {
+    for (const auto& [key, value] : expected.items()) {
+      if (key == "settings" || key == "icp_iterations") continue;
+      ASSERT_TRUE(actual.contains(key)) << where << "/" << key;
+      ExpectAgrees(actual[key], value, where + "/" + key);
+    }
+  } else if (expected.is_array()) {
+    ASSERT_EQ(actual.size(), expected.size()) << where;
+    for (size_t k = 0; k < expected.size(); ++k) ExpectAgrees(actual[k], expected[k], fmt::format("{}[{}]", where, k));
+  } else if (expected.is_number()) {
+    ASSERT_TRUE(actual.is_number()) << where;
+    const double value = expected.get<double>();
+    EXPECT_NEAR(actual.get<double>(), value, kRelativeTolerance * std::abs(value) + 1e-5) << where;
+  } else {
+    EXPECT_EQ(actual, expected) << where;
+  }
+}
+
+class ReferenceTools : public testing::Test {
+ protected:
+  void SetUp() override {
+    const char* tools_dir = std::getenv("ROMAP_TOOLS_DIR");
+    if (tools_dir == nullptr) GTEST_SKIP() << "ROMAP_TOOLS_DIR is not set";
+    tools_dir_ = tools_dir;
+  }
+
+  // The JSON that a tool writes.
+  ordered_json Run(const std::string& tool, const std::string& arguments) {
+    const std::string command = fmt::format("/usr/bin/python3 '{}/{}' {} --json '{}' > '{}' 2>&1", tools_dir_, tool,
+                                            arguments, folder_ / "out.json", folder_ / "out.log");
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+    std::ifstream file(folder_ / "out.json");
+    return ordered_json::parse(file, nullptr, /*allow_exceptions=*/false);
+  }
+
+  // Runs both on the same files with the same options and compares.
+  void CompareObjects(const ObjectsEvalOptions& options, const std::string& more) {
+    const auto report = EvaluateObjects(options);
+    ASSERT_TRUE(report.ok()) << report.status();
+    const ordered_json expected = Run(
+        "eval_objects.py", fmt::format("--pred '{}' --gt '{}' --align {} --samples {} {}", options.predicted_dir,
+                                       options.ground_truth_dir, ToString(options.alignment), options.samples, more));
+    ExpectAgrees(ToJson(*report), expected, "objects");
+  }
+
+  TempFolder folder_;
+  std::string tools_dir_;
+};
+
+TEST_F(ReferenceTools, AgreeOnMeshes) {
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Similarity error{1.03, turn, Eigen::Vector3d(0.004, -0.003, 0.005)};
+  ASSERT_TRUE(WritePly(folder_ / "gt/ball.ply", eval_world::Sphere(0.1, {0, 0, 0})).ok());
+  ASSERT_TRUE(WritePly(folder_ / "gt/brick.ply", eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0})).ok());
+  ASSERT_TRUE(WritePly(folder_ / "pred/1.ply", Moved(eval_world::Sphere(0.1, {0, 0, 0}, 60), error)).ok());
+  ASSERT_TRUE(WritePly(folder_ / "pred/2.ply", Moved(eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0}), error)).ok());
+  ASSERT_TRUE(WritePly(folder_ / "pred/3.ply", eval_world::Sphere(0.1, {5, 5, 5})).ok());
+  ObjectsEvalOptions options;
+  options.predicted_dir = folder_ / "pred";
+  options.ground_truth_dir = folder_ / "gt";
+  options.samples = 30000;
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
+    options.alignment = alignment;
+    CompareObjects(options, "");
+  }
+  options.icp = IcpKind::kSymmetric;
+  options.icp_overlap = 0.9;
+  CompareObjects(options, "--icp sym --icp-overlap 0.9");
+}
+
+TEST_F(ReferenceTools, AgreeOnTrajectories) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 0.01);
+  std::vector<StampedPose> estimated = Moved(eval_world::Orbit(), eval_world::OtherWorld());
+  for (StampedPose& pose : estimated) {
+    pose.timestamp_ns += 3'000'000;
+    pose.T_world_camera = {pose.T_world_camera.rotation(),
+                           Eigen::Vector3d(pose.T_world_camera.translation() +
+                                           Eigen::Vector3d(noise(random), noise(random), noise(random)))};
+  }
+  estimated.resize(150);
+  ASSERT_TRUE(WriteTum(folder_ / "est.txt", estimated).ok());
+  ASSERT_TRUE(WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
+    const auto report = EvaluateTrajectory({.estimated = folder_ / "est.txt",
+                                            .ground_truth = folder_ / "gt.txt",
+                                            .alignment = alignment,
+                                            .max_dt_s = 0.01,
+                                            .offset_s = 0.001});
+    ASSERT_TRUE(report.ok()) << report.status();
+    const ordered_json expected =
+        Run("eval_traj.py", fmt::format("--est '{}' --gt '{}' --align {} --max-dt 0.01 --offset 0.001",
+                                        folder_ / "est.txt", folder_ / "gt.txt", ToString(alignment)));
+    ExpectAgrees(ToJson(*report), expected, "trajectory");
+  }
+}
+
+TEST_F(ReferenceTools, AgreeOnBoxes) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  ObjectsYaml truth, predicted;
+  truth.up_world = Eigen::Vector3d(0.02, -0.05, 1).normalized();
+  for (int k = 1; k <= 6; ++k) {
+    const Eigen::Vector3d center(k, uniform(random), uniform(random));
+    const Eigen::Vector3d half(0.3 + 0.1 * uniform(random), 0.2 + 0.1 * uniform(random), 0.3 + 0.1 * uniform(random));
+    const double yaw_rad = 3 * uniform(random);
+    truth.objects.push_back(eval_world::UprightCuboid(k, center, yaw_rad, half));
+    if (k == 4) continue;
+    const Eigen::Vector3d shift = 0.1 * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+    predicted.objects.push_back(eval_world::UprightCuboid(10 + k, center + shift, yaw_rad + 2 * uniform(random),
+                                                          (1 + 0.2 * uniform(random)) * half));
+  }
+  predicted.objects.push_back(eval_world::UprightCuboid(99, {-20, 0, 0}, 0, {1, 1, 1}));
+  ASSERT_TRUE(WriteObjects(folder_ / "gt.yaml", truth).ok());
+  for (const std::string name : {"cuboids.json", "cuboids.yaml"}) {
+    ASSERT_TRUE(WriteObjects(folder_ / name, predicted).ok());
+    BoxesEvalOptions options;
+    options.predicted = folder_ / name;
+    options.ground_truth = folder_ / "gt.yaml";
+    const auto report = EvaluateBoxes(options);
+    ASSERT_TRUE(report.ok()) << report.status();
+    const ordered_json expected =
+        Run("eval_boxes.py", fmt::format("--pred '{}' --gt '{}'", options.predicted, options.ground_truth));
+    ExpectAgrees(ToJson(*report), expected, "boxes");
+  }
+}
+
+TEST_F(ReferenceTools, AgreeOnASequenceWithMasksAndDepth) {
+  const char* data_dir = std::getenv("ROMAP_DATA_DIR");
+  if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
+  const std::string room = std::string(data_dir) + "/cube_diorama_room";
+  const auto truth = ReadMeshFolder(room + "/gt");
+  ASSERT_TRUE(truth.ok()) << truth.status();
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(0, 0.003f);
+  for (const auto& [name, file] : *truth) {
+    // Small triangles scattered about the true points: a noisy mesh.
+    Mesh mesh;
+    for (size_t k = 0; k < file.mesh.vertices.size(); k += 9) {
+      const Eigen::Vector3f p = file.mesh.vertices[k] + Eigen::Vector3f(noise(random), noise(random), noise(random));
+      const uint32_t first = static_cast<uint32_t>(mesh.vertices.size());
+      mesh.vertices.insert(mesh.vertices.end(),
+                           {p, p + Eigen::Vector3f(0.003f, 0, 0), p + Eigen::Vector3f(0, 0.002f, 0.002f)});
+      mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    ASSERT_TRUE(WritePly(folder_ / ("pred/" + name + ".ply"), mesh).ok());
+  }
+  ObjectsEvalOptions options;
+  options.predicted_dir = folder_ / "pred";
+  options.ground_truth_dir = room + "/gt";
+  options.dataset_dir = room;
+  options.dataset_every = 10;
+  options.no_cap = true;
+  options.alignment = Alignment::kNone;
+  CompareObjects(options, fmt::format("--no-cap --dataset '{}' --dataset-every 10", room));
+}
+
+}  // namespace
+}  // namespace romap

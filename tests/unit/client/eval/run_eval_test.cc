@@ -1,0 +1,88 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "client/eval/eval.h"
+#include "client/files/text_file.h"
+#include "tests/unit/client/eval/eval_world.h"
+
+namespace romap {
+namespace {
+
+using eval_world::Box;
+using eval_world::Moved;
+using eval_world::TempFolder;
+using eval_world::UprightCuboid;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+class RunEval : public testing::Test {
+ protected:
+  // A sequence with one box, and a run that found it in the world that `run_from_true` leads to.
+  void Write(const Similarity& run_from_true) {
+    const Eigen::Vector3d half_extents(0.1, 0.07, 0.05);
+    const ObjectRecord truth = UprightCuboid(1, {0, 0, 0}, 0, half_extents);
+    ObjectRecord found = UprightCuboid(5, run_from_true.translation, 0, run_from_true.scale * half_extents);
+    found.T_world_object = {run_from_true.rotation, run_from_true.translation};
+    EXPECT_TRUE(WritePly(folder_ / "set/gt/b1.ply", Box(half_extents, {0, 0, 0})).ok());
+    EXPECT_TRUE(WriteObjects(folder_ / "set/objects.yaml", {.objects = {truth}}).ok());
+    EXPECT_TRUE(WriteTum(folder_ / "set/groundtruth.txt", eval_world::Orbit()).ok());
+    EXPECT_TRUE(WritePly(folder_ / "run/objects/5_box.ply", Moved(Box(half_extents, {0, 0, 0}), run_from_true)).ok());
+    EXPECT_TRUE(WriteObjects(folder_ / "run/cuboids.json", {.objects = {found}}).ok());
+    EXPECT_TRUE(WriteTum(folder_ / "run/trajectory.txt", Moved(eval_world::Orbit(), run_from_true)).ok());
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(RunEval, WithGivenPosesNothingIsAligned) {
+  Write({});
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/true);
+  EXPECT_THAT(report.notes, SizeIs(0));
+  ASSERT_TRUE(report.objects && report.boxes && report.trajectory);
+  EXPECT_FALSE(report.objects->rows[0].match->icp.has_value());
+  EXPECT_LT(*report.objects->mean.accuracy_cm, 0.1);
+  EXPECT_NEAR(report.boxes->iou_all, 1, 1e-7);
+  EXPECT_EQ(report.trajectory->alignment, Alignment::kNone);
+}
+
+TEST_F(RunEval, WithEstimatedPosesTheTrajectoriesGiveTheScale) {
+  Write(eval_world::OtherWorld());
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/false);
+  EXPECT_THAT(report.notes, SizeIs(0));
+  ASSERT_TRUE(report.objects && report.boxes && report.trajectory);
+  EXPECT_NEAR(report.objects->trajectory_scale, 1 / 0.37, 1e-6);
+  EXPECT_LT(*report.objects->mean.accuracy_cm, 0.1);
+  EXPECT_NEAR(report.boxes->iou_all, 1, 1e-5);
+  EXPECT_LT(report.trajectory->ate_rmse_m, 1e-6);
+}
+
+TEST_F(RunEval, WhatCannotBeMeasuredIsNoted) {
+  const RunReport nothing = EvaluateRun(folder_ / "run/x", folder_ / "set/x", true);
+  EXPECT_THAT(nothing.notes, SizeIs(3));
+  EXPECT_THAT(nothing.notes[0], AllOf(HasSubstr("meshes not measured"), HasSubstr("run/x/objects")));
+  Write({});
+  ASSERT_TRUE(WriteFile(folder_ / "run/cuboids.json", "{\"objects\": 5}").ok());
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
+  ASSERT_THAT(report.notes, SizeIs(1));
+  EXPECT_THAT(report.notes[0], AllOf(HasSubstr("cuboids not measured"), HasSubstr("should hold a list 'objects:'")));
+  EXPECT_TRUE(report.objects && report.trajectory);
+}
+
+TEST_F(RunEval, TablesAndJsonShowTheFigures) {
+  Write({});
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
+  const std::string table = FormatTable(report);
+  EXPECT_THAT(table, AllOf(HasSubstr("acc.seen"), HasSubstr("5_box"), HasSubstr("1 of 1"), HasSubstr("IoU3D"),
+                           HasSubstr("ATE rmse 0.000000 m")));
+  const nlohmann::ordered_json json = ToJson(report);
+  EXPECT_EQ(json["objects"]["objects"][0]["predicted"], "5_box");
+  EXPECT_EQ(json["objects"]["mean"]["ratio_1"], 100.0);
+  EXPECT_NEAR(json["boxes"]["mean"]["iou_all_gt"].get<double>(), 1, 1e-7);
+  EXPECT_EQ(json["trajectory"]["matched"], 200);
+}
+
+}  // namespace
+}  // namespace romap

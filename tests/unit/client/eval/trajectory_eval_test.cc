@@ -1,0 +1,91 @@
+#include "client/eval/trajectory_eval.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/client/eval/eval_world.h"
+
+namespace romap {
+namespace {
+
+using eval_world::Moved;
+using eval_world::Orbit;
+using eval_world::OtherWorld;
+using eval_world::TempFolder;
+using ::testing::HasSubstr;
+
+class TrajectoryEval : public testing::Test {
+ protected:
+  // Evaluates `estimated` against the orbit.
+  absl::StatusOr<TrajectoryReport> Evaluate(const std::vector<StampedPose>& estimated, Alignment alignment) {
+    EXPECT_TRUE(WriteTum(folder_ / "gt.txt", Orbit()).ok());
+    EXPECT_TRUE(WriteTum(folder_ / "est.txt", estimated).ok());
+    return EvaluateTrajectory(
+        {.estimated = folder_ / "est.txt", .ground_truth = folder_ / "gt.txt", .alignment = alignment});
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(TrajectoryEval, ATrajectoryAgainstItselfIsExact) {
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
+    const auto report = Evaluate(Orbit(), alignment);
+    ASSERT_TRUE(report.ok()) << report.status();
+    EXPECT_LT(report->ate_rmse_m, 1e-8);
+    EXPECT_EQ(report->matched, 200u);
+  }
+}
+
+TEST_F(TrajectoryEval, UndoesAKnownSimilarity) {
+  const auto report = Evaluate(Moved(Orbit(), OtherWorld()), Alignment::kSim3);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_LT(report->ate_rmse_m, 1e-7);
+  EXPECT_NEAR(report->scale, 1 / 0.37, 1e-6);
+  EXPECT_LT(report->rotation_rmse_deg, 1e-4);
+}
+
+TEST_F(TrajectoryEval, RigidAlignmentLeavesTheErrorOfScale) {
+  const auto report = Evaluate(Moved(Orbit(), OtherWorld()), Alignment::kSe3);
+  ASSERT_TRUE(report.ok()) << report.status();
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const StampedPose& pose : Orbit()) mean += pose.T_world_camera.translation() / 200;
+  double squared_radius = 0;
+  for (const StampedPose& pose : Orbit()) {
+    squared_radius += (pose.T_world_camera.translation() - mean).squaredNorm() / 200;
+  }
+  EXPECT_NEAR(report->ate_rmse_m, (1 - 0.37) * std::sqrt(squared_radius), 1e-7);
+  EXPECT_EQ(report->scale, 1);
+}
+
+TEST_F(TrajectoryEval, MeasuresAShiftAndARollAsTheyAre) {
+  std::vector<StampedPose> poses = Orbit();
+  const Eigen::Quaterniond roll(Eigen::AngleAxisd(2 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
+  for (StampedPose& pose : poses) {
+    pose.T_world_camera = {pose.T_world_camera.rotation() * roll,
+                           Eigen::Vector3d(pose.T_world_camera.translation() + Eigen::Vector3d(0.03, 0.04, 0))};
+  }
+  const auto report = Evaluate(poses, Alignment::kNone);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_NEAR(report->ate_rmse_m, 0.05, 1e-8);
+  EXPECT_NEAR(report->ate_median_m, 0.05, 1e-8);
+  EXPECT_NEAR(report->rotation_rmse_deg, 2, 1e-5);
+  EXPECT_NEAR(report->rotation_max_deg, 2, 1e-5);
+  EXPECT_NEAR(Evaluate(poses, Alignment::kSe3)->ate_rmse_m, 0, 1e-8);
+}
+
+TEST_F(TrajectoryEval, SaysWhyThereIsNothingToCompare) {
+  std::vector<StampedPose> late = Orbit();
+  for (StampedPose& pose : late) pose.timestamp_ns += 1'000'000'000'000;
+  EXPECT_THAT(std::string(Evaluate(late, Alignment::kSim3).status().message()),
+              HasSubstr("only 0 of 200 estimated poses"));
+  std::vector<StampedPose> still = Orbit();
+  for (StampedPose& pose : still) pose.T_world_camera = {};
+  EXPECT_THAT(std::string(Evaluate(still, Alignment::kSim3).status().message()), HasSubstr("positions coincide"));
+  EXPECT_EQ(EvaluateTrajectory({.estimated = folder_ / "no", .ground_truth = folder_ / "gt.txt"}).status().code(),
+            absl::StatusCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace romap
