@@ -6,7 +6,7 @@
 
 #include "common/messages.h"
 #include "server/objects/silhouette.h"
-#include "server/objects/visual_hull.h"
+#include "server/objects/silhouette_hull.h"
 
 namespace romap {
 

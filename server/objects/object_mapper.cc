@@ -3,7 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <numbers>
+#include <cmath>
 
 namespace romap {
 namespace {
@@ -155,7 +155,15 @@ void ObjectMapper::CountPointVotes(const KeyframeView& view) {
   for (size_t d = 0; d < current_.detections.size(); ++d) {
     if (!current_.ambiguous[d]) key_of_label[current_.detections[d].label] = current_.keys[d];
   }
+  const CameraModel& camera = view.frame->camera;
+  const cv::Mat& labels = view.frame->labels;
   for (const PointObservation& observation : view.observations) {
+    // A label of 0 may also mean "too close to the border of a mask to tell": no evidence for the background.
+    if (observation.label == 0 && !labels.empty()) {
+      const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);
+      if (labels.at<uint16_t>(v, u) != 0) continue;
+    }
     const auto key = key_of_label.find(observation.label);
     if (key != key_of_label.end()) registry_.Vote(observation.point, key->second);
   }

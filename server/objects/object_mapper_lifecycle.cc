@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "server/objects/angles.h"
 #include "server/objects/object_mapper.h"
 
 namespace romap {
 namespace {
-
-constexpr double kDegToRad = std::numbers::pi / 180;
 
 // Share of `points` inside the cuboid, its half extents enlarged a little.
 double ShareInside(const Cuboid& cuboid, const std::vector<Eigen::Vector3d>& points_world) {
@@ -30,7 +28,7 @@ bool DiffersNotably(const Cuboid& a, const Cuboid& b, const ObjectsConfig& confi
   const double shift = (a.T_world_object.translation() - b.T_world_object.translation()).norm();
   const double growth = 2 * (a.half_extents - b.half_extents).cwiseAbs().maxCoeff();
   const double turn_rad = a.T_world_object.rotation().angularDistance(b.T_world_object.rotation());
-  return std::max(shift, growth) > config.update_change_share * size || turn_rad > config.update_yaw_deg * kDegToRad;
+  return std::max(shift, growth) > config.update_change_share * size || turn_rad > config.update_yaw_deg * kRadPerDeg;
 }
 
 }  // namespace
@@ -43,7 +41,7 @@ bool ObjectMapper::IsProven(const Landmark& landmark) const {
   const bool believable = half.minCoeff() > 0 && half.maxCoeff() < kMostElongated * half.minCoeff();
   // Without points the masks alone must say where it is, which takes a wider base.
   const bool has_points = landmark.points.size() >= static_cast<size_t>(config_.min_object_points);
-  const double parallax_rad = (has_points ? 1.0 : 1.5) * config_.confirm_parallax_deg * kDegToRad;
+  const double parallax_rad = (has_points ? 1.0 : 1.5) * config_.confirm_parallax_deg * kRadPerDeg;
   return believable && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
          landmark.keyframe_sightings >= config_.confirm_keyframes && landmark.parallax_rad >= parallax_rad;
 }
@@ -61,7 +59,7 @@ void ObjectMapper::ConfirmProven(const std::vector<LandmarkKey>& keys) {
     landmark.id = ObjectId{++last_id_};
     spdlog::debug("objects: landmark {} is {} ({}): {} sightings, {} points, parallax {:.0f} deg", key,
                   landmark.id.ToString(), landmark.BestClass().first, landmark.sightings, landmark.points.size(),
-                  landmark.parallax_rad / kDegToRad);
+                  landmark.parallax_rad / kRadPerDeg);
   }
 }
 

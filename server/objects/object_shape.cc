@@ -5,19 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "server/objects/angles.h"
 #include "server/objects/cuboid_fitter.h"
 #include "server/objects/isolation_forest.h"
 
 namespace romap {
 namespace {
-
-constexpr double kDegToRad = std::numbers::pi / 180;
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
   Eigen::Vector3d median;
@@ -40,7 +34,7 @@ Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
 }  // namespace
 
 bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
-  const double limit = config_.silhouette_angle_deg * kDegToRad;
+  const double limit = config_.silhouette_angle_deg * kRadPerDeg;
   return std::any_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
     return other.cut_by_border <= silhouette.cut_by_border &&
            AngleBetween(ViewDirection(other), ViewDirection(silhouette)) < limit;
@@ -72,8 +66,8 @@ void ObjectShape::MakeRoom() {
 }
 
 std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surroundings& surroundings) const {
-  constexpr double kGoodParallaxRad = 15 * kDegToRad;
-  constexpr double kLeastParallaxRad = 5 * kDegToRad;
+  constexpr double kGoodParallaxRad = 15 * kRadPerDeg;
+  constexpr double kLeastParallaxRad = 5 * kRadPerDeg;
   const auto ray_center = IntersectCenterRays(silhouettes_, kLeastParallaxRad);
   const bool enough_points = surroundings.points.size() >= static_cast<size_t>(config_.min_object_points);
   if (!ray_center && !enough_points) return std::nullopt;
@@ -125,9 +119,9 @@ void ObjectShape::JudgeSilhouettes() {
     int denied = 0;
     int judged = 0;
     for (size_t i = 0; i < cells.size(); i += step) {
-      const Sight sight = silhouette.Look(hull_.region().ToWorld(cells[i]));
-      judged += sight != Sight::kUnknown ? 1 : 0;
-      denied += sight == Sight::kOutside ? 1 : 0;
+      const MaskHit sight = silhouette.Look(hull_.region().ToWorld(cells[i]));
+      judged += sight != MaskHit::kUnknown ? 1 : 0;
+      denied += sight == MaskHit::kOutside ? 1 : 0;
     }
     denied_shares.push_back(judged > 0 ? static_cast<double>(denied) / judged : 0);
   }
@@ -255,7 +249,7 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   fit.cuboid = *cuboid;
   fit.body_world = SampleBody(*cuboid, surroundings.points, fit.point_is_inlier);
   fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
-  const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kDegToRad));
+  const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));
   const double seen_often = std::min(1.0, TrustedCount() / 10.0);
   fit.cuboid.confidence = 0.5 * seen_around + 0.5 * seen_often;
   return fit;

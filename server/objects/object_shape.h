@@ -7,7 +7,7 @@
 
 #include "server/objects/objects_config.h"
 #include "server/objects/silhouette.h"
-#include "server/objects/visual_hull.h"
+#include "server/objects/silhouette_hull.h"
 
 namespace romap {
 
@@ -57,7 +57,7 @@ class ObjectShape {
 
   ObjectsConfig config_;
   std::vector<Silhouette> silhouettes_;
-  VisualHull hull_;
+  SilhouetteHull hull_;
 };
 
 }  // namespace romap

@@ -4,15 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/objects/angles.h"
+
 namespace romap {
 namespace {
 
 constexpr int kThinnedColumns = 320;
 constexpr size_t kMaxOutlineRays = 160;
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 // Directions through the first and last pixel of the mask in each row and column of its box.
 std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {

@@ -19,7 +19,7 @@ struct ThinnedLabels {
 // Thins so that at most about 320 columns stay: a box then is within a pixel or two of the full resolution's.
 ThinnedLabels ThinLabels(const cv::Mat& labels);
 
-enum class Sight { kUnknown /* outside the image or behind something else */, kInside, kOutside };
+enum class MaskHit { kUnknown /* outside the image or behind something else */, kInside, kOutside };
 
 // The outline of one object in one keyframe.
 struct Silhouette {
@@ -35,19 +35,19 @@ struct Silhouette {
   bool trusted = true;                              // false: contradicts the other silhouettes
 
   // What lies under a point of the world.
-  Sight Look(const Eigen::Vector3d& p_world) const {
+  MaskHit Look(const Eigen::Vector3d& p_world) const {
     return LookHomogeneous(P_image_world.leftCols<3>() * p_world + P_image_world.col(3));
   }
   // The same for an already projected point.
-  Sight LookHomogeneous(const Eigen::Vector3d& q) const {
-    if (!(q.z() > 1e-9)) return Sight::kUnknown;
+  MaskHit LookHomogeneous(const Eigen::Vector3d& q) const {
+    if (!(q.z() > 1e-9)) return MaskHit::kUnknown;
     const double scale = 1 / q.z();
     const double u = q.x() * scale + 0.5;
     const double v = q.y() * scale + 0.5;
-    if (!(u >= 0 && v >= 0 && u < thinned.labels.cols && v < thinned.labels.rows)) return Sight::kUnknown;
+    if (!(u >= 0 && v >= 0 && u < thinned.labels.cols && v < thinned.labels.rows)) return MaskHit::kUnknown;
     const uint16_t seen = thinned.labels.ptr<uint16_t>(static_cast<int>(v))[static_cast<int>(u)];
-    if (seen == label) return Sight::kInside;
-    return seen == 0 ? Sight::kOutside : Sight::kUnknown;
+    if (seen == label) return MaskHit::kInside;
+    return seen == 0 ? MaskHit::kOutside : MaskHit::kUnknown;
   }
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };

@@ -4,19 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "server/objects/angles.h"
 #include "server/objects/projection.h"
 
 namespace romap {
 namespace {
-
-constexpr double kDegToRad = std::numbers::pi / 180;
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 // Why the candidate's mask does not fit what is known of the object, or nullptr. A body point must lie in the mask
 // unless something hides it, and the mask must not reach far beyond the cuboid.
@@ -171,7 +165,7 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
   for (const ViewCandidate& candidate : waiting_) {
     if (taken_.size() >= static_cast<size_t>(config_.max_views)) break;
     const double patience = IsSharp(candidate.sharpness) ? 1 : kPatience;
-    const double angle_rad = patience * config_.view_angle_deg * kDegToRad;
+    const double angle_rad = patience * config_.view_angle_deg * kRadPerDeg;
     if (!IsNewDirection(candidate.T_world_camera.translation(), center, angle_rad)) continue;
     if (const char* doubt = FindDoubt(candidate, context)) {
       spdlog::debug("objects: {}: {} is no view: {}", context.object.ToString(), candidate.keyframe.ToString(), doubt);
@@ -190,7 +184,7 @@ std::vector<ObjectView> ViewPicker::Adopt(ViewPicker&& other, ObjectId object, c
   std::vector<ObjectView> adopted;
   for (ObjectView& view : other.taken_) {
     if (taken_.size() >= static_cast<size_t>(config_.max_views)) break;
-    const double angle_rad = config_.view_angle_deg * kDegToRad;
+    const double angle_rad = config_.view_angle_deg * kRadPerDeg;
     if (!IsNewDirection(view.T_world_camera.translation(), center_world, angle_rad)) continue;
     view.object = object;
     taken_.push_back(view);

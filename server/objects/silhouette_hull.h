@@ -29,7 +29,7 @@ struct HullVotes {
 // The space that the silhouettes of an object leave for it, as votes over a regular grid of a region. Silhouettes are
 // added and removed one at a time, each costs one pass over the grid.
 // Source: A. Laurentini, "The visual hull concept for silhouette-based image understanding", PAMI 1994.
-class VisualHull {
+class SilhouetteHull {
  public:
   // Forgets all votes. `cells` per side.
   void Reset(const HullRegion& region, int cells);

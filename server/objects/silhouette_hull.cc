@@ -1,10 +1,10 @@
-#include "server/objects/visual_hull.h"
+#include "server/objects/silhouette_hull.h"
 
 #include <cmath>
 
 namespace romap {
 
-void VisualHull::Reset(const HullRegion& region, int cells) {
+void SilhouetteHull::Reset(const HullRegion& region, int cells) {
   region_ = region;
   cells_ = cells;
   const auto count = static_cast<size_t>(cells) * static_cast<size_t>(cells) * static_cast<size_t>(cells);
@@ -12,7 +12,7 @@ void VisualHull::Reset(const HullRegion& region, int cells) {
   outside_.assign(count, 0);
 }
 
-void VisualHull::Vote(const Silhouette& silhouette, int weight) {
+void SilhouetteHull::Vote(const Silhouette& silhouette, int weight) {
   const Eigen::Matrix3d M = silhouette.P_image_world.leftCols<3>() * region_.R_world_grid;
   const Eigen::Vector3d origin =
       silhouette.P_image_world.leftCols<3>() * region_.center_world + silhouette.P_image_world.col(3);
@@ -22,15 +22,15 @@ void VisualHull::Vote(const Silhouette& silhouette, int weight) {
     for (int y = 0; y < cells_; ++y) {
       Eigen::Vector3d q = origin + M * CellCenter(0, y, z);
       for (int x = 0; x < cells_; ++x, ++index, q += step_x) {
-        const Sight sight = silhouette.LookHomogeneous(q);
-        if (sight == Sight::kInside) inside_[index] = static_cast<int16_t>(inside_[index] + weight);
-        if (sight == Sight::kOutside) outside_[index] = static_cast<int16_t>(outside_[index] + weight);
+        const MaskHit sight = silhouette.LookHomogeneous(q);
+        if (sight == MaskHit::kInside) inside_[index] = static_cast<int16_t>(inside_[index] + weight);
+        if (sight == MaskHit::kOutside) outside_[index] = static_cast<int16_t>(outside_[index] + weight);
       }
     }
   }
 }
 
-std::vector<Eigen::Vector3d> VisualHull::Cells(const HullVotes& votes) const {
+std::vector<Eigen::Vector3d> SilhouetteHull::Cells(const HullVotes& votes) const {
   std::vector<Eigen::Vector3d> centers;
   size_t index = 0;
   for (int z = 0; z < cells_; ++z) {
@@ -44,7 +44,7 @@ std::vector<Eigen::Vector3d> VisualHull::Cells(const HullVotes& votes) const {
   return centers;
 }
 
-bool VisualHull::Contains(const Eigen::Vector3d& p_grid, const HullVotes& votes) const {
+bool SilhouetteHull::Contains(const Eigen::Vector3d& p_grid, const HullVotes& votes) const {
   if (empty()) return false;
   size_t index = 0;
   for (int axis = 2; axis >= 0; --axis) {

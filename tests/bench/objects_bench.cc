@@ -1,0 +1,235 @@
+// Runs the object mapper over a recorded sequence with its ground-truth poses and labels permuted in every frame, and
+// compares the cuboids with the sequence's objects.yaml.
+//
+//   objects_bench DIR [--masks mask_yolo.txt --detections detections_yolo.csv] [--set SECTION.FIELD=VALUE]... [--debug]
+//
+// Prints for each told object: the nearest true one, overlap, errors, the share of the true surface (gt/*.ply, points
+// some camera saw) inside the cuboid as it is and enlarged by 10 % as the fields train on it, updates, views, the frame
+// of the first cuboid; and user time per frame and keyframe.
+
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "client/files/ply.h"
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "server/objects/object_mapper.h"
+#include "server/slam/given_pose_tracker.h"
+#include "server/slam/sparse_mapper.h"
+#include "tests/support/synthetic_world.h"
+
+namespace romap {
+namespace {
+
+double UserSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
+}
+
+cv::Mat Decode(const std::string& bytes, int flags) {
+  if (bytes.empty()) return {};
+  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+  return cv::imdecode(raw, flags);
+}
+
+std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraModel& camera) {
+  auto frame = std::make_shared<Frame>();
+  frame->frame_id = input.frame_id;
+  frame->timestamp_ns = input.timestamp_ns;
+  frame->camera = camera;
+  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
+  frame->has_masks = !input.label_png.empty();
+  if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
+  frame->instances = input.instances;
+  frame->T_world_camera = input.T_world_camera;
+  return frame;
+}
+
+struct Told {
+  ObjectUpdate last;
+  size_t first_frame = 0;
+  size_t views = 0;
+  size_t cuboid_changes = 0;
+};
+
+struct Run {
+  std::map<ObjectId, Told> objects;
+  std::vector<std::string> gone;
+  double frames_s = 0;
+  double keyframes_s = 0;
+  double slowest_keyframe_s = 0;
+  int frames = 0;
+  int keyframes = 0;
+};
+
+void Record(const ObjectMapper::Output& output, size_t frame, Run& run) {
+  for (const MapEvent& event : output.events) {
+    if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
+      const auto [entry, is_new] = run.objects.try_emplace(update->id);
+      if (is_new) entry->second.first_frame = frame;
+      entry->second.last = *update;
+    } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
+      run.gone.push_back(
+          fmt::format("frame {}: {} merged into {}", frame, merged->from.ToString(), merged->into.ToString()));
+      run.objects.erase(merged->from);
+    } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
+      run.gone.push_back(fmt::format("frame {}: {} removed: {}", frame, removed->id.ToString(), removed->reason));
+      run.objects.erase(removed->id);
+    }
+  }
+  for (const ObjectViews& views : output.views) {
+    Told& told = run.objects[views.object];
+    told.views += views.new_views.size();
+    ++told.cuboid_changes;
+  }
+}
+
+absl::StatusOr<Run> MapSequence(const Sequence& sequence, const SlamConfig& slam, const ObjectsConfig& objects) {
+  GivenPoseTracker tracker(slam);
+  SparseMapper sparse(slam);
+  ObjectMapper mapper(objects);
+  Run run;
+  for (size_t i = 0; i < sequence.size(); ++i) {
+    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
+    ROMAP_ASSIGN_OR_RETURN(const TrackedFrame tracked, tracker.Track(DecodeFrame(input, sequence.camera())));
+    double start = UserSeconds();
+    Record(mapper.ObserveFrame(tracked), i, run);
+    run.frames_s += UserSeconds() - start;
+    ++run.frames;
+    if (!tracked.is_keyframe) continue;
+    const KeyframeView view = sparse.AddKeyframe(tracked);
+    start = UserSeconds();
+    Record(mapper.ObserveKeyframe(view), i, run);
+    const double keyframe_s = UserSeconds() - start;
+    run.keyframes_s += keyframe_s;
+    run.slowest_keyframe_s = std::max(run.slowest_keyframe_s, keyframe_s);
+    ++run.keyframes;
+  }
+  Record(mapper.Finish(), sequence.size(), run);
+  return run;
+}
+
+const ObjectRecord* NearestTrue(const Sequence& sequence, const Cuboid& cuboid) {
+  const ObjectRecord* nearest = nullptr;
+  double best = 0;
+  if (!sequence.objects()) return nullptr;
+  for (const ObjectRecord& record : sequence.objects()->objects) {
+    const double distance = (record.T_world_object.translation() - cuboid.T_world_object.translation()).norm();
+    if (nearest != nullptr && distance >= best) continue;
+    nearest = &record;
+    best = distance;
+  }
+  return nearest;
+}
+
+// Difference of two yaws that leaves the same box: within 45 degrees.
+double YawErrorDeg(const SE3<World, Object>& a, const SE3<World, Object>& b) {
+  const Eigen::Vector3d x = (a.rotation().conjugate() * b.rotation()).toRotationMatrix().col(0);
+  const double degrees = std::atan2(x.y(), x.x()) * 180 / 3.14159265358979;
+  return std::abs(std::remainder(degrees, 90.0));
+}
+
+std::vector<Eigen::Vector3d> TrueSurface(const Sequence& sequence, const ObjectRecord& record) {
+  std::vector<Eigen::Vector3d> points;
+  std::error_code error;
+  for (const auto& file : std::filesystem::directory_iterator(sequence.dir() + "/gt", error)) {
+    const std::string name = file.path().stem().string();
+    const std::string suffix = "_" + record.name;
+    if (name != record.name && !name.ends_with(suffix)) continue;
+    const auto ply = ReadPly(file.path().string());
+    if (!ply.ok()) continue;
+    const auto seen = ply->scalars.find("seen");
+    for (size_t i = 0; i < ply->mesh.vertices.size(); ++i) {
+      if (seen == ply->scalars.end() || seen->second[i] > 0) points.push_back(ply->mesh.vertices[i].cast<double>());
+    }
+  }
+  return points;
+}
+
+void Print(const Sequence& sequence, const Run& run) {
+  for (const std::string& line : run.gone) std::printf("%s\n", line.c_str());
+  double iou_sum = 0;
+  for (const auto& [id, told] : run.objects) {
+    const Cuboid& cuboid = told.last.cuboid;
+    const Eigen::Vector3d half_cm = 100 * cuboid.half_extents;
+    std::printf(
+        "%-10s %-13s score %.2f state %d first %3zu seen %3lu revisions %2lu boxes %2zu views %2zu half %.1f %.1f %.1f "
+        "cm",
+        id.ToString().c_str(), told.last.class_name.c_str(), told.last.class_score, static_cast<int>(told.last.state),
+        told.first_frame, told.last.observations, told.last.revision, told.cuboid_changes, told.views, half_cm.x(),
+        half_cm.y(), half_cm.z());
+    if (const ObjectRecord* truth = NearestTrue(sequence, cuboid)) {
+      const Cuboid true_cuboid{.T_world_object = truth->T_world_object, .half_extents = truth->half_extents};
+      const Eigen::Vector3d true_half_cm = 100 * truth->half_extents;
+      const Eigen::Vector3d shift_cm =
+          100 * (cuboid.T_world_object.translation() - truth->T_world_object.translation());
+      const std::vector<Eigen::Vector3d> surface = TrueSurface(sequence, *truth);
+      const double iou = CuboidIou(cuboid, true_cuboid);
+      iou_sum += iou;
+      std::printf(" | %-9s IoU %.3f shift %4.1f %4.1f %4.1f yaw %4.1f true %.1f %.1f %.1f inside %.3f enlarged %.4f",
+                  truth->name.c_str(), iou, shift_cm.x(), shift_cm.y(), shift_cm.z(),
+                  YawErrorDeg(cuboid.T_world_object, truth->T_world_object), true_half_cm.x(), true_half_cm.y(),
+                  true_half_cm.z(), ContainedShare(cuboid, surface, 1), ContainedShare(cuboid, surface, 1.1));
+    }
+    std::printf("\n");
+  }
+  std::printf("%zu objects, mean IoU %.3f; %d frames %.3f ms each, %d keyframes %.2f ms each, slowest %.1f ms (user)\n",
+              run.objects.size(), iou_sum / std::max<size_t>(1, run.objects.size()), run.frames,
+              1e3 * run.frames_s / run.frames, run.keyframes, 1e3 * run.keyframes_s / run.keyframes,
+              1e3 * run.slowest_keyframe_s);
+}
+
+int Main(int argc, char** argv) {
+  SlamConfig slam;
+  ObjectsConfig objects;
+  ConfigFields fields;
+  slam.Fields(fields);
+  objects.Fields(fields);
+  SequenceOptions options{.permute_labels_seed = 1};
+  std::vector<std::string> assignments;
+  std::string dir;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (std::strcmp(argv[i], "--debug") == 0) {
+      spdlog::set_level(spdlog::level::debug);
+    } else if (std::strcmp(argv[i], "--masks") == 0 && has_value) {
+      options.masks = argv[++i];
+    } else if (std::strcmp(argv[i], "--detections") == 0 && has_value) {
+      options.detections = argv[++i];
+    } else if (std::strcmp(argv[i], "--set") == 0 && has_value) {
+      assignments.emplace_back(argv[++i]);
+    } else {
+      dir = argv[i];
+    }
+  }
+  if (absl::Status status = fields.Set(assignments); !status.ok()) {
+    std::fprintf(stderr, "%s\n", Message(status).c_str());
+    return 2;
+  }
+  const auto sequence = Sequence::Open(dir, options);
+  if (!sequence.ok()) {
+    std::fprintf(stderr, "%s\n", Message(sequence.status()).c_str());
+    return 2;
+  }
+  const auto run = MapSequence(*sequence, slam, objects);
+  if (!run.ok()) {
+    std::fprintf(stderr, "%s\n", Message(run.status()).c_str());
+    return 1;
+  }
+  Print(*sequence, *run);
+  return 0;
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) { return romap::Main(argc, argv); }
