@@ -1,0 +1,166 @@
+#include "common/wire/events.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "common/status.h"
+
+namespace romap::wire {
+namespace {
+
+using ::testing::HasSubstr;
+
+template <class T>
+T RoundTrip(const T& event) {
+  const auto got = FromProto(ToProto(MapEvent(event)), "event");
+  EXPECT_TRUE(got.ok()) << Message(got.status());
+  return got.ok() && std::holds_alternative<T>(*got) ? std::get<T>(*got) : T{};
+}
+
+ObjectUpdate FullObject() {
+  ObjectUpdate object;
+  object.id = ObjectId{12};
+  object.revision = 1ull << 60;
+  object.state = ObjectState::kConfirmed;
+  object.class_name = "teapot";
+  object.class_score = 0.75;
+  object.cuboid.T_world_object = {Eigen::Quaterniond(0.6, 0, 0, 0.8), Eigen::Vector3d(-1, 0, 4)};
+  object.cuboid.half_extents = {0.1, 0.2, 0.3};
+  object.cuboid.confidence = 0.5;
+  object.observations = 99;
+  object.T_world_mesh.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(7, 8, 9));
+  return object;
+}
+
+TEST(WireEvents, FrameAckComesBack) {
+  FrameAck ack;
+  ack.frame_id = 3;
+  ack.accepted = false;
+  ack.error = "too dark";
+  ack.state = TrackingState::kRelocalised;
+  ack.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3));
+  ack.is_keyframe = true;
+  ack.latency_s = 0.125;
+  const FrameAck got = RoundTrip(ack);
+  EXPECT_EQ(got.frame_id, ack.frame_id);
+  EXPECT_EQ(got.accepted, ack.accepted);
+  EXPECT_EQ(got.error, ack.error);
+  EXPECT_EQ(got.state, ack.state);
+  ASSERT_TRUE(got.T_world_camera.has_value());
+  EXPECT_EQ(got.T_world_camera->translation(), ack.T_world_camera->translation());
+  EXPECT_EQ(got.is_keyframe, ack.is_keyframe);
+  EXPECT_EQ(got.latency_s, ack.latency_s);
+}
+
+TEST(WireEvents, ObjectUpdateComesBack) {
+  const ObjectUpdate object = FullObject();
+  const ObjectUpdate got = RoundTrip(object);
+  EXPECT_EQ(got.id, object.id);
+  EXPECT_EQ(got.revision, object.revision);
+  EXPECT_EQ(got.state, object.state);
+  EXPECT_EQ(got.class_name, object.class_name);
+  EXPECT_EQ(got.class_score, object.class_score);
+  EXPECT_TRUE(got.cuboid.T_world_object.Matrix().isApprox(object.cuboid.T_world_object.Matrix(), 1e-15));
+  EXPECT_EQ(got.cuboid.half_extents, object.cuboid.half_extents);
+  EXPECT_EQ(got.cuboid.confidence, object.cuboid.confidence);
+  EXPECT_EQ(got.observations, object.observations);
+  ASSERT_TRUE(got.T_world_mesh.has_value());
+  EXPECT_EQ(got.T_world_mesh->translation(), object.T_world_mesh->translation());
+}
+
+TEST(WireEvents, MeshUpdateComesBack) {
+  MeshUpdate mesh;
+  mesh.id = ObjectId{5};
+  mesh.revision = 6;
+  mesh.steps = 7;
+  mesh.train_seconds = 8.5;
+  mesh.final = true;
+  mesh.vertex_count = 9;
+  mesh.triangle_count = 10;
+  mesh.draco = std::string("DRACO\0\xff", 7);
+  const MeshUpdate got = RoundTrip(mesh);
+  EXPECT_EQ(got.id, mesh.id);
+  EXPECT_EQ(got.revision, mesh.revision);
+  EXPECT_EQ(got.steps, mesh.steps);
+  EXPECT_EQ(got.train_seconds, mesh.train_seconds);
+  EXPECT_EQ(got.final, mesh.final);
+  EXPECT_EQ(got.vertex_count, mesh.vertex_count);
+  EXPECT_EQ(got.triangle_count, mesh.triangle_count);
+  EXPECT_EQ(got.draco, mesh.draco);
+}
+
+TEST(WireEvents, RemovalAndMergeComeBack) {
+  const auto removed = RoundTrip(ObjectRemoved{.id = ObjectId{1}, .revision = 2, .reason = "not seen again"});
+  EXPECT_EQ(removed.id, ObjectId{1});
+  EXPECT_EQ(removed.revision, 2u);
+  EXPECT_EQ(removed.reason, "not seen again");
+  const auto merged = RoundTrip(ObjectMerged{.from = ObjectId{3}, .into = ObjectId{4}, .revision = 5});
+  EXPECT_EQ(merged.from, ObjectId{3});
+  EXPECT_EQ(merged.into, ObjectId{4});
+  EXPECT_EQ(merged.revision, 5u);
+}
+
+TEST(WireEvents, StatisticsComeBack) {
+  const Statistics statistics{.frames_received = 1,
+                              .frames_processed = 2,
+                              .frames_dropped = 3,
+                              .frames_rejected = 4,
+                              .keyframes = 5,
+                              .map_points = 6,
+                              .objects = 7,
+                              .objects_training = 8,
+                              .training_steps = 9,
+                              .training_progress = 0.5,
+                              .resident_bytes = 1ull << 40};
+  const Statistics got = RoundTrip(statistics);
+  EXPECT_EQ(got.frames_received, 1u);
+  EXPECT_EQ(got.frames_processed, 2u);
+  EXPECT_EQ(got.frames_dropped, 3u);
+  EXPECT_EQ(got.frames_rejected, 4u);
+  EXPECT_EQ(got.keyframes, 5u);
+  EXPECT_EQ(got.map_points, 6u);
+  EXPECT_EQ(got.objects, 7u);
+  EXPECT_EQ(got.objects_training, 8u);
+  EXPECT_EQ(got.training_steps, 9u);
+  EXPECT_EQ(got.training_progress, 0.5);
+  EXPECT_EQ(got.resident_bytes, 1ull << 40);
+}
+
+void ExpectFault(const v1::MapEvent& proto, const char* message) {
+  const auto got = FromProto(proto, "event");
+  EXPECT_EQ(got.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(Message(got.status()), HasSubstr(message));
+}
+
+TEST(WireEvents, FaultsAreNamed) {
+  ExpectFault({}, "event: of a kind that is not known here");
+
+  v1::MapEvent proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->set_id(0);
+  ExpectFault(proto, "event.object.id: missing");
+
+  proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->clear_cuboid();
+  ExpectFault(proto, "event.object.cuboid: missing");
+
+  proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->mutable_cuboid()->mutable_half_extents()->set_y(-0.1);
+  ExpectFault(proto, "event.object.cuboid.half_extents");
+
+  proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->mutable_t_world_mesh()->mutable_rotation()->set_w(2);
+  ExpectFault(proto, "event.object.t_world_mesh.rotation");
+
+  proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->set_state(v1::OBJECT_STATE_UNSPECIFIED);
+  ExpectFault(proto, "event.object.state: value 0");
+
+  proto = ToProto(MapEvent(FrameAck{}));
+  proto.mutable_frame_ack()->set_latency_s(std::numeric_limits<double>::quiet_NaN());
+  ExpectFault(proto, "event.frame_ack.latency_s");
+}
+
+}  // namespace
+}  // namespace romap::wire

@@ -1,0 +1,108 @@
+// The Map call as a client in another language sees it: plain generated stubs, and requests that our own client would
+// not send.
+
+#include "server/transport/map_reactor.h"
+
+#include <gmock/gmock.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <gtest/gtest.h>
+
+#include "common/wire/frame.h"
+#include "server/transport/grpc_server.h"
+#include "tests/support/fake_mapping_service.h"
+#include "tests/support/streams.h"
+
+namespace romap {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::MakeFrame;
+
+class MapReactorTest : public ::testing::Test {
+ protected:
+  MapReactorTest() {
+    TransportConfig config;
+    config.listen_address = "127.0.0.1:0";
+    server_ = GrpcServer::Start(&fake_, config).value();
+    stub_ = v1::Mapping::NewStub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+    session_ = fake_.CreateSession({.name = "", .camera = testing::SmallCamera()})->id;
+    call_ = stub_->Map(&context_);
+  }
+
+  bool WriteStart() {
+    v1::MapRequest request;
+    request.mutable_start()->set_session_id(session_);
+    return call_->Write(request);
+  }
+  bool WriteFrame(v1::Frame frame) {
+    v1::MapRequest request;
+    *request.mutable_frame() = std::move(frame);
+    return call_->Write(request);
+  }
+  grpc::Status Finish() {
+    for (v1::MapResponse response; call_->Read(&response);) {
+    }
+    return call_->Finish();
+  }
+
+  testing::FakeMappingService fake_;
+  std::unique_ptr<GrpcServer> server_;
+  std::unique_ptr<v1::Mapping::Stub> stub_;
+  std::string session_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::MapRequest, v1::MapResponse>> call_;
+};
+
+TEST_F(MapReactorTest, SaysThatItIsOpenFirst) {
+  WriteStart();
+  v1::MapResponse response;
+  ASSERT_TRUE(call_->Read(&response));
+  EXPECT_EQ(response.opened().session_id(), session_);
+  call_->WritesDone();
+  EXPECT_TRUE(Finish().ok());
+}
+
+TEST_F(MapReactorTest, AFrameWithoutStartIsRefused) {
+  WriteFrame(wire::ToProto(MakeFrame(1)));
+  const grpc::Status status = Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("the first request must be `start`"));
+}
+
+TEST_F(MapReactorTest, AStreamThatEndsBeforeItStartsIsRefused) {
+  call_->WritesDone();
+  EXPECT_EQ(Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+TEST_F(MapReactorTest, ASecondStartEndsTheStreamAndFreesTheSession) {
+  WriteStart();
+  WriteStart();
+  const grpc::Status status = Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("must be `frame`"));
+  EXPECT_FALSE(fake_.GetSession(session_)->stream_open) << "must be free before the client learns of the end";
+}
+
+TEST_F(MapReactorTest, AFrameOfANewerClientIsRefusedByName) {
+  WriteStart();
+  v1::Frame frame = wire::ToProto(MakeFrame(1));
+  frame.mutable_image()->set_encoding(static_cast<v1::ImageEncoding>(77));
+  WriteFrame(frame);
+  v1::MapResponse response;
+  ASSERT_TRUE(call_->Read(&response));
+  ASSERT_TRUE(call_->Read(&response));
+  EXPECT_EQ(response.event().frame_ack().frame_id(), 1u);
+  EXPECT_FALSE(response.event().frame_ack().accepted());
+  EXPECT_THAT(response.event().frame_ack().error(), HasSubstr("frame.image.encoding: value 77"));
+
+  WriteFrame(wire::ToProto(MakeFrame(2)));
+  ASSERT_TRUE(call_->Read(&response));
+  EXPECT_EQ(response.event().frame_ack().frame_id(), 2u);
+  EXPECT_TRUE(response.event().frame_ack().accepted());
+  call_->WritesDone();
+  EXPECT_TRUE(Finish().ok());
+}
+
+}  // namespace
+}  // namespace romap
