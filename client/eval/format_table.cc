@@ -1,6 +1,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "client/eval/eval.h"
@@ -18,12 +19,30 @@ std::string Cell(std::optional<double> value) {
 
 std::string Cell(const std::string& text) { return fmt::format("{:>{}}", text, kNumberWidth); }
 
-// Width of a column of names, with a blank behind the longest.
-size_t NameWidth(const std::vector<std::string>& names) {
-  size_t width = 0;
-  for (const std::string& name : names) width = std::max(width, name.size());
-  return width + 1;
-}
+// Lines of two names and some cells, printed so that the columns stand below each other.
+class Table {
+ public:
+  void Add(const std::string& object, const std::string& predicted, const std::string& cells) {
+    rows_.push_back({object, predicted, cells});
+  }
+
+  std::string ToString() const {
+    std::array<size_t, 2> width{};
+    for (const auto& row : rows_) {
+      for (size_t k = 0; k < width.size(); ++k) width[k] = std::max(width[k], row[k].size() + 1);
+    }
+    std::string text;
+    for (const auto& row : rows_) {
+      text += fmt::format("{:<{}}{:<{}}{}\n", row[0], width[0], row[1], width[1], row[2]);
+    }
+    return text;
+  }
+
+ private:
+  std::vector<std::array<std::string, 3>> rows_;
+};
+
+std::string CountOf(size_t matched, size_t all) { return fmt::format("{} of {}", matched, all); }
 
 template <class Figures>
 std::string SurfaceCells(const Figures& figures) {
@@ -51,66 +70,52 @@ std::string ObjectsHead(const ObjectsReport& report) {
 }  // namespace
 
 std::string FormatTable(const ObjectsReport& report) {
-  std::vector<std::string> names{"object"}, predicted{"predicted"};
-  for (const ObjectRow& row : report.rows) {
-    names.push_back(row.object);
-    predicted.push_back(row.match ? row.match->predicted : "MISSING");
-  }
-  names.push_back("mean");
-  predicted.push_back(fmt::format("{} of {}", report.matched, report.rows.size()));
-  const size_t name_width = NameWidth(names), predicted_width = NameWidth(predicted);
-  const auto line = [&](size_t k, const std::string& cells) {
-    return fmt::format("{:<{}}{:<{}}{}\n", names[k], name_width, predicted[k], predicted_width, cells);
-  };
-  std::string table = fmt::format("meshes, distances in cm; per-object ICP: {}\n", ToString(report.options.alignment));
+  std::string text = fmt::format("meshes, distances in cm; per-object ICP: {}\n", ToString(report.options.alignment));
   if (!report.options.estimated_trajectory.empty()) {
-    table += fmt::format("moved by the trajectories ({}), scale {:.6f}\n",
-                         ToString(report.options.trajectory_alignment), report.trajectory_scale);
+    text += fmt::format("moved by the trajectories ({}), scale {:.6f}\n", ToString(report.options.trajectory_alignment),
+                        report.trajectory_scale);
   }
-  table += line(0, ObjectsHead(report));
-  for (size_t k = 0; k < report.rows.size(); ++k) {
-    const std::optional<ObjectMatch>& match = report.rows[k].match;
-    table += line(k + 1, match ? SurfaceCells(match->figures) + IcpCells(match->icp) : "");
+  Table table;
+  table.Add("object", "predicted", ObjectsHead(report));
+  for (const ObjectRow& row : report.rows) {
+    if (row.match) {
+      table.Add(row.object, row.match->predicted, SurfaceCells(row.match->figures) + IcpCells(row.match->icp));
+    } else {
+      table.Add(row.object, "MISSING", "");
+    }
   }
-  table += line(names.size() - 1, SurfaceCells(report.mean));
+  table.Add("mean", CountOf(report.matched, report.rows.size()), SurfaceCells(report.mean));
+  text += table.ToString();
   if (!report.extra.empty()) {
-    table += fmt::format("predicted without a true object: {}\n", fmt::join(report.extra, ", "));
+    text += fmt::format("predicted without a true object: {}\n", fmt::join(report.extra, ", "));
   }
-  if (report.matched == report.rows.size()) return table;
-  table += "missing objects are left out of the mean; with 0 for them the ratios are:";
+  if (report.matched == report.rows.size()) return text;
+  text += "missing objects are left out of the mean; with 0 for them the ratios are:";
   for (const auto& ratio : report.mean.ratios) {
-    table += fmt::format("  <{}cm {:.2f}", ratio.threshold_cm, ratio.all_percent_with_missing);
+    text += fmt::format("  <{}cm {:.2f}", ratio.threshold_cm, ratio.all_percent_with_missing);
   }
-  return table + "\n";
+  return text + "\n";
 }
 
 std::string FormatTable(const BoxesReport& report) {
-  std::vector<std::string> names{"object"}, predicted{"predicted"};
+  Table table;
+  table.Add("object", "predicted",
+            Cell("IoU3D") + Cell("centre.cm") + Cell("yaw.deg") + Cell("tilt.deg") + "   size ratio");
   for (const BoxRow& row : report.rows) {
-    names.push_back(row.object);
-    predicted.push_back(row.match ? row.match->predicted : "MISSING");
-  }
-  names.push_back("mean");
-  predicted.push_back(fmt::format("{} of {}", report.matched, report.rows.size()));
-  const size_t name_width = NameWidth(names), predicted_width = NameWidth(predicted);
-  const auto line = [&](size_t k, const std::string& cells) {
-    return fmt::format("{:<{}}{:<{}}{}\n", names[k], name_width, predicted[k], predicted_width, cells);
-  };
-  std::string table =
-      "cuboids\n" + line(0, Cell("IoU3D") + Cell("centre.cm") + Cell("yaw.deg") + Cell("tilt.deg") + "   size ratio");
-  for (size_t k = 0; k < report.rows.size(); ++k) {
-    const std::optional<BoxFigures>& match = report.rows[k].match;
-    if (!match) {
-      table += line(k + 1, Cell(0.0));
+    if (!row.match) {
+      table.Add(row.object, "MISSING", Cell(0.0));
       continue;
     }
-    table += line(k + 1, Cell(match->iou) + Cell(match->center_cm) + Cell(match->yaw_deg) + Cell(match->tilt_deg) +
-                             fmt::format("   {:.3f}", fmt::join(match->size_ratio, " ")));
+    const BoxFigures& match = *row.match;
+    table.Add(row.object, match.predicted,
+              Cell(match.iou) + Cell(match.center_cm) + Cell(match.yaw_deg) + Cell(match.tilt_deg) +
+                  fmt::format("   {:.3f}", fmt::join(match.size_ratio, " ")));
   }
-  table += line(names.size() - 1, Cell(report.iou_matched) + Cell(report.center_cm) + Cell(report.yaw_deg));
-  table += fmt::format("mean IoU with missing = 0: {:.4f}; predicted without a true object: {}\n", report.iou_all,
-                       report.extra.empty() ? "none" : fmt::format("{}", fmt::join(report.extra, ", ")));
-  return table;
+  table.Add("mean", CountOf(report.matched, report.rows.size()),
+            Cell(report.iou_matched) + Cell(report.center_cm) + Cell(report.yaw_deg));
+  return fmt::format("cuboids\n{}mean IoU with missing = 0: {:.4f}; predicted without a true object: {}\n",
+                     table.ToString(), report.iou_all,
+                     report.extra.empty() ? "none" : fmt::format("{}", fmt::join(report.extra, ", ")));
 }
 
 std::string FormatTable(const TrajectoryReport& report) {
