@@ -14,6 +14,8 @@
 namespace romap {
 namespace {
 
+constexpr int kMostDivergences = 3;
+
 NerfConfig WithWholeWidths(NerfConfig config) {
   config.hidden_width = (config.hidden_width + 15) / 16 * 16;
   return config;
@@ -38,6 +40,7 @@ absl::Status ObjectField::SetBox(const Cuboid& cuboid) {
   hull_.Reset(box_);
   for (const ObjectView& view : views_) hull_.Add(view);
   views_changed_ = !views_.empty();
+  divergences_ = 0;
   if (has_box_) Restart();
   has_box_ = true;
   return absl::OkStatus();
@@ -61,6 +64,7 @@ absl::Status ObjectField::AddView(ObjectView view) {
     views_.push_back(std::move(view));
   }
   views_changed_ = true;
+  divergences_ = 0;
   plan_.OnNewView(steps());
   return absl::OkStatus();
 }
@@ -112,10 +116,15 @@ TrainStats ObjectField::Train(int steps, int threads) {
   if (!trainer_.model().IsFinite()) {
     spdlog::warn("{}: training diverged after {} steps with {} views; starting anew", id_.ToString(),
                  trainer_.steps_done(), views());
+    ++divergences_;
     Restart();
     stats.restarted = true;
   }
   return stats;
+}
+
+uint64_t ObjectField::AllowedSteps(bool complete) const {
+  return divergences_ < kMostDivergences ? plan_.AllowedSteps(views(), complete) : 0;
 }
 
 FieldSnapshot ObjectField::Snapshot() const {

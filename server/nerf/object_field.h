@@ -44,8 +44,9 @@ class ObjectField {
   ObjectId id() const { return id_; }
   int views() const { return static_cast<int>(views_.size()); }
   uint64_t steps() const { return trainer_.steps_done(); }
-  // Steps the training plan allows now; `complete`: no more views are expected.
-  uint64_t AllowedSteps(bool complete) const { return plan_.AllowedSteps(views(), complete); }
+  // Steps the training plan allows now; `complete`: no more views are expected. 0 once training has diverged again and
+  // again with the views there are.
+  uint64_t AllowedSteps(bool complete) const;
 
  private:
   void Restart();
@@ -56,6 +57,7 @@ class ObjectField {
   ObjectId id_;
   uint64_t seed_;
   uint64_t restarts_ = 0;
+  int divergences_ = 0;  // since the last new view or box
   TrainingBox box_;
   bool has_box_ = false;
   bool views_changed_ = false;

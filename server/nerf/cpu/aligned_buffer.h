@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <new>
 #include <span>
 
 namespace romap::nerf {
@@ -13,7 +15,10 @@ template <class T>
 class AlignedBuffer {
  public:
   AlignedBuffer() = default;
-  explicit AlignedBuffer(size_t count) : data_(hwy::AllocateAligned<T>(count)), count_(count) { Clear(); }
+  explicit AlignedBuffer(size_t count) : data_(hwy::AllocateAligned<T>(count)), count_(count) {
+    if (!data_) throw std::bad_alloc();
+    std::uninitialized_value_construct_n(data(), count_);
+  }
   AlignedBuffer(AlignedBuffer&&) noexcept = default;
   AlignedBuffer& operator=(AlignedBuffer&&) noexcept = default;
 
@@ -22,7 +27,6 @@ class AlignedBuffer {
     std::copy_n(data(), count_, copy.data());
     return copy;
   }
-  void Clear() { std::fill_n(data(), count_, T()); }
 
   T* data() { return data_.get(); }
   const T* data() const { return data_.get(); }

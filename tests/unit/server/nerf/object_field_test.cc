@@ -1,0 +1,304 @@
+#include "server/nerf/object_field.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "common/status.h"
+#include "tests/unit/server/nerf/test_scene.h"
+
+namespace romap {
+namespace {
+
+using testing::BallScene;
+using testing::BallSurfaceError;
+using ::testing::HasSubstr;
+
+NerfConfig FastConfig() {
+  NerfConfig config;
+  config.levels = 6;
+  config.log2_table_entries = 12;
+  config.finest_resolution = 128;
+  config.rays_per_step = 512;
+  return config;
+}
+
+ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t seed = 1) {
+  ObjectField field(config, scene.object, seed);
+  EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+  for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
+  return field;
+}
+
+std::vector<float> RawOnGrid(const FieldSnapshot& snapshot) {
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3f unit(i % 10 / 4.5f - 1, i / 10 % 10 / 4.5f - 1, i / 100 / 4.5f - 1);
+    points.push_back(unit.cwiseProduct(snapshot.box_half_extents));
+  }
+  std::vector<float> raw(points.size());
+  snapshot.field->Sample(points, raw, {});
+  return raw;
+}
+
+TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {
+  const BallScene scene;
+  ObjectField field = MakeField(scene, FastConfig());
+  field.Train(150, 1);
+  const TrainStats stats = field.Train(50, 1);
+  EXPECT_EQ(stats.steps, 50);
+  EXPECT_LT(stats.color_loss, 0.05);
+  const FieldSnapshot snapshot = field.Snapshot();
+  EXPECT_EQ(snapshot.steps, 200u);
+  EXPECT_EQ(snapshot.views, scene.views);
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.08);
+  // Every view's central pixel shows the surface point towards it.
+  for (int i = 0; i < scene.views; ++i) {
+    const ObjectView view = scene.View(i);
+    const Eigen::Vector3f toward = snapshot.view_centers_object[static_cast<size_t>(i)].normalized();
+    const std::vector<Eigen::Vector3f> point = {toward * static_cast<float>(0.95 * scene.radius_mu)};
+    std::vector<float> raw(1);
+    std::vector<Rgb8> rgb(1);
+    snapshot.field->Sample(point, raw, rgb);
+    EXPECT_GT(raw[0], snapshot.connect_level);
+    const cv::Vec3b bgr = view.color_bgr.at<cv::Vec3b>(scene.size_px / 2, scene.size_px / 2);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(rgb[0][static_cast<size_t>(c)], bgr[2 - c], 60) << "view " << i;
+  }
+}
+
+TEST(ObjectFieldTest, LearnsWithThePapersSamplingAndLosses) {
+  BallScene scene;
+  scene.with_depth = true;
+  NerfConfig config = FastConfig();
+  config.sampling = "uniform";
+  config.max_samples_per_ray = 32;
+  config.random_background = true;
+  ObjectField field = MakeField(scene, config);
+  field.Train(150, 1);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.08);
+}
+
+TEST(ObjectFieldTest, DoesNotDependOnTheScaleOfTheMap) {
+  std::vector<std::vector<float>> raws;
+  for (const double radius : {0.5, 0.5 * 128, 0.5 / 128}) {  // powers of two scale without rounding
+    BallScene scene;
+    scene.radius_mu = radius;
+    ObjectField field = MakeField(scene, FastConfig());
+    field.Train(15, 1);
+    raws.push_back(RawOnGrid(field.Snapshot()));
+  }
+  for (size_t i = 0; i < raws[0].size(); ++i) {
+    EXPECT_NEAR(raws[0][i], raws[1][i], 0.02) << i;
+    EXPECT_NEAR(raws[0][i], raws[2][i], 0.02) << i;
+  }
+}
+
+TEST(ObjectFieldTest, IsDeterministicForSeedAndThreadCount) {
+  BallScene scene;
+  scene.views = 5;
+  for (const int threads : {1, 2}) {
+    ObjectField a = MakeField(scene, FastConfig()), b = MakeField(scene, FastConfig());
+    a.Train(12, threads);
+    b.Train(5, threads);
+    b.Train(7, threads);
+    EXPECT_EQ(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot())) << threads << " threads";
+  }
+  ObjectField a = MakeField(scene, FastConfig(), 1), b = MakeField(scene, FastConfig(), 2);
+  a.Train(3, 1);
+  b.Train(3, 1);
+  EXPECT_NE(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot()));
+}
+
+TEST(ObjectFieldTest, EveryInstructionSetLearnsTheSame) {
+  BallScene scene;
+  scene.views = 5;
+  std::vector<double> losses;
+  for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+    hwy::SetSupportedTargetsForTest(left & -left);
+    losses.push_back(MakeField(scene, FastConfig()).Train(25, 1).color_loss);
+    hwy::SetSupportedTargetsForTest(0);
+  }
+  for (const double loss : losses) EXPECT_NEAR(loss, losses[0], 0.02 * losses[0]);
+}
+
+TEST(ObjectFieldTest, SnapshotDoesNotChangeWhenTrainingGoesOn) {
+  BallScene scene;
+  scene.views = 4;
+  ObjectField field = MakeField(scene, FastConfig());
+  field.Train(5, 1);
+  const FieldSnapshot snapshot = field.Snapshot();
+  const std::vector<float> before = RawOnGrid(snapshot);
+  field.Train(5, 1);
+  EXPECT_EQ(RawOnGrid(snapshot), before);
+  EXPECT_NE(RawOnGrid(field.Snapshot()), before);
+}
+
+TEST(ObjectFieldTest, OutsideTheBoxThereIsNothing) {
+  const BallScene scene;
+  const ObjectField field = MakeField(scene, FastConfig());
+  const std::vector<Eigen::Vector3f> points = {{2, 0, 0}, {0, 0, 0}, {0, NAN, 0}};
+  std::vector<float> raw(3);
+  std::vector<Rgb8> rgb(3);
+  field.Snapshot().field->Sample(points, raw, rgb);
+  EXPECT_EQ(raw[0], -1e4f);
+  EXPECT_GT(raw[1], -100.0f);
+  EXPECT_EQ(raw[2], -1e4f);
+}
+
+TEST(ObjectFieldTest, RejectsViewsThatCannotBe) {
+  const BallScene scene;
+  const auto fault = [&](auto&& spoil) {
+    ObjectField field(FastConfig(), scene.object, 1);
+    EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+    ObjectView view = scene.View(0);
+    spoil(view);
+    const absl::Status status = field.AddView(view);
+    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(field.views(), 0);
+    return std::string(status.message());
+  };
+  const Eigen::Vector3d nan = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_THAT(fault([&](ObjectView& v) {
+                v.T_world_camera = {Eigen::Quaterniond::Identity(), nan};
+              }),
+              HasSubstr("pose is not finite"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.ray_kind = cv::Mat::zeros(v.roi_px.size(), CV_8UC1); }),
+              HasSubstr("mask is empty"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.color_bgr = cv::Mat::zeros(10, 12, CV_8UC3); }),
+              HasSubstr("color_bgr is 12x10 px, the crop is 72x72 px"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.depth_mu = cv::Mat::zeros(v.roi_px.size(), CV_16UC1); }),
+              HasSubstr("depth_mu must be CV_32FC1"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.roi_px.x = 5; }), HasSubstr("does not lie in the image"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.camera.fx_px = 0; }), HasSubstr("object/7"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.camera.distortion[0] = 0.1; }), HasSubstr("distortion"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.keyframe = {}; }), HasSubstr("no keyframe id"));
+  EXPECT_THAT(fault([](ObjectView& v) { v.object = ObjectId{8}; }), HasSubstr("object/8"));
+  EXPECT_THAT(fault([](ObjectView& v) {
+                const Eigen::AngleAxisd turn(M_PI, Eigen::Vector3d::UnitY());
+                v.T_world_camera = {Eigen::Quaterniond(v.T_world_camera.RotationMatrix() * turn.toRotationMatrix()),
+                                    v.T_world_camera.translation()};
+              }),
+              HasSubstr("behind the camera"));
+}
+
+TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
+  const BallScene scene;
+  ObjectField field(FastConfig(), scene.object, 1);
+  EXPECT_EQ(field.AddView(scene.View(0)).code(), absl::StatusCode::kFailedPrecondition);
+  Cuboid flat = scene.Box();
+  flat.half_extents.z() = 0;
+  EXPECT_THAT(Message(field.SetBox(flat)), HasSubstr("half extents must be positive"));
+  EXPECT_EQ(field.Train(5, 1).steps, 0);
+}
+
+TEST(ObjectFieldTest, SmallBoxChangeKeepsTrainingAndBigOneRestarts) {
+  const BallScene scene;
+  ObjectField field = MakeField(scene, FastConfig());
+  field.Train(10, 1);
+  Cuboid box = scene.Box();
+  box.half_extents *= 0.95;
+  box.T_world_object =
+      box.T_world_object * SE3<Object, Object>(Eigen::Quaterniond(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitZ())),
+                                               Eigen::Vector3d(0.02, 0, 0));
+  ASSERT_TRUE(field.SetBox(box).ok());
+  EXPECT_EQ(field.steps(), 10u);
+  box.half_extents *= 1.5;
+  ASSERT_TRUE(field.SetBox(box).ok());
+  EXPECT_EQ(field.steps(), 0u);
+  EXPECT_EQ(field.views(), scene.views);
+  field.Train(10, 1);
+  EXPECT_EQ(field.steps(), 10u);
+  EXPECT_NEAR(field.Snapshot().box_half_extents.x(), 1.1 * box.half_extents.x(), 1e-5);
+}
+
+TEST(ObjectFieldTest, CorrectedPoseReplacesTheView) {
+  const BallScene scene;
+  NerfConfig config = FastConfig();
+  ObjectField field(config, scene.object, 1), clean(config, scene.object, 1);
+  ASSERT_TRUE(field.SetBox(scene.Box()).ok());
+  ASSERT_TRUE(clean.SetBox(scene.Box()).ok());
+  for (const ObjectView& view : scene.Views()) {
+    ObjectView wrong = view;
+    wrong.T_world_camera = {view.T_world_camera.rotation(), view.T_world_camera.translation() * 1.05};
+    ASSERT_TRUE(field.AddView(wrong).ok());
+    ASSERT_TRUE(clean.AddView(view).ok());
+  }
+  for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
+  EXPECT_EQ(field.views(), scene.views);
+  field.Train(1, 1);
+  clean.Train(1, 1);
+  EXPECT_EQ(field.Snapshot().hull.bits, clean.Snapshot().hull.bits);
+  EXPECT_EQ(RawOnGrid(field.Snapshot()), RawOnGrid(clean.Snapshot()));
+}
+
+TEST(ObjectFieldTest, ViewBeyondTheLimitReplacesTheNearestOne) {
+  BallScene scene;
+  NerfConfig config = FastConfig();
+  config.max_views = 6;
+  const ObjectField field = MakeField(scene, config);
+  EXPECT_EQ(field.views(), 6);
+}
+
+TEST(VisualHullTest, HoldsTheBallAndLittleMore) {
+  const BallScene scene;
+  VisualHull hull(NerfConfig{});
+  hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
+  for (const ObjectView& view : scene.Views()) hull.Add(view);
+  const std::vector<uint8_t> cells = hull.Carve();
+  double inside = 0, kept = 0;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const Eigen::Vector3d cell(static_cast<double>(i % 64), static_cast<double>(i / 64 % 64),
+                               static_cast<double>(i / 4096));
+    const double distance = 1.1 * ((cell.array() + 0.5) / 32.0 - 1.0).matrix().norm();
+    if (distance < 1) ++inside;
+    if (cells[i] != 0) ++kept;
+    EXPECT_TRUE(distance > 0.98 || cells[i] == 1) << "cell " << i;
+  }
+  EXPECT_LT(kept, 1.35 * inside);
+}
+
+TEST(VisualHullTest, OneBadMaskIsOutvoted) {
+  const BallScene scene;
+  NerfConfig config;
+  config.hull_min_votes = 2;
+  VisualHull hull(config);
+  hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
+  for (const ObjectView& view : scene.Views()) hull.Add(view);
+  const std::vector<uint8_t> before = hull.Carve();
+  ObjectView bad = scene.View(3);
+  hull.Remove(bad);
+  bad.ray_kind = bad.ray_kind.clone();
+  bad.ray_kind.colRange(0, scene.size_px / 2).setTo(static_cast<int>(RayKind::kBackground));
+  hull.Add(bad);
+  const std::vector<uint8_t> after = hull.Carve();
+  int lost_inside = 0;
+  for (size_t i = 0; i < after.size(); ++i) {
+    const Eigen::Vector3d cell(static_cast<double>(i % 64), static_cast<double>(i / 64 % 64),
+                               static_cast<double>(i / 4096));
+    const double distance = 1.1 * ((cell.array() + 0.5) / 32.0 - 1.0).matrix().norm();
+    lost_inside += distance < 0.95 && before[i] != 0 && after[i] == 0;
+  }
+  EXPECT_EQ(lost_inside, 0);
+}
+
+TEST(VisualHullTest, OccludersAndPixelsOutsideTheCropCarveNothing) {
+  const BallScene scene;
+  VisualHull hull(NerfConfig{});
+  hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
+  ObjectView view = scene.View(0);
+  view.ray_kind = cv::Mat(view.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kOccluder)));
+  hull.Add(view);
+  view = scene.View(1);
+  view.roi_px = {0, 0, 2, 2};  // smaller than any cell's footprint
+  view.ray_kind = view.ray_kind(view.roi_px).clone();
+  hull.Add(view);
+  const std::vector<uint8_t> cells = hull.Carve();
+  EXPECT_EQ(std::count(cells.begin(), cells.end(), 1), static_cast<std::ptrdiff_t>(cells.size()));
+}
+
+}  // namespace
+}  // namespace romap

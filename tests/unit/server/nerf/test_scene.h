@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/messages.h"
+
+namespace romap::testing {
+
+// A striped ball of radius `radius_mu` seen by a ring of cameras, drawn exactly: every test makes its own data.
+struct BallScene {
+  double radius_mu = 0.5;
+  int views = 12;
+  int size_px = 72;
+  Eigen::Vector3d center_world{0.3, -0.2, 0.1};  // times radius_mu / 0.5, so that the scene scales as a whole
+  bool with_depth = false;
+
+  ObjectId object{7};
+  Eigen::Vector3d Center() const { return center_world * (radius_mu / 0.5); }
+  Cuboid Box() const;
+  ObjectView View(int index) const;
+  std::vector<ObjectView> Views() const;
+};
+
+// Mean distance, in radii, of the learned surface (where raw first exceeds the surface level on the way from outside to
+// the centre, within the hull) from the ball, over evenly spread directions. A direction without surface counts as 1.
+double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot);
+
+}  // namespace romap::testing

@@ -1,0 +1,224 @@
+#include "server/nerf/training_pool.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "server/nerf/training_plan.h"
+#include "tests/unit/server/nerf/test_scene.h"
+
+namespace romap {
+namespace {
+
+using testing::BallScene;
+
+NerfConfig TinyConfig() {
+  NerfConfig config;
+  config.levels = 4;
+  config.log2_table_entries = 10;
+  config.finest_resolution = 64;
+  config.hidden_width = 16;
+  config.rays_per_step = 128;
+  config.first_budget_steps = 10;
+  config.budget_steps_per_view = 2;
+  config.full_budget_steps = 40;
+  config.slice_steps = 5;
+  config.snapshot_interval_steps = 10;
+  config.settle_time_s = 3600;
+  return config;
+}
+
+ObjectViews Offer(uint64_t object, int views) {
+  BallScene scene;
+  scene.object = ObjectId{object};
+  scene.views = views;
+  scene.size_px = 32;
+  return {scene.object, scene.Box(), scene.Views()};
+}
+
+// Keeps what arrives.
+struct Inbox {
+  std::mutex mutex;
+  std::map<ObjectId, std::vector<FieldSnapshot>> snapshots;
+
+  TrainingPool::Sink Sink() {
+    return [this](FieldSnapshot snapshot) {
+      std::lock_guard lock(mutex);
+      snapshots[snapshot.object].push_back(std::move(snapshot));
+    };
+  }
+  std::vector<FieldSnapshot> Of(uint64_t object) {
+    std::lock_guard lock(mutex);
+    return snapshots[ObjectId{object}];
+  }
+};
+
+void WaitUntilIdle(const TrainingPool& pool, uint64_t client) {
+  while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
+
+template <class Condition>
+void WaitFor(Condition&& condition) {
+  while (!condition()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
+
+TEST(TrainingPoolTest, TrainsEveryObjectToTheEndAfterFinish) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 2);
+  const uint64_t client = pool.Register(inbox.Sink());
+  for (uint64_t object = 1; object <= 3; ++object) pool.Offer(client, Offer(object, 5));
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  const TrainingPool::Progress progress = pool.GetProgress(client);
+  EXPECT_EQ(progress.objects_total, 3);
+  EXPECT_EQ(progress.objects_training, 0);
+  EXPECT_EQ(progress.steps, 120u);
+  EXPECT_EQ(progress.progress, 1.0);
+  pool.Unregister(client);
+  for (uint64_t object = 1; object <= 3; ++object) {
+    const std::vector<FieldSnapshot> snapshots = inbox.Of(object);
+    ASSERT_FALSE(snapshots.empty());
+    for (size_t i = 0; i + 1 < snapshots.size(); ++i) {
+      EXPECT_LT(snapshots[i].steps, snapshots[i + 1].steps);
+      EXPECT_FALSE(snapshots[i].converged);
+    }
+    EXPECT_TRUE(snapshots.back().converged);
+    EXPECT_EQ(snapshots.back().steps, 40u);
+    EXPECT_EQ(snapshots.back().views, 5);
+  }
+}
+
+TEST(TrainingPoolTest, BudgetGrowsWithViews) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, Offer(1, 2));
+  WaitUntilIdle(pool, client);
+  EXPECT_EQ(pool.GetProgress(client).steps, 0u);  // too few views
+  pool.Offer(client, Offer(1, 5));
+  WaitFor([&] { return !inbox.Of(1).empty() && inbox.Of(1).back().steps == 14; });
+  EXPECT_FALSE(inbox.Of(1).back().converged);
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  EXPECT_EQ(pool.GetProgress(client).steps, 40u);
+}
+
+TEST(TrainingPoolTest, CompletesAnObjectThatGetsNoMoreViews) {
+  NerfConfig config = TinyConfig();
+  config.settle_time_s = 0.05;
+  Inbox inbox;
+  TrainingPool pool(config, 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, Offer(1, 3));
+  WaitFor([&] { return !inbox.Of(1).empty() && inbox.Of(1).back().converged; });
+  EXPECT_EQ(inbox.Of(1).back().steps, 40u);
+}
+
+TEST(TrainingPoolTest, NothingArrivesAfterUnregister) {
+  std::atomic<bool> unregistered = false, late = false;
+  std::atomic<int> arrived = 0;
+  NerfConfig config = TinyConfig();
+  config.full_budget_steps = 100000;
+  config.snapshot_interval_steps = 1;
+  TrainingPool pool(config, 2);
+  const uint64_t client = pool.Register([&](FieldSnapshot) {
+    if (unregistered) late = true;
+    ++arrived;
+  });
+  pool.Offer(client, Offer(1, 4));
+  pool.Offer(client, Offer(2, 4));
+  pool.Finish(client);
+  WaitFor([&] { return arrived > 2; });
+  pool.Unregister(client);
+  unregistered = true;
+  const int at_end = arrived;
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_FALSE(late);
+  EXPECT_EQ(arrived, at_end);
+  EXPECT_TRUE(pool.Idle(client));
+  pool.Offer(client, Offer(3, 4));  // a client that is gone is ignored
+  EXPECT_EQ(pool.GetProgress(client).objects_total, 0);
+}
+
+TEST(TrainingPoolTest, ClientsTakeTurns) {
+  NerfConfig config = TinyConfig();
+  config.full_budget_steps = 100000;
+  TrainingPool pool(config, 1);
+  const uint64_t many = pool.Register([](FieldSnapshot) {});
+  const uint64_t one = pool.Register([](FieldSnapshot) {});
+  for (uint64_t object = 1; object <= 4; ++object) pool.Offer(many, Offer(object, 4));
+  pool.Offer(one, Offer(1, 4));
+  pool.Finish(many);
+  pool.Finish(one);
+  WaitFor([&] { return pool.GetProgress(one).steps >= 100; });
+  const double ratio =
+      static_cast<double>(pool.GetProgress(many).steps) / static_cast<double>(pool.GetProgress(one).steps);
+  EXPECT_GT(ratio, 0.6);
+  EXPECT_LT(ratio, 1.8);
+}
+
+TEST(TrainingPoolTest, RemovedObjectIsForgotten) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, Offer(1, 4));
+  pool.Offer(client, Offer(2, 4));
+  pool.Remove(client, ObjectId{1});
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  EXPECT_EQ(pool.GetProgress(client).objects_total, 1);
+  EXPECT_TRUE(inbox.Of(2).back().converged);
+}
+
+TEST(TrainingPoolTest, BadViewsCostNothingButThemselves) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  ObjectViews offer = Offer(1, 5);
+  offer.new_views[1].ray_kind = cv::Mat();
+  offer.new_views[2].T_world_camera = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, NAN)};
+  pool.Offer(client, offer);
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  ASSERT_FALSE(inbox.Of(1).empty());
+  EXPECT_EQ(inbox.Of(1).back().views, 3);
+}
+
+TEST(TrainingPoolTest, DivergedTrainingNeverLeaves) {
+  NerfConfig config = TinyConfig();
+  config.learning_rate = config.final_learning_rate = 1e30;  // overflows at once
+  Inbox inbox;
+  TrainingPool pool(config, 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, Offer(1, 4));
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);  // it is given up after some attempts
+  pool.Unregister(client);
+  EXPECT_TRUE(inbox.Of(1).empty());
+}
+
+TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
+  NerfConfig config;
+  TrainingPlan plan(config);
+  EXPECT_NEAR(plan.LearningRate(0), config.learning_rate, 1e-9);
+  EXPECT_NEAR(plan.LearningRate(200), config.final_learning_rate, 1e-9);
+  EXPECT_LT(plan.LearningRate(150), plan.LearningRate(100));
+  EXPECT_EQ(plan.AllowedSteps(config.min_views - 1, false), 0u);
+  EXPECT_EQ(plan.AllowedSteps(1, true), 200u);
+  EXPECT_EQ(plan.AllowedSteps(config.min_views, false), static_cast<uint64_t>(config.first_budget_steps));
+  plan.OnNewView(50);
+  EXPECT_EQ(plan.AllowedSteps(40, false), 200u);
+  plan.OnNewView(200);
+  EXPECT_EQ(plan.AllowedSteps(40, false), 200u + static_cast<uint64_t>(config.refine_steps_per_view));
+  EXPECT_GT(plan.LearningRate(200), config.final_learning_rate);
+  for (int i = 0; i < 1000; ++i) plan.OnNewView(200);
+  EXPECT_EQ(plan.AllowedSteps(40, false), 200u + static_cast<uint64_t>(config.max_refine_steps));
+}
+
+}  // namespace
+}  // namespace romap
