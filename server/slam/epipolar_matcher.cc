@@ -79,8 +79,9 @@ void VisitPlane(const EpipolarRay& ray, const std::vector<EpipolarRay>& sorted, 
     auto it = std::lower_bound(sorted.begin(), sorted.end(), around_rad - reach_rad,
                                [](const EpipolarRay& r, double value) { return r.around_rad < value; });
     for (; it != sorted.end() && it->around_rad <= around_rad + reach_rad; ++it) {
-      const double sigma_rad = std::hypot(ray.around_sigma_rad, it->around_sigma_rad);
-      if (std::abs(it->around_rad - around_rad) <= kSigmas * sigma_rad) visit(*it);
+      const double gap_rad = it->around_rad - around_rad;
+      const double variance = ray.around_sigma_rad * ray.around_sigma_rad + it->around_sigma_rad * it->around_sigma_rad;
+      if (gap_rad * gap_rad <= kSigmas * kSigmas * variance) visit(*it);
     }
   }
 }
@@ -123,7 +124,7 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
     const Best& back = best_of_second[static_cast<size_t>(best.feature)];
     if (back.feature != static_cast<int>(i)) continue;
     const double ratio = config.descriptor_ratio;
-    if (best.distance > ratio * best.second_distance || back.distance > ratio * back.second_distance) continue;
+    if (best.distance >= ratio * best.second_distance || back.distance >= ratio * back.second_distance) continue;
     matches.push_back({static_cast<int>(i), best.feature, best.distance});
   }
   return matches;

@@ -84,10 +84,10 @@ void DropRepeated(Keypoints& keypoints) {
 
 // The label under a pixel, or 0 when another one lies within `erosion_px` of it: a corner on an object's outline may
 // as well be the background's.
-uint16_t LabelAt(const cv::Mat& labels, const cv::Point2f& pixel_px, int erosion_px) {
+uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int erosion_px) {
   if (labels.empty()) return 0;
-  const int u = static_cast<int>(std::lround(pixel_px.x));
-  const int v = static_cast<int>(std::lround(pixel_px.y));
+  const int u = static_cast<int>(std::lround(pixel_px.x()));
+  const int v = static_cast<int>(std::lround(pixel_px.y()));
   const cv::Rect image(0, 0, labels.cols, labels.rows);
   if (!image.contains({u, v})) return 0;
   const uint16_t label = labels.at<uint16_t>(v, u);
@@ -119,11 +119,11 @@ std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) const {
   for (size_t i = 0; i < keypoints.size(); ++i) {
     const cv::KeyPoint& keypoint = keypoints[i];
     const double scale = std::pow(kOctaveFactor, keypoint.octave);
-    const auto shift_px = static_cast<float>(0.5 * (scale - 1));
+    const auto shift_px = static_cast<float>(0.5 * (scale - 1));  // to pixel centres at integer coordinates
     Feature feature{.pixel_px = {keypoint.pt.x + shift_px, keypoint.pt.y + shift_px},
                     .octave = keypoint.octave,
-                    .octave_scale = scale,
-                    .label = LabelAt(frame.labels, keypoint.pt, config_.mask_erosion_px)};
+                    .octave_scale = scale};
+    feature.label = LabelAt(frame.labels, feature.pixel_px, config_.mask_erosion_px);
     std::memcpy(feature.descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
     features.push_back(feature);
   }

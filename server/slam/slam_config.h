@@ -22,11 +22,11 @@ struct SlamConfig {
   int matched_keyframes = 4;
   int kept_keyframes = 20;
   int max_points = 20000;
-  double min_parallax_deg = 1.5;
+  double min_parallax_deg = 2.0;
   double pixel_sigma_px = 1.0;
   double search_radius_px = 4.0;
   int max_descriptor_distance = 60;
-  double descriptor_ratio = 0.85;
+  double descriptor_ratio = 0.8;
   int trial_keyframes = 3;
   int trial_observations = 3;
   double depth_sigma_ratio = 0.02;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <tuple>
+#include <unordered_set>
 #include <utility>
 
 #include "server/slam/epipolar_matcher.h"
@@ -150,9 +151,10 @@ std::vector<MapPointId> SparseMapper::Cull() {
     for (const auto& [latest_keyframe, id] : by_age) gone.push_back(id);
   }
   for (const MapPointId id : gone) tracks_.erase(id);
+  const std::unordered_set<MapPointId> gone_set(gone.begin(), gone.end());
   for (MapKeyframe& keyframe : kept_keyframes_) {
     for (MapPointId& point : keyframe.points) {
-      if (point && !tracks_.contains(point)) point = {};
+      if (point && gone_set.contains(point)) point = {};
     }
   }
   return gone;

@@ -1,0 +1,214 @@
+#include "server/slam/sparse_mapper.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "tests/unit/server/slam/textured_world.h"
+
+namespace romap {
+namespace {
+
+TrackedFrame Keyframe(std::shared_ptr<const Frame> frame) {
+  TrackedFrame tracked;
+  tracked.T_world_camera = *frame->T_world_camera;
+  tracked.frame = std::move(frame);
+  tracked.is_keyframe = true;
+  return tracked;
+}
+
+// What a reader of the views knows of the map.
+struct KnownPoints {
+  std::map<MapPointId, MapPoint> points;
+  std::map<MapPointId, std::map<uint16_t, int>> labels;
+
+  void Take(const KeyframeView& view) {
+    for (size_t i = 0; i < view.points.size(); ++i) {
+      points[view.points[i].id] = view.points[i];
+      ++labels[view.points[i].id][view.observations[i].label];
+    }
+    for (const MapPointId id : view.removed_points) {
+      points.erase(id);
+      labels.erase(id);
+    }
+  }
+
+  // Distance to the true surface that `share` of the points keep.
+  double Error_mu(double share) const {
+    std::vector<double> errors_mu;
+    for (const auto& [id, point] : points) {
+      errors_mu.push_back(TexturedWorld::DistanceToSurface_mu(point.position_world));
+    }
+    std::sort(errors_mu.begin(), errors_mu.end());
+    return errors_mu.at(static_cast<size_t>(share * static_cast<double>(errors_mu.size() - 1)));
+  }
+};
+
+KnownPoints MapOrbit(const TexturedWorld& world, SparseMapper& mapper, int keyframes, bool with_depth = false) {
+  KnownPoints known;
+  for (int i = 0; i < keyframes; ++i) {
+    auto frame = world.Render(static_cast<uint64_t>(i + 1), TexturedWorld::OrbitPose(6.0 * i));
+    if (with_depth) frame->depth_mu = world.RenderDepth(*frame);
+    known.Take(mapper.AddKeyframe(Keyframe(frame)));
+  }
+  return known;
+}
+
+TEST(SparseMapper, PointsLieOnTheTrueSurfaces) {
+  const TexturedWorld world;
+  SparseMapper mapper{SlamConfig{}};
+  const KnownPoints known = MapOrbit(world, mapper, 10);
+  EXPECT_EQ(mapper.keyframes(), 10);
+  EXPECT_EQ(mapper.points(), known.points.size());
+  EXPECT_GT(known.points.size(), 200);
+  // One and five percent of the distance of 1.6 mu; a pixel is 0.006 mu wide there, and points that were just made have
+  // 12 degrees of parallax, which magnify its error in depth five times.
+  EXPECT_LT(known.Error_mu(0.5), 0.016);
+  EXPECT_LT(known.Error_mu(0.9), 0.08);
+}
+
+TEST(SparseMapper, AViewIsConsistentInItself) {
+  const TexturedWorld world;
+  SparseMapper mapper{SlamConfig{}};
+  for (int i = 0; i < 6; ++i) {
+    const auto frame = world.Render(static_cast<uint64_t>(i + 1), TexturedWorld::OrbitPose(6.0 * i));
+    const KeyframeView view = mapper.AddKeyframe(Keyframe(frame));
+    EXPECT_EQ(view.id, KeyframeId{static_cast<uint64_t>(i + 1)});
+    EXPECT_EQ(view.frame, frame);
+    ASSERT_EQ(view.observations.size(), view.points.size());
+    std::set<MapPointId> seen;
+    for (size_t k = 0; k < view.points.size(); ++k) {
+      const MapPoint& point = view.points[k];
+      EXPECT_EQ(view.observations[k].point, point.id);
+      EXPECT_TRUE(seen.insert(point.id).second) << point.id << " is seen twice";
+      EXPECT_GE(point.observations, 2);
+      EXPECT_GT(point.max_parallax_rad, 0.034);
+      const Eigen::Vector2d pixel_px = world.camera().Project(view.T_world_camera.Inverse() * point.position_world);
+      EXPECT_LT((pixel_px - view.observations[k].pixel_px.cast<double>()).norm(), 10);
+    }
+    for (const MapPointId gone : view.removed_points) EXPECT_FALSE(seen.contains(gone));
+  }
+}
+
+TEST(SparseMapper, LabelsTellThePlateFromTheFloor) {
+  const TexturedWorld world;
+  SparseMapper mapper{SlamConfig{}};
+  const KnownPoints known = MapOrbit(world, mapper, 8);
+  int plate_points = 0;
+  int misplaced = 0;
+  for (const auto& [id, labels] : known.labels) {
+    const auto plate = labels.find(TexturedWorld::kPlateLabel);
+    if (plate == labels.end() || 2 * plate->second < known.points.at(id).observations) continue;
+    ++plate_points;
+    misplaced += std::abs(known.points.at(id).position_world.z() - TexturedWorld::kPlateHeight_mu) > 0.1;
+  }
+  EXPECT_GT(plate_points, 50);
+  EXPECT_LT(misplaced, 0.05 * plate_points);
+}
+
+TEST(SparseMapper, PointsGainObservationsAndAccuracy) {
+  const TexturedWorld world;
+  SparseMapper short_mapper{SlamConfig{}};
+  SparseMapper long_mapper{SlamConfig{}};
+  const KnownPoints few = MapOrbit(world, short_mapper, 3);
+  const KnownPoints many = MapOrbit(world, long_mapper, 12);
+  EXPECT_LT(many.Error_mu(0.5), few.Error_mu(0.5));
+  const auto most = std::max_element(many.points.begin(), many.points.end(), [](const auto& a, const auto& b) {
+    return a.second.observations < b.second.observations;
+  });
+  EXPECT_GE(most->second.observations, 5);
+}
+
+TEST(SparseMapper, AnUnrelatedImageAddsNoLastingPoints) {
+  const TexturedWorld world;
+  SparseMapper mapper{SlamConfig{}};
+  MapOrbit(world, mapper, 4);
+  const size_t before = mapper.points();
+  for (int i = 0; i < 6; ++i) {  // noise of its own in every frame: whatever matches is wrong
+    auto frame = world.Render(static_cast<uint64_t>(100 + i), TexturedWorld::OrbitPose(24 + 6.0 * i));
+    cv::RNG random(static_cast<uint64_t>(i + 1));
+    random.fill(frame->image_bgr, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(frame->image_bgr, frame->image_bgr, {5, 5}, 0);
+    mapper.AddKeyframe(Keyframe(frame));
+  }
+  EXPECT_LT(mapper.points(), before + 10);
+}
+
+TEST(SparseMapper, DepthImagesGivePointsFromTheFirstKeyframeOn) {
+  const TexturedWorld world;
+  SparseMapper one{SlamConfig{}};
+  const KnownPoints first = MapOrbit(world, one, 1, true);
+  EXPECT_GT(first.points.size(), 200);
+  EXPECT_LT(first.Error_mu(0.95), 0.01);
+  SparseMapper five{SlamConfig{}};
+  EXPECT_LT(MapOrbit(world, five, 5, true).Error_mu(0.9), 0.02);
+}
+
+TEST(SparseMapper, TheSameKeyframesGiveTheSameMap) {
+  const TexturedWorld world;
+  SparseMapper once{SlamConfig{}};
+  SparseMapper again{SlamConfig{}};
+  const KnownPoints a = MapOrbit(world, once, 6);
+  const KnownPoints b = MapOrbit(world, again, 6);
+  ASSERT_EQ(a.points.size(), b.points.size());
+  for (auto i = a.points.begin(), j = b.points.begin(); i != a.points.end(); ++i, ++j) {
+    EXPECT_EQ(i->first, j->first);
+    EXPECT_EQ(i->second.position_world, j->second.position_world);
+  }
+}
+
+TEST(SparseMapper, ImagesWithoutTextureGiveAnEmptyView) {
+  SparseMapper mapper{SlamConfig{}};
+  for (const int side_px : {16, 64, 320}) {
+    const TexturedWorld world(side_px, side_px);
+    const auto frame = world.Render(1, TexturedWorld::OrbitPose(side_px));
+    frame->image_bgr.setTo(0);
+    EXPECT_TRUE(mapper.AddKeyframe(Keyframe(frame)).observations.empty());
+  }
+  EXPECT_EQ(mapper.keyframes(), 3);
+  EXPECT_EQ(mapper.points(), 0);
+}
+
+TEST(SparseMapper, GoesOnWhenTheImageSizeChanges) {
+  const TexturedWorld world(320, 240);
+  const TexturedWorld larger(400, 300);
+  SparseMapper mapper{SlamConfig{}};
+  KnownPoints known = MapOrbit(world, mapper, 4);
+  const KeyframeView view = mapper.AddKeyframe(Keyframe(larger.Render(9, TexturedWorld::OrbitPose(24))));
+  known.Take(view);
+  EXPECT_GT(view.observations.size(), 50);
+  const auto old_points = std::count_if(view.points.begin(), view.points.end(),
+                                        [](const MapPoint& point) { return point.observations > 3; });
+  EXPECT_GT(old_points, 10);
+  EXPECT_LT(known.Error_mu(0.5), 0.02);
+}
+
+TEST(SparseMapper, TheMapStaysWithinItsBounds) {
+  const TexturedWorld world;
+  SlamConfig config;
+  config.max_points = 150;
+  config.kept_keyframes = 3;
+  SparseMapper mapper{config};
+  const KnownPoints known = MapOrbit(world, mapper, 8);
+  EXPECT_LE(mapper.points(), 150);
+  EXPECT_GT(mapper.points(), 100);
+  EXPECT_EQ(known.points.size(), mapper.points());
+}
+
+TEST(SparseMapper, AnAbsurdPoseDoesNoHarm) {
+  const TexturedWorld world;
+  SparseMapper mapper{SlamConfig{}};
+  MapOrbit(world, mapper, 4);
+  auto frame = world.Render(9, TexturedWorld::OrbitPose(24));
+  frame->T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1e9, 1e9, -1e9));
+  mapper.AddKeyframe(Keyframe(frame));
+  for (const MapPoint& point : mapper.AddKeyframe(Keyframe(world.Render(10, TexturedWorld::OrbitPose(30)))).points) {
+    EXPECT_LT(point.position_world.norm(), 10);
+  }
+}
+
+}  // namespace
+}  // namespace romap
