@@ -68,7 +68,7 @@ std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence
     gap = azimuths[i] - azimuths[i - 1];
     gap_middle = azimuths[i - 1] + gap / 2;
   }
-  constexpr double kWidestHarmlessGap = 100 * std::numbers::pi / 180;
+  constexpr double kWidestHarmlessGap = 60 * std::numbers::pi / 180;
   if (gap < kWidestHarmlessGap) return std::nullopt;
   const double direction = gap_middle + std::numbers::pi / 2;
   return Eigen::Vector3d(std::cos(direction), std::sin(direction), 0);
@@ -89,7 +89,7 @@ std::vector<Eigen::Vector3d> ClipCells(const CuboidEvidence& evidence, const Int
   Interval depths{unbounded->dot(evidence.center) - 0.7 * width, unbounded->dot(evidence.center) + 0.7 * width};
   if (evidence.points.size() >= static_cast<size_t>(evidence.min_points)) {
     depths = TrimmedBounds(evidence.points, *unbounded);
-    depths = {depths.low - 0.15 * width, depths.high + 0.15 * width};
+    depths = {depths.low - 0.2 * width, depths.high + 0.2 * width};
   }
   std::erase_if(cells, [&](const Eigen::Vector3d& cell) { return !depths.Contains(unbounded->dot(cell)); });
   return cells;
@@ -217,6 +217,8 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
     if (previous) previous_yaw = YawInGrid(*previous, evidence.region.R_world_grid);
     footprint = FitFootprint(cells, evidence.cell_size, previous_yaw);
     if (!footprint) return std::nullopt;
+    // A footprint that was cut to the points may be too short at its far end, and a box over it too low to cover.
+    if (unbounded && enough_points) break;
     const auto covering = CoveringHeights(evidence, silhouettes, *footprint);
     if (!covering) break;
     heights.high = std::min(std::max(heights.high, covering->high), hull.high + evidence.cell_size.z());

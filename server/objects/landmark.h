@@ -37,6 +37,7 @@ struct Landmark {
 
   // Geometry.
   ObjectShape shape;
+  bool needs_fit = false;                   // silhouettes came since the last fit
   std::optional<Cuboid> cuboid;             // newest fit
   double parallax_rad = 0;                  // of the silhouettes behind it
   std::vector<Eigen::Vector3d> body_world;  // points spread over its volume; its map points while there is no cuboid

@@ -183,13 +183,15 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
 
 void ObjectMapper::CollectEvidence(const KeyframeView& view) {
   if (current_.detections.empty()) return;
-  const ThinnedLabels thinned = ThinLabels(view.frame->labels);
+  const auto masks = ThinMasks(view.frame->labels, current_.detections, current_.keys);
+  std::vector<uint16_t> labels;
+  for (const Detection& detection : current_.detections) labels.push_back(detection.label);
   for (size_t d = 0; d < current_.detections.size(); ++d) {
     if (current_.ambiguous[d]) continue;
     const Detection& detection = current_.detections[d];
     Landmark& landmark = *FindLandmark(current_.keys[d]);
     ++landmark.keyframe_sightings;
-    landmark.shape.AddSilhouette(MakeSilhouette(view, thinned, detection));
+    landmark.needs_fit |= landmark.shape.AddSilhouette(MakeSilhouette(view, masks, detection, d));
     ViewCandidate candidate{.keyframe = view.id,
                             .frame = view.frame,
                             .T_world_camera = view.T_world_camera,
@@ -198,6 +200,7 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
                             .points = {},
                             .pixels_px = {},
                             .detected = current_.keys,
+                            .detected_labels = labels,
                             .sharpness = MeasureSharpness(view.frame->image_bgr, detection.box_px)};
     for (const PointObservation& observation : view.observations) {
       if (observation.label != detection.label) continue;
@@ -215,7 +218,11 @@ void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
   if (found != groups.end()) {
     for (const PointRegistry::Member& member : found->second) background.push_back(member.position_world);
   }
-  for (LandmarkKey key : keys) FitShape(*FindLandmark(key), groups, background);
+  for (LandmarkKey key : keys) {
+    Landmark& landmark = *FindLandmark(key);
+    // Points alone move a box too little to pay for a fit, unless there is none yet.
+    if (landmark.needs_fit || !landmark.cuboid) FitShape(landmark, groups, background);
+  }
 }
 
 void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
@@ -230,15 +237,14 @@ void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
       positions.push_back(member.position_world);
     }
   }
-  std::vector<double> neighbour_bottoms;
+  std::map<LandmarkKey, Cuboid> neighbours;
   for (const auto& other : landmarks_) {
-    if (other->key == landmark.key || !other->published) continue;
-    const Cuboid& cuboid = other->published->cuboid;
-    neighbour_bottoms.push_back(up_world_.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z());
+    if (other->key != landmark.key && other->published) neighbours[other->key] = other->published->cuboid;
   }
   const auto fit = landmark.shape.Update(
-      {.up_world = up_world_, .points = positions, .background = background, .neighbour_bottoms = neighbour_bottoms},
+      {.up_world = up_world_, .points = positions, .background = background, .neighbours = &neighbours},
       landmark.cuboid);
+  landmark.needs_fit = false;
   if (!fit) {
     if (!landmark.cuboid) landmark.body_world = positions;
     return;

@@ -94,7 +94,7 @@ void ObjectMapper::MergeDuplicates(Output* output) {
 void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   spdlog::debug("objects: landmark {} merges into landmark {}", from.key, into.key);
   registry_.Merge(from.key, into.key);
-  for (const Silhouette& silhouette : from.shape.silhouettes()) into.shape.AddSilhouette(silhouette);
+  for (const Silhouette& silhouette : from.shape.silhouettes()) into.needs_fit |= into.shape.AddSilhouette(silhouette);
   for (const auto& [name, evidence] : from.class_evidence) into.class_evidence[name] += evidence;
   for (const auto& [key, count] : from.seen_beside) into.seen_beside[key] += count;
   into.seen_beside.erase(into.key);

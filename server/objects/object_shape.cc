@@ -9,6 +9,7 @@
 #include "server/objects/angles.h"
 #include "server/objects/cuboid_fitter.h"
 #include "server/objects/isolation_forest.h"
+#include "server/objects/projection.h"
 
 namespace romap {
 namespace {
@@ -22,6 +23,17 @@ Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
     median[axis] = values[values.size() / 2];
   }
   return median;
+}
+
+// Depths at which the other things of the picture begin, as far as their cuboids are known.
+void UpdateNearDepths(const std::map<LandmarkKey, Cuboid>& neighbours, Silhouette* silhouette) {
+  silhouette->near_depth_mu.fill(0);
+  const SE3<Camera, World> T_camera_world = silhouette->T_world_camera.Inverse();
+  for (size_t d = 0; d + 1 < kOtherMask && d < silhouette->masks->keys.size(); ++d) {
+    const auto neighbour = neighbours.find(silhouette->masks->keys[d]);
+    if (neighbour == neighbours.end()) continue;
+    silhouette->near_depth_mu[d + 1] = static_cast<float>(DepthRange(neighbour->second, T_camera_world).first);
+  }
 }
 
 // Without a centre, the optical axis stands for the direction to the object: good enough to compare cameras.
@@ -41,11 +53,12 @@ bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
   });
 }
 
-void ObjectShape::AddSilhouette(Silhouette silhouette) {
-  if (IsRedundant(silhouette)) return;
+bool ObjectShape::AddSilhouette(Silhouette silhouette) {
+  if (IsRedundant(silhouette)) return false;
   if (!hull_.empty()) hull_.Add(silhouette);
   silhouettes_.push_back(std::move(silhouette));
   if (silhouettes_.size() > static_cast<size_t>(config_.max_silhouettes)) MakeRoom();
+  return true;
 }
 
 // Drops the silhouette whose direction is nearest to another one's: it says least that the others do not.
@@ -85,9 +98,12 @@ std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surrounding
   return extent;
 }
 
-void ObjectShape::Carve(const HullRegion& region) {
+// Carving anew is also when the silhouettes learn where the other things in their pictures stand by now.
+void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundings) {
   hull_.Reset(region, config_.hull_cells);
-  for (const Silhouette& silhouette : silhouettes_) {
+  silhouettes_when_carved_ = silhouettes_.size();
+  for (Silhouette& silhouette : silhouettes_) {
+    UpdateNearDepths(*surroundings.neighbours, &silhouette);
     if (silhouette.trusted) hull_.Add(silhouette);
   }
 }
@@ -107,42 +123,60 @@ HullVotes ObjectShape::LenientVotes() const {
   return {.max_outside = std::max(1, count / 4), .min_inside = std::max(1, count * 3 / 10)};
 }
 
-// A truncated or misplaced mask denies much of what most others agree on. Such silhouettes lose their vote; they get it
-// back when later ones side with them.
-void ObjectShape::JudgeSilhouettes() {
-  constexpr size_t kFewestToJudge = 5;
-  if (silhouettes_.size() < kFewestToJudge) return;
-  const std::vector<Eigen::Vector3d> cells = hull_.Cells(LenientVotes());
-  const size_t step = cells.size() / 1000 + 1;
-  std::vector<double> denied_shares;
-  for (const Silhouette& silhouette : silhouettes_) {
-    int denied = 0;
-    int judged = 0;
-    for (size_t i = 0; i < cells.size(); i += step) {
-      const MaskHit sight = silhouette.Look(hull_.region().ToWorld(cells[i]));
-      judged += sight != MaskHit::kUnknown ? 1 : 0;
-      denied += sight == MaskHit::kOutside ? 1 : 0;
-    }
-    denied_shares.push_back(judged > 0 ? static_cast<double>(denied) / judged : 0);
+// Whether the cameras of two other silhouettes stand on either side of this one, not far away. Then nearly all that it
+// denies is denied by one of them as well, which is not so at the frontier of what was seen.
+bool ObjectShape::IsBetweenOthers(const Silhouette& silhouette) const {
+  constexpr double kNearRad = 25 * kRadPerDeg;
+  std::vector<Eigen::Vector3d> near;
+  for (const Silhouette& other : silhouettes_) {
+    const double angle = AngleBetween(ViewDirection(other), ViewDirection(silhouette));
+    if (&other != &silhouette && other.trusted && angle < kNearRad) near.push_back(ViewDirection(other));
   }
-  std::vector<double> sorted = denied_shares;
-  std::sort(sorted.begin(), sorted.end());
-  const double limit = std::max(0.15, 2.5 * sorted[sorted.size() / 2]);
-  for (size_t i = 0; i < silhouettes_.size(); ++i) {
-    Silhouette& silhouette = silhouettes_[i];
-    const bool trusted = denied_shares[i] <= limit;
-    if (trusted == silhouette.trusted) continue;
-    silhouette.trusted = trusted;
-    spdlog::debug("objects: silhouette of {} {}: it denies {:.0f} % of the hull", silhouette.keyframe.ToString(),
-                  trusted ? "trusted again" : "distrusted", 100 * denied_shares[i]);
-    trusted ? hull_.Add(silhouette) : hull_.Remove(silhouette);
+  for (size_t i = 0; i < near.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      const double to_i = AngleBetween(near[i], ViewDirection(silhouette));
+      const double to_j = AngleBetween(near[j], ViewDirection(silhouette));
+      if (AngleBetween(near[i], near[j]) > 0.8 * (to_i + to_j)) return true;
+    }
+  }
+  return false;
+}
+
+// A truncated or misplaced mask is the only one to deny a part of the object. Such silhouettes lose their vote.
+void ObjectShape::JudgeSilhouettes() {
+  constexpr double kMostDeniedAlone = 0.12;  // of the hull
+  const HullVotes undenied{.max_outside = 0, .min_inside = StrictVotes().min_inside};
+  const HullVotes denied_once{.max_outside = 1, .min_inside = undenied.min_inside};
+  std::vector<Eigen::Vector3d> cells = hull_.Cells(denied_once);
+  const auto hull_cells = static_cast<double>(hull_.Cells(undenied).size());
+  std::erase_if(cells, [&](const Eigen::Vector3d& cell) { return hull_.Contains(cell, undenied); });
+  constexpr size_t kSamples = 600;
+  const size_t step = cells.size() / kSamples + 1;
+  std::vector<double> denied_alone(silhouettes_.size(), 0);
+  for (size_t i = 0; i < cells.size(); i += step) {
+    const Eigen::Vector3d p_world = hull_.region().ToWorld(cells[i]);
+    for (size_t s = 0; s < silhouettes_.size(); ++s) {
+      if (!silhouettes_[s].trusted || silhouettes_[s].Look(p_world) != MaskHit::kOutside) continue;
+      denied_alone[s] += static_cast<double>(step);
+      break;
+    }
+  }
+  for (size_t s = 0; s < silhouettes_.size(); ++s) {
+    Silhouette& silhouette = silhouettes_[s];
+    const double share = denied_alone[s] / std::max(1.0, hull_cells);
+    if (!silhouette.trusted || share < kMostDeniedAlone || !IsBetweenOthers(silhouette)) continue;
+    silhouette.trusted = false;
+    hull_.Remove(silhouette);
+    spdlog::debug("objects: silhouette of {} distrusted: it alone denies a part of {:.0f} % of the hull",
+                  silhouette.keyframe.ToString(), 100 * share);
   }
 }
 
-// Moves the grid to where the hull is once it fills too little of it or reaches its border. True when it moved.
-bool ObjectShape::RefocusRegion(const Extent& extent) {
+// Moves the grid to where the hull is when it reaches the grid's border, or when there are many more silhouettes than
+// at the last time: then it fills little of the grid.
+void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surroundings) {
   const std::vector<Eigen::Vector3d> cells = hull_.Cells(StrictVotes());
-  if (cells.empty()) return false;
+  if (cells.empty()) return;
   Eigen::Vector3d low = cells.front();
   Eigen::Vector3d high = cells.front();
   for (const Eigen::Vector3d& cell : cells) {
@@ -152,19 +186,19 @@ bool ObjectShape::RefocusRegion(const Extent& extent) {
   low -= hull_.CellSize() / 2;
   high += hull_.CellSize() / 2;
   const HullRegion& region = hull_.region();
-  const Eigen::Vector3d fill = ((high - low) / 2).cwiseQuotient(region.half_extents);
   const Eigen::Vector3d reach = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
   const double most_mu = 1.3 * extent.size_mu;
   const bool may_grow = (region.half_extents.array() < 0.99 * most_mu).any() && reach.maxCoeff() > 0.97;
-  if (fill.minCoeff() > 0.5 && !may_grow) return false;
+  const bool much_news = silhouettes_.size() > 1.4 * static_cast<double>(silhouettes_when_carved_);
+  const bool any_news = silhouettes_.size() != silhouettes_when_carved_;
+  if (!much_news && !(may_grow && any_news)) return;
   HullRegion next = region;
   next.center_world = region.ToWorld((low + high) / 2);
   for (int axis = 0; axis < 3; ++axis) {
     const double growth = reach[axis] > 0.97 ? 1.6 : 1.25;
     next.half_extents[axis] = std::min(most_mu, growth * (high[axis] - low[axis]) / 2);
   }
-  Carve(next);
-  return true;
+  Carve(next, surroundings);
 }
 
 std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) const {
@@ -211,11 +245,12 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   if (!extent) return std::nullopt;
   const auto start_over = [&] {
     Carve({RotationFromZTo(surroundings.up_world).toRotationMatrix(), extent->center_world,
-           Eigen::Vector3d::Constant(0.85 * extent->size_mu)});
+           Eigen::Vector3d::Constant(0.85 * extent->size_mu)},
+          surroundings);
   };
   if (hull_.empty()) start_over();
+  RefocusRegion(*extent, surroundings);
   JudgeSilhouettes();
-  for (int attempt = 0; attempt < 2 && RefocusRegion(*extent); ++attempt) JudgeSilhouettes();
 
   CuboidEvidence evidence;
   evidence.region = hull_.region();
@@ -237,7 +272,10 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
       evidence.background.push_back(evidence.region.ToGrid(p));
   }
   const double center_height = surroundings.up_world.dot(evidence.region.center_world);
-  for (double bottom : surroundings.neighbour_bottoms) evidence.neighbour_bottoms.push_back(bottom - center_height);
+  for (const auto& [key, cuboid] : *surroundings.neighbours) {
+    const double bottom = surroundings.up_world.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z();
+    evidence.neighbour_bottoms.push_back(bottom - center_height);
+  }
   evidence.center = evidence.region.ToGrid(extent->center_world);
   evidence.object_size_mu = extent->size_mu;
   const Silhouette& newest = silhouettes_.back();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,9 +17,9 @@ class ObjectShape {
  public:
   struct Surroundings {
     Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
-    std::span<const Eigen::Vector3d> points;      // map points that belong to the object, world
-    std::span<const Eigen::Vector3d> background;  // map points that belong to no object, world
-    std::span<const double> neighbour_bottoms;    // dot(up_world, p) of points p under other objects
+    std::span<const Eigen::Vector3d> points;                    // map points that belong to the object, world
+    std::span<const Eigen::Vector3d> background;                // map points that belong to no object, world
+    const std::map<LandmarkKey, Cuboid>* neighbours = nullptr;  // the other landmarks that have a cuboid
   };
   struct Fit {
     Cuboid cuboid;
@@ -29,8 +30,9 @@ class ObjectShape {
 
   explicit ObjectShape(const ObjectsConfig& config) : config_(config) {}
 
-  // Redundant silhouettes (direction close to another one's) are not kept, so that the cost of a fit stays bounded.
-  void AddSilhouette(Silhouette silhouette);
+  // Redundant silhouettes (direction close to another one's) are not kept, so that the cost of a fit stays bounded;
+  // then the answer is false.
+  bool AddSilhouette(Silhouette silhouette);
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
 
   // The box as of now; nullopt while masks and points do not say where the object is.
@@ -45,9 +47,10 @@ class ObjectShape {
   std::optional<Extent> EstimateExtent(const Surroundings& surroundings) const;
   bool IsRedundant(const Silhouette& silhouette) const;
   void MakeRoom();
-  void Carve(const HullRegion& region);
+  void Carve(const HullRegion& region, const Surroundings& surroundings);
+  bool IsBetweenOthers(const Silhouette& silhouette) const;
   void JudgeSilhouettes();
-  bool RefocusRegion(const Extent& extent);
+  void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
   int TrustedCount() const;
   HullVotes StrictVotes() const;
   HullVotes LenientVotes() const;
@@ -58,6 +61,7 @@ class ObjectShape {
   ObjectsConfig config_;
   std::vector<Silhouette> silhouettes_;
   SilhouetteHull hull_;
+  size_t silhouettes_when_carved_ = 0;
 };
 
 }  // namespace romap

@@ -41,6 +41,14 @@ std::vector<Eigen::Vector3d> CuboidCorners(const Cuboid& cuboid, double enlargem
   return corners;
 }
 
+std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, World>& T_camera_world) {
+  const double center = (T_camera_world * cuboid.T_world_object.translation()).z();
+  const Eigen::Vector3d depth_of_axes =
+      (T_camera_world.RotationMatrix() * cuboid.T_world_object.RotationMatrix()).row(2).transpose();
+  const double reach = depth_of_axes.cwiseAbs().dot(cuboid.half_extents);
+  return {center - reach, center + reach};
+}
+
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,
                        const SE3<World, Camera>& T_world_camera) {
   const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();

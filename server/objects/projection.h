@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/types.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/messages.h"
@@ -18,6 +19,9 @@ cv::Rect BoundProjections(const std::vector<Eigen::Vector3d>& points_camera, con
 
 // The corners of a cuboid, its half extents times `enlargement`, in the world.
 std::vector<Eigen::Vector3d> CuboidCorners(const Cuboid& cuboid, double enlargement);
+
+// Least and greatest z depth of a cuboid's corners.
+std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, World>& T_camera_world);
 
 // Box around a projected cuboid, as BoundProjections.
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,

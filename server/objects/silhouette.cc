@@ -14,15 +14,15 @@ constexpr size_t kMaxOutlineRays = 160;
 
 // Directions through the first and last pixel of the mask in each row and column of its box.
 std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
-  const int stride = silhouette.thinned.stride_px;
-  const cv::Mat& labels = silhouette.thinned.labels;
+  const int stride = silhouette.masks->stride_px;
+  const cv::Mat& masks = silhouette.masks->index;
   const cv::Rect box = silhouette.box_px;
   const int left = box.x / stride;
   const int top = box.y / stride;
-  const int right = std::min(labels.cols - 1, (box.x + box.width - 1) / stride);
-  const int bottom = std::min(labels.rows - 1, (box.y + box.height - 1) / stride);
+  const int right = std::min(masks.cols - 1, (box.x + box.width - 1) / stride);
+  const int bottom = std::min(masks.rows - 1, (box.y + box.height - 1) / stride);
   std::vector<Eigen::Vector2d> rim_px;
-  const auto is_mask = [&](int u, int v) { return labels.at<uint16_t>(v, u) == silhouette.label; };
+  const auto is_mask = [&](int u, int v) { return masks.at<uint8_t>(v, u) == silhouette.index; };
   const auto add = [&](int u, int v) { rim_px.emplace_back(u * stride, v * stride); };
   for (int v = top; v <= bottom; ++v) {
     int first = left;
@@ -53,33 +53,42 @@ std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
 
 }  // namespace
 
-ThinnedLabels ThinLabels(const cv::Mat& labels) {
-  ThinnedLabels thinned;
-  thinned.stride_px = std::max(1, labels.cols / kThinnedColumns);
-  const int stride = thinned.stride_px;
-  thinned.labels.create((labels.rows + stride - 1) / stride, (labels.cols + stride - 1) / stride, CV_16UC1);
-  for (int v = 0; v < thinned.labels.rows; ++v) {
-    const auto* from = labels.ptr<uint16_t>(v * stride);
-    auto* to = thinned.labels.ptr<uint16_t>(v);
-    for (int u = 0; u < thinned.labels.cols; ++u) to[u] = from[u * stride];
+std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
+                                               const std::vector<LandmarkKey>& keys) {
+  auto masks = std::make_shared<KeyframeMasks>();
+  masks->stride_px = std::max(1, labels.cols / kThinnedColumns);
+  masks->keys = keys;
+  std::vector<uint8_t> index_of_label(1 << 16, kOtherMask);
+  index_of_label[0] = 0;
+  for (size_t d = 0; d < std::min<size_t>(detections.size(), kOtherMask - 1); ++d) {
+    index_of_label[detections[d].label] = static_cast<uint8_t>(d + 1);
   }
-  return thinned;
+  const int stride = masks->stride_px;
+  masks->index.create((labels.rows + stride - 1) / stride, (labels.cols + stride - 1) / stride, CV_8UC1);
+  for (int v = 0; v < masks->index.rows; ++v) {
+    const auto* from = labels.ptr<uint16_t>(v * stride);
+    auto* to = masks->index.ptr<uint8_t>(v);
+    for (int u = 0; u < masks->index.cols; ++u) to[u] = index_of_label[from[u * stride]];
+  }
+  return masks;
 }
 
-Silhouette MakeSilhouette(const KeyframeView& view, const ThinnedLabels& thinned, const Detection& detection) {
+Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
+                          const Detection& detection, size_t detection_index) {
+  const int stride = masks->stride_px;
   Silhouette silhouette{.keyframe = view.id,
                         .camera = view.frame->camera,
                         .T_world_camera = view.T_world_camera,
                         .P_image_world = {},
-                        .thinned = thinned,
-                        .label = detection.label,
+                        .masks = std::move(masks),
+                        .index = static_cast<uint8_t>(std::min<size_t>(detection_index + 1, kOtherMask)),
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
                         .outline_rays_world = {}};
   const CameraModel& camera = silhouette.camera;
   Eigen::Matrix3d K;
-  K << camera.fx_px / thinned.stride_px, 0, camera.cx_px / thinned.stride_px,  //
-      0, camera.fy_px / thinned.stride_px, camera.cy_px / thinned.stride_px,   //
+  K << camera.fx_px / stride, 0, camera.cx_px / stride,  //
+      0, camera.fy_px / stride, camera.cy_px / stride,   //
       0, 0, 1;
   silhouette.P_image_world = K * view.T_world_camera.Inverse().Matrix().topRows<3>();
   silhouette.outline_rays_world = OutlineRays(silhouette);

@@ -1,23 +1,30 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
 
 #include "common/messages.h"
 #include "server/objects/detections.h"
+#include "server/objects/point_registry.h"
 
 namespace romap {
 
-// A keyframe's label image, thinned: it serves all objects of the keyframe and is kept long after the frame is gone.
-struct ThinnedLabels {
-  cv::Mat labels;  // CV_16UC1, every stride_px-th pixel of every stride_px-th row
+// A keyframe's masks, thinned: they serve all objects of the keyframe and are kept long after the frame is gone.
+struct KeyframeMasks {
+  cv::Mat index;  // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
   int stride_px = 1;
+  std::vector<LandmarkKey> keys;  // landmark of each detection
 };
+inline constexpr uint8_t kOtherMask = 255;
 
-// Thins so that at most about 320 columns stay: a box then is within a pixel or two of the full resolution's.
-ThinnedLabels ThinLabels(const cv::Mat& labels);
+// Thins so that at most about 320 columns stay: a box then is within a pixel or two of the full resolution's. `keys`
+// are the landmarks of `detections`; beyond 254 of them are kOtherMask.
+std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
+                                               const std::vector<LandmarkKey>& keys);
 
 enum class MaskHit { kUnknown /* outside the image or behind something else */, kInside, kOutside };
 
@@ -27,8 +34,11 @@ struct Silhouette {
   CameraModel camera;
   SE3<World, Camera> T_world_camera;
   Eigen::Matrix<double, 3, 4> P_image_world;  // projection to homogeneous thinned pixels
-  ThinnedLabels thinned;
-  uint16_t label = 0;
+  std::shared_ptr<const KeyframeMasks> masks;
+  uint8_t index = 0;  // of the object in `masks`
+  // By index in `masks`: where that thing begins (z depth), so that what it hides is told from what it stands behind.
+  // 0 = unknown, may hide anything.
+  std::array<float, 256> near_depth_mu{};
   cv::Rect box_px;
   bool cut_by_border = false;
   std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
@@ -44,15 +54,18 @@ struct Silhouette {
     const double scale = 1 / q.z();
     const double u = q.x() * scale + 0.5;
     const double v = q.y() * scale + 0.5;
-    if (!(u >= 0 && v >= 0 && u < thinned.labels.cols && v < thinned.labels.rows)) return MaskHit::kUnknown;
-    const uint16_t seen = thinned.labels.ptr<uint16_t>(static_cast<int>(v))[static_cast<int>(u)];
-    if (seen == label) return MaskHit::kInside;
-    return seen == 0 ? MaskHit::kOutside : MaskHit::kUnknown;
+    const cv::Mat& image = masks->index;
+    if (!(u >= 0 && v >= 0 && u < image.cols && v < image.rows)) return MaskHit::kUnknown;
+    const uint8_t seen = image.ptr<uint8_t>(static_cast<int>(v))[static_cast<int>(u)];
+    if (seen == index) return MaskHit::kInside;
+    return seen == 0 || near_depth_mu[seen] > q.z() ? MaskHit::kOutside : MaskHit::kUnknown;
   }
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };
 
-Silhouette MakeSilhouette(const KeyframeView& view, const ThinnedLabels& thinned, const Detection& detection);
+// `detection_index` is the object's place among the detections that `masks` was made of.
+Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
+                          const Detection& detection, size_t detection_index);
 
 // The point nearest to all rays through the middles of the silhouettes' boxes (least squares); nullopt when fewer than
 // two uncut silhouettes differ by at least `min_parallax_rad`.

@@ -67,22 +67,35 @@ void HideBehindMissedNeighbours(const ViewCandidate& candidate, const ViewContex
   }
 }
 
+// Labels of things that stand entirely behind the object: a ray that ends there meets nothing of the object.
+std::vector<uint16_t> LabelsBehind(const ViewCandidate& candidate, const ViewContext& context) {
+  const SE3<Camera, World> T_camera_world = candidate.T_world_camera.Inverse();
+  const double far_depth = DepthRange(context.cuboid, T_camera_world).second;
+  std::vector<uint16_t> labels;
+  for (size_t i = 0; i < candidate.detected.size(); ++i) {
+    const auto neighbour = std::find_if(context.neighbours.begin(), context.neighbours.end(),
+                                        [&](const auto& n) { return n.key == candidate.detected[i]; });
+    if (neighbour == context.neighbours.end()) continue;
+    if (DepthRange(neighbour->cuboid, T_camera_world).first > far_depth) labels.push_back(candidate.detected_labels[i]);
+  }
+  return labels;
+}
+
 cv::Mat ClassifyRays(const ViewCandidate& candidate, const ViewContext& context, const cv::Rect& roi) {
   cv::Mat hidden = cv::Mat::zeros(candidate.frame->labels.size(), CV_8UC1);
   HideBehindMissedNeighbours(candidate, context, &hidden);
+  std::vector<RayKind> kind_of_label(1 << 16, RayKind::kOccluder);
+  kind_of_label[0] = RayKind::kBackground;
+  for (uint16_t label : LabelsBehind(candidate, context)) kind_of_label[label] = RayKind::kBackground;
+  kind_of_label[candidate.label] = RayKind::kObject;
   cv::Mat kinds(roi.size(), CV_8UC1);
   for (int v = 0; v < roi.height; ++v) {
     const auto* labels = candidate.frame->labels.ptr<uint16_t>(roi.y + v) + roi.x;
     const auto* hidden_row = hidden.ptr<uint8_t>(roi.y + v) + roi.x;
     auto* kind = kinds.ptr<uint8_t>(v);
     for (int u = 0; u < roi.width; ++u) {
-      RayKind ray = RayKind::kOccluder;
-      if (labels[u] == candidate.label) {
-        ray = RayKind::kObject;
-      } else if (labels[u] == 0 && hidden_row[u] == 0) {
-        ray = RayKind::kBackground;
-      }
-      kind[u] = static_cast<uint8_t>(ray);
+      const bool unsure = labels[u] == 0 && hidden_row[u] != 0;
+      kind[u] = static_cast<uint8_t>(unsure ? RayKind::kOccluder : kind_of_label[labels[u]]);
     }
   }
   return kinds;

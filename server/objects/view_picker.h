@@ -23,6 +23,7 @@ struct ViewCandidate {
   std::vector<MapPointId> points;          // map points seen under the mask
   std::vector<Eigen::Vector2f> pixels_px;  // where, as long as `points`
   std::vector<LandmarkKey> detected;       // landmarks that have a mask in this frame
+  std::vector<uint16_t> detected_labels;   // their labels, as long as `detected`
   double sharpness = 0;                    // variance of the Laplacian inside the box
 };
 
