@@ -110,6 +110,7 @@ size_t Bvh::Partition(std::span<Reference> references) {
 // Calls visit(t) for each triangle hit at 0 < t < t_max, in no order, until it returns true.
 template <class Visit>
 void Bvh::Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_max, Visit visit) const {
+  if (triangles_.empty()) return;
   const Eigen::Vector3f inverse = direction.cwiseInverse();
   std::array<uint32_t, kStack> stack;
   size_t depth = 0;

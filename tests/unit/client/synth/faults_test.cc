@@ -1,0 +1,128 @@
+#include "client/synth/faults.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+namespace romap::synth {
+namespace {
+
+// Four squares of 40 px with labels 1..4 on a ground of 200 x 200.
+cv::Mat FourSquares() {
+  cv::Mat labels = cv::Mat::zeros(200, 200, CV_8UC1);
+  for (int i = 0; i < 4; ++i) {
+    labels(cv::Rect(30 + 100 * (i % 2), 30 + 100 * (i / 2), 40, 40)).setTo(i + 1);
+  }
+  return labels;
+}
+
+TEST(SpoilMask, ChangesNothingUnasked) {
+  Random random(1);
+  const FaultyMask mask = SpoilMask(FourSquares(), 4, {}, random);
+  EXPECT_EQ(cv::countNonZero(mask.labels != FourSquares()), 0);
+  ASSERT_EQ(mask.detections.size(), 4U);
+  for (const SynthDetection& detection : mask.detections) {
+    EXPECT_EQ(detection.label, detection.object);
+    EXPECT_GT(detection.score, 0);
+    EXPECT_LE(detection.score, 1);
+  }
+}
+
+TEST(SpoilMask, ListsOnlyWhatIsVisible) {
+  cv::Mat labels = FourSquares();
+  labels.setTo(0, labels == 2);
+  Random random(1);
+  const FaultyMask mask = SpoilMask(labels, 4, {}, random);
+  ASSERT_EQ(mask.detections.size(), 3U);
+  EXPECT_EQ(mask.detections[1].object, 3);
+}
+
+TEST(SpoilMask, DropsTheShareAskedFor) {
+  Random random(2);
+  size_t kept = 0;
+  for (int i = 0; i < 250; ++i) {
+    const FaultyMask mask = SpoilMask(FourSquares(), 4, {.mask_drop_share = 0.3}, random);
+    kept += mask.detections.size();
+    ASSERT_EQ(cv::countNonZero(mask.labels), 1600 * static_cast<int>(mask.detections.size()));
+  }
+  EXPECT_NEAR(static_cast<double>(kept) / 1000, 0.7, 0.05);
+}
+
+TEST(SpoilMask, ShufflesLabelsAndSaysWhatTheyMean) {
+  Random random(3);
+  const cv::Mat truth = FourSquares();
+  std::set<uint8_t> labels_of_first;
+  for (int i = 0; i < 50; ++i) {
+    const FaultyMask mask = SpoilMask(truth, 4, {.permute_labels = true}, random);
+    std::set<uint8_t> labels;
+    for (const SynthDetection& detection : mask.detections) {
+      labels.insert(detection.label);
+      ASSERT_EQ(cv::countNonZero((mask.labels == detection.label) != (truth == detection.object)), 0);
+      if (detection.object == 1) labels_of_first.insert(detection.label);
+    }
+    ASSERT_EQ(labels, (std::set<uint8_t>{1, 2, 3, 4}));
+  }
+  EXPECT_EQ(labels_of_first.size(), 4U);
+}
+
+TEST(SpoilMask, MovesBordersByAboutTheJitter) {
+  Random random(4);
+  const cv::Mat truth = FourSquares();
+  const FaultyMask mask = SpoilMask(truth, 4, {.mask_jitter_px = 4}, random);
+  const cv::Mat changed = mask.labels != truth;
+  EXPECT_GT(cv::countNonZero(changed), 100);
+  // Nothing changes farther from a border than the displacement reaches.
+  cv::Mat far_inside;
+  cv::erode(truth == 1, far_inside, cv::getStructuringElement(cv::MORPH_RECT, {15, 15}));
+  EXPECT_GT(cv::countNonZero(far_inside), 400);
+  EXPECT_EQ(cv::countNonZero(changed & far_inside), 0);
+}
+
+TEST(SpoilImage, ChangesNothingUnasked) {
+  Random random(1);
+  cv::Mat image(20, 20, CV_8UC3, cv::Scalar(50, 100, 150));
+  SpoilImage(image, {1, 0}, {}, random);
+  EXPECT_EQ(cv::norm(image, cv::Mat(20, 20, CV_8UC3, cv::Scalar(50, 100, 150))), 0);
+}
+
+TEST(SpoilImage, AddsNoiseOfTheSigmaAskedFor) {
+  Random random(1);
+  cv::Mat image(100, 100, CV_8UC3, cv::Scalar(120, 120, 120));
+  SpoilImage(image, {1, 0}, {.noise_sigma = 8}, random);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image, mean, deviation);
+  EXPECT_NEAR(mean[1], 120, 0.5);
+  EXPECT_NEAR(deviation[1], 8, 0.3);
+}
+
+TEST(SpoilImage, SmearsAlongTheMotionOnly) {
+  // A white dot becomes a line of the blur's length.
+  for (const cv::Vec2d& motion : {cv::Vec2d(3, 0), cv::Vec2d(0, -2)}) {
+    Random random(1);
+    cv::Mat image = cv::Mat::zeros(41, 41, CV_8UC3);
+    image.at<cv::Vec3b>(20, 20) = {255, 255, 255};
+    SpoilImage(image, motion, {.motion_blur_px = 10}, random);
+    cv::Mat grey;
+    cv::extractChannel(image, grey, 0);
+    const cv::Rect line = cv::boundingRect(grey);
+    const bool horizontal = motion[0] != 0;
+    EXPECT_NEAR(horizontal ? line.width : line.height, 11, 1);
+    EXPECT_EQ(horizontal ? line.height : line.width, 1);
+    EXPECT_NEAR(cv::sum(grey)[0], 255, 15) << "no light is lost";
+  }
+}
+
+TEST(SpoilImage, DefocusSpreadsADot) {
+  Random random(1);
+  cv::Mat image = cv::Mat::zeros(41, 41, CV_8UC3);
+  cv::circle(image, {20, 20}, 3, {255, 255, 255}, cv::FILLED);
+  const int before = cv::countNonZero(image.reshape(1) > 20);
+  SpoilImage(image, {0, 0}, {.defocus_px = 2}, random);
+  EXPECT_GT(cv::countNonZero(image.reshape(1) > 20), 3 * before / 2);
+}
+
+}  // namespace
+}  // namespace romap::synth
