@@ -54,7 +54,6 @@ std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence
                                                   const std::vector<Silhouette>& silhouettes) {
   std::vector<double> azimuths;
   for (const Silhouette& silhouette : silhouettes) {
-    if (!silhouette.trusted) continue;
     const Eigen::Vector3d view = evidence.region.ToGrid(silhouette.CameraCenter()) - evidence.center;
     const double azimuth = std::atan2(view.y(), view.x());
     azimuths.push_back(azimuth < 0 ? azimuth + std::numbers::pi : azimuth);
@@ -123,7 +122,6 @@ std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const st
   std::vector<double> tops;
   std::vector<double> bottoms;
   for (const Silhouette& silhouette : silhouettes) {
-    if (!silhouette.trusted) continue;
     const Eigen::Vector3d origin = evidence.region.ToGrid(silhouette.CameraCenter());
     std::vector<double> lows;
     std::vector<double> highs;

@@ -184,6 +184,7 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
 void ObjectMapper::CollectEvidence(const KeyframeView& view) {
   if (current_.detections.empty()) return;
   const auto masks = ThinMasks(view.frame->labels, current_.detections, current_.keys);
+  const std::map<LandmarkKey, Cuboid> cuboids = PublishedCuboids();
   std::vector<uint16_t> labels;
   for (const Detection& detection : current_.detections) labels.push_back(detection.label);
   for (size_t d = 0; d < current_.detections.size(); ++d) {
@@ -191,7 +192,9 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
     const Detection& detection = current_.detections[d];
     Landmark& landmark = *FindLandmark(current_.keys[d]);
     ++landmark.keyframe_sightings;
-    landmark.needs_fit |= landmark.shape.AddSilhouette(MakeSilhouette(view, masks, detection, d));
+    Silhouette silhouette = MakeSilhouette(view, masks, detection, d);
+    UpdateNeighbours(cuboids, &silhouette);
+    landmark.needs_fit |= landmark.shape.AddSilhouette(std::move(silhouette));
     ViewCandidate candidate{.keyframe = view.id,
                             .frame = view.frame,
                             .T_world_camera = view.T_world_camera,
@@ -225,6 +228,14 @@ void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
   }
 }
 
+std::map<LandmarkKey, Cuboid> ObjectMapper::PublishedCuboids() const {
+  std::map<LandmarkKey, Cuboid> cuboids;
+  for (const auto& landmark : landmarks_) {
+    if (landmark->published) cuboids[landmark->key] = landmark->published->cuboid;
+  }
+  return cuboids;
+}
+
 void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
                             const std::vector<Eigen::Vector3d>& background) {
   if (landmark.shape.silhouettes().empty()) return;
@@ -237,10 +248,8 @@ void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
       positions.push_back(member.position_world);
     }
   }
-  std::map<LandmarkKey, Cuboid> neighbours;
-  for (const auto& other : landmarks_) {
-    if (other->key != landmark.key && other->published) neighbours[other->key] = other->published->cuboid;
-  }
+  std::map<LandmarkKey, Cuboid> neighbours = PublishedCuboids();
+  neighbours.erase(landmark.key);
   const auto fit = landmark.shape.Update(
       {.up_world = up_world_, .points = positions, .background = background, .neighbours = &neighbours},
       landmark.cuboid);

@@ -56,6 +56,7 @@ class ObjectMapper {
   void CountPointVotes(const KeyframeView& view);
   void UpdateSceneDepth(const KeyframeView& view);
   void CollectEvidence(const KeyframeView& view);
+  std::map<LandmarkKey, Cuboid> PublishedCuboids() const;
   void FitShapes(const std::vector<LandmarkKey>& keys);
   void FitShape(Landmark& landmark, const PointGroups& groups, const std::vector<Eigen::Vector3d>& background);
   bool IsProven(const Landmark& landmark) const;

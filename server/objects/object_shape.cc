@@ -25,17 +25,6 @@ Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
   return median;
 }
 
-// Depths at which the other things of the picture begin, as far as their cuboids are known.
-void UpdateNearDepths(const std::map<LandmarkKey, Cuboid>& neighbours, Silhouette* silhouette) {
-  silhouette->near_depth_mu.fill(0);
-  const SE3<Camera, World> T_camera_world = silhouette->T_world_camera.Inverse();
-  for (size_t d = 0; d + 1 < kOtherMask && d < silhouette->masks->keys.size(); ++d) {
-    const auto neighbour = neighbours.find(silhouette->masks->keys[d]);
-    if (neighbour == neighbours.end()) continue;
-    silhouette->near_depth_mu[d + 1] = static_cast<float>(DepthRange(neighbour->second, T_camera_world).first);
-  }
-}
-
 // Without a centre, the optical axis stands for the direction to the object: good enough to compare cameras.
 Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
   const double u_px = silhouette.box_px.x + silhouette.box_px.width / 2.0;
@@ -71,10 +60,10 @@ void ObjectShape::MakeRoom() {
       const double angle = AngleBetween(ViewDirection(silhouettes_[i]), ViewDirection(silhouettes_[j]));
       if (angle >= worst_angle) continue;
       worst_angle = angle;
-      worst = silhouettes_[i].cut_by_border || !silhouettes_[i].trusted ? i : j;
+      worst = silhouettes_[i].cut_by_border ? i : j;
     }
   }
-  if (!hull_.empty() && silhouettes_[worst].trusted) hull_.Remove(silhouettes_[worst]);
+  if (!hull_.empty()) hull_.Remove(silhouettes_[worst]);
   silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(worst));
 }
 
@@ -103,73 +92,20 @@ void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundin
   hull_.Reset(region, config_.hull_cells);
   silhouettes_when_carved_ = silhouettes_.size();
   for (Silhouette& silhouette : silhouettes_) {
-    UpdateNearDepths(*surroundings.neighbours, &silhouette);
-    if (silhouette.trusted) hull_.Add(silhouette);
+    UpdateNeighbours(*surroundings.neighbours, &silhouette);
+    hull_.Add(silhouette);
   }
 }
 
-int ObjectShape::TrustedCount() const {
-  return static_cast<int>(
-      std::count_if(silhouettes_.begin(), silhouettes_.end(), [](const auto& s) { return s.trusted; }));
-}
-
+// A bad mask must not eat the object, but every silhouette that may err makes the hull wider.
 HullVotes ObjectShape::StrictVotes() const {
-  const int count = TrustedCount();
+  const auto count = static_cast<int>(silhouettes_.size());
   return {.max_outside = count < 8 ? 0 : std::max(1, count / 20), .min_inside = std::max(1, count * 3 / 10)};
 }
 
 HullVotes ObjectShape::LenientVotes() const {
-  const int count = TrustedCount();
+  const auto count = static_cast<int>(silhouettes_.size());
   return {.max_outside = std::max(1, count / 4), .min_inside = std::max(1, count * 3 / 10)};
-}
-
-// Whether the cameras of two other silhouettes stand on either side of this one, not far away. Then nearly all that it
-// denies is denied by one of them as well, which is not so at the frontier of what was seen.
-bool ObjectShape::IsBetweenOthers(const Silhouette& silhouette) const {
-  constexpr double kNearRad = 25 * kRadPerDeg;
-  std::vector<Eigen::Vector3d> near;
-  for (const Silhouette& other : silhouettes_) {
-    const double angle = AngleBetween(ViewDirection(other), ViewDirection(silhouette));
-    if (&other != &silhouette && other.trusted && angle < kNearRad) near.push_back(ViewDirection(other));
-  }
-  for (size_t i = 0; i < near.size(); ++i) {
-    for (size_t j = 0; j < i; ++j) {
-      const double to_i = AngleBetween(near[i], ViewDirection(silhouette));
-      const double to_j = AngleBetween(near[j], ViewDirection(silhouette));
-      if (AngleBetween(near[i], near[j]) > 0.8 * (to_i + to_j)) return true;
-    }
-  }
-  return false;
-}
-
-// A truncated or misplaced mask is the only one to deny a part of the object. Such silhouettes lose their vote.
-void ObjectShape::JudgeSilhouettes() {
-  constexpr double kMostDeniedAlone = 0.12;  // of the hull
-  const HullVotes undenied{.max_outside = 0, .min_inside = StrictVotes().min_inside};
-  const HullVotes denied_once{.max_outside = 1, .min_inside = undenied.min_inside};
-  std::vector<Eigen::Vector3d> cells = hull_.Cells(denied_once);
-  const auto hull_cells = static_cast<double>(hull_.Cells(undenied).size());
-  std::erase_if(cells, [&](const Eigen::Vector3d& cell) { return hull_.Contains(cell, undenied); });
-  constexpr size_t kSamples = 600;
-  const size_t step = cells.size() / kSamples + 1;
-  std::vector<double> denied_alone(silhouettes_.size(), 0);
-  for (size_t i = 0; i < cells.size(); i += step) {
-    const Eigen::Vector3d p_world = hull_.region().ToWorld(cells[i]);
-    for (size_t s = 0; s < silhouettes_.size(); ++s) {
-      if (!silhouettes_[s].trusted || silhouettes_[s].Look(p_world) != MaskHit::kOutside) continue;
-      denied_alone[s] += static_cast<double>(step);
-      break;
-    }
-  }
-  for (size_t s = 0; s < silhouettes_.size(); ++s) {
-    Silhouette& silhouette = silhouettes_[s];
-    const double share = denied_alone[s] / std::max(1.0, hull_cells);
-    if (!silhouette.trusted || share < kMostDeniedAlone || !IsBetweenOthers(silhouette)) continue;
-    silhouette.trusted = false;
-    hull_.Remove(silhouette);
-    spdlog::debug("objects: silhouette of {} distrusted: it alone denies a part of {:.0f} % of the hull",
-                  silhouette.keyframe.ToString(), 100 * share);
-  }
 }
 
 // Moves the grid to where the hull is when it reaches the grid's border, or when there are many more silhouettes than
@@ -250,7 +186,6 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   };
   if (hull_.empty()) start_over();
   RefocusRegion(*extent, surroundings);
-  JudgeSilhouettes();
 
   CuboidEvidence evidence;
   evidence.region = hull_.region();
@@ -288,7 +223,7 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   fit.body_world = SampleBody(*cuboid, surroundings.points, fit.point_is_inlier);
   fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
   const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));
-  const double seen_often = std::min(1.0, TrustedCount() / 10.0);
+  const double seen_often = std::min(1.0, static_cast<double>(silhouettes_.size()) / 10);
   fit.cuboid.confidence = 0.5 * seen_around + 0.5 * seen_often;
   return fit;
 }

@@ -48,10 +48,7 @@ class ObjectShape {
   bool IsRedundant(const Silhouette& silhouette) const;
   void MakeRoom();
   void Carve(const HullRegion& region, const Surroundings& surroundings);
-  bool IsBetweenOthers(const Silhouette& silhouette) const;
-  void JudgeSilhouettes();
   void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
-  int TrustedCount() const;
   HullVotes StrictVotes() const;
   HullVotes LenientVotes() const;
   std::vector<bool> JudgePoints(std::span<const Eigen::Vector3d> points_world) const;

@@ -82,6 +82,7 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
                         .P_image_world = {},
                         .masks = std::move(masks),
                         .index = static_cast<uint8_t>(std::min<size_t>(detection_index + 1, kOtherMask)),
+                        .neighbours = {},
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
                         .outline_rays_world = {}};
@@ -93,6 +94,31 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
   silhouette.P_image_world = K * view.T_world_camera.Inverse().Matrix().topRows<3>();
   silhouette.outline_rays_world = OutlineRays(silhouette);
   return silhouette;
+}
+
+void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette) {
+  silhouette->neighbours.assign(silhouette->masks->keys.size(), std::nullopt);
+  for (size_t i = 0; i < silhouette->neighbours.size(); ++i) {
+    const auto found = cuboids.find(silhouette->masks->keys[i]);
+    if (found == cuboids.end()) continue;
+    const SE3<Object, World> T_object_world = found->second.T_world_object.Inverse();
+    const Eigen::Matrix3d shrink = found->second.half_extents.cwiseInverse().asDiagonal();
+    silhouette->neighbours[i] =
+        UnitBox{shrink * T_object_world.RotationMatrix(), shrink * T_object_world.translation()};
+  }
+}
+
+bool Silhouette::MayHide(int seen, const Eigen::Vector3d& p_world) const {
+  const auto neighbour = static_cast<size_t>(seen) - 1;
+  if (neighbour >= neighbours.size() || !neighbours[neighbour]) return true;
+  // The sight line from the camera (parameter 0) to the point (1) meets the box.
+  const Eigen::Vector3d from = *neighbours[neighbour] * CameraCenter();
+  const Eigen::Vector3d step = *neighbours[neighbour] * p_world - from;
+  const Eigen::Array3d t0 = (-1 - from.array()) / step.array();
+  const Eigen::Array3d t1 = (1 - from.array()) / step.array();
+  const double near = t0.min(t1).maxCoeff();
+  const double far = t0.max(t1).minCoeff();
+  return near <= far && far >= 0 && near <= 1;
 }
 
 std::optional<Eigen::Vector3d> IntersectCenterRays(const std::vector<Silhouette>& silhouettes,

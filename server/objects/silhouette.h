@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
+#include <map>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -28,6 +28,14 @@ std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std:
 
 enum class MaskHit { kUnknown /* outside the image or behind something else */, kInside, kOutside };
 
+// A cuboid as the map of its inside to the cube [-1, 1]^3.
+struct UnitBox {
+  Eigen::Matrix3d M;
+  Eigen::Vector3d offset;
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p_world) const { return M * p_world + offset; }
+};
+
 // The outline of one object in one keyframe.
 struct Silhouette {
   KeyframeId keyframe;
@@ -36,36 +44,46 @@ struct Silhouette {
   Eigen::Matrix<double, 3, 4> P_image_world;  // projection to homogeneous thinned pixels
   std::shared_ptr<const KeyframeMasks> masks;
   uint8_t index = 0;  // of the object in `masks`
-  // By index in `masks`: where that thing begins (z depth), so that what it hides is told from what it stands behind.
-  // 0 = unknown, may hide anything.
-  std::array<float, 256> near_depth_mu{};
+  // By index in `masks` - 1: the cuboid of that thing, as far as known. It tells what the thing hides from what it
+  // stands behind.
+  std::vector<std::optional<UnitBox>> neighbours;
   cv::Rect box_px;
   bool cut_by_border = false;
   std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
-  bool trusted = true;                              // false: contradicts the other silhouettes
 
   // What lies under a point of the world.
   MaskHit Look(const Eigen::Vector3d& p_world) const {
-    return LookHomogeneous(P_image_world.leftCols<3>() * p_world + P_image_world.col(3));
+    return Judge(SeenAt(P_image_world.leftCols<3>() * p_world + P_image_world.col(3)), [&] { return p_world; });
   }
-  // The same for an already projected point.
-  MaskHit LookHomogeneous(const Eigen::Vector3d& q) const {
-    if (!(q.z() > 1e-9)) return MaskHit::kUnknown;
+  // Value of masks->index under a projected point; -1 outside the image.
+  int SeenAt(const Eigen::Vector3d& q) const {
+    if (!(q.z() > 1e-9)) return -1;
     const double scale = 1 / q.z();
     const double u = q.x() * scale + 0.5;
     const double v = q.y() * scale + 0.5;
     const cv::Mat& image = masks->index;
-    if (!(u >= 0 && v >= 0 && u < image.cols && v < image.rows)) return MaskHit::kUnknown;
-    const uint8_t seen = image.ptr<uint8_t>(static_cast<int>(v))[static_cast<int>(u)];
-    if (seen == index) return MaskHit::kInside;
-    return seen == 0 || near_depth_mu[seen] > q.z() ? MaskHit::kOutside : MaskHit::kUnknown;
+    if (!(u >= 0 && v >= 0 && u < image.cols && v < image.rows)) return -1;
+    return image.ptr<uint8_t>(static_cast<int>(v))[static_cast<int>(u)];
   }
+  // `p_world()` gives the point that was projected; it is asked for only where another thing is seen.
+  template <class PointFunction>
+  MaskHit Judge(int seen, const PointFunction& p_world) const {
+    if (seen == index) return MaskHit::kInside;
+    if (seen == 0) return MaskHit::kOutside;
+    return seen < 0 || MayHide(seen, p_world()) ? MaskHit::kUnknown : MaskHit::kOutside;
+  }
+  // Whether the thing with this index may stand between the camera and the point.
+  bool MayHide(int seen, const Eigen::Vector3d& p_world) const;
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };
 
 // `detection_index` is the object's place among the detections that `masks` was made of.
+// Its neighbours are unknown yet.
 Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
                           const Detection& detection, size_t detection_index);
+
+// Tells a silhouette where the other things of its picture stand, as far as their cuboids are known.
+void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette);
 
 // The point nearest to all rays through the middles of the silhouettes' boxes (least squares); nullopt when fewer than
 // two uncut silhouettes differ by at least `min_parallax_rad`.

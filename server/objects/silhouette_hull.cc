@@ -22,9 +22,10 @@ void SilhouetteHull::Vote(const Silhouette& silhouette, int weight) {
     for (int y = 0; y < cells_; ++y) {
       Eigen::Vector3d q = origin + M * CellCenter(0, y, z);
       for (int x = 0; x < cells_; ++x, ++index, q += step_x) {
-        const MaskHit sight = silhouette.LookHomogeneous(q);
-        if (sight == MaskHit::kInside) inside_[index] = static_cast<int16_t>(inside_[index] + weight);
-        if (sight == MaskHit::kOutside) outside_[index] = static_cast<int16_t>(outside_[index] + weight);
+        const MaskHit hit =
+            silhouette.Judge(silhouette.SeenAt(q), [&] { return region_.ToWorld(CellCenter(x, y, z)); });
+        if (hit == MaskHit::kInside) inside_[index] = static_cast<int16_t>(inside_[index] + weight);
+        if (hit == MaskHit::kOutside) outside_[index] = static_cast<int16_t>(outside_[index] + weight);
       }
     }
   }
