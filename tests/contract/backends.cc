@@ -4,6 +4,7 @@
 
 #include "client/sdk/remote_mapping_service.h"
 #include "common/status.h"
+#include "server/session/local_mapping_service.h"
 #include "tests/support/fake_mapping_service.h"
 
 namespace romap::contract {
@@ -20,6 +21,13 @@ T Must(absl::StatusOr<T> result) {
 std::vector<Backend> AllBackends() {
   const std::vector<Backend> in_process = {
       {"Fake", [] { return std::make_unique<testing::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
+      {"Local",
+       [] {
+         ServerConfig config;
+         config.training_threads = 1;
+         return std::make_unique<LocalMappingService>(config);
+       },
+       /*objects_from_one_frame=*/false},
   };
   std::vector<Backend> all;
   for (const Backend& backend : in_process) {
