@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "common/status.h"
@@ -9,6 +11,7 @@
 #include "server/mesh/floaters.h"
 #include "server/mesh/hidden_space.h"
 #include "server/mesh/marching_cubes.h"
+#include "server/mesh/support_height.h"
 
 namespace romap {
 namespace {
@@ -50,6 +53,10 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   std::span<const Eigen::Vector3f> views;
   if (config.fill_unseen) views = snapshot.view_centers_object;
   FillHiddenSpace(grid, level, views, config.unseen_optical_depth);
+  if (config.cut_below_support) {
+    const auto height = FindSupportHeight(grid, level, snapshot.view_centers_object, config.unseen_optical_depth);
+    if (height) CutBelow(grid, level, *height);
+  }
   if (RemoveFloaters(grid, level, connect_level, config.min_component_share) == 0) {
     return FailedPrecondition("{}: no surface at this level", snapshot.object.ToString());
   }

@@ -34,6 +34,8 @@ struct FieldGrid {
             static_cast<float>(index / StrideZ())};
   }
   Eigen::Vector3f Position(const Eigen::Vector3f& node) const { return origin + node.cwiseProduct(spacing); }
+  // Inverse of Position(): node coordinates of a point of the Object frame.
+  Eigen::Vector3f ToNode(const Eigen::Vector3f& p_object) const { return (p_object - origin).cwiseQuotient(spacing); }
 };
 
 // A grid of `resolution`^3 empty nodes over the box |p| <= half_extents, and the ring.

@@ -8,7 +8,8 @@ namespace romap {
 struct MeshConfig {
   int resolution = 64;
   bool fill_unseen = true;
-  double unseen_optical_depth = 1.5;
+  double unseen_optical_depth = 0.2;
+  bool cut_below_support = true;
   double min_component_share = 0.5;
 
   void Fields(ConfigFields& fields) {
@@ -17,7 +18,9 @@ struct MeshConfig {
     fields.Add("fill_unseen", &fill_unseen,
                {.help = "Empty space that no training view can see becomes solid (undersides, insides)"});
     fields.Add("unseen_optical_depth", &unseen_optical_depth,
-               {.min = 0.1, .max = 100, .help = "Optical depth towards a view beyond which it sees nothing"});
+               {.min = 0.01, .max = 100, .help = "Optical depth towards a view beyond which it sees nothing"});
+    fields.Add("cut_below_support", &cut_below_support,
+               {.help = "The object ends at the lowest height where a training view sees its surface"});
     fields.Add("min_component_share", &min_component_share,
                {.min = 0, .max = 1, .help = "A separate piece smaller than this share of the largest is a floater"});
   }

@@ -42,7 +42,8 @@ class DistanceField : public FieldSampler {
 
 inline constexpr float kTestLevel = 3.0f;
 
-// A snapshot of object/3 over the box, seen by nobody, without a hull. Raw changes by 20 over the longest half extent.
+// A snapshot of object/3 over the box, seen by nobody, without a hull. Raw changes by 60 over the longest half extent,
+// as a trained field's does or faster.
 inline FieldSnapshot SnapshotOf(InsideDistance distance,
                                 const Eigen::Vector3f& box_half_extents = Eigen::Vector3f::Ones()) {
   FieldSnapshot snapshot;
@@ -50,7 +51,7 @@ inline FieldSnapshot SnapshotOf(InsideDistance distance,
   snapshot.box_half_extents = box_half_extents;
   snapshot.surface_level = kTestLevel;
   snapshot.connect_level = kTestLevel - 2.0f;
-  snapshot.field = std::make_shared<DistanceField>(std::move(distance), kTestLevel, 20.0f / box_half_extents.maxCoeff(),
+  snapshot.field = std::make_shared<DistanceField>(std::move(distance), kTestLevel, 60.0f / box_half_extents.maxCoeff(),
                                                    box_half_extents);
   return snapshot;
 }
