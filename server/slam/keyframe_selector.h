@@ -1,7 +1,6 @@
 #pragma once
 
 #include <deque>
-#include <opencv2/core/mat.hpp>
 #include <optional>
 
 #include "common/messages.h"

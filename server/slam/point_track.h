@@ -25,12 +25,14 @@ struct PointTrack {
 // The ray of a feature, with its range where the keyframe's depth image gave one.
 Sight SightOf(const MapKeyframe& keyframe, int feature, const SlamConfig& config);
 
-// The feature of `keyframe`, not tied to a point yet, that shows `track`: near its projection, of fitting size and
-// descriptor. nullopt: out of sight, seen from too different a direction, not found, or ambiguous.
+// Where a point was found in a keyframe.
 struct Sighting {
   int feature = 0;
   int distance = 0;  // Hamming, bits
 };
+
+// The feature of `keyframe`, not tied to a point yet, that shows `track`: near its projection, of fitting size and
+// descriptor. nullopt: out of sight, seen from too different a direction, not found, or ambiguous.
 std::optional<Sighting> FindInKeyframe(const PointTrack& track, const MapKeyframe& keyframe, const SlamConfig& config);
 
 // A track with one sight, at `p_world`.

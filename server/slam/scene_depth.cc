@@ -18,7 +18,8 @@ constexpr int kDepths = 24;
 // nothing at this image size.
 constexpr double kFirstParallax = 0.008;
 constexpr double kLastParallax = 0.4;
-constexpr int kMinVotes = 8;
+constexpr int kMinVotes = 8;       // blocks
+constexpr float kDistinct = 0.6F;  // best cost of a block over its mean cost
 
 // Pixels of a view to pixels of another one by way of the plane z = depth_mu in the first camera.
 cv::Matx33d PlaneHomography(const DepthView& first, const DepthView& second, double depth_mu) {
@@ -123,10 +124,12 @@ std::optional<double> SceneDepth(const DepthView& first, const DepthView& second
       for (int i = 0; i < kDepths; ++i) {
         const float cost = costs[i].at<float>(row, col);
         if (cost < costs[best].at<float>(row, col)) best = i;
-        if (std::isfinite(cost)) sum += cost, ++finite;
+        if (!std::isfinite(cost)) continue;
+        sum += cost;
+        ++finite;
       }
       // A block votes when one depth stands out, and not at either end: there the true depth may lie beyond.
-      const bool distinct = finite > kDepths / 2 && costs[best].at<float>(row, col) < 0.6F * sum / finite;
+      const bool distinct = finite > kDepths / 2 && costs[best].at<float>(row, col) < kDistinct * sum / finite;
       if (distinct && best > 0 && best < kDepths - 1) votes.push_back(depths_mu[best]);
     }
   }

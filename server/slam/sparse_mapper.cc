@@ -40,14 +40,12 @@ void SparseMapper::FindKnownPoints(MapKeyframe& keyframe) {
   using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
   std::vector<Claim> claims;
   for (const auto& [id, track] : tracks_) {
-    if (const auto found = FindInKeyframe(track, keyframe, config_))
-      claims.emplace_back(found->distance, id, found->feature);
+    const auto found = FindInKeyframe(track, keyframe, config_);
+    if (found) claims.emplace_back(found->distance, id, found->feature);
   }
   std::sort(claims.begin(), claims.end());
   for (const auto& [distance, id, feature] : claims) {
-    if (!keyframe.points[static_cast<size_t>(feature)]) {
-      Tie(keyframe, feature, tracks_.at(id));
-    }
+    Tie(keyframe, feature, tracks_.at(id));
   }
 }
 
