@@ -31,6 +31,8 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "views", .min = 1, .max = 100, .help = "Fewest views that must call a hull cell empty"});
   fields.Add("hull_vote_share", &c.hull_vote_share,
              {.min = 0, .max = 1, .help = "Least share of the views seeing a hull cell that must call it empty"});
+  fields.Add("hull_trim_share", &c.hull_trim_share,
+             {.min = 0, .max = 0.2, .help = "Outermost layers in which fewer rays end are cut off the hull; 0 = none"});
   fields.Add("occupancy_start_step", &c.occupancy_start_step,
              {.unit = "steps", .min = 0, .max = 100000, .help = "First step that narrows the occupied cells"});
   fields.Add("occupancy_interval_steps", &c.occupancy_interval_steps,

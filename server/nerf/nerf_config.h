@@ -21,7 +21,8 @@ struct NerfConfig {
   double box_enlargement = 0.1;
   double hull_margin = 0.8;
   int hull_min_votes = 1;
-  double hull_vote_share = 0.0;
+  double hull_vote_share = 0.08;
+  double hull_trim_share = 0.002;
   int occupancy_start_step = 40;
   int occupancy_interval_steps = 20;
   double occupancy_decay = 0.9;

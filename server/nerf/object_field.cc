@@ -138,7 +138,7 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.box_half_extents = box_.half_extents.cast<float>();
   snapshot.surface_level = static_cast<float>(config_.surface_level);
   snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
-  snapshot.hull = {nerf::kOccupancyResolution, occupancy_.hull()};
+  snapshot.hull = {nerf::kOccupancyResolution, occupancy_.TrimmedHull(config_.hull_trim_share)};
   const SE3<Object, World> T_object_world = box_.T_world_object.Inverse();
   for (const ObjectView& view : views_) {
     snapshot.view_centers_object.push_back((T_object_world * view.T_world_camera.translation()).cast<float>());

@@ -1,5 +1,6 @@
 #include "server/nerf/cpu/occupancy.h"
 
+#include <numeric>
 #include <utility>
 
 namespace romap::nerf {
@@ -37,11 +38,40 @@ void Occupancy::SetHull(std::vector<uint8_t> hull) {
 }
 
 void Occupancy::Reset() {
+  layer_weight_ = {};
   for (size_t i = 0; i < score_.size(); ++i) score_[i] = 1.0f;
   Update();
 }
 
+std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {
+  std::array<int, 3> first, last;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto& weight = layer_weight_[axis];
+    const double most_cut = share * std::accumulate(weight.begin(), weight.end(), 0.0);
+    first[axis] = 0;
+    last[axis] = kSide - 1;
+    double below = weight.front(), above = weight.back();
+    while (first[axis] < kSide - 1 && below < most_cut) below += weight[static_cast<size_t>(++first[axis])];
+    while (last[axis] > 0 && above < most_cut) above += weight[static_cast<size_t>(--last[axis])];
+    // One layer of margin: the surface lies somewhere within its cell.
+    first[axis] -= 1;
+    last[axis] += 1;
+  }
+  std::vector<uint8_t> trimmed = hull_;
+  for (size_t cell = 0; cell < trimmed.size(); ++cell) {
+    const std::array<int, 3> at = {static_cast<int>(cell % kSide), static_cast<int>(cell / kSide % kSide),
+                                   static_cast<int>(cell / (kSide * kSide))};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (at[axis] < first[axis] || at[axis] > last[axis]) trimmed[cell] = 0;
+    }
+  }
+  return trimmed;
+}
+
 void Occupancy::Update() {
+  for (auto& axis : layer_weight_) {
+    for (double& weight : axis) weight *= 0.5;  // early steps end rays all over the hull
+  }
   std::vector<uint64_t> in_hull(kRows), live(kRows);
   for (size_t row = 0; row < kRows; ++row) {
     for (int x = 0; x < kSide; ++x) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,11 +21,19 @@ class Occupancy {
   void Reset();
   // A sample in `cell` got `weight`: the score becomes the larger of that and the decayed score.
   void Record(uint32_t cell, float weight) {
+    layer_weight_[0][cell % kOccupancyResolution] += weight;
+    layer_weight_[1][cell / kOccupancyResolution % kOccupancyResolution] += weight;
+    layer_weight_[2][cell / (kOccupancyResolution * kOccupancyResolution)] += weight;
     const float decayed = score_[cell] * decay_;
     score_[cell] = weight > decayed ? weight : decayed;
   }
   // Occupied = in the hull, and within one cell of a hull cell whose score exceeds the threshold.
   void Update();
+
+  // The hull without the outermost layers along each axis in which rays have ended with less than `share` of all
+  // weight. Behind what no view sees, such as the table an object stands on, the hull goes on to the end of the box;
+  // the object does not.
+  std::vector<uint8_t> TrimmedHull(double share) const;
 
   const uint32_t* bits() const { return bits_.data(); }
   const std::vector<uint8_t>& hull() const { return hull_; }
@@ -35,6 +44,7 @@ class Occupancy {
   std::vector<uint8_t> hull_;
   AlignedBuffer<float> score_;
   AlignedBuffer<uint32_t> bits_;
+  std::array<std::array<double, kOccupancyResolution>, 3> layer_weight_ = {};  // fades from Update to Update
 };
 
 }  // namespace romap::nerf

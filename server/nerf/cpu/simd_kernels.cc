@@ -19,9 +19,9 @@ const KernelTable& GetKernels() {
 #if HWY_TARGET == HWY_SCALAR
   static const KernelTable table = MakeKernelTable<float, float, float, Quad>("SCALAR");
 #else
-  using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes>>;
-  using Narrow = hn::VFromD<hn::CappedTag<float, 8>>;
-  using Four = hn::VFromD<hn::FixedTag<float, 4>>;
+  using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes> >;
+  using Narrow = hn::VFromD<hn::CappedTag<float, 8> >;
+  using Four = hn::VFromD<hn::FixedTag<float, 4> >;
   static const KernelTable table = MakeKernelTable<Wide, Narrow, Four, VectorQuad>(hwy::TargetName(HWY_TARGET));
 #endif
   return table;
