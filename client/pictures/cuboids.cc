@@ -8,6 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "client/pictures/pictures.h"

@@ -1,6 +1,7 @@
 #include "client/synth/solid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>

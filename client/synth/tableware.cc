@@ -1,14 +1,12 @@
 // Mug, bottle, bowl, teapot, wine glass: surfaces of revolution with thick walls, handles and spouts.
 
+#include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "client/synth/solids.h"
 
 namespace romap::synth {
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
 

@@ -1,5 +1,6 @@
 // Chair, bear, duck, car: small enough to stand on a table.
 
+#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <opencv2/core.hpp>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 
 namespace romap {
 namespace {
