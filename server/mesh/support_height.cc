@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,10 @@ namespace {
 constexpr float kMinCosine = 0.5f;
 // Of the visible area; what is noise at the rim of the hull.
 constexpr double kShareBelow = 0.01;
+// Walls have normals within 30 degrees of the horizontal. Where views see hardly any, as from straight above, the
+// lowest visible height says nothing.
+constexpr float kMaxWallNormalZ = 0.5f;
+constexpr double kMinWallShare = 0.05;  // of the visible area
 // Raw units per node spacing with which matter fades below the cut.
 constexpr float kCutSlope = 4.0f;
 
@@ -33,6 +38,7 @@ std::optional<float> FindSupportHeight(const FieldGrid& grid, float level,
   const Mesh mesh = MarchingCubes(grid, level);
   std::vector<SurfacePatch> visible;
   double visible_area = 0;
+  double wall_area = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
     const Eigen::Vector3f& p = mesh.vertices[a];
     const Eigen::Vector3f cross = (mesh.vertices[b] - p).cross(mesh.vertices[c] - p);
@@ -44,8 +50,9 @@ std::optional<float> FindSupportHeight(const FieldGrid& grid, float level,
     if (!sight.IsSurfaceSeen(grid.ToNode(center) + normal, normal, kMinCosine)) continue;
     visible.push_back({center.z(), area});
     visible_area += area;
+    if (std::abs(normal.z()) < kMaxWallNormalZ) wall_area += area;
   }
-  if (visible.empty()) return std::nullopt;
+  if (visible.empty() || wall_area < kMinWallShare * visible_area) return std::nullopt;
   std::sort(visible.begin(), visible.end(),
             [](const SurfacePatch& a, const SurfacePatch& b) { return a.height < b.height; });
   double below = 0;

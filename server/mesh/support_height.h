@@ -9,7 +9,8 @@
 namespace romap {
 
 // Height (z in the Object frame, map units) of the lowest part of the surface at `level` that some view sees from the
-// front, with a small share of the visible area allowed below it for noise. nullopt: no view sees any surface.
+// front, with a small share of the visible area allowed below it for noise. nullopt: the views see no walls that could
+// end somewhere.
 //
 // Cameras mostly look down on an object, so neither masks nor colours tell where it ends below: hidden space reaches
 // down to the bottom of the box. But what carries the object was seen around it, and where that begins the visible

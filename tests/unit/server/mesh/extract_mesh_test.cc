@@ -203,6 +203,12 @@ TEST(ExtractMesh, UndersideThatAViewSeesIsNotCut) {
   EXPECT_NEAR(Volume(Extract(snapshot)), whole, 0.01 * whole);
 }
 
+TEST(ExtractMesh, SeenFromStraightAboveNothingIsCut) {
+  FieldSnapshot snapshot = SnapshotOf([](const Eigen::Vector3f& p) { return 0.5f - p.cwiseAbs().maxCoeff(); });
+  snapshot.view_centers_object = {{0.1f, 0, 6}, {0, 0.1f, 6}, {-0.1f, 0, 6}};
+  EXPECT_GT(Volume(Extract(snapshot)), 1.0);
+}
+
 // The same bowl upright: cameras look into it.
 TEST(ExtractMesh, SpaceThatSomeViewSeesStaysEmpty) {
   const InsideDistance bowl = [](const Eigen::Vector3f& p) {
