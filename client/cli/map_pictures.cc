@@ -10,8 +10,7 @@
 
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/mapped_frames.h"
-#include "client/pictures/draw_cuboids.h"
-#include "client/pictures/mesh_beside_view.h"
+#include "client/pictures/pictures.h"
 
 namespace romap {
 namespace {
@@ -76,6 +75,12 @@ absl::Status WriteMapPictures(const std::string& dir, const Sequence& sequence,
         WriteImage(folder / (entry.file_stem + ".png"),
                    DrawMeshBesideView(entry.mesh_world, image, camera, view->T_world_camera, &entry.object.cuboid)));
   }
+  std::vector<Mesh> meshes;
+  for (const MapObject& entry : objects) meshes.push_back(entry.mesh_world);
+  const Eigen::Vector3d up_world =
+      objects.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
+                      : objects.front().object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();
+  ROMAP_RETURN_IF_ERROR(WriteImage(folder / "map.png", DrawOverview(meshes, updates, up_world)));
   for (size_t i = 0; i < std::min(kCuboidFrames, frames.size()); ++i) {
     const MappedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * std::min(kCuboidFrames, frames.size()))];
     ROMAP_ASSIGN_OR_RETURN(cv::Mat image, LoadImage(sequence, frame.index));

@@ -12,7 +12,7 @@
 #include "client/cli/run_stream.h"
 #include "client/cli/run_summary.h"
 #include "client/cli/service_options.h"
-#include "client/eval/evaluate_run.h"
+#include "client/eval/eval.h"
 #include "common/status.h"
 
 namespace romap {
@@ -56,15 +56,11 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
 }
 
 // Adds the figures against ground truth, where the sequence has any, to the summary and prints them.
-absl::Status Evaluate(const RunOptions& options, nlohmann::json& summary) {
-  const auto report = EvaluateRun(options.out, options.sequence_dir);
-  if (!report.ok()) {
-    if (report.status().code() == absl::StatusCode::kNotFound) return absl::OkStatus();  // no ground truth
-    return report.status();
-  }
-  summary["evaluation"] = ToJson(*report);
-  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, FormatTable(*report));
-  return absl::OkStatus();
+void Evaluate(const RunOptions& options, nlohmann::json& summary) {
+  const RunReport report = EvaluateRun(options.out, options.sequence_dir, /*poses_given=*/true);
+  summary["evaluation"] = ToJson(report);
+  if (!report.objects && !report.boxes) return;  // the sequence has no ground truth
+  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, FormatTable(report));
 }
 
 absl::Status RunSequence(const RunOptions& options) {
@@ -87,12 +83,11 @@ absl::Status RunSequence(const RunOptions& options) {
   fmt::print("{}", FormatSummary(summary));
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
-  const absl::Status evaluated = objects.empty() ? absl::OkStatus() : Evaluate(options, json);
+  if (!objects.empty()) Evaluate(options, json);
   std::ofstream(fs::path(options.out) / "summary.json") << json.dump(1) << '\n';
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures/*.png\nfigures: {0}/summary.json\n",
              options.out);
   if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
-  ROMAP_RETURN_IF_ERROR(evaluated);
   if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
     return InvalidArgument("no frame of {} was accepted; the first: {}", options.sequence_dir,
                            summary.faults.empty() ? "" : summary.faults.front());

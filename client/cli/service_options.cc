@@ -11,8 +11,6 @@
 namespace romap {
 namespace {
 
-constexpr std::chrono::seconds kConnectTimeout{3};
-
 absl::StatusOr<ServerConfig> LoadConfig(const ServiceOptions& options) {
   ServerConfig config;
   ConfigFields fields;
@@ -42,7 +40,7 @@ void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
 
 absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
   if (!local) {
-    ROMAP_ASSIGN_OR_RETURN(auto remote, RemoteMappingService::Connect(server, kConnectTimeout));
+    ROMAP_ASSIGN_OR_RETURN(auto remote, RemoteMappingService::Connect(server));
     return std::unique_ptr<MappingService>(std::move(remote));
   }
   ROMAP_ASSIGN_OR_RETURN(const ServerConfig config, LoadConfig(*this));

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <memory>
+
+#include "client/cli/command.h"
+#include "client/cli/progress.h"
+#include "client/synth/synth.h"
+
+namespace romap {
+namespace {
+
+struct SynthCommandOptions {
+  synth::SynthOptions synth;
+  std::string out;
+};
+
+absl::Status RunSynth(const SynthCommandOptions& options) {
+  Progress progress("rendering");
+  const absl::Status status = synth::MakeSequence(options.synth, options.out, [&](int done, int total) {
+    progress.Show(static_cast<double>(done) / total, fmt::format("frame {}/{}", done, total));
+  });
+  progress.Done();
+  if (status.ok()) {
+    fmt::print("{} frames of {} objects with ground truth written to {}\n", options.synth.frames, options.synth.objects,
+               options.out);
+  }
+  return status;
+}
+
+}  // namespace
+
+void AddSynthCommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<SynthCommandOptions>();
+  synth::SynthOptions& synth = options->synth;
+  CLI::App* command =
+      app.add_subcommand("synth", "Make a sequence of textured objects on a table, with exact ground truth");
+  command->add_option("--out", options->out, "Folder to write")->required();
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    command->add_option(name, value, help)->capture_default_str();
+  };
+  add("--seed", synth.seed, "Everything follows from this number");
+  add("--objects", synth.objects, "Number of objects, 1 to 16");
+  add("--identical-pairs", synth.identical_pairs, "So many pairs of the objects are twins");
+  add("--frames", synth.frames, "Number of frames");
+  add("--fps", synth.fps, "Frames per second");
+  const std::map<std::string, synth::PathKind> paths = {{"orbit", synth::PathKind::kOrbit},
+                                                        {"handheld", synth::PathKind::kHandheld}};
+  command->add_option("--path", synth.path, "Way of the camera: orbit or handheld")
+      ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
+  add("--rounds", synth.rounds, "Circles of the orbit, or passes along the hand-held arc");
+  add("--elevation", synth.elevation_deg, "Of the camera above the table [deg]");
+  add("--width", synth.width_px, "Image width [px]");
+  add("--height", synth.height_px, "Image height [px]");
+  const std::map<std::string, synth::ImageFormat> formats = {{"png", synth::ImageFormat::kPng},
+                                                             {"jpeg", synth::ImageFormat::kJpeg}};
+  command->add_option("--format", synth.format, "Colour images: png or jpeg")
+      ->transform(CLI::CheckedTransformer(formats, CLI::ignore_case));
+  add("--mask-jitter", synth.mask_jitter_px, "Displace the borders of the masks by about so much [px]");
+  add("--mask-drop", synth.mask_drop_share, "Share of the masks to leave out, 0 to 1");
+  command->add_flag("--permute-labels", synth.permute_labels, "Shuffle the labels in every frame");
+  add("--noise", synth.noise_sigma, "Sigma of the image noise [8-bit levels]");
+  add("--motion-blur", synth.motion_blur_px, "Length of the smear along the camera's motion [px]");
+  add("--defocus", synth.defocus_px, "Sigma of the blur [px]");
+  command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
+}
+
+}  // namespace romap

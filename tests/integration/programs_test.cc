@@ -1,0 +1,166 @@
+// The built programs as a user runs them: a made sequence through server and client, and what they say to bad input.
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "client/synth/synth.h"
+#include "tests/support/subprocess.h"
+
+namespace romap {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing_support::BackgroundProcess;
+using testing_support::ProcessResult;
+using testing_support::RunProcess;
+using testing_support::TemporaryFolder;
+
+namespace fs = std::filesystem;
+
+ProcessResult Romap(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), ROMAP_CLIENT);
+  return RunProcess(arguments);
+}
+
+nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
+
+synth::SynthOptions SmallScene() {
+  synth::SynthOptions options;
+  options.seed = 3;
+  options.objects = 3;
+  options.frames = 60;
+  options.width_px = 320;
+  options.height_px = 240;
+  options.permute_labels = true;
+  return options;
+}
+
+void MakeSmallSequence(const std::string& dir) {
+  ASSERT_TRUE(synth::MakeSequence(SmallScene(), dir).ok());
+}
+
+size_t CountFiles(const std::string& folder, const std::string& extension) {
+  return std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
+                       [&](const auto& entry) { return entry.path().extension() == extension; });
+}
+
+void ExpectMapOfThree(const std::string& out) {
+  const nlohmann::json summary = ReadJson(out + "/summary.json");
+  EXPECT_EQ(summary["frames"]["accepted"], 60);
+  EXPECT_EQ(summary["objects"].size(), 3u) << summary.dump(1);
+  const nlohmann::json& objects = summary["evaluation"]["objects"]["mean"];
+  EXPECT_LT(objects["comp_seen_cm"].get<double>(), 0.8) << summary["evaluation"].dump(1);
+  EXPECT_EQ(ReadJson(out + "/cuboids.json")["objects"].size(), 3u);
+  EXPECT_EQ(CountFiles(out + "/objects", ".ply"), 3u);
+  EXPECT_EQ(CountFiles(out + "/objects", ".glb"), 3u);
+  EXPECT_GE(CountFiles(out + "/pictures", ".png"), 6u);
+  EXPECT_GT(fs::file_size(out + "/trajectory.txt"), 1000u);
+}
+
+TEST(ProgramsTest, AServerAndAClientMapASequence) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
+  const std::string address = server.WaitForLine("romap-server listening on ");
+  ASSERT_NE(address, "");
+
+  const ProcessResult run = Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map",
+                                   "--keep-session", "--name", "three things"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  ExpectMapOfThree(folder / "map");
+
+  const ProcessResult sessions = Romap({"sessions", "--server", address});
+  EXPECT_THAT(sessions.out, AllOf(HasSubstr("finished"), HasSubstr("three things")));
+  const std::string id = ReadJson(folder / "map/summary.json")["session"];
+  const ProcessResult exported = Romap({"export", id, "--server", address, "--out", folder / "export"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_EQ(CountFiles(folder / "export/objects", ".ply"), 3u);
+  EXPECT_THAT(Romap({"sessions", "--server", address, "--delete", id}).out, HasSubstr("(no sessions)"));
+
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait().exit_code, 0);
+}
+
+TEST(ProgramsTest, LocalMappingNeedsNoServer) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  const ProcessResult run = Romap({"run", folder / "sequence", "--local", "--out", folder / "map"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  ExpectMapOfThree(folder / "map");
+}
+
+TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  // At the recorded rate the sequence takes more than two seconds: time enough to interrupt it.
+  BackgroundProcess run({ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  run.Signal(SIGINT);
+  const ProcessResult result = run.Wait();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("interrupted"));
+  const nlohmann::json summary = ReadJson(folder / "map/summary.json");
+  EXPECT_TRUE(summary["interrupted"]);
+  EXPECT_LT(summary["frames"]["sent"], 60);
+}
+
+// ------------------------------------------------------------------------------------------------ bad input
+
+void ExpectOneLine(const ProcessResult& result, int exit_code, const std::string& what) {
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_THAT(result.err, HasSubstr(what));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+}
+
+TEST(BadInputTest, SequenceFoldersThatAreNot) {
+  const TemporaryFolder folder;
+  ExpectOneLine(Romap({"run", folder / "nowhere", "--local", "--out", folder / "map"}), 2, "nowhere");
+  fs::create_directory(folder / "empty");
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2, "rgb.txt");
+  std::ofstream(folder / "empty/rgb.txt") << "0.0 rgb/1.png\n";
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2, "camera.yaml");
+}
+
+TEST(BadInputTest, UnreadableImage) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  for (const auto& entry : fs::directory_iterator(folder / "sequence/rgb")) {
+    if (entry.path().filename().string().find("12") != std::string::npos) fs::remove(entry.path());
+  }
+  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "map"}), 2, "12");
+}
+
+TEST(BadInputTest, UnknownFlagCommandAndConfigKey) {
+  const TemporaryFolder folder;
+  ExpectOneLine(Romap({"run", "x", "--frobnicate"}), 2, "frobnicate");
+  ExpectOneLine(Romap({"frobnicate"}), 2, "frobnicate");
+  MakeSmallSequence(folder / "sequence");
+  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--set", "nerf.rays=1", "--out", folder / "map"}), 2,
+                "unknown key 'nerf.rays', did you mean 'nerf.");
+  std::ofstream(folder / "bad.yaml") << "mesh:\n  resolutoin: 64\n";
+  ExpectOneLine(RunProcess({ROMAP_SERVER, "--config", folder / "bad.yaml"}), 2,
+                "bad.yaml:2: unknown key 'mesh.resolutoin', did you mean 'mesh.resolution'?");
+  ExpectOneLine(RunProcess({ROMAP_SERVER, "--frobnicate"}), 2, "frobnicate");
+}
+
+TEST(BadInputTest, NoServerAndPortInUse) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
+  const std::string address = server.WaitForLine("romap-server listening on ");
+  ASSERT_NE(address, "");
+  ExpectOneLine(RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait().exit_code, 0);
+  ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 1,
+                "no romap-server at " + address);
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,84 @@
+#include "client/cli/map_collector.h"
+
+#include <gtest/gtest.h>
+
+namespace romap {
+namespace {
+
+ObjectUpdate Update(uint64_t id, uint64_t revision, ObjectState state = ObjectState::kConfirmed) {
+  ObjectUpdate update;
+  update.id = ObjectId{id};
+  update.revision = revision;
+  update.state = state;
+  update.observations = revision;
+  return update;
+}
+
+MeshUpdate MeshOf(uint64_t id, uint64_t revision) {
+  MeshUpdate mesh;
+  mesh.id = ObjectId{id};
+  mesh.revision = revision;
+  return mesh;
+}
+
+TEST(MapCollectorTest, KeepsTheNewestRevisionOnly) {
+  MapCollector collector;
+  collector.Apply(Update(1, 3));
+  collector.Apply(Update(1, 2));
+  EXPECT_EQ(collector.objects().at(ObjectId{1}).object.observations, 3u);
+  collector.Apply(MeshOf(1, 5));
+  collector.Apply(MeshOf(1, 4));
+  EXPECT_EQ(collector.objects().at(ObjectId{1}).mesh->revision, 5u);
+}
+
+TEST(MapCollectorTest, RemovedAndMergedObjectsGo) {
+  MapCollector collector;
+  for (uint64_t id : {1, 2, 3}) collector.Apply(Update(id, 1));
+  collector.Apply(ObjectRemoved{ObjectId{1}, 2, "ghost"});
+  collector.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 2});
+  ASSERT_EQ(collector.objects().size(), 1u);
+  EXPECT_TRUE(collector.objects().contains(ObjectId{3}));
+}
+
+TEST(MapCollectorTest, AMeshWithoutItsObjectIsIgnored) {
+  MapCollector collector;
+  collector.Apply(MeshOf(7, 1));
+  EXPECT_TRUE(collector.objects().empty());
+}
+
+TEST(MapCollectorTest, ProvisionalObjectsAreNotCounted) {
+  MapCollector collector;
+  collector.Apply(Update(1, 1, ObjectState::kProvisional));
+  EXPECT_EQ(collector.ConfirmedObjects(), 0u);
+  EXPECT_LT(collector.objects().at(ObjectId{1}).first_cuboid_s, 0);
+  collector.Apply(Update(1, 2));
+  EXPECT_EQ(collector.ConfirmedObjects(), 1u);
+  EXPECT_GE(collector.objects().at(ObjectId{1}).first_cuboid_s, 0);
+}
+
+TEST(MapCollectorTest, AcknowledgementsMakeTheTrajectory) {
+  MapCollector collector;
+  collector.NoteSent(1, 1000);
+  collector.NoteSent(2, 2000);
+  FrameAck good;
+  good.frame_id = 1;
+  good.T_world_camera = SE3<World, Camera>();
+  good.is_keyframe = true;
+  collector.Apply(good);
+  FrameAck bad;
+  bad.frame_id = 2;
+  bad.accepted = false;
+  bad.error = "image is truncated";
+  collector.Apply(bad);
+  EXPECT_EQ(collector.sent(), 2u);
+  EXPECT_EQ(collector.acknowledged(), 2u);
+  EXPECT_EQ(collector.rejected(), 1u);
+  EXPECT_EQ(collector.keyframes(), 1u);
+  ASSERT_EQ(collector.Trajectory().size(), 1u);
+  EXPECT_EQ(collector.Trajectory()[0].timestamp_ns, 1000);
+  ASSERT_EQ(collector.faults().size(), 1u);
+  EXPECT_EQ(collector.faults()[0], "frame 2: image is truncated");
+}
+
+}  // namespace
+}  // namespace romap
