@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -83,8 +84,11 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
 absl::Status Load(const Flags& flags, ConfigFields fields) {
   if (!flags.config_file.empty()) {
     std::ifstream file(flags.config_file);
+    // Opening a folder succeeds, and reading from it then throws.
+    if (!file || std::filesystem::is_directory(flags.config_file)) {
+      return InvalidArgument("cannot read the configuration file '{}'", flags.config_file);
+    }
     const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) return InvalidArgument("cannot read the configuration file '{}'", flags.config_file);
     ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text, flags.config_file));
   }
   return fields.Set(flags.assignments);
