@@ -117,7 +117,7 @@ TEST_F(RemoteMappingServiceTest, AFrameJustBelowTheLimitArrives) {
 }
 
 TEST_F(RemoteMappingServiceTest, EventsWaitForALateReader) {
-  constexpr uint64_t kFrames = 3000;
+  constexpr uint64_t kFrames = 500;  // three events each, more than the client keeps
   const auto stream = client_->OpenMap(NewSession()).value();
   for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id, "mug")).ok());
   EXPECT_OK(stream->CloseSend());
@@ -130,7 +130,7 @@ TEST_F(RemoteMappingServiceTest, AStreamMayBeDroppedWithEventsUnread) {
   const auto session = NewSession();
   const auto watch = client_->Watch(session).value();
   auto stream = client_->OpenMap(session).value();
-  for (uint64_t id = 1; id <= 1000; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id, "mug")).ok());
+  for (uint64_t id = 1; id <= 200; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id, "mug")).ok());
   stream.reset();
   EXPECT_TRUE(Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
 }
