@@ -1,0 +1,33 @@
+#pragma once
+
+// One source of kernels for nvcc and for the host: include this instead of the CUDA headers, and launch and declare
+// dynamic shared memory by the two macros below. Under nvcc they are what CUDA says; elsewhere the kernels run on the
+// host, one fiber per CUDA thread. That proves their logic, not their speed, nor memory ordering, tensor core rounding
+// or register limits.
+
+#if defined(__CUDACC__)
+
+#include <cuda_fp16.h>
+#include <cuda_runtime.h>
+#include <mma.h>
+
+// ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, arguments...)
+#define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...) \
+  kernel<<<grid, block, dynamic_shared_bytes, stream>>>(__VA_ARGS__)
+// Declares `T* name`, the block's dynamic shared memory.
+#define ROMAP_DYNAMIC_SHARED(T, name)                                \
+  extern __shared__ __align__(16) unsigned char name##_shared_raw[]; \
+  T* const name = reinterpret_cast<T*>(name##_shared_raw)
+
+#else
+
+#include "tests/support/cuda_on_host/device_builtins.h"
+#include "tests/support/cuda_on_host/runtime_api.h"
+#include "tests/support/cuda_on_host/wmma.h"
+
+#define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...)                          \
+  ((void)(stream), ::romap::cuda_on_host::Launch(reinterpret_cast<const void*>(&kernel), grid, block, \
+                                                 dynamic_shared_bytes, [&] { kernel(__VA_ARGS__); }))
+#define ROMAP_DYNAMIC_SHARED(T, name) T* const name = static_cast<T*>(::romap::cuda_on_host::DynamicShared())
+
+#endif
