@@ -54,8 +54,6 @@ class SE3 {
 };
 
 // Shortest rotation that takes world +z to `up_world` (unit length): the orientation of a cuboid whose yaw is 0.
-inline Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world) {
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up_world);
-}
+Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world);
 
 }  // namespace romap

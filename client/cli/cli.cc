@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
 #include "client/cli/command.h"
 #include "client/cli/interrupt.h"
@@ -31,6 +33,7 @@ int ExitCode(const absl::Status& status) {
 int RunCli(int argc, const char* const* argv) {
   CLI::App app{"romap: turns a video with instance masks into a map of objects", "romap"};
   app.require_subcommand(1);
+  app.fallthrough();  // --log-level may stand after the command too
   app.set_version_flag("--version", "romap 0.1.0");
   std::string log_level = "warn";
   app.add_option("--log-level", log_level, "What to log to stderr")
@@ -46,7 +49,10 @@ int RunCli(int argc, const char* const* argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
-    fmt::print(stderr, "romap: {} (romap --help says more)\n", e.what());
+    // A word that fits nowhere is the cause, whatever else is missing because of it.
+    const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
+    const std::string fault = unknown.empty() ? e.what() : fmt::format("'{}' is not known here", unknown.front());
+    fmt::print(stderr, "romap: {} (romap --help says more)\n", fault);
     return kExitUsage;
   }
   spdlog::set_default_logger(spdlog::stderr_color_mt("romap"));

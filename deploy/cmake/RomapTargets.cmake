@@ -3,7 +3,6 @@
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
-set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
@@ -11,11 +10,12 @@ endif()
 
 find_program(ROMAP_CCACHE ccache)
 if(ROMAP_CCACHE)
-  set(CMAKE_C_COMPILER_LAUNCHER ${ROMAP_CCACHE})
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${ROMAP_CCACHE})
+  # ccache needs to be told that precompiled headers may be trusted.
+  set(CMAKE_CXX_COMPILER_LAUNCHER
+      env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime ${ROMAP_CCACHE})
 endif()
 
-add_compile_options(-Wall -Wextra)
+add_compile_options(-Wall -Wextra -pthread)
 if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
@@ -46,6 +46,22 @@ target_include_directories(romap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(romap_opencv INTERFACE opencv_core opencv_imgproc opencv_imgcodecs opencv_features2d
                                              opencv_calib3d)
 
+# Eigen, OpenCV's matrices and Abseil take five seconds of every compilation; they are parsed once instead. All targets
+# share the one precompiled header, so the definitions that its libraries bring must be the same everywhere.
+file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cc "")
+add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
+target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
+target_compile_options(romap_precompiled PRIVATE -fpch-preprocess)
+target_precompile_headers(romap_precompiled PRIVATE
+  <algorithm> <chrono> <cmath> <cstdint> <functional> <map> <memory> <mutex> <optional> <string> <thread> <vector>
+  <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>)
+
+function(romap_precompile target)
+  target_precompile_headers(${target} REUSE_FROM romap_precompiled)
+  target_link_libraries(${target} PRIVATE fmt::fmt)
+  target_compile_options(${target} PRIVATE -fpch-preprocess)
+endfunction()
+
 # romap_library(name [PUBLIC targets...] [PRIVATE targets...] [SOURCES files...])
 # A static library `romap_<name>` of all *.cc in the folder (or of SOURCES). Links are the layering: a folder may
 # include only what it links.
@@ -58,6 +74,7 @@ function(romap_library name)
     add_library(romap_${name} STATIC ${ARG_SOURCES})
     target_include_directories(romap_${name} PUBLIC ${CMAKE_SOURCE_DIR})
     target_link_libraries(romap_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+    romap_precompile(romap_${name})
   else()
     add_library(romap_${name} INTERFACE)
     target_include_directories(romap_${name} INTERFACE ${CMAKE_SOURCE_DIR})
@@ -75,5 +92,6 @@ function(romap_tests name)
   endif()
   add_executable(${name}_test ${sources})
   target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main)
+  romap_precompile(${name}_test)
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
 endfunction()
