@@ -17,7 +17,7 @@ namespace {
 // surface counts as seen only by views within 60 degrees of its normal.
 constexpr float kMinCosine = 0.5f;
 // Of the visible area; what is noise at the rim of the hull.
-constexpr double kShareBelow = 0.01;
+constexpr double kShareBelow = 0.02;
 // Walls have normals within 30 degrees of the horizontal. Where views see hardly any, as from straight above, the
 // lowest visible height says nothing.
 constexpr float kMaxWallNormalZ = 0.5f;
