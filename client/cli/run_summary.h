@@ -23,7 +23,7 @@ struct RunSummary {
     uint64_t steps = 0;
     double train_s = 0;
     size_t vertices = 0, triangles = 0;
-    double first_cuboid_s = -1;  // from the sending of the first frame in which it could be tracked; -1 = unknown
+    double first_cuboid_s = -1;  // from the sending of the frame in which it could first be tracked; -1 = unknown
     double first_mesh_s = -1;
   };
 

@@ -1,5 +1,7 @@
 #include "client/cli/trackable.h"
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
 #include "client/cli/cuboid_outline.h"
@@ -50,6 +52,7 @@ bool Fits(const Region& region, const cv::Rect2d& outline) {
 std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory,
                                                 const std::vector<MapObject>& objects) {
   std::map<ObjectId, size_t> first;
+  std::map<ObjectId, std::vector<Eigen::Vector3d>> directions;  // from which each object was seen so far, unit length
   for (const MappedFrame& frame : MappedFrames(sequence, trajectory)) {
     if (first.size() == objects.size()) break;
     const std::map<int, Region> regions = MaskRegions(sequence, frame.index);
@@ -57,9 +60,17 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const 
       if (first.contains(entry.object.id)) continue;
       const auto outline = CuboidOutline(entry.object.cuboid, sequence.camera(), frame.T_world_camera);
       if (!outline) continue;
-      for (const auto& [label, region] : regions) {
-        if (Fits(region, *outline)) first[entry.object.id] = frame.index;
-      }
+      const bool seen = std::any_of(regions.begin(), regions.end(),
+                                    [&](const auto& region) { return Fits(region.second, *outline); });
+      if (!seen) continue;
+      const Eigen::Vector3d direction =
+          (frame.T_world_camera.translation() - entry.object.cuboid.T_world_object.translation()).normalized();
+      std::vector<Eigen::Vector3d>& earlier = directions[entry.object.id];
+      const bool parallax = std::any_of(earlier.begin(), earlier.end(), [&](const Eigen::Vector3d& other) {
+        return direction.dot(other) < std::cos(kTrackableParallax_rad);
+      });
+      if (parallax) first[entry.object.id] = frame.index;
+      earlier.push_back(direction);
     }
   }
   return first;

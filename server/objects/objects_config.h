@@ -26,6 +26,8 @@ struct ObjectsConfig {
   double update_yaw_deg = 2;
 
   double view_angle_deg = 13;
+  double first_view_angle_deg = 5;
+  int first_views = 4;
   int max_views = 40;
   double view_min_sharpness_share = 0.6;
   int max_waiting_keyframes = 24;
@@ -67,6 +69,10 @@ struct ObjectsConfig {
                 .min = 1,
                 .max = 90,
                 .help = "A keyframe becomes a training view when it differs by more from all others (paper: 25)"});
+    fields.Add("first_view_angle_deg", &first_view_angle_deg,
+               {.unit = "deg", .min = 1, .max = 90, .help = "The same for the first views of an object"});
+    fields.Add("first_views", &first_views,
+               {.unit = "views", .min = 0, .max = 100, .help = "So many views count as the first"});
     fields.Add("max_views", &max_views, {.unit = "views", .min = 2, .max = 500, .help = "Training views per object"});
     fields.Add("view_min_sharpness_share", &view_min_sharpness_share,
                {.min = 0, .max = 1, .help = "Blurrier than this share of the object's median: wait for a better one"});

@@ -178,7 +178,8 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
   for (const ViewCandidate& candidate : waiting_) {
     if (taken_.size() >= static_cast<size_t>(config_.max_views)) break;
     const double patience = IsSharp(candidate.sharpness) ? 1 : kPatience;
-    const double angle_rad = patience * config_.view_angle_deg * kRadPerDeg;
+    const bool first = taken_.size() < static_cast<size_t>(config_.first_views);
+    const double angle_rad = patience * (first ? config_.first_view_angle_deg : config_.view_angle_deg) * kRadPerDeg;
     if (!IsNewDirection(candidate.T_world_camera.translation(), center, angle_rad)) continue;
     if (const char* doubt = FindDoubt(candidate, context)) {
       spdlog::debug("objects: {}: {} is no view: {}", context.object.ToString(), candidate.keyframe.ToString(), doubt);

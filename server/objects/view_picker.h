@@ -47,9 +47,10 @@ double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px);
 
 // Picks the training views of one object out of its keyframes. The paper takes a keyframe when its direction differs by
 // 25 degrees from the last view's; here it must differ by `view_angle_deg` from every view (or stand at a quite
-// different distance), so that a camera that comes back adds nothing, and a smaller angle is affordable. Left out:
-// keyframes whose mask contradicts the object's shape, those that show too little of it, and blurred ones as long as a
-// sharper one may still come. At `max_views` the picker is done: views were already sent and cannot be taken back.
+// different distance), so that a camera that comes back adds nothing, and a smaller angle is affordable. The first few
+// come closer together, so that a slow camera need not go far before there is a first shape. Left out: keyframes whose
+// mask contradicts the object's shape, those that show too little of it, and blurred ones as long as a sharper one may
+// still come. At `max_views` the picker is done: views were already sent and cannot be taken back.
 class ViewPicker {
  public:
   explicit ViewPicker(const ObjectsConfig& config) : config_(config) {}
