@@ -3,25 +3,10 @@
 #include <cstdint>
 
 #include "server/nerf/cpu/aligned_buffer.h"
+#include "server/nerf/math/types.h"
 #include "server/nerf/nerf_config.h"
 
 namespace romap::nerf {
-
-inline constexpr int kFeaturesPerLevel = 2;
-inline constexpr int kMaxLevels = 16;
-inline constexpr int kOutputs = 4;  // red, green, blue, density, before activation
-
-// Where each level of the hash grid lies in the table; see math/hash_grid.h for the indexing.
-struct GridLayout {
-  int levels = 0;
-  int features = 0;  // per point: 2 x levels, rounded up to 16; the rest stays 0
-  uint32_t entries = 0;
-  alignas(64) float scale[kMaxLevels] = {};  // cells per unit
-  alignas(64) uint32_t stride_y[kMaxLevels] = {};
-  alignas(64) uint32_t stride_z[kMaxLevels] = {};
-  alignas(64) uint32_t mask[kMaxLevels] = {};
-  alignas(64) uint32_t offset[kMaxLevels] = {};
-};
 
 // Levels grow geometrically from `base_resolution` to `finest_resolution` cells per unit.
 GridLayout MakeGridLayout(const NerfConfig& config);

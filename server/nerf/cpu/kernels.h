@@ -25,11 +25,6 @@ struct Ray {
   RayTarget target;
 };
 
-struct RaySpan {
-  int first = 0;  // sample
-  int count = 0;  // 0: the ray meets nothing occupied
-};
-
 struct SamplingRule {
   const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
   std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space, <= 1

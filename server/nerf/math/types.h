@@ -1,8 +1,32 @@
 #pragma once
 
+#include <cstdint>
+
 namespace romap::nerf {
 
-// Plain values that formulas take, the same for every lane type.
+// Plain values that formulas take, the same for every lane type and back end.
+
+inline constexpr int kFeaturesPerLevel = 2;
+inline constexpr int kMaxLevels = 16;
+inline constexpr int kOutputs = 4;  // red, green, blue, density, before activation
+
+// Where each level of the hash grid lies in the table; see hash_grid.h for the indexing.
+struct GridLayout {
+  int levels = 0;
+  int features = 0;  // per point: 2 x levels, rounded up to 16; the rest stays 0
+  uint32_t entries = 0;
+  alignas(64) float scale[kMaxLevels] = {};  // cells per unit
+  alignas(64) uint32_t stride_y[kMaxLevels] = {};
+  alignas(64) uint32_t stride_z[kMaxLevels] = {};
+  alignas(64) uint32_t mask[kMaxLevels] = {};
+  alignas(64) uint32_t offset[kMaxLevels] = {};
+};
+
+// Where the samples of a ray lie in the sample arrays.
+struct RaySpan {
+  int first = 0;  // sample
+  int count = 0;  // 0: the ray meets nothing occupied
+};
 
 // Weights of the loss terms, all >= 0, the same for every ray.
 struct LossWeights {

@@ -1,0 +1,63 @@
+#include "server/nerf/cuda/cuda_field.h"
+
+#include "server/nerf/cuda/field_kernels.h"
+
+namespace romap::nerf::cuda {
+
+absl::StatusOr<int> ProbeDevices() {
+  int count = 0;
+  ROMAP_RETURN_IF_ERROR(ToStatus(cudaGetDeviceCount(&count), "find a device"));
+  if (count == 0) return absl::UnavailableError("CUDA: there is no device");
+  ROMAP_RETURN_IF_ERROR(ToStatus(cudaSetDevice(0), "use device 0"));
+  // A device that counts may still be unable to run our code: too old, or out of order.
+  ROMAP_ASSIGN_OR_RETURN(DeviceArray<float> parameter, DeviceArray<float>::CopyOf(std::vector<float>{1.0f}));
+  ROMAP_ASSIGN_OR_RETURN(DeviceArray<float> gradient, DeviceArray<float>::CopyOf(std::vector<float>{0.0f}));
+  const AdamParams params{.rates = {},
+                          .count = 1,
+                          .parameters = parameter.data(),
+                          .first = parameter.data(),
+                          .second = parameter.data(),
+                          .gradient = gradient.data()};
+  ROMAP_RETURN_IF_ERROR(ToStatus(LaunchAdam(params, nullptr), "run a kernel on device 0"));
+  ROMAP_RETURN_IF_ERROR(ToStatus(cudaDeviceSynchronize(), "run a kernel on device 0"));
+  return count;
+}
+
+absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
+  if (model.mlp.hidden > kMaxHidden) {
+    return InvalidArgument("CUDA: a field with {} hidden neurons; at most {} are possible", model.mlp.hidden,
+                           kMaxHidden);
+  }
+  CudaField field;
+  field.grid_ = model.layout;
+  field.hidden_ = model.mlp.hidden;
+  field.density_bias_ = model.density_bias;
+  ROMAP_ASSIGN_OR_RETURN(field.table_, DeviceArray<float>::CopyOf(model.table.span()));
+  ROMAP_ASSIGN_OR_RETURN(field.parameters_, DeviceArray<float>::CopyOf(model.mlp.parameters.span()));
+  return field;
+}
+
+absl::StatusOr<std::vector<float>> CudaField::Evaluate(std::span<const float> x, std::span<const float> y,
+                                                       std::span<const float> z) const {
+  if (x.size() != y.size() || x.size() != z.size()) {
+    return InvalidArgument("CUDA: {} x, {} y and {} z coordinates; there must be as many of each", x.size(), y.size(),
+                           z.size());
+  }
+  std::vector<float> value(x.size() * kOutputs);
+  if (x.empty()) return value;
+  ROMAP_ASSIGN_OR_RETURN(const DeviceArray<float> device_x, DeviceArray<float>::CopyOf(x));
+  ROMAP_ASSIGN_OR_RETURN(const DeviceArray<float> device_y, DeviceArray<float>::CopyOf(y));
+  ROMAP_ASSIGN_OR_RETURN(const DeviceArray<float> device_z, DeviceArray<float>::CopyOf(z));
+  ROMAP_ASSIGN_OR_RETURN(DeviceArray<float> device_value, DeviceArray<float>::Allocate(value.size()));
+  const EvaluateParams params{.field = {grid_, table_.data(), parameters_.data(), hidden_, density_bias_},
+                              .count = static_cast<int>(x.size()),
+                              .x = device_x.data(),
+                              .y = device_y.data(),
+                              .z = device_z.data(),
+                              .value = device_value.data()};
+  ROMAP_RETURN_IF_ERROR(ToStatus(LaunchEvaluate(params, nullptr), "evaluate a field"));
+  ROMAP_RETURN_IF_ERROR(device_value.Read(value));
+  return value;
+}
+
+}  // namespace romap::nerf::cuda
