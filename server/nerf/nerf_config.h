@@ -58,7 +58,7 @@ struct NerfConfig {
   int min_views = 3;
   int first_budget_steps = 60;
   int budget_steps_per_view = 10;
-  int full_budget_steps = 200;
+  int full_budget_steps = 300;
   int refine_steps_per_view = 6;
   int max_refine_steps = 100;
   int slice_steps = 20;

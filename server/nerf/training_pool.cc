@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/status.h"
+#include "common/thread_priority.h"
 
 namespace romap {
 
@@ -205,6 +206,7 @@ std::optional<TrainingPool::Lease> TrainingPool::Next(Clock::time_point now) {
 }
 
 void TrainingPool::Work() {
+  LowerThreadPriority();
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     std::optional<Lease> lease = Next(Clock::now());

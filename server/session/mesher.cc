@@ -6,6 +6,7 @@
 
 #include "common/mesh_codec.h"
 #include "common/status.h"
+#include "common/thread_priority.h"
 #include "server/mesh/extract_mesh.h"
 
 namespace romap {
@@ -72,6 +73,7 @@ bool Mesher::Idle(uint64_t client) const {
 }
 
 void Mesher::Run() {
+  LowerThreadPriority();
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [&] { return stopping_ || !waiting_.empty(); });

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "client/synth/synth.h"
@@ -108,6 +109,13 @@ TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
   const nlohmann::json summary = ReadJson(folder / "map/summary.json");
   EXPECT_TRUE(summary["interrupted"]);
   EXPECT_LT(summary["frames"]["sent"], 60);
+}
+
+TEST(ProgramsTest, TheConfigurationInDeployIsWhatTheServerHas) {
+  std::ifstream file(ROMAP_SOURCE_DIR "/deploy/server.yaml");
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  EXPECT_EQ(RunProcess({ROMAP_SERVER, "--dump-config"}).out, text) << "romap-server --dump-config > deploy/server.yaml";
+  EXPECT_EQ(RunProcess({ROMAP_SERVER, "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--dump-config"}).out, text);
 }
 
 // ------------------------------------------------------------------------------------------------ bad input

@@ -204,20 +204,21 @@ TEST(TrainingPoolTest, DivergedTrainingNeverLeaves) {
 
 TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
   NerfConfig config;
+  const auto full = static_cast<uint64_t>(config.full_budget_steps);
   TrainingPlan plan(config);
   EXPECT_NEAR(plan.LearningRate(0), config.learning_rate, 1e-9);
-  EXPECT_NEAR(plan.LearningRate(200), config.final_learning_rate, 1e-9);
-  EXPECT_LT(plan.LearningRate(150), plan.LearningRate(100));
+  EXPECT_NEAR(plan.LearningRate(full), config.final_learning_rate, 1e-9);
+  EXPECT_LT(plan.LearningRate(full / 2), plan.LearningRate(full / 3));
   EXPECT_EQ(plan.AllowedSteps(config.min_views - 1, false), 0u);
-  EXPECT_EQ(plan.AllowedSteps(1, true), 200u);
+  EXPECT_EQ(plan.AllowedSteps(1, true), full);
   EXPECT_EQ(plan.AllowedSteps(config.min_views, false), static_cast<uint64_t>(config.first_budget_steps));
   plan.OnNewView(50);
-  EXPECT_EQ(plan.AllowedSteps(40, false), 200u);
-  plan.OnNewView(200);
-  EXPECT_EQ(plan.AllowedSteps(40, false), 200u + static_cast<uint64_t>(config.refine_steps_per_view));
-  EXPECT_GT(plan.LearningRate(200), config.final_learning_rate);
-  for (int i = 0; i < 1000; ++i) plan.OnNewView(200);
-  EXPECT_EQ(plan.AllowedSteps(40, false), 200u + static_cast<uint64_t>(config.max_refine_steps));
+  EXPECT_EQ(plan.AllowedSteps(40, false), full);
+  plan.OnNewView(full);
+  EXPECT_EQ(plan.AllowedSteps(40, false), full + static_cast<uint64_t>(config.refine_steps_per_view));
+  EXPECT_GT(plan.LearningRate(full), config.final_learning_rate);
+  for (int i = 0; i < 1000; ++i) plan.OnNewView(full);
+  EXPECT_EQ(plan.AllowedSteps(40, false), full + static_cast<uint64_t>(config.max_refine_steps));
 }
 
 }  // namespace

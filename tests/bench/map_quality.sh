@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Measures whole runs: streams sequences through a romap-server on loopback at the recorded rate, with the labels of every
+# frame renamed at random, and prints a Markdown table of what came out against ground truth.
+#
+#   tests/bench/map_quality.sh BUILD_DIR OUT_DIR [SEQUENCE...]
+#
+# Without SEQUENCE it makes three synthetic ones (150 frames, five objects, seeds 1 to 3) in OUT_DIR. Figures are means
+# over the objects, of the surface that the cameras saw; distances in cm.
+set -euo pipefail
+[ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+build=$1 out=$2
+shift 2
+mkdir -p "$out"
+romap=$build/client/cli/romap
+sequences=("$@")
+if [ ${#sequences[@]} -eq 0 ]; then
+  for seed in 1 2 3; do
+    [ -f "$out/synth_$seed/objects.yaml" ] ||
+      "$romap" synth --out "$out/synth_$seed" --frames 150 --objects 5 --seed "$seed" >&2
+    sequences+=("$out/synth_$seed")
+  done
+fi
+
+"$build/server/romap-server" --listen 127.0.0.1:0 --log-level warn >"$out/server.out" 2>"$out/server.err" &
+server=$!
+trap 'kill $server 2>/dev/null || true' EXIT
+for _ in $(seq 100); do
+  address=$(sed -n 's/^romap-server listening on //p' "$out/server.out")
+  [ -n "$address" ] && break
+  sleep 0.1
+done
+
+echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | server, client memory |'
+echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
+for sequence in "${sequences[@]}"; do
+  name=$(basename "$sequence")
+  "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 --out "$out/$name.map" --no-pictures >"$out/$name.txt"
+  awk -v name="$name" '
+    / rejected, .* dropped\)/ { dropped = $6; for (i = 1; i < NF; ++i) if ($i == "for") training = $(i + 1) }
+    /^memory:/ { memory = $3 " MB, " $6 " MB" }
+    /^[0-9]+_/ && / s +[0-9]+ +[0-9.]+ s +[0-9.]+ s$/ { if ($(NF-3) > cuboid) cuboid = $(NF-3); if ($(NF-1) > mesh) mesh = $(NF-1) }
+    /^mean/ && !found { found = $2 " of " $4; acc = $6; comp = $8; r04 = $10; r1 = $12; next }
+    /^mean / && NF <= 8 { iou = $5 }
+    END { printf "| %s | %s | %.2f | %.3f | %.3f | %.1f %% | %.1f %% | %.2f s, %.2f s | %s s | %s | %s |\n",
+                 name, found, iou, acc, comp, r04, r1, cuboid, mesh, training, dropped, memory }' "$out/$name.txt"
+done

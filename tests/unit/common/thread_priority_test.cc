@@ -1,0 +1,27 @@
+#include "common/thread_priority.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <thread>
+
+namespace romap {
+namespace {
+
+int Niceness() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
+
+TEST(ThreadPriorityTest, OnlyTheCallingThreadYields) {
+  const int before = Niceness();
+  int inside = before;
+  std::thread thread([&] {
+    LowerThreadPriority();
+    inside = Niceness();
+  });
+  thread.join();
+  EXPECT_GT(inside, before);
+  EXPECT_EQ(Niceness(), before);
+}
+
+}  // namespace
+}  // namespace romap
