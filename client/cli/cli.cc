@@ -35,9 +35,9 @@ int RunCli(int argc, const char* const* argv) {
   app.require_subcommand(1);
   app.fallthrough();  // --log-level may stand after the command too
   app.set_version_flag("--version", "romap 0.1.0");
-  std::string log_level = "warn";
+  std::string log_level = "warning";
   app.add_option("--log-level", log_level, "What to log to stderr")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error"}))
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
       ->capture_default_str();
   Command chosen;
   AddRunCommand(app, &chosen);

@@ -40,6 +40,7 @@ void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
 
 absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
   if (!local) {
+    if (server.find(':') == std::string::npos) return InvalidArgument("--server '{}': expected HOST:PORT", server);
     ROMAP_ASSIGN_OR_RETURN(auto remote, RemoteMappingService::Connect(server));
     return std::unique_ptr<MappingService>(std::move(remote));
   }

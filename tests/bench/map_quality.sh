@@ -21,7 +21,7 @@ if [ ${#sequences[@]} -eq 0 ]; then
   done
 fi
 
-"$build/server/romap-server" --listen 127.0.0.1:0 --log-level warn >"$out/server.out" 2>"$out/server.err" &
+"$build/server/romap-server" --listen 127.0.0.1:0 --log-level warning >"$out/server.out" 2>"$out/server.err" &
 server=$!
 trap 'kill $server 2>/dev/null || true' EXIT
 for _ in $(seq 100); do
@@ -29,6 +29,7 @@ for _ in $(seq 100); do
   [ -n "$address" ] && break
   sleep 0.1
 done
+[ -n "$address" ] || { cat "$out/server.out" "$out/server.err" >&2; exit 1; }
 
 echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | server, client memory |'
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
