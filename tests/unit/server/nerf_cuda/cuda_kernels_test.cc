@@ -3,6 +3,7 @@
 #include "tests/support/cuda_on_host/cuda_on_host.h"
 // clang-format on
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -45,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Orders, CudaKernelsTest,
                          testing::Values(RunOptions{ThreadOrder::kForward}, RunOptions{ThreadOrder::kReverse},
                                          RunOptions{ThreadOrder::kShuffled, 3},
                                          RunOptions{ThreadOrder::kShuffled, 4, 2, true}),
-                         [](const auto& info) { return "Order" + std::to_string(info.index); });
+                         [](const auto& info) { return fmt::format("Order{}", info.index); });
 
 std::vector<float> EvaluateOnCpu(const KernelTable& kernels, const FieldModel& field, const SampleChunk& points) {
   const int n = points.size;
@@ -121,18 +122,17 @@ TEST_P(CudaKernelsTest, AdamMovesParametersAsTheCpu) {
   AlignedBuffer<float> parameters = noise(0), first = noise(1), second = noise(2), gradient = noise(3);
   for (size_t i = 0; i < kCount; ++i) second[i] += 0.5f;
   for (size_t i = 100; i < 200; ++i) gradient[i] = 0.0f;
-  auto on_device = {ToDevice(parameters.span()), ToDevice(first.span()), ToDevice(second.span()),
-                    ToDevice(gradient.span())};
+  DeviceArray<float> device[] = {ToDevice(parameters.span()), ToDevice(first.span()), ToDevice(second.span()),
+                                 ToDevice(gradient.span())};
   const AdamRates rates{0.01f, 0.8f, 0.95f};
-  const auto device = [&](size_t i) -> const DeviceArray<float>& { return *(on_device.begin() + i); };
-  const auto pointer = [&](size_t i) { return const_cast<float*>(device(i).data()); };
-  ASSERT_EQ(LaunchAdam({rates, kCount, pointer(0), pointer(1), pointer(2), pointer(3)}, nullptr), cudaSuccess);
+  const AdamParams params{rates, kCount, device[0].data(), device[1].data(), device[2].data(), device[3].data()};
+  ASSERT_EQ(LaunchAdam(params, nullptr), cudaSuccess);
   float* gradients = gradient.data();
   PlainKernels().adam(rates, 0, kCount, parameters.data(), first.data(), second.data(), &gradients, 1);
-  EXPECT_EQ(Difference(parameters.span(), FromDevice(device(0)), 1e-6), "");
-  EXPECT_EQ(Difference(first.span(), FromDevice(device(1)), 1e-6), "");
-  EXPECT_EQ(Difference(second.span(), FromDevice(device(2)), 1e-6), "");
-  EXPECT_EQ(FromDevice(device(3)), std::vector<float>(kCount, 0.0f));
+  EXPECT_EQ(Difference(parameters.span(), FromDevice(device[0]), 1e-6), "");
+  EXPECT_EQ(Difference(first.span(), FromDevice(device[1]), 1e-6), "");
+  EXPECT_EQ(Difference(second.span(), FromDevice(device[2]), 1e-6), "");
+  EXPECT_EQ(FromDevice(device[3]), std::vector<float>(kCount, 0.0f));
 }
 
 TEST_P(CudaKernelsTest, StepsLearnAsFastAsOnTheCpu) {

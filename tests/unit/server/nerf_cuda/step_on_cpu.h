@@ -2,6 +2,8 @@
 
 // Random fields and one training step on the CPU, to hold the CUDA kernels against.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <span>
