@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +12,7 @@
 #include "client/cli/run_summary.h"
 #include "client/cli/service_options.h"
 #include "client/eval/eval.h"
+#include "client/files/text_file.h"
 #include "common/status.h"
 
 namespace romap {
@@ -33,7 +33,9 @@ struct RunOptions {
 
 absl::Status PrepareOutput(const std::string& out) {
   std::error_code error;
-  fs::create_directories(out, error);
+  for (const char* part : {"objects", "pictures"}) {
+    if (!error) fs::create_directories(fs::path(out) / part, error);
+  }
   if (error) return InvalidArgument("--out {}: cannot make the folder: {}", out, error.message());
   return absl::OkStatus();
 }
@@ -84,10 +86,15 @@ absl::Status RunSequence(const RunOptions& options) {
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
   if (!objects.empty()) Evaluate(options, json);
-  std::ofstream(fs::path(options.out) / "summary.json") << json.dump(1) << '\n';
+  ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures/*.png\nfigures: {0}/summary.json\n",
              options.out);
   if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
+  if (!result.status.ok()) {
+    return absl::Status(result.status.code(), fmt::format("{} (the map until then is written; session {} is left for "
+                                                          "'romap export')",
+                                                          Message(result.status), result.session_id));
+  }
   if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
     return InvalidArgument("no frame of {} was accepted; the first: {}", options.sequence_dir,
                            summary.faults.empty() ? "" : summary.faults.front());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "client/cli/interrupt.h"
@@ -16,6 +17,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
+constexpr std::chrono::seconds kPatience{5};
+constexpr double kTrainingAfterInterrupt_s = 3;
 // Share of the progress bar that the frames take; training has the rest.
 constexpr double kFrameShare = 0.6;
 
@@ -90,24 +93,29 @@ class Run {
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
     result_.session_id = info.id;
     ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(info.id));
-    absl::Status status = SendFrames();
-    if (status.ok()) status = Train();
+    result_.status = SendFrames();
+    if (result_.status.ok()) result_.status = Train();
     progress_.Done();
     stream_.reset();
-    if (!options_.keep_session) {
+    if (result_.status.ok() && !options_.keep_session) {
       // The map is here; a failure to tidy up on the server does not spoil it.
       service_.DeleteSession(info.id).IgnoreError();
     }
-    if (!status.ok()) return status;
     return result_;
   }
 
  private:
   absl::Status SendFrames() {
     Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
+    std::optional<Clock::time_point> patience_ends;
     while (!(sender.done() && AllAcknowledged())) {
       TakeEvent();
       ShowFrames();
+      // Whoever interrupts, or cannot read on, does not want to wait for a server that does not answer.
+      if (!patience_ends && (Interrupted() || (sender.done() && !sender.status().ok()))) {
+        patience_ends = Clock::now() + kPatience;
+      }
+      if (patience_ends && Clock::now() > *patience_ends) break;
       if (stream_->Done()) {
         sender.Join();
         return StreamEnded();
@@ -115,17 +123,25 @@ class Run {
     }
     result_.mapping_s = collector_.last_ack_s() - collector_.first_sent_s();
     result_.interrupted = Interrupted();
+    if (!sender.done()) {
+      stream_->Cancel();  // wakes the sender where it waits for room
+      return absl::DeadlineExceededError("the server stopped taking frames");
+    }
     return sender.status();
   }
 
   absl::Status Train() {
     ROMAP_RETURN_IF_ERROR(service_.FinishSession(result_.session_id).status());
     const Clock::time_point start = Clock::now();
-    while (!stream_->Done() && SecondsSince(start) < options_.max_training_s) {
+    const auto enough = [&] {
+      return SecondsSince(start) > (Interrupted() ? kTrainingAfterInterrupt_s : options_.max_training_s);
+    };
+    while (!stream_->Done() && !enough()) {
       TakeEvent();
       ShowTraining();
     }
     result_.training_s = SecondsSince(start);
+    result_.interrupted = Interrupted();
     result_.training_complete = stream_->Done();
     return stream_->Done() ? stream_->status() : absl::OkStatus();
   }

@@ -20,6 +20,7 @@ struct StreamOptions {
 
 struct StreamResult {
   std::string session_id;
+  absl::Status status;  // not OK: the stream broke; the collector holds what came until then
   bool interrupted = false;
   bool training_complete = false;
   double mapping_s = 0;   // from the first frame sent to the last acknowledged
@@ -27,8 +28,9 @@ struct StreamResult {
 };
 
 // Streams a sequence through a mapping service and collects the map: creates a session, sends every frame, waits until
-// all are acknowledged, finishes the session and waits for the training. On Ctrl-C it stops sending and goes on from
-// there. Shows a progress bar.
+// all are acknowledged, finishes the session and waits for the training. Ctrl-C ends the sending, and the training: what
+// there is by then is the map. Shows a progress bar. Fails only when there is no session to begin with; what goes wrong
+// later is in the result, and then the session is left on the server.
 absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);
 

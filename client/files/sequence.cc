@@ -7,6 +7,7 @@
 #include "client/files/associate.h"
 #include "client/files/permute_labels.h"
 #include "client/files/text_file.h"
+#include "common/utf8.h"
 
 namespace romap {
 namespace {
@@ -64,6 +65,7 @@ absl::StatusOr<Instance> ParseDetection(const TableLine& line, const std::string
   if (!label || *label < 1 || *label > 65535 || *label != std::floor(*label)) {
     return InvalidArgument("{}:{}: label '{}' should be a whole number from 1 to 65535", path, line.number, fields[1]);
   }
+  if (!IsUtf8(fields[2])) return InvalidArgument("{}:{}: the class name is not UTF-8", path, line.number);
   const std::optional<double> score = fields.size() == 4 ? ParseNumber(fields[3]) : std::optional(1.0);
   if (!score || *score < 0 || *score > 1) {
     return InvalidArgument("{}:{}: score '{}' should lie between 0 and 1", path, line.number, fields[3]);

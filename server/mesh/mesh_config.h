@@ -10,7 +10,7 @@ struct MeshConfig {
   bool fill_unseen = true;
   double unseen_optical_depth = 0.2;
   bool cut_below_support = true;
-  double min_component_share = 0.5;
+  double min_component_share = 0.35;
 
   void Fields(ConfigFields& fields) {
     fields.Add("resolution", &resolution,

@@ -40,6 +40,17 @@ std::map<uint16_t, Extent> MeasureLabels(const cv::Mat& labels) {
   return extents;
 }
 
+// Association costs grow with the square of the masks: a segmenter that labels every patch must not starve the rest.
+void KeepLargest(size_t count, uint64_t frame_id, std::vector<Detection>& detections) {
+  if (detections.size() <= count) return;
+  spdlog::debug("objects: frame {}: {} masks, the {} largest are used", frame_id, detections.size(), count);
+  std::nth_element(detections.begin(), detections.begin() + static_cast<std::ptrdiff_t>(count), detections.end(),
+                   [](const Detection& a, const Detection& b) { return a.area_px > b.area_px; });
+  detections.resize(count);
+  std::sort(detections.begin(), detections.end(),
+            [](const Detection& a, const Detection& b) { return a.label < b.label; });
+}
+
 }  // namespace
 
 std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig& config) {
@@ -74,6 +85,7 @@ std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig
     }
     detections.push_back(std::move(detection));
   }
+  KeepLargest(static_cast<size_t>(config.max_detections), frame.frame_id, detections);
   return detections;
 }
 

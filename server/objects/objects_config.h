@@ -8,6 +8,7 @@ namespace romap {
 struct ObjectsConfig {
   int min_mask_area_px = 120;
   double max_mask_area_share = 0.6;
+  int max_detections = 64;
   double match_min_score = 0.3;
 
   int confirm_frames = 6;
@@ -38,6 +39,8 @@ struct ObjectsConfig {
                {.unit = "px", .min = 4, .max = 1e6, .help = "Smaller masks are ignored"});
     fields.Add("max_mask_area_share", &max_mask_area_share,
                {.min = 0.05, .max = 1, .help = "Masks that fill more of the image are ignored"});
+    fields.Add("max_detections", &max_detections,
+               {.unit = "masks", .min = 1, .max = 10000, .help = "Of more masks in one frame the largest are used"});
     fields.Add("match_min_score", &match_min_score,
                {.min = 0, .max = 1, .help = "Least association score between a detection and an object"});
     fields.Add("confirm_frames", &confirm_frames,

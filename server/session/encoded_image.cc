@@ -54,7 +54,12 @@ std::optional<Size> JpegSize(const std::string& bytes) {
 bool HasPngEnd(const std::string& bytes) {
   return bytes.find("IEND", bytes.size() - std::min<size_t>(bytes.size(), 64)) != std::string::npos;
 }
-bool HasJpegEnd(const std::string& bytes) { return bytes.rfind("\xFF\xD9") != std::string::npos; }
+// A thumbnail in the metadata ends with the same marker, so it must come after the last scan has begun.
+bool HasJpegEnd(const std::string& bytes) {
+  const size_t end = bytes.rfind("\xFF\xD9");
+  const size_t scan = bytes.rfind("\xFF\xDA");
+  return end != std::string::npos && scan != std::string::npos && end > scan;
+}
 
 absl::Status CheckSize(const char* what, const Size& size, const CameraModel& camera) {
   if (size.width_px == camera.width_px && size.height_px == camera.height_px) return absl::OkStatus();

@@ -7,14 +7,23 @@
 #include <set>
 
 #include "common/status.h"
+#include "common/utf8.h"
 #include "server/session/encoded_image.h"
 
 namespace romap {
 namespace {
 
+constexpr size_t kMaxClassNameBytes = 100;
+// Farther from the origin single-precision geometry falls apart.
+constexpr double kFarthest_mu = 1e6;
+
 absl::Status CheckPose(const FrameInput& input) {
   if (input.T_world_camera && !input.T_world_camera->IsFinite()) {
     return InvalidArgument("T_world_camera has a number that is not finite");
+  }
+  if (input.T_world_camera && input.T_world_camera->translation().norm() > kFarthest_mu) {
+    return InvalidArgument("T_world_camera lies {:.3g} map units from the origin, at most {:.0e} are allowed",
+                           input.T_world_camera->translation().norm(), kFarthest_mu);
   }
   if (input.gravity_camera) {
     const double norm = input.gravity_camera->norm();
@@ -31,6 +40,10 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
     }
     if (!seen.insert(instance.label).second)
       return InvalidArgument("instance label {} is listed twice", instance.label);
+    if (instance.class_name.size() > kMaxClassNameBytes || !IsUtf8(instance.class_name)) {
+      return InvalidArgument("class name of label {} must be UTF-8 of at most {} bytes", instance.label,
+                             kMaxClassNameBytes);
+    }
     if (!(instance.score >= 0 && instance.score <= 1)) {
       return InvalidArgument("score {} of label {} must lie in 0..1", instance.score, instance.label);
     }

@@ -85,12 +85,16 @@ void Mesher::Run() {
     const FieldSnapshot snapshot = std::move(oldest->second.second);
     waiting_.erase(oldest);
     lock.unlock();
-    if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
-      sink(*std::move(mesh), snapshot.T_world_object);
-    } else {
-      // Early in training there may be no surface yet; the next snapshot brings it.
-      spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
-                    Message(mesh.status()));
+    try {
+      if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
+        sink(*std::move(mesh), snapshot.T_world_object);
+      } else {
+        // Early in training there may be no surface yet; the next snapshot brings it.
+        spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
+                      Message(mesh.status()));
+      }
+    } catch (const std::exception& e) {  // a library, or memory: this mesh is lost, the next may come
+      spdlog::error("{}: meshing failed: {}", snapshot.object.ToString(), e.what());
     }
     lock.lock();
     busy_client_ = 0;

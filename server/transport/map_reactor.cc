@@ -18,7 +18,8 @@ absl::Status MapReactor::Run() {
   ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MapStream> stream, service().OpenMap(session_id));
 
   std::thread frame_pump([&] { PumpFrames(*stream); });
-  const absl::Status status = ForwardEvents(session_id, *stream);
+  // Whatever goes wrong, the pump must be joined before this function is left.
+  const absl::Status status = Guarded([&] { return ForwardEvents(session_id, *stream); });
   RequestStop(status);  // wakes the pump where it waits for a frame,
   stream->Cancel();     // and where it waits for room
   frame_pump.join();

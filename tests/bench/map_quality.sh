@@ -37,7 +37,7 @@ for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
   "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 --out "$out/$name.map" --no-pictures >"$out/$name.txt"
   awk -v name="$name" '
-    / rejected, .* dropped\)/ { dropped = $6; for (i = 1; i < NF; ++i) if ($i == "for") training = $(i + 1) }
+    / rejected, .* dropped\)/ { dropped = $7; for (i = 1; i < NF; ++i) if ($i == "for") training = $(i + 1) }
     /^memory:/ { memory = $3 " MB, " $6 " MB" }
     /^[0-9]+_/ && / s +[0-9]+ +[0-9.]+ s +[0-9.]+ s$/ { if ($(NF-3) > cuboid) cuboid = $(NF-3); if ($(NF-1) > mesh) mesh = $(NF-1) }
     /^mean/ && !found { found = $2 " of " $4; acc = $6; comp = $8; r04 = $10; r1 = $12; next }
