@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "client/eval/assignment.h"
+#include "common/assignment.h"
 #include "client/files/objects_yaml.h"
 
 namespace romap {

@@ -5,7 +5,7 @@
 #include <map>
 #include <numbers>
 
-#include "client/eval/assignment.h"
+#include "common/assignment.h"
 #include "client/eval/pcg64.h"
 #include "client/eval/points.h"
 #include "client/eval/seen_frames.h"

@@ -6,8 +6,7 @@
 namespace romap {
 
 // The one-to-one assignment of rows to columns with the greatest sum of scores, where only pairs whose score is at
-// least `min_score` may be joined. Returns for each row its column, or -1. Source: H. W. Kuhn, "The Hungarian method
-// for the assignment problem", 1955, in the O(n^3) form with potentials.
+// least `min_score` may be joined. Returns for each row its column, or -1.
 std::vector<int> AssignMaximal(const Eigen::MatrixXd& scores, double min_score);
 
 }  // namespace romap

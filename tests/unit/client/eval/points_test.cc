@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "client/eval/assignment.h"
+#include "common/assignment.h"
 #include "client/eval/pcg64.h"
 #include "tests/unit/client/eval/eval_world.h"
 

@@ -1,4 +1,4 @@
-#include "client/eval/assignment.h"
+#include "common/assignment.h"
 
 #include <limits>
 
