@@ -53,6 +53,54 @@ class SE3 {
   Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
 };
 
+// Similarity: p_to = scale * rotation * p_from + translation. What a monocular map undergoes when it is corrected: its
+// scale is as uncertain as its pose. Composes like SE3.
+template <class To, class From>
+class Sim3 {
+ public:
+  Sim3() = default;
+  Sim3(double scale, const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation)
+      : scale_(scale), rotation_(rotation.normalized()), translation_(translation) {}
+  explicit Sim3(const SE3<To, From>& rigid) : Sim3(1.0, rigid.rotation(), rigid.translation()) {}
+
+  double scale() const { return scale_; }  // > 0
+  const Eigen::Quaterniond& rotation() const { return rotation_; }
+  const Eigen::Vector3d& translation() const { return translation_; }
+  // The same without the scale: turns and shifts alike.
+  SE3<To, From> Rigid() const { return {rotation_, translation_}; }
+
+  Sim3<From, To> Inverse() const {
+    const Eigen::Quaterniond inverse = rotation_.conjugate();
+    return {1 / scale_, inverse, -(inverse * translation_) / scale_};
+  }
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p_from) const {
+    return scale_ * (rotation_ * p_from) + translation_;
+  }
+
+  template <class Other>
+  Sim3<To, Other> operator*(const Sim3<From, Other>& other) const {
+    return {scale_ * other.scale(), rotation_ * other.rotation(),
+            scale_ * (rotation_ * other.translation()) + translation_};
+  }
+
+  // Where a rigid frame (a camera, an object) gets to when its space undergoes this similarity: its origin goes along,
+  // its axes turn, and its own unit of length stays what it was.
+  template <class Other>
+  SE3<To, Other> Moved(const SE3<From, Other>& frame) const {
+    return {rotation_ * frame.rotation(), *this * frame.translation()};
+  }
+
+  bool IsFinite() const {
+    return std::isfinite(scale_) && scale_ > 0 && rotation_.coeffs().allFinite() && translation_.allFinite();
+  }
+
+ private:
+  double scale_ = 1;
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
+};
+
 // Shortest rotation that takes world +z to `up_world` (unit length): the orientation of a cuboid whose yaw is 0.
 Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world);
 

@@ -60,10 +60,14 @@ struct FrameInput {
 struct Frame {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
-  CameraModel camera;      // after undistortion: distortion is all zero and all pixels below obey the pinhole model
-  cv::Mat image_bgr;       // CV_8UC3
-  bool has_masks = false;  // false: no detector ran on this frame (differs from "ran and found nothing")
-  cv::Mat labels;          // CV_16UC1, 0 = nothing; empty when !has_masks
+  CameraModel camera;  // after undistortion: distortion is all zero and all pixels below obey the pinhole model
+  cv::Mat image_bgr;   // CV_8UC3
+  // The picture as the lens gave it, for those who undistort points and not pictures. Empty when the lens is a pinhole:
+  // then image_bgr is it.
+  cv::Mat source_grey;        // CV_8UC1
+  CameraModel source_camera;  // of source_grey, with its distortion
+  bool has_masks = false;     // false: no detector ran on this frame (differs from "ran and found nothing")
+  cv::Mat labels;             // CV_16UC1, 0 = nothing; empty when !has_masks
   std::vector<Instance> instances;
   cv::Mat depth_mu;  // CV_32FC1 z depth in map units, 0 = unknown; empty when there is none
   std::optional<SE3<World, Camera>> T_world_camera;
@@ -110,6 +114,22 @@ struct KeyframeView {
   std::vector<MapPointId> removed_points;  // culled since the last keyframe
 };
 
+// What became of one keyframe since it was last told of.
+struct KeyframeCorrection {
+  KeyframeId id;
+  SE3<World, Camera> T_world_camera;  // now
+  // What happened to the space around it: p_new = S_new_old * p_old. Its rotation and the motion of the camera's centre
+  // are those of the pose; its scale is 1 unless a monocular map changed its scale here.
+  Sim3<World, World> S_new_old;
+};
+
+// The map moved under what was already handed on: bundle adjustment, a closed loop, gravity, scale.
+struct MapCorrection {
+  std::vector<KeyframeCorrection> keyframes;  // those that moved noticeably, by id
+  std::vector<MapPoint> points;               // those that moved, with their new positions
+  Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
+};
+
 // ---------------------------------------------------------------------------------------------- objects -> session
 
 enum class ObjectState { kProvisional, kConfirmed, kLost };
@@ -132,6 +152,8 @@ struct ObjectUpdate {
   // Where the newest mesh stands: the pose of the frame its vertices are in. It follows corrections of the map, so that
   // a mesh that was sent once need not be sent again. None while there is no mesh.
   std::optional<SE3<World, Object>> T_world_mesh;
+  // p_world = T_world_mesh * (mesh_scale * vertex): 1 until a correction changes the scale of a monocular map.
+  double mesh_scale = 1;
 };
 
 struct ObjectRemoved {
@@ -165,11 +187,21 @@ struct ObjectView {
       sparse_depth;  // (u_px, v_px, z_mu) in full-image pixels: map points of this object seen here
 };
 
-// What objects tells nerf about one object: its box (always) and views that are new.
+// The corrected pose of a view that was sent before.
+struct ViewPose {
+  KeyframeId keyframe;
+  SE3<World, Camera> T_world_camera;
+};
+
+// What objects tells nerf about one object: its box (always), views that are new, and how the map moved under the old
+// ones. The correction comes first: box and new views are in the corrected world.
 struct ObjectViews {
   ObjectId object;
-  Cuboid cuboid;  // training box before enlargement
-  std::vector<ObjectView> new_views;
+  std::optional<Sim3<World, World>> S_new_old =
+      {};                                      // of the space the object stands in: its field goes along unchanged
+  std::vector<ViewPose> corrected_views = {};  // in the corrected world
+  Cuboid cuboid;                               // training box before enlargement
+  std::vector<ObjectView> new_views = {};
 };
 
 // ---------------------------------------------------------------------------------------------- nerf -> mesh

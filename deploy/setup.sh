@@ -6,7 +6,7 @@ set -euo pipefail
 packages=(
   ccache cmake g++ git ninja-build pkg-config
   libgrpc++-dev libgrpc-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
-  libopencv-dev libopencv-contrib-dev libeigen3-dev libhwy-dev libtbb-dev libnanoflann-dev
+  libopencv-dev libopencv-contrib-dev libeigen3-dev libceres-dev libhwy-dev libtbb-dev libnanoflann-dev
   libdraco-dev libspdlog-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev
 )

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/messages.h"
-#include "server/slam/feature.h"
+#include "server/slam/features/feature.h"
 
 namespace romap {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/messages.h"
-#include "server/slam/feature_extractor.h"
+#include "server/slam/features/feature_extractor.h"
 #include "server/slam/keyframe.h"
 #include "server/slam/point_track.h"
 #include "server/slam/slam_config.h"

@@ -1,4 +1,4 @@
-#include "server/slam/feature_extractor.h"
+#include "server/slam/features/feature_extractor.h"
 
 #include <algorithm>
 #include <cmath>

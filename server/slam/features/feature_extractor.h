@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "common/messages.h"
-#include "server/slam/feature.h"
+#include "server/slam/features/feature.h"
 #include "server/slam/slam_config.h"
 
 namespace romap {

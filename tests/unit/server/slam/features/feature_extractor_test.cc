@@ -1,4 +1,4 @@
-#include "server/slam/feature_extractor.h"
+#include "server/slam/features/feature_extractor.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/geometry.h"
+
+namespace romap {
+
+// Least-squares similarity p_to = S * p_from (Umeyama 1991). `fix_scale`: scale is 1. nullopt: fewer than three points,
+// or all on a line.
+template <class To, class From>
+std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_from,
+                                          std::span<const Eigen::Vector3d> p_to, bool fix_scale);
+
+// A landmark that two keyframes see, each with its own opinion of where it is.
+struct SimilarityMatch {
+  Eigen::Vector3d p_first = Eigen::Vector3d::Zero();   // in the first camera's frame, by the first's map
+  Eigen::Vector3d p_second = Eigen::Vector3d::Zero();  // in the second camera's frame, by the second's map
+  Eigen::Vector2d first_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d second_px = Eigen::Vector2d::Zero();
+  double first_sigma_px = 1;
+  double second_sigma_px = 1;
+};
+
+struct SimilarityOptions {
+  bool fix_scale = false;  // SE3
+  int max_iterations = 300;
+  int min_inliers = 20;
+  double chi2_bound = 9.210;  // per reprojection, two degrees of freedom
+  uint64_t seed = 1;
+};
+
+struct SimilarityEstimate {
+  Sim3<Camera, Camera> S_first_second;
+  std::vector<uint8_t> inlier;  // per match: reprojects within the bound in both cameras
+  int inliers = 0;
+};
+
+// The similarity between two cameras' maps from matches that may be wrong: AlignPoints on three matches in RANSAC,
+// inliers by reprojection into both cameras, then Levenberg-Marquardt on both reprojection errors of the inliers (seven
+// parameters; Huber), repeated until the inliers stay. nullopt when there are fewer than `min_inliers`.
+std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std::span<const SimilarityMatch> matches,
+                                                  const SimilarityOptions& options);
+
+// The refinement alone, from a known start. Inliers are told by the bound.
+SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera, Camera>& start,
+                                    std::span<const SimilarityMatch> matches, const SimilarityOptions& options);
+
+}  // namespace romap

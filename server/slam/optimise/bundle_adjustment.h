@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/geometry.h"
+
+namespace romap {
+
+// What is believed of a pose from elsewhere (a client's tracker): a soft constraint.
+struct PosePrior {
+  SE3<World, Camera> T_world_camera;
+  double rotation_sigma_rad = 0.01;
+  double translation_sigma_mu = 0.01;
+};
+
+struct BundleCamera {
+  SE3<World, Camera> T_world_camera;
+  bool fixed = false;
+  std::optional<PosePrior> prior;
+};
+
+struct BundlePoint {
+  Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
+  bool fixed = false;
+};
+
+struct BundleObservation {
+  int camera = 0;  // index
+  int point = 0;   // index
+  Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();
+  double sigma_px = 1;
+  double depth_mu = 0;  // measured z depth, 0 = unknown
+  double depth_sigma_mu = 0;
+  bool outlier = false;  // in: left out of the problem. out: its error is beyond the 95 % bound
+};
+
+struct BundleProblem {
+  CameraModel camera;  // of all cameras; pinhole
+  std::vector<BundleCamera> cameras;
+  std::vector<BundlePoint> points;
+  std::vector<BundleObservation> observations;
+};
+
+struct BundleOptions {
+  int max_iterations = 10;
+  bool reject_outliers = true;  // after half of the iterations, beyond the bound; they may come back at the end
+  bool dense = false;           // few cameras: DENSE_SCHUR instead of SPARSE_SCHUR
+  int threads = 1;
+  const std::atomic<bool>* abort = nullptr;  // looked at in every iteration; what was reached is kept
+};
+
+struct BundleSummary {
+  int iterations = 0;
+  double initial_rms_px = 0;  // over the observations used, weighted by 1 / sigma
+  double final_rms_px = 0;
+  int outliers = 0;
+  bool aborted = false;
+  bool usable = false;  // false: nothing was changed (numerical failure, or nothing to do)
+};
+
+// Bundle adjustment (Triggs et al. 2000) with Ceres: reprojection errors (and inverse-depth errors where depth was
+// measured), Huber loss at the 95 % bound, analytic Jacobians, right-multiplied SE3 increments, points eliminated by
+// the Schur complement. Deterministic with one thread. The caller fixes the gauge through `fixed` cameras (two for a
+// monocular map, or the far end of the window).
+BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options);
+
+}  // namespace romap
