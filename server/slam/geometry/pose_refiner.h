@@ -29,11 +29,13 @@ struct PoseEstimate {
 struct PoseRefinerOptions {
   int rounds = 3;                // outliers are told anew before each round but the first
   int iterations_per_round = 5;  // of Gauss-Newton (Levenberg-Marquardt)
+  // Outliers are told before the first round, too: for a start that is nearly right among many wrong matches.
+  bool start_is_close = false;
 };
 
 // The camera pose that fits known points best: robust (Huber) Levenberg-Marquardt on reprojection (and depth) errors,
 // six parameters, outliers by the chi-square bound (5.991 without, 7.815 with depth). This runs twice in every frame,
-// so it is written out: no allocation in the loop, normal equations accumulated directly. With fewer than 4 usable
+// so no loop allocates and the normal equations are accumulated directly. With fewer than 4 usable
 // observations the result has no inliers.
 PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& start,
                         std::span<const PoseObservation> observations, const PoseRefinerOptions& options = {});

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+#include "common/camera_model.h"
+#include "server/slam/geometry/levenberg_marquardt.h"
+#include "server/slam/geometry/pose_refiner.h"
+
+namespace romap {
+
+// A camera's pose as the inner loops want it: p_camera = rotation * p_world + translation.
+struct CameraFromWorld {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+inline bool HasDepth(const PoseObservation& observation) {
+  return observation.depth_mu > 0 && observation.depth_sigma_mu > 0;
+}
+
+// 95 % bounds of chi-square with two degrees of freedom, and with three where depth was measured, too.
+inline double Chi2Bound(const PoseObservation& observation) { return HasDepth(observation) ? 7.815 : 5.991; }
+
+// What an observation says against a pose: pixels and depth in units of their standard deviations.
+struct ObservationError {
+  Eigen::Vector3d p_camera;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double depth = 0;
+  double chi2 = std::numeric_limits<double>::infinity();  // stays so behind the camera
+};
+
+inline ObservationError ErrorOf(const CameraModel& camera, const CameraFromWorld& pose,
+                                const PoseObservation& observation) {
+  ObservationError error;
+  error.p_camera = pose.rotation * observation.p_world + pose.translation;
+  if (!(error.p_camera.z() > 0)) return error;
+  error.pixel = (camera.Project(error.p_camera) - observation.pixel_px) / observation.sigma_px;
+  error.chi2 = error.pixel.squaredNorm();
+  if (HasDepth(observation)) {
+    error.depth = (error.p_camera.z() - observation.depth_mu) / observation.depth_sigma_mu;
+    error.chi2 += error.depth * error.depth;
+  }
+  return error;
+}
+
+using PoseEquations = NormalEquations<6>;
+
+// Adds what one observation says about the pose, with Huber's weight at its bound. Parameters: shift, then turn, of the
+// camera's frame, as in Moved.
+void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, const PoseObservation& observation,
+                    PoseEquations& equations);
+
+// p_camera' = Exp(turn) * p_camera + shift, with step = (shift, turn).
+CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& step);
+
+}  // namespace romap
