@@ -100,6 +100,12 @@ struct TrackedFrame {
   SE3<World, Camera> T_world_camera;
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();  // unit length, against gravity
   bool is_keyframe = false;
+  // The keyframe the pose hangs on: T_world_camera = T_world_reference * T_reference_camera as of now; when the
+  // reference is corrected the frame goes along. The translation is in the reference's first unit of length: it is to
+  // be multiplied by all scale corrections the reference went through. 0: the pose was given and hangs on nothing.
+  KeyframeId reference = {};
+  SE3<Camera, Camera> T_reference_camera = {};
+  std::string reason = {};  // for people: why not tracking; empty while tracking
 };
 
 // A keyframe with what the sparse map says about it. `points` holds the present position of every point in
@@ -262,7 +268,8 @@ struct FrameAck {
   TrackingState state = TrackingState::kInitialising;
   std::optional<SE3<World, Camera>> T_world_camera;
   bool is_keyframe = false;
-  double latency_s = 0;  // from arrival at the server to this acknowledgement
+  double latency_s = 0;           // from arrival at the server to this acknowledgement
+  std::string state_reason = {};  // for people: why the state is not kTracking, e.g. "too little parallax"
 };
 
 struct Statistics {
