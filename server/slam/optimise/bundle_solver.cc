@@ -1,0 +1,256 @@
+#include "server/slam/optimise/bundle_solver.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <memory>
+
+#include "server/slam/optimise/bundle_state.h"
+#include "server/slam/optimise/reprojection_cost.h"
+
+namespace romap {
+namespace {
+
+// A relative fall of the cost per iteration below which a map no longer changes visibly.
+constexpr double kFunctionTolerance = 1e-4;
+
+class AbortCallback : public ceres::IterationCallback {
+ public:
+  explicit AbortCallback(const std::atomic<bool>* abort) : abort_(abort) {}
+
+  // Termination "with success" makes Ceres keep what was reached.
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*summary*/) override {
+    if (abort_ == nullptr || !abort_->load(std::memory_order_relaxed)) return ceres::SOLVER_CONTINUE;
+    aborted_ = true;
+    return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+  }
+  bool aborted() const { return aborted_; }
+
+ private:
+  const std::atomic<bool>* abort_;
+  bool aborted_ = false;
+};
+
+bool IsUsable(const PosePrior& prior) {
+  return prior.T_world_camera.IsFinite() && prior.rotation_sigma_rad > 0 && prior.translation_sigma_mu > 0 &&
+         std::isfinite(prior.rotation_sigma_rad) && std::isfinite(prior.translation_sigma_mu);
+}
+
+// A bundle problem in the form of Ceres. Lengths are divided by the typical distance from camera to point, so that
+// tolerances and damping mean the same whatever the map's unit.
+class BundleSolver {
+ public:
+  BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& use);
+
+  void Run(const BundleOptions& options, int max_iterations, BundleRun& run);
+
+ private:
+  void MeasureUnit();
+  void SelectPoints();
+  void AddObservations();
+  void AddPriors();
+  ceres::Solver::Options SolverOptions(const BundleOptions& options, int max_iterations, const BundleRun& run);
+  bool WriteBack() const;
+
+  static ceres::Problem::Options ProblemOptions(RefreshCameras* refresh);
+
+  BundleProblem& problem_;
+  std::vector<uint8_t> use_;
+  double unit_mu_ = 1;
+
+  std::vector<CameraState> cameras_;
+  std::vector<std::array<double, 3>> points_;
+  std::vector<uint8_t> varied_cameras_;  // per camera: has a free parameter block in the Ceres problem
+  std::vector<uint8_t> varied_points_;   // per point
+
+  RefreshCameras refresh_{&cameras_};
+  ceres::HuberLoss reprojection_loss_{std::sqrt(kChi2Bound2)};
+  ceres::HuberLoss depth_loss_{std::sqrt(kChi2Bound1)};
+  // Costs cannot be moved, hence no vectors.
+  std::deque<ReprojectionCost> reprojection_costs_;
+  std::deque<InverseDepthCost> depth_costs_;
+  std::deque<PosePriorCost> prior_costs_;
+  ceres::Problem ceres_;  // last: it refers to all the others
+};
+
+ceres::Problem::Options BundleSolver::ProblemOptions(RefreshCameras* refresh) {
+  ceres::Problem::Options options;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;
+  options.evaluation_callback = refresh;
+  return options;
+}
+
+BundleSolver::BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& use)
+    : problem_(problem), use_(use), ceres_(ProblemOptions(&refresh_)) {
+  MeasureUnit();
+  cameras_.reserve(problem.cameras.size());
+  for (const BundleCamera& camera : problem.cameras) {
+    const SE3<World, Camera>& T = camera.T_world_camera;
+    cameras_.emplace_back(SE3<World, Camera>(T.rotation(), T.translation() / unit_mu_));
+  }
+  points_.resize(problem.points.size());
+  for (size_t i = 0; i < points_.size(); ++i) {
+    Eigen::Map<Eigen::Vector3d>(points_[i].data()) = problem.points[i].position_world / unit_mu_;
+  }
+  varied_cameras_.assign(cameras_.size(), 0);
+  varied_points_.assign(points_.size(), 0);
+  SelectPoints();
+  AddObservations();
+  AddPriors();
+}
+
+void BundleSolver::MeasureUnit() {
+  std::vector<double> distances_mu;
+  distances_mu.reserve(use_.size());
+  for (size_t i = 0; i < use_.size(); ++i) {
+    if (!use_[i]) continue;
+    const BundleObservation& observation = problem_.observations[i];
+    distances_mu.push_back((problem_.points[observation.point].position_world -
+                            problem_.cameras[observation.camera].T_world_camera.translation())
+                               .norm());
+  }
+  if (distances_mu.empty()) return;
+  const auto middle = distances_mu.begin() + static_cast<std::ptrdiff_t>(distances_mu.size() / 2);
+  std::nth_element(distances_mu.begin(), middle, distances_mu.end());
+  if (*middle > 0) unit_mu_ = *middle;
+}
+
+// Leaves out what would only cost time or make the equations singular: points that no free camera sees do not touch the
+// cameras, and a single sight without depth does not determine a point.
+void BundleSolver::SelectPoints() {
+  struct Sights {
+    int constraints = 0;
+    bool from_free_camera = false;
+  };
+  std::vector<Sights> sights(points_.size());
+  for (size_t i = 0; i < use_.size(); ++i) {
+    if (!use_[i]) continue;
+    const BundleObservation& observation = problem_.observations[i];
+    Sights& point = sights[observation.point];
+    point.constraints += HasDepth(observation) ? 2 : 1;
+    if (!problem_.cameras[observation.camera].fixed) point.from_free_camera = true;
+  }
+  for (size_t i = 0; i < use_.size(); ++i) {
+    const Sights& point = sights[problem_.observations[i].point];
+    const bool fixed = problem_.points[problem_.observations[i].point].fixed;
+    use_[i] = use_[i] && point.from_free_camera && (fixed || point.constraints >= 2);
+  }
+}
+
+void BundleSolver::AddObservations() {
+  for (size_t i = 0; i < use_.size(); ++i) {
+    if (!use_[i]) continue;
+    const BundleObservation& observation = problem_.observations[i];
+    const bool camera_fixed = problem_.cameras[observation.camera].fixed;
+    const bool point_fixed = problem_.points[observation.point].fixed;
+    if (camera_fixed && point_fixed) continue;
+    CameraState& camera = cameras_[observation.camera];
+    double* increment = camera.increment.data();
+    double* point = points_[observation.point].data();
+
+    reprojection_costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px);
+    ceres_.AddResidualBlock(&reprojection_costs_.back(), &reprojection_loss_, increment, point);
+    if (HasDepth(observation)) {
+      depth_costs_.emplace_back(&camera, observation.depth_mu / unit_mu_, observation.depth_sigma_mu / unit_mu_);
+      ceres_.AddResidualBlock(&depth_costs_.back(), &depth_loss_, increment, point);
+    }
+    if (camera_fixed) ceres_.SetParameterBlockConstant(increment);
+    if (point_fixed) ceres_.SetParameterBlockConstant(point);
+    varied_cameras_[observation.camera] = !camera_fixed;
+    varied_points_[observation.point] = !point_fixed;
+  }
+}
+
+void BundleSolver::AddPriors() {
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    const BundleCamera& camera = problem_.cameras[i];
+    if (camera.fixed || !camera.prior || !IsUsable(*camera.prior) || !camera.T_world_camera.IsFinite()) continue;
+    PosePrior prior = *camera.prior;
+    const SE3<World, Camera>& T = prior.T_world_camera;
+    prior.T_world_camera = SE3<World, Camera>(T.rotation(), T.translation() / unit_mu_);
+    prior.translation_sigma_mu /= unit_mu_;
+    prior_costs_.emplace_back(&cameras_[i], prior);
+    ceres_.AddResidualBlock(&prior_costs_.back(), nullptr, cameras_[i].increment.data());
+    varied_cameras_[i] = 1;
+  }
+}
+
+ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options, int max_iterations,
+                                                   const BundleRun& run) {
+  ceres::Solver::Options solver;
+  solver.max_num_iterations = max_iterations;
+  solver.function_tolerance = kFunctionTolerance;
+  solver.initial_trust_region_radius = run.trust_region_radius;
+  solver.num_threads = std::max(1, options.threads);
+  solver.linear_solver_type = options.dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  solver.logging_type = ceres::SILENT;
+  // The points are eliminated first; found by hand, this costs Ceres a search for independent sets.
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (varied_points_[i]) ordering->AddElementToGroup(points_[i].data(), 0);
+  }
+  for (CameraState& camera : cameras_) {
+    if (ceres_.HasParameterBlock(camera.increment.data())) ordering->AddElementToGroup(camera.increment.data(), 1);
+  }
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (!varied_points_[i] && ceres_.HasParameterBlock(points_[i].data())) {
+      ordering->AddElementToGroup(points_[i].data(), 1);
+    }
+  }
+  solver.linear_solver_ordering = ordering;
+  return solver;
+}
+
+void BundleSolver::Run(const BundleOptions& options, int max_iterations, BundleRun& run) {
+  if (ceres_.NumResidualBlocks() == 0) return;
+  ceres::Solver::Options solver = SolverOptions(options, max_iterations, run);
+  AbortCallback abort(options.abort);
+  solver.callbacks.push_back(&abort);
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &ceres_, &summary);
+
+  run.aborted = abort.aborted();
+  run.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  run.converged = summary.termination_type == ceres::CONVERGENCE;
+  if (!summary.iterations.empty()) run.trust_region_radius = summary.iterations.back().trust_region_radius;
+  const bool changed = summary.num_successful_steps > 0 || run.converged;
+  run.usable = summary.IsSolutionUsable() && changed && WriteBack();
+}
+
+// False, and nothing written, when a number is not finite.
+bool BundleSolver::WriteBack() const {
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (varied_cameras_[i] && !cameras_[i].Pose().IsFinite()) return false;
+  }
+  for (size_t i = 0; i < points_.size(); ++i) {
+    const bool finite = std::isfinite(points_[i][0]) && std::isfinite(points_[i][1]) && std::isfinite(points_[i][2]);
+    if (varied_points_[i] && !finite) return false;
+  }
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (!varied_cameras_[i]) continue;
+    const SE3<World, Camera> pose = cameras_[i].Pose();
+    problem_.cameras[i].T_world_camera = SE3<World, Camera>(pose.rotation(), pose.translation() * unit_mu_);
+  }
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (!varied_points_[i]) continue;
+    problem_.points[i].position_world = Eigen::Map<const Eigen::Vector3d>(points_[i].data()) * unit_mu_;
+  }
+  return true;
+}
+
+}  // namespace
+
+void RunBundle(BundleProblem& problem, const std::vector<uint8_t>& use, const BundleOptions& options,
+               int max_iterations, BundleRun& run) {
+  run.usable = run.converged = run.aborted = false;
+  run.iterations = 0;
+  if (max_iterations <= 0) return;
+  BundleSolver(problem, use).Run(options, max_iterations, run);
+}
+
+}  // namespace romap
