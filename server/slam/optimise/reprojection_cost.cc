@@ -105,9 +105,9 @@ bool PosePriorCost::Evaluate(double const* const* /*parameters*/, double* residu
   const Eigen::Matrix3d R_world_camera = state.R_camera_world.transpose();
   const Eigen::Vector3d turn_rad =
       LogRotation(Eigen::Quaterniond(prior_.T_world_camera.RotationMatrix().transpose() * R_world_camera));
-  Eigen::Map<Eigen::Vector3d>(residuals) = turn_rad / prior_.rotation_sigma_rad;
-  Eigen::Map<Eigen::Vector3d>(residuals + 3) =
-      (state.t_world_camera - prior_.T_world_camera.translation()) / prior_.translation_sigma_mu;
+  Eigen::Map<Eigen::Matrix<double, 6, 1>> residual(residuals);
+  residual.head<3>() = turn_rad / prior_.rotation_sigma_rad;
+  residual.tail<3>() = (state.t_world_camera - prior_.T_world_camera.translation()) / prior_.translation_sigma_mu;
   if (jacobians == nullptr || jacobians[0] == nullptr) return true;
 
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> jacobian(jacobians[0]);
