@@ -26,6 +26,13 @@ enum class ImageEncoding { kJpeg, kPng, kRawRgb8, kRawBgr8, kRawGray8 };
 enum class MaskEncoding { kNone, kLabelPng, kRunLength };
 enum class DepthEncoding { kNone, kPng16, kRawUint16 };
 
+// What becomes of the camera poses that frames bring.
+enum class PoseUse {
+  kGiven,   // they are the truth; frames without one are tracked from the image
+  kPrior,   // they help tracking from the image and may be corrected
+  kIgnore,  // the camera is tracked from the images alone
+};
+
 // What one label of a mask image means in this frame only. Labels need not be stable from frame to frame.
 struct Instance {
   uint32_t label = 0;  // value in the mask image, 1..65535
@@ -235,6 +242,9 @@ struct FieldSnapshot {
   double train_seconds = 0;  // wall time inside training slices
   double loss = 0;           // mean colour loss of the last slice
   int views = 0;
+  // All that corrections did to the object's space since its first ObjectViews. Whoever knows of later ones can tell
+  // from it how to move what is made of this snapshot.
+  Sim3<World, World> S_new_first;
   bool converged = false;  // the pool will not train it further unless a new view comes
   SE3<World, Object> T_world_object;
   Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units

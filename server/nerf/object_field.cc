@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/map_motion.h"
 #include "common/status.h"
 #include "server/nerf/field_sampler.h"
 #include "server/nerf/math/random.h"
@@ -33,8 +34,9 @@ ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
       plan_(config_),
       trainer_(config_, seed) {}
 
-absl::Status ObjectField::SetBox(const Cuboid& cuboid) {
-  ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid));
+absl::Status ObjectField::SetBox(const Cuboid& cuboid_new) {
+  ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid_new));
+  const Cuboid cuboid = Moved(S_new_first_.Inverse(), cuboid_new);
   if (has_box_ && box_.StillFits(cuboid)) return absl::OkStatus();
   box_ = TrainingBox::Around(cuboid, config_.box_enlargement);
   hull_.Reset(box_);
@@ -51,6 +53,21 @@ absl::Status ObjectField::AddView(ObjectView view) {
   if (view.object != id_) {
     return FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString());
   }
+  return TakeView(Moved(S_new_first_.Inverse(), std::move(view)));
+}
+
+void ObjectField::Move(const Sim3<World, World>& S_new_old) { S_new_first_ = S_new_old * S_new_first_; }
+
+absl::Status ObjectField::CorrectView(const ViewPose& pose) {
+  const auto known = std::ranges::find(views_, pose.keyframe, &ObjectView::keyframe);
+  if (known == views_.end()) return absl::OkStatus();
+  ObjectView corrected = *known;
+  corrected.T_world_camera = S_new_first_.Inverse().Moved(pose.T_world_camera);
+  return TakeView(std::move(corrected));
+}
+
+// The view is in the first world.
+absl::Status ObjectField::TakeView(ObjectView view) {
   ROMAP_RETURN_IF_ERROR(ValidateView(view, box_));
   auto same = std::ranges::find(views_, view.keyframe, &ObjectView::keyframe);
   if (same == views_.end() && views() >= config_.max_views) {
@@ -134,16 +151,19 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.train_seconds = train_seconds_;
   snapshot.loss = loss_;
   snapshot.views = views();
-  snapshot.T_world_object = box_.T_world_object;
-  snapshot.box_half_extents = box_.half_extents.cast<float>();
+  const TrainingBox box = box_.Moved(S_new_first_);
+  snapshot.S_new_first = S_new_first_;
+  snapshot.T_world_object = box.T_world_object;
+  snapshot.box_half_extents = box.half_extents.cast<float>();
   snapshot.surface_level = static_cast<float>(config_.surface_level);
   snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
   snapshot.hull = {nerf::kOccupancyResolution, occupancy_.TrimmedHull(config_.hull_trim_share)};
   const SE3<Object, World> T_object_world = box_.T_world_object.Inverse();
   for (const ObjectView& view : views_) {
-    snapshot.view_centers_object.push_back((T_object_world * view.T_world_camera.translation()).cast<float>());
+    const Eigen::Vector3d center_object = T_object_world * view.T_world_camera.translation();
+    snapshot.view_centers_object.push_back((S_new_first_.scale() * center_object).cast<float>());
   }
-  snapshot.field = std::make_shared<TrainedField>(trainer_.model().Clone(), box_);
+  snapshot.field = std::make_shared<TrainedField>(trainer_.model().Clone(), box);
   return snapshot;
 }
 

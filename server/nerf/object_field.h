@@ -28,9 +28,17 @@ class ObjectField {
   // starts a new box and a new training. INVALID_ARGUMENT: pose or size that cannot be.
   absl::Status SetBox(const Cuboid& cuboid);
 
-  // Adds a view, or replaces the one of the same keyframe (its pose was corrected). FAILED_PRECONDITION: no box yet, or
-  // the view is of another object. INVALID_ARGUMENT: see ValidateView.
+  // Adds a view, or replaces the one of the same keyframe. FAILED_PRECONDITION: no box yet, or the view is of another
+  // object. INVALID_ARGUMENT: see ValidateView.
   absl::Status AddView(ObjectView view);
+
+  // The map was corrected: the object's space underwent `S_new_old`, and boxes and views come in the new world from now
+  // on. What is learned is relative to the box, which goes along with all views, so nothing is trained anew.
+  void Move(const Sim3<World, World>& S_new_old);
+
+  // The corrected pose, in the new world, of a view that is there; one that is not (any more) is passed over. Training
+  // goes on from what is learned, a little longer. INVALID_ARGUMENT: see ValidateView; then the view stays as it was.
+  absl::Status CorrectView(const ViewPose& pose);
 
   // `steps` steps of optimisation on `threads` (1..64) threads. Nothing happens without box and views.
   TrainStats Train(int steps, int threads);
@@ -49,6 +57,7 @@ class ObjectField {
   uint64_t AllowedSteps(bool complete) const;
 
  private:
+  absl::Status TakeView(ObjectView view);
   void Restart();
   void PrepareViews();
   size_t MostRedundantView(const ObjectView& view) const;
@@ -58,6 +67,9 @@ class ObjectField {
   uint64_t seed_;
   uint64_t restarts_ = 0;
   int divergences_ = 0;  // since the last new view or box
+  // The field lives in the world as it was when the object was first told of, whatever corrections follow: box, views
+  // and hull below never move. What comes in is taken back to that world, what goes out is brought to the present one.
+  Sim3<World, World> S_new_first_;
   TrainingBox box_;
   bool has_box_ = false;
   bool views_changed_ = false;

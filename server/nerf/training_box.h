@@ -20,7 +20,11 @@ struct TrainingBox {
   Eigen::Vector3d ToUnit(const Eigen::Vector3d& p_object) const { return (p_object + half_extents) / side_mu; }
   Eigen::Vector3f ExtentUnit() const { return (2.0 * half_extents / side_mu).cast<float>(); }
 
-  // Whether the cuboid lies inside and still fills a good part of this box, so that training may go on in it.
+  // The box after its space underwent `S_new_old`. Unit space stays what it was.
+  TrainingBox Moved(const Sim3<World, World>& S_new_old) const;
+
+  // Whether the cuboid lies inside and still fills a good part of this box, so that training may go on in it. A box
+  // that a correction turned may lean a little against the cuboid, which is always upright: that alone is no misfit.
   bool StillFits(const Cuboid& cuboid) const;
 };
 

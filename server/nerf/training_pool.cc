@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -39,6 +40,7 @@ struct TrainingPool::Job {
 struct TrainingPool::Client {
   Sink sink;
   std::map<ObjectId, std::shared_ptr<Job>> jobs;
+  std::set<ObjectId> given_up;  // a second start would lack the views and corrections of the first
   bool finished = false;
   bool closing = false;
   int leases = 0;
@@ -79,12 +81,13 @@ void TrainingPool::Offer(uint64_t client_id, ObjectViews views) {
   std::lock_guard lock(mutex_);
   const auto client = clients_.find(client_id);
   if (client == clients_.end() || client->second->closing) return;
+  if (client->second->given_up.contains(views.object)) return;
   std::shared_ptr<Job>& job = client->second->jobs[views.object];
   if (!job) {
     job = std::make_shared<Job>();
     job->id = views.object;
   }
-  if (!views.new_views.empty()) job->last_view_time = Clock::now();
+  if (!views.new_views.empty() || !views.corrected_views.empty()) job->last_view_time = Clock::now();
   job->offers.push_back(std::move(views));
   work_changed_.notify_one();
 }
@@ -230,6 +233,7 @@ void TrainingPool::Work() {
       spdlog::error("{}: training failed and is given up: {}", lease->job->id.ToString(), failure);
       auto& jobs = lease->client->jobs;
       std::erase_if(jobs, [&](const auto& entry) { return entry.second == lease->job; });
+      lease->client->given_up.insert(lease->job->id);
     }
     lease->job->leased = false;
     --lease->client->leases;
@@ -238,18 +242,25 @@ void TrainingPool::Work() {
   }
 }
 
+void TrainingPool::GiveTo(ObjectField& field, ObjectViews offer) {
+  if (offer.S_new_old) field.Move(*offer.S_new_old);
+  for (const ViewPose& pose : offer.corrected_views) {
+    const absl::Status status = field.CorrectView(pose);
+    if (!status.ok()) spdlog::warn("pose left out: {}", Message(status));
+  }
+  absl::Status status = field.SetBox(offer.cuboid);
+  if (!status.ok()) spdlog::warn("{}: box left out: {}", field.id().ToString(), Message(status));
+  for (ObjectView& view : offer.new_views) {
+    status = field.AddView(std::move(view));
+    if (!status.ok()) spdlog::warn("view left out: {}", Message(status));
+  }
+}
+
 void TrainingPool::RunSlice(Lease& lease) {
   Job& job = *lease.job;
   if (!job.field) job.field = std::make_unique<ObjectField>(config_, job.id, job.id.value);
   ObjectField& field = *job.field;
-  for (ObjectViews& offer : lease.offers) {
-    absl::Status status = field.SetBox(offer.cuboid);
-    if (!status.ok()) spdlog::warn("{}: box left out: {}", job.id.ToString(), Message(status));
-    for (ObjectView& view : offer.new_views) {
-      status = field.AddView(std::move(view));
-      if (!status.ok()) spdlog::warn("view left out: {}", Message(status));
-    }
-  }
+  for (ObjectViews& offer : lease.offers) GiveTo(field, std::move(offer));
   const uint64_t goal = field.AllowedSteps(lease.complete);
   const uint64_t left = goal > field.steps() ? goal - field.steps() : 0;
   const int steps = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(config_.slice_steps)));

@@ -42,7 +42,8 @@ class TrainingPool {
 
   // A new client; the result names it in all other calls. Calls with an unknown client do nothing.
   uint64_t Register(Sink sink);
-  // The present cuboid of an object and its new views. What cannot be used is logged and left out.
+  // What is new about an object: corrections, cuboid, views. Taken in the order of the calls, between slices. What
+  // cannot be used is logged and left out, and all of an object whose training failed.
   void Offer(uint64_t client, ObjectViews views);
   // The object is gone (merged, or an error). A snapshot already on its way may still arrive.
   void Remove(uint64_t client, ObjectId object);
@@ -63,6 +64,7 @@ class TrainingPool {
   void Work();
   std::optional<Lease> Next(Clock::time_point now);
   void RunSlice(Lease& lease);
+  static void GiveTo(ObjectField& field, ObjectViews offer);
   bool ShouldSend(const Job& job, bool budget_used) const;
   bool Complete(const Client& client, const Job& job, Clock::time_point now) const;
   bool Runnable(const Client& client, const Job& job, Clock::time_point now) const;

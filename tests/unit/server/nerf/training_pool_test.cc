@@ -38,7 +38,7 @@ ObjectViews Offer(uint64_t object, int views) {
   scene.object = ObjectId{object};
   scene.views = views;
   scene.size_px = 32;
-  return {scene.object, scene.Box(), scene.Views()};
+  return {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()};
 }
 
 // Keeps what arrives.
