@@ -24,9 +24,11 @@ std::string FileStem(const ObjectUpdate& object) {
   return stem;
 }
 
-void MoveToWorld(const SE3<World, Object>& T_world_mesh, Mesh& mesh) {
+void MoveToWorld(const SE3<World, Object>& T_world_mesh, double mesh_scale, Mesh& mesh) {
   const Eigen::Matrix3f rotation = T_world_mesh.RotationMatrix().cast<float>();
-  for (Eigen::Vector3f& vertex : mesh.vertices) vertex = (T_world_mesh * vertex.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& vertex : mesh.vertices) {
+    vertex = (T_world_mesh * (mesh_scale * vertex.cast<double>())).cast<float>();
+  }
   for (Eigen::Vector3f& normal : mesh.normals) normal = rotation * normal;
 }
 
@@ -55,7 +57,8 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
       entry.steps = snapshot.mesh->steps;
       if (auto mesh = DecodeDraco(snapshot.mesh->draco); mesh.ok()) {
         entry.mesh_world = *std::move(mesh);
-        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object), entry.mesh_world);
+        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object),
+                    snapshot.object.mesh_scale, entry.mesh_world);
       } else {
         faults->push_back(
             fmt::format("{}: mesh cannot be decoded: {}", snapshot.object.id.ToString(), Message(mesh.status())));

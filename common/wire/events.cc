@@ -148,6 +148,7 @@ v1::ObjectUpdate ToProto(ObjectUpdate update) {
   *proto.mutable_cuboid() = ToProto(update.cuboid);
   proto.set_observations(update.observations);
   if (update.T_world_mesh) *proto.mutable_t_world_mesh() = ToProto(*update.T_world_mesh);
+  proto.set_mesh_scale(update.mesh_scale);
   return proto;
 }
 
@@ -166,6 +167,9 @@ absl::StatusOr<ObjectUpdate> FromProto(v1::ObjectUpdate proto, const std::string
     ROMAP_ASSIGN_OR_RETURN(update.T_world_mesh,
                            (TransformFromProto<World, Object>(proto.t_world_mesh(), where + ".t_world_mesh")));
   }
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.mesh_scale(), where + ".mesh_scale"));
+  if (proto.mesh_scale() < 0) return InvalidArgument("{}.mesh_scale: must be positive", where);
+  if (proto.mesh_scale() > 0) update.mesh_scale = proto.mesh_scale();
   return update;
 }
 

@@ -25,9 +25,10 @@ void MapState::Apply(MapEvent event) {
 }
 
 void MapState::ApplyUpdate(ObjectUpdate update) {
-  ObjectSnapshot& entry = objects_[update.id];
+  Object& entry = objects_[update.id];
   update.revision = entry.object.revision + 1;
   update.T_world_mesh = entry.object.T_world_mesh;
+  update.mesh_scale = entry.object.mesh_scale;
   entry.object = std::move(update);
   Send(entry.object);
 }
@@ -41,27 +42,57 @@ uint64_t MapState::Forget(ObjectId id) {
   return revision;
 }
 
-void MapState::PublishMesh(MeshUpdate mesh, const SE3<World, Object>& T_world_mesh) {
+void MapState::MoveObject(ObjectId object, const Sim3<World, World>& S_new_old) {
+  std::lock_guard lock(mutex_);
+  const auto it = objects_.find(object);
+  if (it == objects_.end()) return;
+  Object& entry = it->second;
+  entry.S_new_first = S_new_old * entry.S_new_first;
+  if (!entry.object.T_world_mesh) return;
+  entry.object.T_world_mesh = S_new_old.Moved(*entry.object.T_world_mesh);
+  entry.object.mesh_scale *= S_new_old.scale();
+}
+
+void MapState::PublishMesh(MeshUpdate mesh, const MeshPlace& place) {
   std::lock_guard lock(mutex_);
   const auto it = objects_.find(mesh.id);
   if (it == objects_.end()) return;
-  ObjectSnapshot& entry = it->second;
+  Object& entry = it->second;
   mesh.revision = ++entry.object.revision;
   entry.mesh = std::move(mesh);
   Send(*entry.mesh);
-  // Where the mesh stands travels with the object.
-  entry.object.T_world_mesh = T_world_mesh;
+  // Where the mesh stands travels with the object. The snapshot may lack the newest corrections.
+  const Sim3<World, World> S_new_snapshot = entry.S_new_first * place.S_new_first.Inverse();
+  entry.object.T_world_mesh = S_new_snapshot.Moved(place.T_world_mesh);
+  entry.object.mesh_scale = S_new_snapshot.scale();
   ++entry.object.revision;
   Send(entry.object);
 }
 
-void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns) {
+void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference,
+                           const SE3<Camera, Camera>& T_reference_camera) {
   std::lock_guard lock(mutex_);
   if (ack.accepted && ack.T_world_camera) {
-    trajectory_.push_back(ack);
-    timestamps_ns_.push_back(timestamp_ns);
+    if (reference) references_.try_emplace(reference, *ack.T_world_camera * T_reference_camera.Inverse());
+    trajectory_.push_back({ack, timestamp_ns, reference, T_reference_camera});
   }
   Send(ack);
+}
+
+void MapState::Correct(const MapCorrection& correction) {
+  std::lock_guard lock(mutex_);
+  for (const KeyframeCorrection& keyframe : correction.keyframes) {
+    Reference& reference = references_[keyframe.id];
+    reference.T_world_camera = keyframe.T_world_camera;
+    reference.scale *= keyframe.S_new_old.scale();
+  }
+}
+
+SE3<World, Camera> MapState::PoseNow(const TrajectoryEntry& entry) const {
+  if (!entry.reference) return *entry.ack.T_world_camera;
+  const Reference& reference = references_.at(entry.reference);
+  return reference.T_world_camera * SE3<Camera, Camera>(entry.T_reference_camera.rotation(),
+                                                        reference.scale * entry.T_reference_camera.translation());
 }
 
 void MapState::Publish(const Statistics& statistics) {
@@ -103,10 +134,15 @@ MapSnapshot MapState::Snapshot() const {
   std::lock_guard lock(mutex_);
   MapSnapshot snapshot;
   for (const auto& [id, entry] : objects_) {
-    if (entry.object.state != ObjectState::kProvisional) snapshot.objects.push_back(entry);
+    if (entry.object.state != ObjectState::kProvisional) {
+      snapshot.objects.push_back({entry.object, entry.mesh});
+    }
   }
-  snapshot.trajectory = trajectory_;
-  snapshot.timestamps_ns = timestamps_ns_;
+  for (const TrajectoryEntry& entry : trajectory_) {
+    snapshot.trajectory.push_back(entry.ack);
+    snapshot.trajectory.back().T_world_camera = PoseNow(entry);
+    snapshot.timestamps_ns.push_back(entry.timestamp_ns);
+  }
   return snapshot;
 }
 

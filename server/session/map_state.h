@@ -10,20 +10,29 @@
 
 #include "common/mapping_service.h"
 #include "common/messages.h"
+#include "server/session/mesh_place.h"
 #include "server/session/outbox.h"
 
 namespace romap {
 
 // The map as clients see it: the newest cuboid and mesh of every object, the trajectory, and who listens. Every change
-// gets its revision here and goes to all outboxes. Thread-safe.
+// gets its revision here and goes to all outboxes. Corrections move meshes and frames that are there already; the mesh
+// itself is never sent again for it. Thread-safe.
 class MapState {
  public:
   // What the objects stage says: updates, removals, merges.
   void Apply(MapEvent event);
-  // A new mesh and the pose of the frame its vertices are in. Ignored when its object is gone.
-  void PublishMesh(MeshUpdate mesh, const SE3<World, Object>& T_world_mesh);
-  // Answer to one frame; kept in the trajectory when it has a pose.
-  void Acknowledge(FrameAck ack, int64_t timestamp_ns);
+  // The space of an object underwent `S_new_old`: its mesh goes along, and so will meshes that are being made of older
+  // snapshots. Clients learn of it by the object's next update, so call it before Apply() of what the same correction
+  // changed, and before the field is told, which must never be ahead of the map.
+  void MoveObject(ObjectId object, const Sim3<World, World>& S_new_old);
+  // A new mesh, and where it stood when its snapshot was taken. Ignored when its object is gone.
+  void PublishMesh(MeshUpdate mesh, const MeshPlace& place);
+  // Answer to one frame; kept in the trajectory when it has a pose. See TrackedFrame for `reference`.
+  void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
+                   const SE3<Camera, Camera>& T_reference_camera = {});
+  // Keyframes were corrected: the frames of the trajectory that hang on them go along.
+  void Correct(const MapCorrection& correction);
   void Publish(const Statistics& statistics);
 
   // Starts with the objects there are, if `with_snapshot`. Already closed when the map is.
@@ -37,14 +46,31 @@ class MapState {
   uint64_t ConfirmedObjects() const;
 
  private:
+  struct Object {
+    ObjectUpdate object;
+    std::optional<MeshUpdate> mesh;
+    Sim3<World, World> S_new_first;  // all that corrections did to its space
+  };
+  struct TrajectoryEntry {
+    FrameAck ack;
+    int64_t timestamp_ns = 0;
+    KeyframeId reference;
+    SE3<Camera, Camera> T_reference_camera;
+  };
+  struct Reference {
+    SE3<World, Camera> T_world_camera;
+    double scale = 1;  // product of its scale corrections
+  };
+
   void Send(const MapEvent& event);
   void ApplyUpdate(ObjectUpdate update);
   uint64_t Forget(ObjectId id);
+  SE3<World, Camera> PoseNow(const TrajectoryEntry& entry) const;
 
   mutable std::mutex mutex_;
-  std::map<ObjectId, ObjectSnapshot> objects_;
-  std::vector<FrameAck> trajectory_;
-  std::vector<int64_t> timestamps_ns_;
+  std::map<ObjectId, Object> objects_;
+  std::vector<TrajectoryEntry> trajectory_;
+  std::map<KeyframeId, Reference> references_;
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

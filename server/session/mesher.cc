@@ -87,7 +87,7 @@ void Mesher::Run() {
     lock.unlock();
     try {
       if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
-        sink(*std::move(mesh), snapshot.T_world_object);
+        sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
       } else {
         // Early in training there may be no surface yet; the next snapshot brings it.
         spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,

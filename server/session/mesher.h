@@ -9,14 +9,14 @@
 
 #include "common/messages.h"
 #include "server/mesh/mesh_config.h"
+#include "server/session/mesh_place.h"
 
 namespace romap {
 
 // The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits.
 class Mesher {
  public:
-  // The mesh and the pose of the frame its vertices are in.
-  using Sink = std::function<void(MeshUpdate, const SE3<World, Object>& T_world_mesh)>;
+  using Sink = std::function<void(MeshUpdate, const MeshPlace&)>;
 
   explicit Mesher(const MeshConfig& config);
   ~Mesher();

@@ -44,9 +44,8 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       next_statistics_(Clock::now()),
       frames_(config.session.frame_queue),
       tracked_(config.session.mapping_queue) {
-  mesher_client_ = mesher_->Register([this](MeshUpdate mesh, const SE3<World, Object>& T_world_mesh) {
-    map_.PublishMesh(std::move(mesh), T_world_mesh);
-  });
+  mesher_client_ =
+      mesher_->Register([this](MeshUpdate mesh, const MeshPlace& place) { map_.PublishMesh(std::move(mesh), place); });
   pool_client_ =
       pool_->Register([this](FieldSnapshot snapshot) { mesher_->Offer(mesher_client_, std::move(snapshot)); });
   tracking_thread_ = std::thread([this] { RunTracking(); });
@@ -128,6 +127,10 @@ void Session::MapFrame(const TrackedFrame& tracked) {
 }
 
 void Session::Publish(ObjectMapper::Output output) {
+  // Before the updates that tell clients of it, and before the fields make meshes in the corrected world.
+  for (const ObjectViews& views : output.views) {
+    if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
+  }
   for (MapEvent& event : output.events) {
     ObjectId gone;
     if (const auto* removed = std::get_if<ObjectRemoved>(&event)) gone = removed->id;

@@ -31,6 +31,7 @@ ObjectUpdate FullObject() {
   object.cuboid.confidence = 0.5;
   object.observations = 99;
   object.T_world_mesh.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(7, 8, 9));
+  object.mesh_scale = 1.25;
   return object;
 }
 
@@ -68,6 +69,17 @@ TEST(WireEvents, ObjectUpdateComesBack) {
   EXPECT_EQ(got.observations, object.observations);
   ASSERT_TRUE(got.T_world_mesh.has_value());
   EXPECT_EQ(got.T_world_mesh->translation(), object.T_world_mesh->translation());
+  EXPECT_EQ(got.mesh_scale, object.mesh_scale);
+}
+
+TEST(WireEvents, MeshScaleIsOneWhereAnOlderReleaseSaysNothing) {
+  v1::MapEvent proto = ToProto(MapEvent(FullObject()));
+  proto.mutable_object()->clear_mesh_scale();
+  const auto got = FromProto(proto, "event");
+  ASSERT_TRUE(got.ok()) << Message(got.status());
+  EXPECT_EQ(std::get<ObjectUpdate>(*got).mesh_scale, 1);
+  proto.mutable_object()->set_mesh_scale(-0.5);
+  EXPECT_THAT(Message(FromProto(proto, "event").status()), HasSubstr("event.object.mesh_scale: must be positive"));
 }
 
 TEST(WireEvents, MeshUpdateComesBack) {

@@ -20,7 +20,7 @@ MeshUpdate MeshOf(uint64_t id) {
   return mesh;
 }
 
-SE3<World, Object> PoseAt(double x) { return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}; }
+MeshPlace PlaceAt(double x) { return {{Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}, {}}; }
 
 std::shared_ptr<Outbox> Listen(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100, true); }
 
@@ -29,7 +29,7 @@ TEST(MapStateTest, RevisionsGrowOverCuboidsAndMeshes) {
   const auto outbox = Listen(map);
   map.Apply(Update(1));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 1u);
-  map.PublishMesh(MeshOf(1), PoseAt(0));
+  map.PublishMesh(MeshOf(1), PlaceAt(0));
   EXPECT_EQ(std::get<MeshUpdate>(*outbox->Next(kNoWait)).revision, 2u);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "the mesh's pose travels with the object";
   map.Apply(Update(1));
@@ -43,14 +43,14 @@ TEST(MapStateTest, AMeshWhoseObjectIsGoneIsNotPublished) {
   const auto outbox = Listen(map);
   map.Apply(Update(1));
   map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
-  map.PublishMesh(MeshOf(1), PoseAt(0));
+  map.PublishMesh(MeshOf(1), PlaceAt(0));
   while (const auto event = outbox->Next(kNoWait)) EXPECT_FALSE(std::holds_alternative<MeshUpdate>(*event));
 }
 
 TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1), PoseAt(5));
+  map.PublishMesh(MeshOf(1), PlaceAt(5));
   map.Apply(Update(1));
   const auto outbox = Listen(map);
   const auto update = std::get<ObjectUpdate>(*outbox->Next(kNoWait));
@@ -61,7 +61,7 @@ TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
 TEST(MapStateTest, ANewcomerGetsTheMapFirst) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1), PoseAt(0));
+  map.PublishMesh(MeshOf(1), PlaceAt(0));
   map.Apply(Update(2));
   const auto outbox = Listen(map);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).id, ObjectId{1});
