@@ -14,9 +14,26 @@ namespace {
 struct SynthCommandOptions {
   synth::SynthOptions synth;
   std::string out;
+  // FIRST:LAST, as given.
+  std::vector<std::string> cuts;
+  std::vector<std::string> black;
+  std::vector<std::string> blurred;
 };
 
-absl::Status RunSynth(const SynthCommandOptions& options) {
+absl::Status ReadRanges(const char* option, const std::vector<std::string>& texts,
+                        std::vector<synth::FrameRange>* ranges) {
+  for (const std::string& text : texts) {
+    const absl::StatusOr<synth::FrameRange> range = synth::ParseFrameRange(text);
+    if (!range.ok()) return InvalidArgument("{}: {}", option, Message(range.status()));
+    ranges->push_back(*range);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RunSynth(SynthCommandOptions options) {
+  ROMAP_RETURN_IF_ERROR(ReadRanges("--cut", options.cuts, &options.synth.cuts));
+  ROMAP_RETURN_IF_ERROR(ReadRanges("--black", options.black, &options.synth.black));
+  ROMAP_RETURN_IF_ERROR(ReadRanges("--blur", options.blurred, &options.synth.blurred));
   Progress progress("rendering");
   const absl::Status status = synth::MakeSequence(options.synth, options.out, [&](int done, int total) {
     progress.Show(static_cast<double>(done) / total, fmt::format("frame {}/{}", done, total));
@@ -46,10 +63,12 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
   add("--frames", synth.frames, "Number of frames");
   add("--fps", synth.fps, "Frames per second");
   const std::map<std::string, synth::PathKind> paths = {{"orbit", synth::PathKind::kOrbit},
-                                                        {"handheld", synth::PathKind::kHandheld}};
-  command->add_option("--path", synth.path, "Way of the camera: orbit or handheld")
+                                                        {"handheld", synth::PathKind::kHandheld},
+                                                        {"tworounds", synth::PathKind::kTwoRounds}};
+  command->add_option("--path", synth.path, "Way of the camera: orbit, handheld, or tworounds of a larger room")
       ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
-  add("--rounds", synth.rounds, "Circles of the orbit, or passes along the hand-held arc");
+  add("--rounds", synth.rounds, "Circles of the orbit, passes along the hand-held arc, or pairs of rounds");
+  add("--unrest", synth.unrest, "How far the hand wanders in height, distance, aim and roll; 1 = calm");
   add("--elevation", synth.elevation_deg, "Of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");
@@ -63,6 +82,14 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
   add("--noise", synth.noise_sigma, "Sigma of the image noise [8-bit levels]");
   add("--motion-blur", synth.motion_blur_px, "Length of the smear along the camera's motion [px]");
   add("--defocus", synth.defocus_px, "Sigma of the blur [px]");
+  const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
+    command->add_option(name, texts, help)->type_name("FIRST:LAST");
+  };
+  add_ranges("--cut", options->cuts, "Leave out these frames, as if the camera had been carried off");
+  add_ranges("--black", options->black, "Cover the lens in these frames");
+  add_ranges("--blur", options->blurred, "Smear these frames beyond recognition");
+  add("--exposure-jumps", synth.exposure_stops, "Jumps of gain and gamma every second or two [stops]");
+  add("--duplicates", synth.duplicate_share, "Share of the frames that show the picture before them again, 0 to 1");
   command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
 }
 

@@ -46,20 +46,47 @@ Viewpoint OrbitView(const SynthOptions& options, double share, double start_rad,
   return view;
 }
 
-// A walk along an arc: slow turns of height, distance and aim, and the small tremor of the hand.
+// A walk along an arc: slow turns of height, distance, aim and roll, and the small tremor of the hand.
 Viewpoint HandheldView(const SynthOptions& options, double share, double time_s, double start_rad, double sweep_rad,
                        double distance_m) {
   const auto seed = static_cast<uint32_t>(Scramble(options.seed));
   Viewpoint view;
   view.azimuth_rad = start_rad + 0.5 * sweep_rad * (1 - std::cos(kPi * options.rounds * share)) +
                      0.05 * Wander(time_s, 3, seed + 10) + 0.002 * Wander(time_s, 0.4, seed + 20);
-  const double elevation_deg = options.elevation_deg + 13 * Wander(time_s, 4.5, seed + 30);
+  const double unrest = options.unrest;
+  const double elevation_deg = options.elevation_deg + 13 * unrest * Wander(time_s, 4.5, seed + 30);
   view.elevation_rad = std::clamp(elevation_deg, 5.0, 80.0) * kPi / 180 + 0.002 * Wander(time_s, 0.4, seed + 40);
-  view.distance_m = distance_m * (0.97 + 0.14 * Wander(time_s, 5, seed + 50));
-  view.roll_rad = 0.05 * Wander(time_s, 2.5, seed + 60) + 0.002 * Wander(time_s, 0.3, seed + 70);
+  view.distance_m = distance_m * std::max(0.97 + 0.14 * unrest * Wander(time_s, 5, seed + 50), 0.5);
+  view.roll_rad = 0.05 * unrest * Wander(time_s, 2.5, seed + 60) + 0.002 * Wander(time_s, 0.3, seed + 70);
   view.target_m =
-      0.07 * distance_m *
+      0.07 * unrest * distance_m *
       Eigen::Vector3d(Wander(time_s, 3, seed + 80), Wander(time_s, 3, seed + 90), Wander(time_s, 4, seed + 99));
+  return view;
+}
+
+// A walk around the room on a circle that starts near the table. The camera looks at the table at first and turns to
+// the walls on the far side: nothing that it sees there is in view for long. The plain wall is at +y.
+Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s, const Scene& scene) {
+  constexpr double kStart_rad = -10 * kPi / 180;  // puts the plain wall before the camera about a third of the way
+  constexpr double kSwing_rad = 150 * kPi / 180;
+  const auto seed = static_cast<uint32_t>(Scramble(options.seed));
+  const double unrest = options.unrest;
+  const double turn_rad = 2 * 2 * kPi * options.rounds * share;
+  const double away = 0.5 * (1 - std::cos(turn_rad));  // 0 at the start of a round, 1 half-way
+  const auto toward = [](double azimuth_rad) { return Eigen::Vector2d(std::cos(azimuth_rad), std::sin(azimuth_rad)); };
+  const Eigen::Vector2d sway_m =
+      0.08 * unrest * Eigen::Vector2d(Wander(time_s, 3, seed + 10), Wander(time_s, 3, seed + 20));
+  const Eigen::Vector2d place_m =
+      scene.room_half_m * (0.48 * toward(kStart_rad + turn_rad) - 0.14 * toward(kStart_rad)) + sway_m;
+  const double heading_rad = std::atan2(-place_m.y(), -place_m.x()) + kSwing_rad * away +
+                             0.06 * unrest * Wander(time_s, 2.5, seed + 30) + 0.002 * Wander(time_s, 0.4, seed + 40);
+  Viewpoint view;
+  view.distance_m = 0;
+  view.target_m = {place_m.x(), place_m.y(), scene.table_height_m + 0.55 + 0.1 * unrest * Wander(time_s, 4, seed + 50)};
+  view.azimuth_rad = heading_rad + kPi;
+  view.elevation_rad = std::lerp(0.45, 0.1, away) + 0.06 * unrest * Wander(time_s, 3.5, seed + 60) +
+                       0.002 * Wander(time_s, 0.4, seed + 70);
+  view.roll_rad = 0.05 * unrest * Wander(time_s, 2.5, seed + 80) + 0.002 * Wander(time_s, 0.3, seed + 90);
   return view;
 }
 
@@ -92,6 +119,11 @@ std::vector<SE3<World, Camera>> MakeCameraPath(const SynthOptions& options, cons
   std::vector<SE3<World, Camera>> path;
   path.reserve(static_cast<size_t>(options.frames));
   for (int i = 0; i < options.frames; ++i) {
+    if (options.path == PathKind::kTwoRounds) {
+      const double way_share = static_cast<double>(i) / std::max(options.frames - 1, 1);  // the last frame is back
+      path.push_back(LookFrom(TwoRoundsView(options, way_share, i / options.fps, scene)));
+      continue;
+    }
     const double share = static_cast<double>(i) / options.frames;
     Viewpoint view = options.path == PathKind::kOrbit
                          ? OrbitView(options, share, start_rad, distance_m)

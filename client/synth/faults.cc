@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "client/synth/noise.h"
@@ -42,6 +43,18 @@ cv::Mat SmearKernel(const cv::Vec2d& direction, double length_px) {
   }
   return kernel;
 }
+
+void Expose(cv::Mat& color_bgr, double gain, double gamma) {
+  cv::Mat table(1, 256, CV_8UC1);
+  for (int value = 0; value < 256; ++value) {
+    table.at<uint8_t>(0, value) = cv::saturate_cast<uint8_t>(255 * gain * std::pow(value / 255.0, gamma));
+  }
+  cv::LUT(color_bgr, table, color_bgr);
+}
+
+// In a blurred stretch of frames: such that corners of a few pixels are gone.
+constexpr double kStretchSmear_share = 1.0 / 16;  // of the image's width
+constexpr double kStretchDefocus_share = 1.0 / 200;
 
 }  // namespace
 
@@ -85,13 +98,19 @@ FaultyMask SpoilMask(const cv::Mat& true_labels, int object_count, const SynthOp
   return mask;
 }
 
-void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random) {
-  if (options.motion_blur_px > 0) {
-    cv::filter2D(color_bgr, color_bgr, -1, SmearKernel(motion_px, options.motion_blur_px), cv::Point(-1, -1), 0,
+void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random,
+                const FramePlan& plan) {
+  if (plan.black) color_bgr.setTo(cv::Scalar::all(0));
+  if (plan.gain != 1 || plan.gamma != 1) Expose(color_bgr, plan.gain, plan.gamma);
+  const double width_px = plan.blurred ? color_bgr.cols : 0;
+  const double smear_px = std::max(options.motion_blur_px, kStretchSmear_share * width_px);
+  const double defocus_px = std::max(options.defocus_px, kStretchDefocus_share * width_px);
+  if (smear_px > 0) {
+    cv::filter2D(color_bgr, color_bgr, -1, SmearKernel(motion_px, smear_px), cv::Point(-1, -1), 0,
                  cv::BORDER_REPLICATE);
   }
-  if (options.defocus_px > 0) {
-    cv::GaussianBlur(color_bgr, color_bgr, cv::Size(), options.defocus_px, options.defocus_px, cv::BORDER_REPLICATE);
+  if (defocus_px > 0) {
+    cv::GaussianBlur(color_bgr, color_bgr, cv::Size(), defocus_px, defocus_px, cv::BORDER_REPLICATE);
   }
   if (options.noise_sigma > 0) {
     for (int v = 0; v < color_bgr.rows; ++v) {

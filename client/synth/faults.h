@@ -4,6 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "client/synth/frame_plan.h"
 #include "client/synth/options.h"
 #include "client/synth/random.h"
 
@@ -26,8 +27,9 @@ struct FaultyMask {
 // Drops objects, displaces borders and shuffles labels of a true mask (CV_8UC1, labels 1..object_count).
 FaultyMask SpoilMask(const cv::Mat& true_labels, int object_count, const SynthOptions& options, Random& random);
 
-// Blurs and adds noise to CV_8UC3 in place. `motion_px` is how the scene moves through the image at this frame; only
-// its direction is used.
-void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random);
+// Covers, exposes, blurs and adds noise to CV_8UC3 in place. `motion_px` is how the scene moves through the image at
+// this frame; only its direction is used.
+void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random,
+                const FramePlan& plan = {});
 
 }  // namespace romap::synth

@@ -87,6 +87,22 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   }
 }
 
+// The same wall painted in one colour: a faint grain and a few notes pinned to it are all there is to see.
+void AddPlainWall(Scene& scene, Random& random, float half_m, float turn_rad) {
+  const Eigen::Quaternionf turn = Turn(turn_rad, Point::UnitZ());
+  const auto add = [&](const Mesh& mesh, const Material& material) {
+    AddPart(scene, Moved(mesh, turn, Point::Zero()), material);
+  };
+  Material paint = Backdrop(Pattern::kPlain, 0.1F, random);
+  paint.grain = 0.03F;
+  add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F), paint);
+  for (float y_m = -half_m + 0.3F; y_m < half_m - 0.3F; y_m += In(random, 0.5, 0.8)) {
+    const Point half(0.004F, In(random, 0.03, 0.06), In(random, 0.04, 0.08));
+    add(RoundedBox(Point(half_m - 0.004F, y_m, In(random, 0.9, 1.6)), half, 0.001F, 0.05F),
+        Backdrop(Pattern::kPrint, 0.03F, random));
+  }
+}
+
 void AddTable(Scene& scene, Random& random) {
   const auto height_m = static_cast<float>(scene.table_height_m);
   const auto half_x = static_cast<float>(scene.layout_radius_m) + In(random, 0.15, 0.3);
@@ -115,8 +131,9 @@ void AddTable(Scene& scene, Random& random) {
 
 }  // namespace
 
-void AddRoom(Scene& scene, Random& random) {
-  const float half_m = std::max(2.0F, static_cast<float>(4.2 * scene.layout_radius_m) + 0.4F);
+void AddRoom(Scene& scene, const SceneOptions& options, Random& random) {
+  const float half_m =
+      std::max(static_cast<float>(options.min_room_half_m), static_cast<float>(4.2 * scene.layout_radius_m) + 0.4F);
   scene.room_half_m = half_m;
   const Material floor = random.Chance(0.5) ? Backdrop(Pattern::kTiles, In(random, 0.2, 0.35), random)
                                             : Backdrop(Pattern::kFabric, In(random, 0.12, 0.25), random);
@@ -125,7 +142,10 @@ void AddRoom(Scene& scene, Random& random) {
   ceiling.colors[0] = Rgb::Constant(0.8F);
   AddPart(scene, Sheet(Point(-half_m, half_m, kRoomHeight_m), Point(2 * half_m, 0, 0), Point(0, -2 * half_m, 0), 0.3F),
           ceiling);
-  for (int side = 0; side < 4; ++side) AddWall(scene, random, half_m, 0.5F * kPi * static_cast<float>(side));
+  for (int side = 0; side < 4; ++side) {
+    const bool plain = options.plain_wall && side == 1;
+    (plain ? AddPlainWall : AddWall)(scene, random, half_m, 0.5F * kPi * static_cast<float>(side));
+  }
   AddTable(scene, random);
 
   // A warm panel over the table and cool daylight from one side. Turned against the table's axes: the few samples of a

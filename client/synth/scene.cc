@@ -152,7 +152,7 @@ Scene MakeScene(const SceneOptions& options) {
   scene.table_height_m = random.Uniform(0.68, 0.78);
   AddObjects(scene, ChooseSolids(options, random), random);
   Random room_random(options.seed, 2);
-  AddRoom(scene, room_random);
+  AddRoom(scene, options, room_random);
   return scene;
 }
 

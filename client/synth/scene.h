@@ -42,6 +42,8 @@ struct SceneOptions {
   uint64_t seed = 1;
   int objects = 6;
   int identical_pairs = 0;
+  double min_room_half_m = 2;  // the room grows with what is on the table, and is no smaller than this
+  bool plain_wall = false;     // the wall at +y shows next to nothing a camera could hold on to
 };
 
 struct Scene {
@@ -74,6 +76,6 @@ void AddSurface(Scene& scene, const Mesh& mesh_local, const SE3<World, Object>& 
 Scene MakeScene(const SceneOptions& options);
 
 // room.cc: fills in room_half_m and lights and adds the surfaces of floor, walls, furniture and table.
-void AddRoom(Scene& scene, Random& random);
+void AddRoom(Scene& scene, const SceneOptions& options, Random& random);
 
 }  // namespace romap::synth

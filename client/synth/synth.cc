@@ -16,6 +16,7 @@
 #include "client/files/tum.h"
 #include "client/synth/camera_path.h"
 #include "client/synth/faults.h"
+#include "client/synth/frame_plan.h"
 #include "client/synth/frame_renderer.h"
 #include "client/synth/ground_truth.h"
 #include "client/synth/lighting.h"
@@ -65,6 +66,7 @@ class SequenceMaker {
   SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
       : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)) {
     path_ = MakeCameraPath(options, scene, camera_);
+    plans_ = PlanFrames(options);
     detections_.resize(path_.size());
     for (const SceneObject& object : scene.objects) {
       surfaces_.push_back(std::make_unique<SurfacePoints>(object, options.seed));
@@ -97,8 +99,10 @@ class SequenceMaker {
     std::vector<StampedPose> poses;
     std::string detections = "timestamp,label,class,score\n";
     for (size_t i = 0; i < path_.size(); ++i) {
-      poses.push_back({Timestamp_ns(i), path_[i]});
-      for (const SynthDetection& detection : detections_[i]) {
+      const FramePlan& plan = plans_[i];
+      if (plan.missing) continue;
+      poses.push_back({Timestamp_ns(i), path_[plan.shown]});
+      for (const SynthDetection& detection : detections_[plan.shown]) {
         detections += fmt::format("{},{},{},{:.3f}\n", FormatSeconds(Timestamp_ns(i)), detection.label,
                                   scene_.objects[detection.object - 1U].solid.class_name, detection.score);
       }
@@ -130,14 +134,21 @@ class SequenceMaker {
 
  private:
   absl::Status MakeFrame(int i) {
+    const FramePlan& plan = plans_[static_cast<size_t>(i)];
+    if (plan.missing || plan.shown != static_cast<size_t>(i)) return absl::OkStatus();
     const SE3<World, Camera>& T_world_camera = path_[static_cast<size_t>(i)];
     TrueFrame frame = RenderFrame(scene_, camera_, T_world_camera);
+    const cv::Vec2d motion_px = SceneMotion(static_cast<size_t>(i), CentreDepth_m(frame.depth_m));
+    if (plan.black) {
+      frame.labels.setTo(0);
+      frame.depth_m.setTo(0);
+    }
     for (const auto& surface : surfaces_) surface->MarkSeen(frame, camera_, T_world_camera);
 
     // One stream of random numbers per frame: frames are made in any order.
     Random random(options_.seed, 100000U + static_cast<uint64_t>(i));
     const FaultyMask mask = SpoilMask(frame.labels, static_cast<int>(scene_.objects.size()), options_, random);
-    SpoilImage(frame.color_bgr, SceneMotion(static_cast<size_t>(i)), options_, random);
+    SpoilImage(frame.color_bgr, motion_px, options_, random, plan);
     detections_[static_cast<size_t>(i)] = mask.detections;
 
     const std::vector<int> fast_png = {cv::IMWRITE_PNG_COMPRESSION, 2};
@@ -148,11 +159,17 @@ class SequenceMaker {
     return WriteImage(dir_ + "/" + FrameFile("depth", i, ".png"), DepthUnits(frame.depth_m), fast_png);
   }
 
-  // How the middle of the table top moves through the image around frame i, pixels per frame.
-  cv::Vec2d SceneMotion(size_t i) const {
+  // Depth in the middle of the image, metres; 1 where there is nothing.
+  static double CentreDepth_m(const cv::Mat& depth_m) {
+    const float centre_m = depth_m.at<float>(depth_m.rows / 2, depth_m.cols / 2);
+    return centre_m > 0 ? centre_m : 1;
+  }
+
+  // How what lies straight ahead moves through the image around frame i, pixels per frame.
+  cv::Vec2d SceneMotion(size_t i, double depth_m) const {
     if (path_.size() < 2) return {0, 0};
     const size_t from = i + 1 < path_.size() ? i : i - 1;
-    const Eigen::Vector3d middle_world(0, 0, scene_.table_height_m);
+    const Eigen::Vector3d middle_world = path_[from] * Eigen::Vector3d(0, 0, depth_m);
     const Eigen::Vector2d before = camera_.Project(path_[from].Inverse() * middle_world);
     const Eigen::Vector2d after = camera_.Project(path_[from + 1].Inverse() * middle_world);
     // An orbit keeps the middle in place and turns the table under it: what is near the camera moves most.
@@ -173,9 +190,10 @@ class SequenceMaker {
 
   absl::Status WriteList(const char* folder, const char* extension) const {
     std::string lines = fmt::format("# {} images, synthetic, seed {}\n# timestamp filename\n", folder, options_.seed);
-    for (int i = 0; i < options_.frames; ++i) {
-      lines +=
-          fmt::format("{} {}\n", FormatSeconds(Timestamp_ns(static_cast<size_t>(i))), FrameFile(folder, i, extension));
+    for (size_t i = 0; i < plans_.size(); ++i) {
+      if (plans_[i].missing) continue;
+      lines += fmt::format("{} {}\n", FormatSeconds(Timestamp_ns(i)),
+                           FrameFile(folder, static_cast<int>(plans_[i].shown), extension));
     }
     return WriteFile(fmt::format("{}/{}.txt", dir_, folder), lines);
   }
@@ -185,6 +203,7 @@ class SequenceMaker {
   const Scene& scene_;
   CameraModel camera_;
   std::vector<SE3<World, Camera>> path_;
+  std::vector<FramePlan> plans_;
   std::vector<std::vector<SynthDetection>> detections_;   // per frame
   std::vector<std::unique_ptr<SurfacePoints>> surfaces_;  // per object
 };
@@ -195,8 +214,13 @@ absl::Status MakeSequence(const SynthOptions& options, const std::string& dir,
                           const std::function<void(int done, int total)>& progress) {
   ROMAP_RETURN_IF_ERROR(ValidateSynthOptions(options));
   ROMAP_RETURN_IF_ERROR(MakeFolders(dir));
-  Scene scene =
-      MakeScene({.seed = options.seed, .objects = options.objects, .identical_pairs = options.identical_pairs});
+  SceneOptions scene_options{
+      .seed = options.seed, .objects = options.objects, .identical_pairs = options.identical_pairs};
+  if (options.path == PathKind::kTwoRounds) {
+    scene_options.min_room_half_m = kTwoRoundsRoomHalf_m;
+    scene_options.plain_wall = true;
+  }
+  Scene scene = MakeScene(scene_options);
   BakeLight(scene);
   SequenceMaker maker(options, dir, scene);
   ROMAP_RETURN_IF_ERROR(maker.MakeFrames(progress));

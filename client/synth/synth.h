@@ -21,9 +21,11 @@ namespace romap::synth {
 //                            (2: the side it stands on, else 0)
 //   gt_mesh/<name>.ply       the exact triangles; parts are closed and may reach into each other
 //
-// The same options give the same bytes on any number of threads. `progress` (may be empty) is called from any thread,
-// one call at a time, with frames done and frames in total. INVALID_ARGUMENT: bad options, all named; the folder cannot
-// be written.
+// A frame that is cut is in no list, but keeps its number and its time; a frame that repeats the picture before it
+// lists that picture's files again and has its pose. Frames go to the disk as they are made: memory does not grow with
+// images. The same options give the same bytes on any number of threads. `progress` (may be empty) is called from any
+// thread, one call at a time, with frames done and frames in total. INVALID_ARGUMENT: bad options, all named; the
+// folder cannot be written.
 absl::Status MakeSequence(const SynthOptions& options, const std::string& dir,
                           const std::function<void(int done, int total)>& progress = {});
 

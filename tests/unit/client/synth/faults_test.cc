@@ -115,6 +115,38 @@ TEST(SpoilImage, SmearsAlongTheMotionOnly) {
   }
 }
 
+TEST(SpoilImage, ExposesByGainAndGamma) {
+  Random random(1);
+  cv::Mat image(4, 4, CV_8UC3, cv::Scalar(0, 64, 200));
+  SpoilImage(image, {1, 0}, {}, random, {.gain = 2});
+  EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 128, 255)) << "bright values clip";
+  cv::Mat darker(4, 4, CV_8UC3, cv::Scalar(0, 64, 255));
+  SpoilImage(darker, {1, 0}, {}, random, {.gamma = 2});
+  EXPECT_EQ(darker.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 16, 255)) << "gamma keeps black and white";
+}
+
+TEST(SpoilImage, ACoveredLensShowsNothing) {
+  Random random(1);
+  cv::Mat image(20, 20, CV_8UC3, cv::Scalar(50, 100, 150));
+  SpoilImage(image, {1, 0}, {}, random, {.black = true});
+  EXPECT_EQ(cv::norm(image), 0);
+}
+
+TEST(SpoilImage, ABlurredStretchKeepsNoCorners) {
+  // Squares of 8 px become a grey that hardly varies along the motion.
+  Random random(1);
+  cv::Mat image(120, 320, CV_8UC3);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      image.at<cv::Vec3b>(v, u) = cv::Vec3b::all((u / 8 + v / 8) % 2 == 0 ? 40 : 220);
+    }
+  }
+  SpoilImage(image, {5, 0}, {}, random, {.blurred = true});
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(image(cv::Rect(40, 20, 240, 80)), mean, deviation);
+  EXPECT_LT(deviation[0], 30) << "of 90 before";
+}
+
 TEST(SpoilImage, DefocusSpreadsADot) {
   Random random(1);
   cv::Mat image = cv::Mat::zeros(41, 41, CV_8UC3);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -132,6 +133,49 @@ TEST(MakeCameraPath, TheHandMovesSmoothlyInsideTheRoom) {
     EXPECT_LT(highest_m, 2.5);
     EXPECT_GT(highest_m - lowest_m, 0.05) << "height changes";
   }
+}
+
+TEST(MakeCameraPath, ALivelyHandWandersFarther) {
+  const Scene scene = MakeScene({.seed = 1, .objects = 3});
+  const auto spread_m = [&](double unrest) {
+    const SynthOptions options{.seed = 1, .frames = 300, .path = PathKind::kHandheld, .unrest = unrest};
+    double nearest_m = 1e9, farthest_m = 0;
+    for (const auto& pose : MakeCameraPath(options, scene, SynthCamera(options))) {
+      const double distance_m = (pose.translation() - Eigen::Vector3d(0, 0, scene.table_height_m)).norm();
+      nearest_m = std::min(nearest_m, distance_m);
+      farthest_m = std::max(farthest_m, distance_m);
+    }
+    return farthest_m - nearest_m;
+  };
+  EXPECT_GT(spread_m(2.5), 1.5 * spread_m(1));
+}
+
+TEST(MakeCameraPath, TwoRoundsComeBackByWayOfThePlainWall) {
+  const Scene scene = MakeScene({.seed = 4, .objects = 4, .min_room_half_m = kTwoRoundsRoomHalf_m, .plain_wall = true});
+  ASSERT_GE(scene.room_half_m, kTwoRoundsRoomHalf_m);
+  const SynthOptions options{.seed = 4, .frames = 1200, .path = PathKind::kTwoRounds};
+  const auto path = MakeCameraPath(options, scene, SynthCamera(options));
+  double way_m = 0;
+  int at_plain_wall = 0, at_table = 0;
+  for (size_t i = 0; i < path.size(); ++i) {
+    const Eigen::Vector3d& p = path[i].translation();
+    ASSERT_LT(p.head<2>().cwiseAbs().maxCoeff(), scene.room_half_m - 0.4) << "furniture";
+    const Eigen::Vector3d forward = path[i].rotation() * Eigen::Vector3d::UnitZ();
+    // Where the view's middle meets the plane of the wall at y = half.
+    const double s = (scene.room_half_m - p.y()) / forward.y();
+    if (s > 0 && std::abs(p.x() + s * forward.x()) < 0.7 * scene.room_half_m) ++at_plain_wall;
+    if (forward.head<2>().normalized().dot(-p.head<2>().normalized()) > 0.95) ++at_table;
+    if (i == 0) continue;
+    way_m += (p - path[i - 1].translation()).norm();
+    ASSERT_LT((p - path[i - 1].translation()).norm(), 0.05);
+    ASSERT_LT(path[i].rotation().angularDistance(path[i - 1].rotation()), 0.05);
+  }
+  EXPECT_GT(way_m, 15);
+  EXPECT_LT((path.front().translation() - path.back().translation()).norm(), 0.3);
+  EXPECT_LT(path.front().rotation().angularDistance(path.back().rotation()), 0.35);
+  EXPECT_GT(at_plain_wall, 60);
+  EXPECT_LT(at_plain_wall, 400);
+  EXPECT_GT(at_table, 200);
 }
 
 }  // namespace

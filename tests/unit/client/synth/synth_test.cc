@@ -203,6 +203,37 @@ TEST_F(MakeSequenceTest, FaultsShowInMasksAndTables) {
   EXPECT_EQ(classes_of_label[1].size(), 2U) << "label 1 means one thing here and another there";
 }
 
+TEST_F(MakeSequenceTest, CutFramesAreGoneAndRepeatedOnesListTheSamePicture) {
+  SynthOptions options = Small();
+  options.frames = 8;
+  options.width_px = 64;
+  options.height_px = 48;
+  options.cuts = {{3, 4}};
+  options.black = {{8, 8}};
+  options.duplicate_share = 1;
+  ASSERT_TRUE(MakeSequence(options, Dir()).ok());
+  const auto sequence = Sequence::Open(Dir(), {.use_depth = true});
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  ASSERT_EQ(sequence->size(), 6U);
+  EXPECT_EQ(sequence->timestamp_ns(1), 40000000);
+  EXPECT_EQ(sequence->timestamp_ns(2), 160000000) << "time goes on during a cut";
+  EXPECT_FALSE(fs::exists(Dir() + "/rgb/000003.png"));
+  // 1 1 - - 5 5 5 8: each picture stays until the next stretch.
+  const auto first = sequence->Load(0);
+  const auto repeated = sequence->Load(1);
+  const auto after_cut = sequence->Load(2);
+  ASSERT_TRUE(first.ok() && repeated.ok() && after_cut.ok());
+  EXPECT_TRUE(first->image == repeated->image);
+  EXPECT_EQ(first->instances.size(), repeated->instances.size());
+  EXPECT_EQ(first->T_world_camera->translation(), repeated->T_world_camera->translation());
+  EXPECT_FALSE(first->image == after_cut->image);
+  const auto black = sequence->Load(5);
+  ASSERT_TRUE(black.ok()) << black.status();
+  EXPECT_TRUE(black->instances.empty());
+  EXPECT_EQ(cv::countNonZero(Read(Dir() + "/rgb/000008.png").reshape(1)), 0);
+  EXPECT_EQ(cv::countNonZero(Read(Dir() + "/depth/000008.png")), 0);
+}
+
 TEST_F(MakeSequenceTest, RefusesBadOptionsByName) {
   SynthOptions options;
   options.objects = 17;
@@ -215,6 +246,17 @@ TEST_F(MakeSequenceTest, RefusesBadOptionsByName) {
   }
   EXPECT_EQ(Message(status).find("frames"), std::string::npos) << status;
   EXPECT_FALSE(fs::exists(Dir())) << "nothing is written";
+
+  SynthOptions ranges;
+  ranges.cuts = {{5, 2}};
+  ranges.black = {{0, 3}};
+  ranges.blurred = {{290, 301}};
+  for (const char* name : {"cut = 5:2", "black = 0:3", "blurred = 290:301", "1:300"}) {
+    EXPECT_NE(Message(ValidateSynthOptions(ranges)).find(name), std::string::npos) << name;
+  }
+  SynthOptions nothing;
+  nothing.cuts = {{1, 200}, {150, 300}};
+  EXPECT_EQ(Message(ValidateSynthOptions(nothing)), "synthetic sequence: cut leaves no frame");
 
   SynthOptions twins;
   twins.objects = 3;

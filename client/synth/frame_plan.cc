@@ -1,0 +1,55 @@
+#include "client/synth/frame_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "client/synth/random.h"
+
+namespace romap::synth {
+namespace {
+
+bool InAny(const std::vector<FrameRange>& ranges, size_t frame) {
+  return std::any_of(ranges.begin(), ranges.end(),
+                     [&](const FrameRange& range) { return range.Contains(static_cast<int>(frame) + 1); });
+}
+
+// A camera that sets its exposure anew every now and then.
+void PlanExposure(const SynthOptions& options, std::vector<FramePlan>& plans) {
+  Random random(options.seed, 8);
+  double next_jump_s = 0;
+  double gain = 1;
+  double gamma = 1;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    const double time_s = static_cast<double>(i) / options.fps;
+    if (time_s >= next_jump_s) {
+      gain = std::exp2(options.exposure_stops * random.Uniform(-1, 1));
+      gamma = std::exp2(0.3 * options.exposure_stops * random.Uniform(-1, 1));
+      next_jump_s = time_s + random.Uniform(0.8, 2.2);
+    }
+    plans[i].gain = gain;
+    plans[i].gamma = gamma;
+  }
+}
+
+}  // namespace
+
+std::vector<FramePlan> PlanFrames(const SynthOptions& options) {
+  std::vector<FramePlan> plans(static_cast<size_t>(options.frames));
+  if (options.exposure_stops > 0) PlanExposure(options, plans);
+  Random random(options.seed, 7);
+  for (size_t i = 0; i < plans.size(); ++i) {
+    FramePlan& plan = plans[i];
+    plan.missing = InAny(options.cuts, i);
+    plan.black = InAny(options.black, i);
+    plan.blurred = InAny(options.blurred, i);
+    plan.shown = i;
+    const bool repeat = random.Chance(options.duplicate_share);
+    // Not across the borders of a stretch: a covered lens must not show an older picture, nor a new one a black one.
+    const bool like_before = i > 0 && !plan.missing && !plans[i - 1].missing && plan.black == plans[i - 1].black &&
+                             plan.blurred == plans[i - 1].blurred;
+    if (repeat && like_before) plan = plans[i - 1];
+  }
+  return plans;
+}
+
+}  // namespace romap::synth

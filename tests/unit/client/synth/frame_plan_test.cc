@@ -1,0 +1,79 @@
+#include "client/synth/frame_plan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+namespace romap::synth {
+namespace {
+
+TEST(ParseFrameRange, ReadsTwoNumbers) {
+  const auto range = ParseFrameRange("100:130");
+  ASSERT_TRUE(range.ok()) << range.status();
+  EXPECT_EQ(*range, (FrameRange{100, 130}));
+  EXPECT_TRUE(range->Contains(100));
+  EXPECT_TRUE(range->Contains(130));
+  EXPECT_FALSE(range->Contains(131));
+}
+
+TEST(ParseFrameRange, SaysWhatItShouldLookLike) {
+  for (const char* text : {"", "100", "100:", ":5", "1:2:3", "a:b", "1-2", "1:2 ", "99999999999:1"}) {
+    const auto range = ParseFrameRange(text);
+    EXPECT_EQ(range.status().code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_NE(Message(range.status()).find("FIRST:LAST"), std::string::npos) << text;
+  }
+}
+
+TEST(PlanFrames, ChangesNothingUnasked) {
+  const auto plans = PlanFrames({.frames = 20});
+  ASSERT_EQ(plans.size(), 20U);
+  for (size_t i = 0; i < plans.size(); ++i) {
+    EXPECT_FALSE(plans[i].missing || plans[i].black || plans[i].blurred);
+    EXPECT_EQ(plans[i].shown, i);
+    EXPECT_EQ(plans[i].gain, 1);
+    EXPECT_EQ(plans[i].gamma, 1);
+  }
+}
+
+TEST(PlanFrames, CountsStretchesFromOne) {
+  const auto plans = PlanFrames({.frames = 10, .cuts = {{1, 2}, {9, 10}}, .black = {{4, 4}}, .blurred = {{5, 6}}});
+  for (size_t i = 0; i < plans.size(); ++i) {
+    const size_t number = i + 1;
+    EXPECT_EQ(plans[i].missing, number <= 2 || number >= 9) << number;
+    EXPECT_EQ(plans[i].black, number == 4) << number;
+    EXPECT_EQ(plans[i].blurred, number == 5 || number == 6) << number;
+  }
+}
+
+TEST(PlanFrames, RepeatsTheShareAskedForAndNeverAcrossAStretch) {
+  const SynthOptions options{.frames = 1000, .cuts = {{200, 300}}, .black = {{400, 420}}, .duplicate_share = 0.3};
+  const auto plans = PlanFrames(options);
+  int repeated = 0;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    if (plans[i].missing) continue;
+    ASSERT_LE(plans[i].shown, i);
+    if (plans[i].shown == i) continue;
+    ++repeated;
+    EXPECT_EQ(plans[i].shown, plans[i - 1].shown) << "the picture before it";
+    EXPECT_FALSE(plans[plans[i].shown].missing);
+    EXPECT_EQ(plans[plans[i].shown].black, plans[i].black);
+  }
+  EXPECT_NEAR(repeated / 899.0, 0.3, 0.05);
+}
+
+TEST(PlanFrames, ExposureHoldsForAWhileAndJumpsWithinItsBounds) {
+  const auto plans = PlanFrames({.frames = 500, .fps = 25, .exposure_stops = 1});
+  std::set<double> gains;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    gains.insert(plans[i].gain);
+    EXPECT_LE(std::abs(std::log2(plans[i].gain)), 1);
+    EXPECT_LE(std::abs(std::log2(plans[i].gamma)), 0.31);
+  }
+  // 20 seconds, one jump every 0.8 to 2.2 of them.
+  EXPECT_GE(gains.size(), 9U);
+  EXPECT_LE(gains.size(), 26U);
+}
+
+}  // namespace
+}  // namespace romap::synth
