@@ -13,9 +13,10 @@ struct SlamConfig {
   int keyframe_wait_frames = 3;
   double keyframe_sharpness_ratio = 0.75;
 
-  int scene_features = 900;
+  int scene_features = 1000;
   int object_features = 600;
   int scene_fast_threshold = 12;
+  int scene_fast_min_threshold = 6;
   int object_fast_threshold = 5;
   int mask_erosion_px = 1;
 
@@ -55,10 +56,12 @@ struct SlamConfig {
 
   void FeatureFields(ConfigFields& fields) {
     fields.Add("scene_features", &scene_features,
-               {.min = 50, .max = 10000, .help = "ORB features per keyframe, spread over the whole image"});
+               {.min = 50, .max = 10000, .help = "ORB features per frame, spread over the whole image"});
     fields.Add("object_features", &object_features,
                {.min = 0, .max = 10000, .help = "Further ORB features, spread over the instance masks only"});
     fields.Add("scene_fast_threshold", &scene_fast_threshold,
+    fields.Add("scene_fast_min_threshold", &scene_fast_min_threshold,
+               {.unit = "grey levels", .min = 1, .max = 100, .help = "The same where nothing has as much contrast"});
                {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner anywhere"});
     fields.Add("object_fast_threshold", &object_fast_threshold,
                {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner inside an instance mask"});

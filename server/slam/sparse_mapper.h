@@ -40,7 +40,7 @@ class SparseMapper {
   KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe) const;
 
   const SlamConfig config_;
-  const FeatureExtractor extractor_;
+  FeatureExtractor extractor_;
   std::map<MapPointId, PointTrack> tracks_;
   std::deque<MapKeyframe> kept_keyframes_;  // newest last
   uint64_t keyframe_count_ = 0;

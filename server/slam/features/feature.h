@@ -20,12 +20,13 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
 inline constexpr double kOctaveFactor = 1.2;
 inline constexpr int kOctaves = 8;
 
-// A corner of one keyframe.
+// A corner of one frame.
 struct Feature {
-  Eigen::Vector2f pixel_px;
-  int octave = 0;           // pyramid level it was found on, 0 = full size
-  double octave_scale = 1;  // kOctaveFactor ^ octave
-  uint16_t label = 0;       // of the mask under it; 0 = none, or too close to the mask's border to tell
+  Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, whatever the lens
+  int octave = 0;            // pyramid level it was found on, 0 = full size
+  double octave_scale = 1;   // kOctaveFactor ^ octave
+  float angle_rad = 0;       // of its patch: from the image's +x towards +y (clockwise as seen), -pi..pi
+  uint16_t label = 0;        // of the mask under it; 0 = none, or too close to the mask's border to tell
   Descriptor descriptor{};
 };
 

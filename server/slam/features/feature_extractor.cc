@@ -1,85 +1,46 @@
 #include "server/slam/features/feature_extractor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
-#include <map>
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <tuple>
-#include <utility>
+
+#include "server/slam/features/steered_brief.h"
 
 namespace romap {
 namespace {
 
-constexpr int kPatch_px = 31;  // side of the square that a descriptor looks at
-constexpr int kBorder_px = 16;
-constexpr int kMinImageSide_px = 2 * kBorder_px + 8;
-constexpr int kSceneCell_px = 32;
-constexpr int kObjectCell_px = 12;
-// How many more corners are found than kept, to have some choice where there are few.
-constexpr int kSurplus = 3;
+constexpr int kMinImageSide_px = 2 * kPatchBorder_px + 8;
+// Corners of one octave that are closer than this, in its pixels, count as one.
+constexpr double kSameCorner_px = 2;
 
-using Keypoints = std::vector<cv::KeyPoint>;
+const std::array<double, kOctaves> kOctaveScales = [] {
+  std::array<double, kOctaves> scales{};
+  for (size_t i = 0; i < scales.size(); ++i) scales[i] = std::pow(kOctaveFactor, i);
+  return scales;
+}();
 
-cv::Ptr<cv::ORB> MakeOrb(int features, int fast_threshold) {
-  return cv::ORB::create(features, static_cast<float>(kOctaveFactor), kOctaves, kBorder_px, 0, 2, cv::ORB::HARRIS_SCORE,
-                         kPatch_px, fast_threshold);
+cv::Rect Describable(const cv::Mat& image) {
+  return {kPatchBorder_px, kPatchBorder_px, image.cols - 2 * kPatchBorder_px, image.rows - 2 * kPatchBorder_px};
 }
 
-// Takes the strongest corner of each cell, then the second of each, and so on until `count` are taken.
-Keypoints Spread(const Keypoints& keypoints, int cell_px, size_t count) {
-  std::map<std::pair<int, int>, Keypoints> cells;
-  for (const cv::KeyPoint& keypoint : keypoints) {
-    cells[{static_cast<int>(keypoint.pt.y) / cell_px, static_cast<int>(keypoint.pt.x) / cell_px}].push_back(keypoint);
-  }
-  size_t rounds = 0;
-  for (auto& [cell, members] : cells) {
-    std::stable_sort(members.begin(), members.end(),
-                     [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; });
-    rounds = std::max(rounds, members.size());
-  }
-  Keypoints taken;
-  for (size_t round = 0; round < rounds; ++round) {
-    for (const auto& [cell, members] : cells) {
-      if (taken.size() == count) return taken;
-      if (round < members.size()) taken.push_back(members[round]);
-    }
-  }
-  return taken;
+// Takes the pixels around a feature out of `free`.
+void Occupy(cv::Mat& free, const Feature& feature) {
+  const auto radius_px = static_cast<float>(kSameCorner_px * feature.octave_scale);
+  const Eigen::Vector2f begin_px = feature.pixel_px.array() - radius_px;
+  const int side_px = static_cast<int>(std::ceil(2 * radius_px));
+  const cv::Rect around(static_cast<int>(std::lround(begin_px.x())), static_cast<int>(std::lround(begin_px.y())),
+                        side_px, side_px);
+  free(around & cv::Rect(cv::Point(), free.size())).setTo(0);
 }
 
-Keypoints SceneKeypoints(const cv::Mat& grey, const SlamConfig& config) {
-  Keypoints keypoints;
-  MakeOrb(kSurplus * config.scene_features, config.scene_fast_threshold)->detect(grey, keypoints);
-  return Spread(keypoints, kSceneCell_px, static_cast<size_t>(config.scene_features));
-}
-
-Keypoints ObjectKeypoints(const cv::Mat& grey, const cv::Mat& labels, const SlamConfig& config) {
-  Keypoints keypoints;
-  if (labels.empty() || config.object_features == 0) return keypoints;
-  const cv::Mat mask = labels > 0;
-  cv::Rect box = cv::boundingRect(mask);
-  if (box.empty()) return keypoints;
-  box -= cv::Point(kPatch_px, kPatch_px);
-  box += cv::Size(2 * kPatch_px, 2 * kPatch_px);
-  box &= cv::Rect(cv::Point(), grey.size());
-  if (std::min(box.width, box.height) < kMinImageSide_px) return keypoints;
-
-  MakeOrb(kSurplus * config.object_features, config.object_fast_threshold)->detect(grey(box), keypoints, mask(box));
-  for (cv::KeyPoint& keypoint : keypoints) keypoint.pt += cv::Point2f(box.tl());
-  return Spread(keypoints, kObjectCell_px, static_cast<size_t>(config.object_features));
-}
-
-// Corners that both searches found are one corner.
-void DropRepeated(Keypoints& keypoints) {
-  const auto key = [](const cv::KeyPoint& k) {
-    return std::tuple(k.octave, static_cast<int>(std::lround(k.pt.y)), static_cast<int>(std::lround(k.pt.x)));
-  };
-  std::stable_sort(keypoints.begin(), keypoints.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
-  keypoints.erase(
-      std::unique(keypoints.begin(), keypoints.end(), [&](const auto& a, const auto& b) { return key(a) == key(b); }),
-      keypoints.end());
+// Features due to the octave `octave` when `left` of them are to be shared among it and all finer ones. The share of an
+// octave goes with its image's side: coarse corners are fewer, but are seen from farther off.
+size_t Share(size_t left, int octave) {
+  double sum = 0;
+  for (int i = 0; i <= octave; ++i) sum += 1 / kOctaveScales[static_cast<size_t>(i)];
+  return static_cast<size_t>(
+      std::lround(static_cast<double>(left) / (kOctaveScales[static_cast<size_t>(octave)] * sum)));
 }
 
 // The label under a pixel, or 0 when another one lies within `erosion_px` of it: a corner on an object's outline may
@@ -102,30 +63,84 @@ uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int ero
 
 }  // namespace
 
-std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) const {
+void FeatureExtractor::LookAt(const Frame& frame) {
+  const cv::Mat& picture = frame.source_grey.empty() ? frame.image_bgr : frame.source_grey;
+  if (picture_.data == picture.data && picture_.size() == picture.size()) return;
+  picture_ = picture;
+  if (picture.channels() == 3) cv::cvtColor(picture, grey_, cv::COLOR_BGR2GRAY);
+  pyramid_.Build(picture.channels() == 3 ? grey_ : picture, kMinImageSide_px);
+}
+
+// From the coarsest octave on, so that what an octave cannot fill goes to the finer ones, which have more to choose
+// from.
+std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const FindCorners& find, int count) const {
+  std::vector<Candidate> candidates;
+  auto left = static_cast<size_t>(count);
+  for (int octave = pyramid_.octaves() - 1; octave >= 0; --octave) {
+    for (const cv::KeyPoint& corner : find(octave, Share(left, octave))) {
+      candidates.push_back({corner.pt, octave, pyramid_.ToFullSize(octave, corner.pt)});
+    }
+    left = static_cast<size_t>(count) - candidates.size();
+  }
+  return candidates;
+}
+
+std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
+  LookAt(frame);
+  const auto find = [&](int octave, size_t count) {
+    const cv::Mat& image = pyramid_.sharp(octave);
+    return SpreadEvenly(DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
+                                                config_.scene_fast_min_threshold),
+                        image.size(), count);
+  };
+  return Describe(frame, FindInOctaves(find, config_.scene_features));
+}
+
+std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const std::vector<Feature>& have) {
+  if (frame.labels.empty() || config_.object_features == 0) return {};
+  const cv::Mat inside = frame.labels > 0;
+  const cv::Rect box_px = cv::boundingRect(inside);
+  if (box_px.empty()) return {};
+  LookAt(frame);
+  cv::Mat free;
+  const auto find = [&](int octave, size_t count) {
+    const cv::Mat& image = pyramid_.sharp(octave);
+    inside.copyTo(free);
+    for (const Feature& feature : have) {
+      if (feature.octave == octave) Occupy(free, feature);
+    }
+    const cv::Rect part = Describable(image) & pyramid_.Part(octave, box_px);
+    Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
+    std::erase_if(corners, [&](const cv::KeyPoint& corner) {
+      const Eigen::Vector2f pixel_px = pyramid_.ToFullSize(octave, corner.pt);
+      return free.at<uint8_t>(static_cast<int>(std::lround(pixel_px.y())),
+                              static_cast<int>(std::lround(pixel_px.x()))) == 0;
+    });
+    return SpreadEvenly(corners, image.size(), count);
+  };
+  return Describe(frame, FindInOctaves(find, config_.object_features));
+}
+
+std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) {
+  std::vector<Feature> features = ExtractScene(frame);
+  const std::vector<Feature> more = ExtractObjects(frame, features);
+  features.insert(features.end(), more.begin(), more.end());
+  return features;
+}
+
+std::vector<Feature> FeatureExtractor::Describe(const Frame& frame, const std::vector<Candidate>& candidates) {
   std::vector<Feature> features;
-  if (std::min(frame.image_bgr.cols, frame.image_bgr.rows) < kMinImageSide_px) return features;
-  cv::Mat grey, descriptors;
-  cv::cvtColor(frame.image_bgr, grey, cv::COLOR_BGR2GRAY);
-
-  Keypoints keypoints = SceneKeypoints(grey, config_);
-  const Keypoints more = ObjectKeypoints(grey, frame.labels, config_);
-  keypoints.insert(keypoints.end(), more.begin(), more.end());
-  DropRepeated(keypoints);
-  if (keypoints.empty()) return features;
-  MakeOrb(static_cast<int>(keypoints.size()), config_.scene_fast_threshold)->compute(grey, keypoints, descriptors);
-
-  features.reserve(keypoints.size());
-  for (size_t i = 0; i < keypoints.size(); ++i) {
-    const cv::KeyPoint& keypoint = keypoints[i];
-    const double scale = std::pow(kOctaveFactor, keypoint.octave);
-    const auto shift_px = static_cast<float>(0.5 * (scale - 1));  // to pixel centres at integer coordinates
-    Feature feature{.pixel_px = {keypoint.pt.x + shift_px, keypoint.pt.y + shift_px},
-                    .octave = keypoint.octave,
-                    .octave_scale = scale};
-    feature.label = LabelAt(frame.labels, feature.pixel_px, config_.mask_erosion_px);
-    std::memcpy(feature.descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
-    features.push_back(feature);
+  features.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) {
+    const auto x_px = static_cast<int>(candidate.corner_px.x);
+    const auto y_px = static_cast<int>(candidate.corner_px.y);
+    const PatchDirection direction = IntensityCentroid(pyramid_.sharp(candidate.octave), x_px, y_px);
+    features.push_back({.pixel_px = candidate.pixel_px,
+                        .octave = candidate.octave,
+                        .octave_scale = kOctaveScales[static_cast<size_t>(candidate.octave)],
+                        .angle_rad = std::atan2(direction.sine, direction.cosine),
+                        .label = LabelAt(frame.labels, candidate.pixel_px, config_.mask_erosion_px),
+                        .descriptor = SteeredBrief(pyramid_.smooth(candidate.octave), x_px, y_px, direction)});
   }
   return features;
 }

@@ -1,24 +1,58 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "common/messages.h"
+#include "server/slam/features/corner_detector.h"
 #include "server/slam/features/feature.h"
+#include "server/slam/features/image_pyramid.h"
 #include "server/slam/slam_config.h"
 
 namespace romap {
 
-// Finds ORB features: some spread evenly over the image, and further ones inside the instance masks, where weaker
-// corners are welcome because objects are small and have little texture.
+// Finds oriented FAST corners with steered BRIEF descriptors (ORB: Rublee et al., ICCV 2011). The same frame gives the
+// same features in the same order; an image that is too small or has no texture gives none. For one thread: keeps its
+// buffers, and the pyramid of the last frame, from call to call.
+//
+// Where the frame has the picture as the lens gave it (Frame::source_grey), corners are found and described there and
+// only their positions are undistorted: a resampled picture is less sharp.
 class FeatureExtractor {
  public:
   explicit FeatureExtractor(const SlamConfig& config) : config_(config) {}
 
-  // The same frame gives the same features in the same order. None for an image that is too small or has no texture.
-  std::vector<Feature> Extract(const Frame& frame) const;
+  // At most SlamConfig::scene_features, spread evenly over the image at every octave.
+  std::vector<Feature> ExtractScene(const Frame& frame);
+
+  // At most SlamConfig::object_features further ones inside the instance masks, where weaker corners are welcome
+  // because objects are small and have little texture. None repeats one of `have`, the same frame's scene features.
+  std::vector<Feature> ExtractObjects(const Frame& frame, const std::vector<Feature>& have);
+
+  // Both, scene features first.
+  std::vector<Feature> Extract(const Frame& frame);
 
  private:
+  // A corner on its way to become a feature.
+  struct Candidate {
+    cv::Point2f corner_px;  // in the octave's image
+    int octave = 0;
+    Eigen::Vector2f pixel_px;  // in the pinhole image
+  };
+
+  // Finds that many corners of an octave, or fewer.
+  using FindCorners = std::function<Corners(int octave, size_t count)>;
+
+  void LookAt(const Frame& frame);
+  std::vector<Candidate> FindInOctaves(const FindCorners& find, int count) const;
+  std::vector<Feature> Describe(const Frame& frame, const std::vector<Candidate>& candidates);
+
   const SlamConfig config_;
+  cv::Mat grey_;
+  cv::Mat picture_;  // what the pyramid shows; holding it keeps its memory from becoming another picture's
+  ImagePyramid pyramid_;
 };
 
 }  // namespace romap

@@ -61,7 +61,7 @@ TEST(FeatureExtractor, AFeatureOnTheMasksBorderHasNoLabel) {
 TEST(FeatureExtractor, TheSameFrameGivesTheSameFeatures) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
-  const FeatureExtractor extractor{SlamConfig{}};
+  FeatureExtractor extractor{SlamConfig{}};
   const std::vector<Feature> once = extractor.Extract(*frame);
   const std::vector<Feature> again = extractor.Extract(*frame);
   ASSERT_EQ(once.size(), again.size());

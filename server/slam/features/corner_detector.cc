@@ -1,0 +1,129 @@
+#include "server/slam/features/corner_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/features2d.hpp>
+
+namespace romap {
+namespace {
+
+constexpr int kCell_px = 48;
+// How many corners, over those wanted, there are to choose from. More choice spreads them better, but weak corners are
+// found again less often.
+constexpr double kChoice = 1.5;
+constexpr int kCircleRadius_px = 3;  // of FAST's test
+
+bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; }
+
+// Divides a rectangle evenly into cells of about kCell_px.
+class CellGrid {
+ public:
+  explicit CellGrid(const cv::Rect& part)
+      : part_(part), columns_(std::max(1, part.width / kCell_px)), rows_(std::max(1, part.height / kCell_px)) {}
+
+  size_t size() const { return static_cast<size_t>(columns_ * rows_); }
+  size_t IndexOf(const cv::Point2f& pixel_px) const {
+    const int column = std::clamp(static_cast<int>(pixel_px.x - part_.x) * columns_ / part_.width, 0, columns_ - 1);
+    const int row = std::clamp((static_cast<int>(pixel_px.y) - part_.y) * rows_ / part_.height, 0, rows_ - 1);
+    return static_cast<size_t>(row * columns_ + column);
+  }
+  cv::Rect Cell(size_t index) const {
+    const int column = static_cast<int>(index) % columns_;
+    const int row = static_cast<int>(index) / columns_;
+    return {cv::Point(Edge(part_.x, part_.width, column, columns_), Edge(part_.y, part_.height, row, rows_)),
+            cv::Point(Edge(part_.x, part_.width, column + 1, columns_), Edge(part_.y, part_.height, row + 1, rows_))};
+  }
+
+ private:
+  // The first pixel p whose (p - begin) * cells / length is `cell`.
+  static int Edge(int begin, int length, int cell, int cells) { return begin + (cell * length + cells - 1) / cells; }
+
+  cv::Rect part_;
+  int columns_;
+  int rows_;
+};
+
+// Moves the corners that may be taken to the front: the strongest, and of each cell the best one, however weak.
+void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
+  std::stable_sort(corners.begin(), corners.end(), Stronger);
+  const CellGrid grid(cv::Rect(cv::Point(), image_size));
+  std::vector<bool> has_corner(grid.size(), false);
+  size_t kept = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const size_t cell = grid.IndexOf(corners[i].pt);
+    if (i < count || !has_corner[cell]) corners[kept++] = corners[i];
+    has_corner[cell] = true;
+  }
+  corners.resize(kept);
+}
+
+// Takes corners in order, each unless an earlier one lies within about `distance_px`: it covers the square of that half
+// side around it, in cells of half that size. Stops when more than `limit` are taken. Returns indices.
+std::vector<size_t> TakeApart(const Corners& corners, const cv::Size& image_size, float distance_px, size_t limit) {
+  constexpr int kReach_cells = 2;
+  const float cell_px = distance_px / kReach_cells;
+  const int columns = static_cast<int>(static_cast<float>(image_size.width) / cell_px) + 1;
+  const int rows = static_cast<int>(static_cast<float>(image_size.height) / cell_px) + 1;
+  cv::Mat covered(rows + 2 * kReach_cells, columns + 2 * kReach_cells, CV_8UC1, cv::Scalar(0));
+  std::vector<size_t> taken;
+  for (size_t i = 0; i < corners.size() && taken.size() <= limit; ++i) {
+    const int column = static_cast<int>(corners[i].pt.x / cell_px);
+    const int row = static_cast<int>(corners[i].pt.y / cell_px);
+    if (covered.at<uint8_t>(row + kReach_cells, column + kReach_cells) != 0) continue;
+    taken.push_back(i);
+    for (int y = row; y <= row + 2 * kReach_cells; ++y) {
+      std::fill_n(covered.ptr<uint8_t>(y) + column, 2 * kReach_cells + 1, uint8_t{1});
+    }
+  }
+  return taken;
+}
+
+}  // namespace
+
+Corners DetectCorners(const cv::Mat& image, const cv::Rect& part, int threshold) {
+  const cv::Rect reach = cv::Rect(part.x - kCircleRadius_px, part.y - kCircleRadius_px,
+                                  part.width + 2 * kCircleRadius_px, part.height + 2 * kCircleRadius_px) &
+                         cv::Rect(cv::Point(), image.size());
+  Corners corners;
+  if (std::min(reach.width, reach.height) <= 2 * kCircleRadius_px) return corners;
+  cv::FAST(image(reach), corners, threshold, /*nonmaxSuppression=*/true, cv::FastFeatureDetector::TYPE_9_16);
+  for (cv::KeyPoint& corner : corners) corner.pt += cv::Point2f(reach.tl());
+  return corners;
+}
+
+Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int threshold, int min_threshold) {
+  Corners corners = DetectCorners(image, part, threshold);
+  if (min_threshold >= threshold) return corners;
+  const CellGrid grid(part);
+  std::vector<bool> has_corner(grid.size(), false);
+  for (const cv::KeyPoint& corner : corners) has_corner[grid.IndexOf(corner.pt)] = true;
+  for (size_t cell = 0; cell < grid.size(); ++cell) {
+    if (has_corner[cell]) continue;
+    const Corners weak = DetectCorners(image, grid.Cell(cell), min_threshold);
+    corners.insert(corners.end(), weak.begin(), weak.end());
+  }
+  return corners;
+}
+
+Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count) {
+  if (corners.size() <= count) return corners;
+  KeepChoice(corners, image_size, static_cast<size_t>(kChoice * static_cast<double>(count)));
+  // At twice the distance of a square lattice of `count` corners not as many fit; at one pixel all do.
+  float near_px = 1;
+  float far_px = 2 * std::sqrt(static_cast<float>(image_size.area()) / static_cast<float>(count));
+  std::vector<size_t> taken = TakeApart(corners, image_size, near_px, count);
+  while (far_px - near_px > 0.25F) {
+    const float distance_px = 0.5F * (near_px + far_px);
+    std::vector<size_t> fewer = TakeApart(corners, image_size, distance_px, count);
+    const bool enough = fewer.size() >= count;
+    (enough ? near_px : far_px) = distance_px;
+    if (enough) taken = std::move(fewer);
+  }
+  taken.resize(std::min(taken.size(), count));
+  Corners spread;
+  spread.reserve(taken.size());
+  for (const size_t i : taken) spread.push_back(corners[i]);
+  return spread;
+}
+
+}  // namespace romap

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+
+#include "server/slam/features/feature.h"
+
+namespace romap {
+
+// How far from a corner its orientation and its descriptor look, rounding included; corners closer than this to the
+// image's edge cannot be described.
+inline constexpr int kPatchRadius_px = 15;
+inline constexpr int kPatchBorder_px = kPatchRadius_px + 1;
+
+// Direction of a patch, as a unit vector (cosine, sine) in the image, x right and y down.
+struct PatchDirection {
+  float cosine = 1;
+  float sine = 0;
+};
+
+// From the corner to the centroid of the grey values in the circle around it (intensity centroid, Rosin 1999, as used
+// by Rublee et al., ICCV 2011). `image` is CV_8UC1; the pixel lies at least kPatchBorder_px inside it.
+PatchDirection IntensityCentroid(const cv::Mat& image, int x_px, int y_px);
+
+// One binary test: the bit is set when the grey value at the first point is less than that at the second. Offsets from
+// the corner, in pixels, for the direction (1, 0).
+struct BriefTest {
+  int8_t first_x_px = 0;
+  int8_t first_y_px = 0;
+  int8_t second_x_px = 0;
+  int8_t second_y_px = 0;
+};
+
+// The 256 tests; bit i of the descriptor is bit i % 64 of its word i / 64.
+const std::array<BriefTest, 256>& BriefTests();
+
+// The tests' results with the pattern turned into the patch's direction (steered BRIEF, Rublee et al., ICCV 2011).
+// `smooth` is CV_8UC1, blurred; the pixel lies at least kPatchBorder_px inside it.
+Descriptor SteeredBrief(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction);
+
+}  // namespace romap
