@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "common/ids.h"
 #include "server/slam/features/feature.h"
+#include "server/slam/places/descriptor_tree.h"
 
 namespace romap {
 
@@ -17,16 +19,41 @@ struct PlaceMatch {
 
 // Finds keyframes that show the same place, by their binary descriptors alone and without a vocabulary file. For one
 // thread at a time.
+//
+// An inverted index whose words are the leaves of a tree that grows with the keyframes. A word holds whole descriptors,
+// so that a feature votes only for the keyframes that have a similar one (Hamming embedding: Jegou et al., ECCV 2008),
+// and votes less the more keyframes it is similar to (inverse document frequency: Sivic and Zisserman, ICCV 2003).
+// About 60 bytes per feature.
 class PlaceIndex {
  public:
   explicit PlaceIndex(uint64_t seed = 1);
 
+  // A keyframe that is known already gets these features instead of its old ones.
   void Add(KeyframeId keyframe, std::span<const Feature> features);
   void Remove(KeyframeId keyframe);  // unknown: nothing happens
   // The `max_results` best, best first. Scores fall for words that are everywhere.
   std::vector<PlaceMatch> Query(std::span<const Feature> features, int max_results) const;
-  size_t size() const;
+  size_t size() const { return slots_of_.size(); }
   size_t bytes() const;  // about, for statistics
+
+ private:
+  // A keyframe as the tree's entries name it.
+  struct Slot {
+    KeyframeId keyframe;  // none: removed, or free
+    size_t features = 0;
+  };
+
+  void SweepRemoved();
+
+  DescriptorTree tree_;
+  std::vector<Slot> slots_;
+  std::vector<uint32_t> free_slots_;
+  std::unordered_map<KeyframeId, uint32_t> slots_of_;
+  // Entries of removed keyframes stay in the tree, unseen, until they are many: one sweep is cheaper than many
+  // searches.
+  std::vector<uint32_t> removed_slots_;
+  size_t live_entries_ = 0;
+  size_t removed_entries_ = 0;
 };
 
 }  // namespace romap

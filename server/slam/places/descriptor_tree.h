@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "server/slam/features/feature.h"
+
+namespace romap {
+
+// A tree of binary descriptors that grows with what is put into it, so that it needs no vocabulary trained beforehand.
+// Every inner node has up to kBranching centres, a descriptor goes to the child with the nearest one, and a leaf that
+// gets too full splits around centres that are bitwise majorities of its own descriptors (after the hierarchical
+// clustering trees of Muja and Lowe, "Fast Matching of Binary Features", CRV 2012). The order of insertion shapes the
+// tree; the same order and seed give the same tree.
+class DescriptorTree {
+ public:
+  struct Entry {
+    Descriptor descriptor{};
+    uint32_t owner = 0;  // whatever the caller likes
+  };
+
+  // What a search needs and the next one can use again.
+  struct Search {
+    struct Branch {
+      int distance;
+      uint32_t node;
+    };
+    std::vector<Branch> open;
+    std::vector<uint32_t> leaves;
+  };
+
+  explicit DescriptorTree(uint64_t seed);
+
+  void Insert(const Entry& entry);
+  // Takes out all entries of the owners with gone[owner] != 0. Touches every entry.
+  void RemoveOwners(std::span<const uint8_t> gone);
+
+  // Puts up to `max_leaves` leaves where descriptors near to this one may be into `search.leaves`, the most likely
+  // first: best-bin-first by the distance to the centres passed by.
+  void FindLeaves(const Descriptor& descriptor, int max_leaves, Search& search) const;
+  std::span<const Entry> entries(uint32_t leaf) const { return nodes_[leaf].entries; }
+
+  size_t bytes() const;  // of all arrays
+
+ private:
+  // Small leaves cost fewer comparisons and lose more neighbours across their borders.
+  static constexpr size_t kLeafEntries = 256;
+
+  struct Node {
+    uint32_t first_child = 0;  // children follow each other; 0 = leaf
+    uint32_t children = 0;
+    size_t split_at = kLeafEntries;  // a leaf splits when it holds more
+    std::vector<Entry> entries;      // of a leaf
+  };
+
+  uint32_t NearestChild(const Node& node, const Descriptor& descriptor) const;
+  void Split(uint32_t leaf);
+  std::vector<Descriptor> PickCenters(std::span<const Entry> entries);
+
+  std::vector<Node> nodes_;          // [0] is the root
+  std::vector<Descriptor> centers_;  // [i] of nodes_[i]; apart from them, so that siblings are close in memory
+  std::mt19937_64 random_;
+};
+
+}  // namespace romap
