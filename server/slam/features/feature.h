@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <bit>
 #include <cstdint>
 
 namespace romap {
@@ -10,10 +9,24 @@ namespace romap {
 // 256 bits of an ORB descriptor (Rublee et al., ICCV 2011).
 using Descriptor = std::array<uint64_t, 4>;
 
+// Without an instruction that counts bits, which not every x86-64 has, std::popcount calls a function for each word.
+// Here all words are counted side by side: first in pairs of bits, then in 4, 8 and 16 bits, each as wide as its sum
+// needs.
 inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
-  int distance = 0;
-  for (size_t i = 0; i < a.size(); ++i) distance += std::popcount(a[i] ^ b[i]);
-  return distance;
+  constexpr uint64_t kOf2 = 0x5555555555555555, kOf4 = 0x3333333333333333;
+  constexpr uint64_t kOf8 = 0x0f0f0f0f0f0f0f0f, kOf16 = 0x00ff00ff00ff00ff;
+  uint64_t sums_of_8 = 0;
+  for (size_t i = 0; i < a.size(); i += 2) {
+    uint64_t sums_of_4 = 0;
+    for (size_t word = i; word < i + 2; ++word) {
+      const uint64_t differing = a[word] ^ b[word];
+      const uint64_t sums_of_2 = differing - ((differing >> 1) & kOf2);
+      sums_of_4 += (sums_of_2 & kOf4) + ((sums_of_2 >> 2) & kOf4);
+    }
+    sums_of_8 += (sums_of_4 & kOf8) + ((sums_of_4 >> 4) & kOf8);
+  }
+  const uint64_t sums_of_16 = (sums_of_8 & kOf16) + ((sums_of_8 >> 8) & kOf16);
+  return static_cast<int>((sums_of_16 * 0x0001000100010001) >> 48);
 }
 
 // Each octave of the image pyramid is this much smaller than the one before.
