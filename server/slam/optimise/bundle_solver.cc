@@ -218,8 +218,8 @@ void BundleSolver::Run(const BundleOptions& options, int max_iterations, BundleR
   run.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
   run.converged = summary.termination_type == ceres::CONVERGENCE;
   if (!summary.iterations.empty()) run.trust_region_radius = summary.iterations.back().trust_region_radius;
-  const bool changed = summary.num_successful_steps > 0 || run.converged;
-  run.usable = summary.IsSolutionUsable() && changed && WriteBack();
+  const bool begun = run.iterations > 0 || !run.aborted;
+  run.usable = begun && summary.IsSolutionUsable() && WriteBack();
 }
 
 // False, and nothing written, when a number is not finite.

@@ -1,0 +1,90 @@
+// Measures bundle adjustment on synthetic maps.
+//
+//   bundle_bench [REPEATS]
+//
+// Prints, for each size and solver, the least user time of REPEATS (default 5) runs, iterations, and the errors before
+// and after.
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "tests/unit/server/slam/optimise/bundle_world.h"
+
+namespace romap {
+namespace {
+
+double UserSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
+}
+
+void Measure(const std::string& name, const BundleWorldOptions& world_options, const BundleOptions& options,
+             int repeats) {
+  const BundleWorld world = MakeBundleWorld(world_options);
+  BundleSummary summary;
+  double least_s = 1e300;
+  for (int i = 0; i < repeats; ++i) {
+    BundleProblem problem = world.problem;
+    const double start_s = UserSeconds();
+    summary = AdjustBundle(problem, options);
+    least_s = std::min(least_s, UserSeconds() - start_s);
+  }
+  fmt::print("{:<28} {:4d} cameras {:6d} points {:7d} observations {:8.1f} ms {:3d} iterations {:7.2f} -> {:5.2f} px\n",
+             name, world.problem.cameras.size(), world.problem.points.size(), world.problem.observations.size(),
+             1e3 * least_s, summary.iterations, summary.initial_rms_px, summary.final_rms_px);
+}
+
+BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int sights) {
+  BundleWorldOptions options;
+  options.cameras = cameras;
+  options.fixed_cameras = fixed_cameras;
+  options.points = points;
+  options.sights_per_point = sights;
+  options.step_rad = 0.05;
+  options.pixel_noise_px = 1;
+  options.pose_noise_rad = 0.002;
+  options.pose_noise_mu = 0.01;
+  options.point_noise_mu = 0.02;
+  options.outlier_share = 0.03;
+  return options;
+}
+
+void MeasureAll(int repeats) {
+  BundleOptions local;
+  local.dense = true;
+  local.max_iterations = 8;
+  BundleOptions local_sparse = local;
+  local_sparse.dense = false;
+  for (const int points : {1500, 3000}) {
+    for (const int free : {10, 20}) {
+      const BundleWorldOptions window = Window(free + 20, 20, points, 6);
+      Measure(fmt::format("window {} free, dense", free), window, local, repeats);
+      Measure(fmt::format("window {} free, sparse", free), window, local_sparse, repeats);
+    }
+  }
+  BundleWorldOptions depth = Window(30, 20, 1500, 6);
+  depth.with_depth = true;
+  Measure("window with depth, dense", depth, local, repeats);
+
+  BundleOptions global;
+  global.max_iterations = 20;
+  BundleWorldOptions whole = Window(200, 2, 15000, 7);
+  whole.step_rad = 0.03;
+  Measure("whole map, sparse", whole, global, std::min(repeats, 2));
+  global.dense = true;
+  Measure("whole map, dense", whole, global, std::min(repeats, 2));
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) {
+  romap::MeasureAll(argc > 1 ? std::max(1, std::atoi(argv[1])) : 5);
+  return 0;
+}

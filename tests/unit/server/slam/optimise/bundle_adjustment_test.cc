@@ -1,0 +1,375 @@
+#include "server/slam/optimise/bundle_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "tests/unit/server/slam/optimise/bundle_world.h"
+
+namespace romap {
+namespace {
+
+BundleWorldOptions NoisyStart() {
+  BundleWorldOptions options;
+  options.fixed_cameras = 4;  // a base long enough that scale is not the largest error
+  options.pixel_noise_px = 0.5;
+  options.pose_noise_rad = 0.005;
+  options.pose_noise_mu = 0.02;
+  options.point_noise_mu = 0.05;
+  return options;
+}
+
+double RmsPoseErrorMu(const BundleWorld& world) {
+  double sum = 0;
+  for (size_t i = 0; i < world.true_poses.size(); ++i) {
+    sum += (world.problem.cameras[i].T_world_camera.translation() - world.true_poses[i].translation()).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(world.true_poses.size()));
+}
+
+double RmsTurnRad(const BundleWorld& world) {
+  double sum = 0;
+  for (size_t i = 0; i < world.true_poses.size(); ++i) {
+    const double turn_rad =
+        world.problem.cameras[i].T_world_camera.rotation().angularDistance(world.true_poses[i].rotation());
+    sum += turn_rad * turn_rad;
+  }
+  return std::sqrt(sum / static_cast<double>(world.true_poses.size()));
+}
+
+double RmsPointErrorMu(const BundleWorld& world) {
+  double sum = 0;
+  for (size_t i = 0; i < world.true_points.size(); ++i) {
+    sum += (world.problem.points[i].position_world - world.true_points[i]).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(world.true_points.size()));
+}
+
+bool Same(const BundleProblem& a, const BundleProblem& b) {
+  for (size_t i = 0; i < a.cameras.size(); ++i) {
+    const SE3<World, Camera>& first = a.cameras[i].T_world_camera;
+    const SE3<World, Camera>& second = b.cameras[i].T_world_camera;
+    if (first.translation() != second.translation()) return false;
+    if (first.rotation().coeffs() != second.rotation().coeffs()) return false;
+  }
+  for (size_t i = 0; i < a.points.size(); ++i) {
+    if (a.points[i].position_world != b.points[i].position_world) return false;
+  }
+  return true;
+}
+
+TEST(BundleAdjustment, FindsTheExactWorldWithoutNoise) {
+  BundleWorldOptions options = NoisyStart();
+  options.pixel_noise_px = 0;
+  for (const bool dense : {false, true}) {
+    BundleWorld world = MakeBundleWorld(options);
+    const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 30, .dense = dense});
+    EXPECT_TRUE(summary.usable);
+    EXPECT_GT(summary.initial_rms_px, 5);
+    EXPECT_LT(summary.final_rms_px, 1e-3);
+    EXPECT_EQ(summary.outliers, 0);
+    EXPECT_LT(RmsPoseErrorMu(world), 1e-4);
+    EXPECT_LT(RmsTurnRad(world), 1e-4);
+    EXPECT_LT(RmsPointErrorMu(world), 1e-4);
+  }
+}
+
+TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  const double pose_before_mu = RmsPoseErrorMu(world);
+  const BundleSummary summary = AdjustBundle(world.problem, {.dense = true});
+  EXPECT_TRUE(summary.usable);
+  // Two residuals of 0.5 px per observation, less the share that the parameters take up.
+  const double freedom = 1 - (6 * 6 + 200 * 3) / (2.0 * static_cast<double>(world.problem.observations.size()));
+  EXPECT_NEAR(summary.final_rms_px, 0.5 * std::sqrt(2 * freedom), 0.05);
+  // The bound holds for 95 % of them.
+  EXPECT_LT(summary.outliers, 0.08 * static_cast<double>(world.problem.observations.size()));
+  EXPECT_LT(RmsPoseErrorMu(world), 0.25 * pose_before_mu);
+  EXPECT_LT(RmsPoseErrorMu(world), 0.008);
+  EXPECT_LT(RmsTurnRad(world), 0.003);
+  EXPECT_LT(RmsPointErrorMu(world), 0.02);
+}
+
+TEST(BundleAdjustment, TenPercentOutliersHardlyMatter) {
+  BundleWorldOptions options = NoisyStart();
+  options.sights_per_point = 8;
+  BundleWorld clean = MakeBundleWorld(options);
+  ASSERT_TRUE(AdjustBundle(clean.problem, {.dense = true}).usable);
+  options.outlier_share = 0.1;
+  BundleWorld world = MakeBundleWorld(options);
+  const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 20, .dense = true});
+  EXPECT_TRUE(summary.usable);
+  int wrong = 0;
+  int found = 0;
+  for (size_t i = 0; i < world.wrong.size(); ++i) {
+    wrong += world.wrong[i];
+    found += world.wrong[i] && world.problem.observations[i].outlier;
+  }
+  EXPECT_GT(wrong, 100);
+  EXPECT_GT(found, 0.99 * wrong);
+  EXPECT_LT(RmsPoseErrorMu(world), 2 * RmsPoseErrorMu(clean) + 0.001);
+  EXPECT_LT(summary.final_rms_px, 0.8);
+}
+
+TEST(BundleAdjustment, ObservationsCalledOutliersAreLeftOutAndMayComeBack) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  BundleObservation& wrong = world.problem.observations[10];
+  wrong.pixel_px.x() += 300;
+  wrong.outlier = true;
+  BundleObservation& right = world.problem.observations[20];
+  right.outlier = true;
+  BundleProblem without = world.problem;
+  without.observations[10].pixel_px.x() -= 299;  // as long as it is left out, its pixel is nothing to it
+  ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
+  ASSERT_TRUE(AdjustBundle(without, {.dense = true}).usable);
+  EXPECT_TRUE(Same(world.problem, without));
+  EXPECT_TRUE(wrong.outlier);
+  EXPECT_FALSE(right.outlier);
+}
+
+TEST(BundleAdjustment, WhatIsFixedDoesNotMoveAtAll) {
+  BundleWorldOptions options = NoisyStart();
+  BundleWorld world = MakeBundleWorld(options);
+  for (size_t i = 0; i < 50; ++i) {
+    world.problem.points[i] = {world.true_points[i], true};
+  }
+  const BundleProblem before = world.problem;
+  ASSERT_TRUE(AdjustBundle(world.problem, {}).usable);
+  for (size_t i = 0; i < before.cameras.size(); ++i) {
+    const SE3<World, Camera>& now = world.problem.cameras[i].T_world_camera;
+    const SE3<World, Camera>& start = before.cameras[i].T_world_camera;
+    const bool same = now.translation() == start.translation() && now.rotation().coeffs() == start.rotation().coeffs();
+    EXPECT_EQ(same, i < 4) << i;
+  }
+  for (size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(world.problem.points[i].position_world, before.points[i].position_world) << i;
+  }
+  EXPECT_LT(RmsPoseErrorMu(world), 0.008);
+}
+
+TEST(BundleAdjustment, PointsThatOnlyFixedCamerasSeeStayAndAreJudged) {
+  BundleWorldOptions options = NoisyStart();
+  options.fixed_cameras = 6;
+  BundleWorld world = MakeBundleWorld(options);
+  BundleProblem& problem = world.problem;
+  problem.points.push_back({Eigen::Vector3d(0.1, 0.2, 0.3), false});
+  const int point = static_cast<int>(problem.points.size()) - 1;
+  for (int camera = 0; camera < 3; ++camera) {
+    BundleObservation observation;
+    observation.camera = camera;
+    observation.point = point;
+    observation.pixel_px =
+        problem.camera.Project(problem.cameras[camera].T_world_camera.Inverse() * problem.points[point].position_world);
+    if (camera == 2) observation.pixel_px.x() += 10;
+    problem.observations.push_back(observation);
+  }
+  ASSERT_TRUE(AdjustBundle(problem, {}).usable);
+  EXPECT_EQ(problem.points[point].position_world, Eigen::Vector3d(0.1, 0.2, 0.3));
+  const size_t last = problem.observations.size() - 1;
+  EXPECT_FALSE(problem.observations[last - 1].outlier);
+  EXPECT_TRUE(problem.observations[last].outlier);
+}
+
+TEST(BundleAdjustment, DoesNotDependOnTheUnitOfTheMap) {
+  BundleWorldOptions options = NoisyStart();
+  options.with_depth = true;
+  options.outlier_share = 0.03;
+  BundleWorld world = MakeBundleWorld(options);
+  const BundleSummary summary = AdjustBundle(world.problem, {.dense = true});
+  ASSERT_TRUE(summary.usable);
+  for (const double unit : {0.01, 100.0}) {
+    options.scale = unit;
+    BundleWorld scaled = MakeBundleWorld(options);
+    const BundleSummary scaled_summary = AdjustBundle(scaled.problem, {.dense = true});
+    ASSERT_TRUE(scaled_summary.usable);
+    EXPECT_EQ(scaled_summary.iterations, summary.iterations);
+    EXPECT_EQ(scaled_summary.outliers, summary.outliers);
+    EXPECT_NEAR(scaled_summary.final_rms_px, summary.final_rms_px, 1e-6);
+    for (size_t i = 0; i < world.problem.cameras.size(); ++i) {
+      EXPECT_LT((scaled.problem.cameras[i].T_world_camera.translation() / unit -
+                 world.problem.cameras[i].T_world_camera.translation())
+                    .norm(),
+                1e-7);
+    }
+  }
+}
+
+TEST(BundleAdjustment, IsDeterministic) {
+  BundleWorldOptions options = NoisyStart();
+  options.outlier_share = 0.05;
+  for (const bool dense : {false, true}) {
+    BundleWorld first = MakeBundleWorld(options);
+    BundleWorld second = MakeBundleWorld(options);
+    ASSERT_TRUE(AdjustBundle(first.problem, {.dense = dense}).usable);
+    ASSERT_TRUE(AdjustBundle(second.problem, {.dense = dense}).usable);
+    EXPECT_TRUE(Same(first.problem, second.problem));
+  }
+}
+
+TEST(BundleAdjustment, DepthFindsTheScaleThatImagesCannot) {
+  BundleWorldOptions options = NoisyStart();
+  options.fixed_cameras = 1;
+  options.with_depth = true;
+  BundleWorld world = MakeBundleWorld(options);
+  // All but the fixed camera and the depths is larger by a third.
+  const Eigen::Vector3d anchor = world.true_poses[0].translation();
+  for (BundleCamera& camera : world.problem.cameras) {
+    const SE3<World, Camera>& T = camera.T_world_camera;
+    camera.T_world_camera = {T.rotation(), anchor + 1.3 * (T.translation() - anchor)};
+  }
+  for (BundlePoint& point : world.problem.points) {
+    point.position_world = anchor + 1.3 * (point.position_world - anchor);
+  }
+  const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 30, .dense = true});
+  EXPECT_TRUE(summary.usable);
+  EXPECT_LT(RmsPoseErrorMu(world), 0.01);
+  EXPECT_LT(RmsPointErrorMu(world), 0.02);
+}
+
+TEST(BundleAdjustment, AWrongDepthIsAnOutlier) {
+  BundleWorldOptions options = NoisyStart();
+  options.with_depth = true;
+  BundleWorld world = MakeBundleWorld(options);
+  world.problem.observations[7].depth_mu *= 1.5;
+  ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
+  EXPECT_TRUE(world.problem.observations[7].outlier);
+  EXPECT_LT(RmsPoseErrorMu(world), 0.005);
+}
+
+TEST(BundleAdjustment, PriorsHoldTheGauge) {
+  BundleWorldOptions options = NoisyStart();
+  options.fixed_cameras = 0;
+  BundleWorld world = MakeBundleWorld(options);
+  for (size_t i = 0; i < world.problem.cameras.size(); ++i) {
+    world.problem.cameras[i].prior = PosePrior{world.true_poses[i], 0.002, 0.005};
+  }
+  ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
+  EXPECT_LT(RmsPoseErrorMu(world), 0.005);
+  EXPECT_LT(RmsTurnRad(world), 0.002);
+}
+
+TEST(BundleAdjustment, ACameraWithAPriorAloneGoesThere) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  BundleCamera lonely;
+  lonely.T_world_camera = OrbitPose(2.0, 1);
+  lonely.prior = PosePrior{OrbitPose(2.1, 1), 0.01, 0.01};
+  world.problem.cameras.push_back(lonely);
+  ASSERT_TRUE(AdjustBundle(world.problem, {}).usable);
+  const SE3<World, Camera>& reached = world.problem.cameras.back().T_world_camera;
+  EXPECT_LT((reached.translation() - OrbitPose(2.1, 1).translation()).norm(), 1e-3);
+}
+
+TEST(BundleAdjustment, AnAbortBeforeTheStartChangesNothing) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  const BundleProblem before = world.problem;
+  const std::atomic<bool> abort = true;
+  const BundleSummary summary = AdjustBundle(world.problem, {.abort = &abort});
+  EXPECT_TRUE(summary.aborted);
+  EXPECT_FALSE(summary.usable);
+  EXPECT_EQ(summary.iterations, 0);
+  EXPECT_TRUE(Same(world.problem, before));
+}
+
+// Whenever the abort comes, what is there afterwards is whole and no worse than what was there before.
+TEST(BundleAdjustment, AnAbortKeepsWhatWasReached) {
+  BundleWorldOptions options = NoisyStart();
+  options.cameras = 30;
+  options.points = 1000;
+  for (const int delay_us : {0, 500, 2000, 8000}) {
+    BundleWorld world = MakeBundleWorld(options);
+    const BundleProblem before = world.problem;
+    std::atomic<bool> abort = false;
+    std::thread aborter([&] {
+      std::this_thread::sleep_for(std::chrono::microseconds(delay_us));
+      abort = true;
+    });
+    const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 50, .abort = &abort});
+    aborter.join();
+    EXPECT_LE(summary.final_rms_px, summary.initial_rms_px);
+    EXPECT_EQ(Same(world.problem, before), !summary.usable);
+    EXPECT_EQ(summary.usable, summary.iterations > 0);
+  }
+}
+
+TEST(BundleAdjustment, FewIterationsKeepTheBestSoFar) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 1, .reject_outliers = false});
+  EXPECT_TRUE(summary.usable);
+  EXPECT_EQ(summary.iterations, 1);
+  EXPECT_LT(summary.final_rms_px, 0.5 * summary.initial_rms_px);
+}
+
+TEST(BundleAdjustment, BadNumbersAreLeftOut) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  BundleProblem clean = world.problem;
+  BundleProblem& problem = world.problem;
+  const auto add = [&](auto change) {
+    BundleObservation observation = problem.observations[3];
+    change(observation);
+    problem.observations.push_back(observation);
+  };
+  add([](BundleObservation& observation) { observation.camera = 1000; });
+  add([](BundleObservation& observation) { observation.camera = -1; });
+  add([](BundleObservation& observation) { observation.point = 1000; });
+  add([](BundleObservation& observation) { observation.point = -7; });
+  add([&](BundleObservation& observation) { observation.pixel_px.y() = nan; });
+  add([](BundleObservation& observation) { observation.sigma_px = 0; });
+  add([&](BundleObservation& observation) { observation.sigma_px = nan; });
+  add([&](BundleObservation& observation) { observation.depth_mu = nan; });
+  problem.points.push_back({Eigen::Vector3d(nan, 0, 0), false});
+  add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
+  problem.points.push_back({Eigen::Vector3d(100, 0, 0), false});  // behind
+  add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
+  BundleCamera broken;
+  broken.T_world_camera = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(nan, 0, 0)};
+  broken.prior = PosePrior{};
+  problem.cameras.push_back(broken);
+  add([&](BundleObservation& observation) { observation.camera = static_cast<int>(problem.cameras.size()) - 1; });
+  problem.cameras[5].prior = PosePrior{problem.cameras[5].T_world_camera, 0, nan};
+
+  ASSERT_TRUE(AdjustBundle(clean, {.dense = true}).usable);
+  const size_t sound = clean.observations.size();
+  ASSERT_TRUE(AdjustBundle(problem, {.dense = true}).usable);
+  for (size_t i = 0; i < clean.cameras.size(); ++i) {
+    EXPECT_EQ(problem.cameras[i].T_world_camera.translation(), clean.cameras[i].T_world_camera.translation()) << i;
+  }
+  for (size_t i = sound; i < problem.observations.size(); ++i) EXPECT_TRUE(problem.observations[i].outlier) << i;
+}
+
+TEST(BundleAdjustment, NothingToDoIsNotUsable) {
+  BundleProblem empty;
+  EXPECT_FALSE(AdjustBundle(empty, {}).usable);
+  empty.camera = BundleWorldCamera();
+  EXPECT_FALSE(AdjustBundle(empty, {}).usable);
+
+  BundleWorldOptions options = NoisyStart();
+  options.fixed_cameras = options.cameras;
+  BundleWorld all_fixed = MakeBundleWorld(options);
+  const BundleProblem before = all_fixed.problem;
+  EXPECT_FALSE(AdjustBundle(all_fixed.problem, {}).usable);
+  EXPECT_TRUE(Same(all_fixed.problem, before));
+
+  BundleWorld blind = MakeBundleWorld(NoisyStart());
+  blind.problem.camera.fx_px = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(AdjustBundle(blind.problem, {}).usable);
+  BundleWorld idle = MakeBundleWorld(NoisyStart());
+  EXPECT_FALSE(AdjustBundle(idle.problem, {.max_iterations = 0}).usable);
+}
+
+TEST(BundleAdjustment, PointsThatStartBehindTheCameraSpoilNothing) {
+  BundleWorld world = MakeBundleWorld(NoisyStart());
+  for (size_t i = 0; i < 10; ++i) world.problem.points[i].position_world = Eigen::Vector3d(30, 5, 0);
+  ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
+  for (const BundleObservation& observation : world.problem.observations) {
+    EXPECT_TRUE(observation.point >= 10 || observation.outlier);
+  }
+  EXPECT_LT(RmsPoseErrorMu(world), 0.008);
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,110 @@
+#include "server/slam/optimise/reprojection_cost.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/slam/optimise/lie.h"
+#include "tests/unit/server/slam/optimise/bundle_world.h"
+#include "tests/unit/server/slam/optimise/jacobians.h"
+
+namespace romap {
+namespace {
+
+// A camera some way off its start, so that the Jacobians of the increment matter, and a point in its view.
+struct Sight {
+  explicit Sight(const Eigen::Vector3d& p_camera, double turn_rad = 0.7)
+      : camera(SE3<World, Camera>(ExpRotation({0.4, -0.9, 1.3}), {0.5, -0.2, 0.8})) {
+    camera.increment = {turn_rad, -0.5 * turn_rad, 0.3 * turn_rad, 0.2, -0.1, 0.15};
+    camera.Refresh();
+    Eigen::Map<Eigen::Vector3d>(point.data()) = camera.Pose() * p_camera;
+  }
+  std::vector<double*> Parameters() { return {camera.increment.data(), point.data()}; }
+
+  CameraState camera;
+  std::array<double, 3> point{};
+};
+
+TEST(ReprojectionCost, IsThePixelErrorInSigmas) {
+  Sight sight({0.3, -0.2, 1.5});
+  const CameraModel model = BundleWorldCamera();
+  const Eigen::Vector2d pixel_px = model.Project({0.3, -0.2, 1.5}) + Eigen::Vector2d(3, -4);
+  const ReprojectionCost cost(model, &sight.camera, pixel_px, 2);
+  Eigen::Vector2d residual;
+  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), nullptr));
+  EXPECT_LT((residual - Eigen::Vector2d(-1.5, 2)).norm(), 1e-9);
+}
+
+TEST(ReprojectionCost, JacobiansMatchFiniteDifferences) {
+  for (const double turn_rad : {0.0, 1e-6, 0.02, 0.7, 2.0}) {
+    Sight sight({0.3, -0.2, 1.5}, turn_rad);
+    const ReprojectionCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1.7);
+    ExpectJacobiansMatch(cost, sight.Parameters(), [&] { sight.camera.Refresh(); });
+  }
+}
+
+TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
+  Sight sight({0.3, -0.2, -1.5});
+  const ReprojectionCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1);
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_camera;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
+  double* jacobians[] = {by_camera.data(), by_point.data()};
+  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), jacobians));
+  EXPECT_GT(residual.norm(), 50);
+  EXPECT_TRUE(by_camera.isZero());
+  EXPECT_TRUE(by_point.isZero());
+}
+
+TEST(InverseDepthCost, IsTheErrorOfInverseDepthInSigmas) {
+  Sight sight({0.3, -0.2, 2.0});
+  // sigma of 1 / depth is 0.1 / 2.5^2.
+  const InverseDepthCost cost(&sight.camera, 2.5, 0.1);
+  Eigen::Vector2d residual;
+  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), nullptr));
+  EXPECT_NEAR(residual[0], (1 / 2.0 - 1 / 2.5) / (0.1 / 6.25), 1e-9);
+  EXPECT_EQ(residual[1], 0);
+}
+
+TEST(InverseDepthCost, JacobiansMatchFiniteDifferences) {
+  for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
+    Sight sight({0.3, -0.2, 1.5}, turn_rad);
+    const InverseDepthCost cost(&sight.camera, 1.4, 0.05);
+    ExpectJacobiansMatch(cost, sight.Parameters(), [&] { sight.camera.Refresh(); });
+  }
+}
+
+TEST(PosePriorCost, IsTheDistanceInSigmas) {
+  CameraState camera(SE3<World, Camera>(ExpRotation({0.4, -0.9, 1.3}), {0.5, -0.2, 0.8}));
+  PosePrior prior;
+  prior.T_world_camera = SE3<World, Camera>(camera.start_rotation * ExpRotation({0, -0.02, 0}), {0.5, -0.2, 0.5});
+  prior.rotation_sigma_rad = 0.01;
+  prior.translation_sigma_mu = 0.1;
+  const PosePriorCost cost(&camera, prior);
+  const double* parameters[] = {camera.increment.data()};
+  Eigen::Matrix<double, 6, 1> residual;
+  ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), nullptr));
+  EXPECT_LT((residual - (Eigen::Matrix<double, 6, 1>() << 0, 2, 0, 0, 0, 3).finished()).norm(), 1e-9);
+}
+
+TEST(PosePriorCost, JacobianMatchesFiniteDifferences) {
+  for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
+    Sight sight({0, 0, 1}, turn_rad);
+    PosePrior prior;
+    prior.T_world_camera = SE3<World, Camera>(ExpRotation({0.5, -0.8, 1.2}), {0.4, -0.1, 0.7});
+    prior.rotation_sigma_rad = 0.03;
+    prior.translation_sigma_mu = 0.2;
+    const PosePriorCost cost(&sight.camera, prior);
+    ExpectJacobiansMatch(cost, {sight.camera.increment.data()}, [&] { sight.camera.Refresh(); });
+  }
+}
+
+TEST(CameraState, PoseAgreesWithWhatTheCostsRead) {
+  const Sight sight({0, 0, 1});
+  const SE3<World, Camera> pose = sight.camera.Pose();
+  EXPECT_LT((pose.RotationMatrix().transpose() - sight.camera.R_camera_world).norm(), 1e-12);
+  EXPECT_LT((pose.translation() - sight.camera.t_world_camera).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace romap
