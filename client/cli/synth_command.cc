@@ -72,6 +72,11 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
   add("--elevation", synth.elevation_deg, "Of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");
+  const std::map<std::string, synth::SynthLens> lenses = {{"pinhole", synth::SynthLens::kPinhole},
+                                                          {"radtan", synth::SynthLens::kRadialTangential},
+                                                          {"fisheye", synth::SynthLens::kFisheye}};
+  command->add_option("--lens", synth.lens, "Of the camera: pinhole, radtan or fisheye")
+      ->transform(CLI::CheckedTransformer(lenses, CLI::ignore_case));
   const std::map<std::string, synth::ImageFormat> formats = {{"png", synth::ImageFormat::kPng},
                                                              {"jpeg", synth::ImageFormat::kJpeg}};
   command->add_option("--format", synth.format, "Colour images: png or jpeg")

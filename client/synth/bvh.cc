@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace romap::synth {
 namespace {
@@ -50,7 +51,8 @@ Bvh::Bvh(std::span<const Eigen::Vector3f> positions_m, std::span<const std::arra
   triangles_.reserve(triangles.size());
   for (const Reference& reference : references) {
     const auto& [a, b, c] = triangles[reference.triangle];
-    triangles_.push_back({positions_m[a], positions_m[b] - positions_m[a], positions_m[c] - positions_m[a]});
+    triangles_.push_back(
+        {positions_m[a], positions_m[b] - positions_m[a], positions_m[c] - positions_m[a], reference.triangle});
   }
 }
 
@@ -133,6 +135,49 @@ void Bvh::Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction
       if (t > 0 && t < t_max && visit(t)) return;
     }
   }
+}
+
+// Where the ray enters the node's box, infinity where it misses it before t_max.
+float Bvh::Entry(const Node& node, const Eigen::Vector3f& origin_m, const Eigen::Vector3f& inverse, float t_max) {
+  const Eigen::Vector3f to_low = (node.box.min() - origin_m).cwiseProduct(inverse);
+  const Eigen::Vector3f to_high = (node.box.max() - origin_m).cwiseProduct(inverse);
+  const float enter = to_low.cwiseMin(to_high).maxCoeff();
+  const float leave = to_low.cwiseMax(to_high).minCoeff();
+  return enter <= leave && leave >= 0 && enter < t_max ? enter : std::numeric_limits<float>::infinity();
+}
+
+std::optional<Bvh::Hit> Bvh::Nearest(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction) const {
+  if (triangles_.empty() || !direction.allFinite()) return std::nullopt;
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const Eigen::Vector3f inverse = direction.cwiseInverse();
+  Hit best{0, kFar};
+  std::array<std::pair<uint32_t, float>, kStack> stack;  // nodes, and where the ray enters them
+  size_t depth = 0;
+  if (Entry(nodes_[0], origin_m, inverse, kFar) < kFar) stack[depth++] = {0, 0.0F};
+  while (depth > 0) {
+    const auto [index, enter] = stack[--depth];
+    if (enter >= best.t) continue;
+    const Node& node = nodes_[index];
+    if (node.count == 0) {
+      const float left = Entry(nodes_[node.first], origin_m, inverse, best.t);
+      const float right = Entry(nodes_[node.first + 1], origin_m, inverse, best.t);
+      const bool left_first = left <= right;
+      const std::pair<uint32_t, float> near{node.first + (left_first ? 0 : 1), std::min(left, right)};
+      const std::pair<uint32_t, float> far{node.first + (left_first ? 1 : 0), std::max(left, right)};
+      if (far.second < kFar) stack[depth++] = far;
+      if (near.second < kFar) stack[depth++] = near;
+      continue;
+    }
+    for (uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const Triangle& triangle = triangles_[i];
+      if (direction.dot(triangle.edge1.cross(triangle.edge2)) >= 0) continue;  // from behind
+      const float t = HitDistance(triangle.corner, triangle.edge1, triangle.edge2, origin_m, direction);
+      // Of triangles that share an edge the first one takes it, in whatever order they come.
+      if (t > 0 && (t < best.t || (t == best.t && triangle.index < best.triangle))) best = {triangle.index, t};
+    }
+  }
+  if (best.t == kFar) return std::nullopt;
+  return best;
 }
 
 bool Bvh::Occluded(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_min, float t_max) const {

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,14 @@ class Bvh {
  public:
   Bvh(std::span<const Eigen::Vector3f> positions_m, std::span<const std::array<uint32_t, 3>> triangles);
 
+  struct Hit {
+    uint32_t triangle = 0;  // index into the constructor's triangles
+    float t = 0;            // in lengths of the direction
+  };
+
+  // The first triangle that the ray meets from its front, where its corners run counter-clockwise. Nothing for a
+  // direction that is not finite.
+  std::optional<Hit> Nearest(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction) const;
   // Whether any triangle meets origin + t * direction for some t in (t_min, t_max); t in lengths of `direction`.
   bool Occluded(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_min, float t_max) const;
   // Whether the point is inside the closed surface the triangles form: an odd number of them lies on a ray from it.
@@ -23,6 +32,7 @@ class Bvh {
  private:
   struct Triangle {
     Eigen::Vector3f corner, edge1, edge2;
+    uint32_t index;
   };
   // Inner nodes: children at `first` and `first + 1`, count 0. Leaves: triangles [first, first + count).
   struct Node {
@@ -40,6 +50,7 @@ class Bvh {
   static size_t Partition(std::span<Reference> references);
   template <class Visit>
   void Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_max, Visit visit) const;
+  static float Entry(const Node& node, const Eigen::Vector3f& origin_m, const Eigen::Vector3f& inverse, float t_max);
 
   std::vector<Node> nodes_;
   std::vector<Triangle> triangles_;

@@ -11,7 +11,9 @@ namespace romap::synth {
 
 inline constexpr double kTwoRoundsRoomHalf_m = 3.2;
 
-// The pinhole camera of a sequence: focal length 0.9 * width, principal point in the middle, no distortion.
+// The camera of a sequence, principal point in the middle. The focal length is 0.9 * width for the pinhole; a lens,
+// with coefficients as they are found in calibrations, sees more: 0.6 * width (radial-tangential) or 0.45 * width
+// (fisheye).
 CameraModel SynthCamera(const SynthOptions& options);
 
 // One camera pose per frame, inside the room. Orbit and hand look at the objects from a distance that fits them into

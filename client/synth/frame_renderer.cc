@@ -1,13 +1,15 @@
 #include "client/synth/frame_renderer.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
-#include "client/render/rasterizer.h"
+#include "client/synth/lens_rays.h"
 
 namespace romap::synth {
 namespace {
@@ -29,68 +31,93 @@ uint8_t ToSrgb8(float linear) {
   return kTable[static_cast<size_t>(std::clamp(linear, 0.0F, 1.0F) * 4095 + 0.5F)];
 }
 
-class Shader {
- public:
-  Shader(const Scene& scene, const CameraModel& camera, const SE3<World, Camera>& T_world_camera)
-      : scene_(scene),
-        camera_(camera),
-        rotation_(T_world_camera.RotationMatrix()),
-        origin_(T_world_camera.translation()) {}
+bool ShareVertex(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
+  return std::any_of(a.begin(), a.end(), [&](uint32_t i) { return i == b[0] || i == b[1] || i == b[2]; });
+}
 
-  // Light that comes from where the ray through (u, v) meets the triangle; `pixel_share` is the side of the area that
-  // the colour stands for, in pixels.
-  Rgb Radiance(int32_t triangle, double u_px, double v_px, float inverse_depth, float pixel_share) const {
-    const std::array<uint32_t, 3>& corner = scene_.triangles[static_cast<size_t>(triangle)];
-    const std::array<Eigen::Vector3f, 3> world = {scene_.positions_world[corner[0]], scene_.positions_world[corner[1]],
-                                                  scene_.positions_world[corner[2]]};
-    const Eigen::Vector3d ray = rotation_ * camera_.Unproject(u_px, v_px);
-    // A pixel's centre may lie just outside the triangle that one of its samples hit.
-    Eigen::Vector3f weights = Barycentrics(world, origin_, ray).cwiseMax(0.0F);
-    weights /= weights.sum();
-    const auto blend = [&](const auto& attribute) -> Eigen::Vector3f {
-      return weights.x() * attribute[corner[0]] + weights.y() * attribute[corner[1]] +
-             weights.z() * attribute[corner[2]];
-    };
-    const Eigen::Vector3f normal_world = (world[1] - world[0]).cross(world[2] - world[0]).normalized();
-    const auto& local = scene_.positions_local;
-    const Eigen::Vector3f normal_local =
-        (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
-    // A slanted surface shows more of itself in one direction of the pixel but not in the other: take the mean of both.
-    const float cosine = std::abs(normal_world.dot(ray.cast<float>().normalized()));
-    const float footprint_m =
-        pixel_share / (inverse_depth * static_cast<float>(camera_.fx_px) * std::sqrt(std::max(cosine, 0.05F)));
-    const Material& material = scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].material;
-    return Albedo(material, blend(local), normal_local, footprint_m).cwiseProduct(blend(scene_.irradiance));
+// Whether the samples of a pixel see one smooth piece of surface, so that one colour will do for all of them.
+bool SameSurface(const Scene& scene, const std::array<int32_t, kSamples>& hits) {
+  if (hits[0] == VisibilityImage::kNothing) return false;
+  for (const int32_t hit : hits) {
+    if (hit == hits[0]) continue;
+    if (hit == VisibilityImage::kNothing) return false;
+    const auto a = static_cast<size_t>(hits[0]);
+    const auto b = static_cast<size_t>(hit);
+    if (scene.surface_of_triangle[a] != scene.surface_of_triangle[b]) return false;
+    // Neighbours on a smooth surface share a vertex; a fold that hides a part of the same surface does not.
+    if (!ShareVertex(scene.triangles[a], scene.triangles[b])) return false;
   }
+  return true;
+}
 
-  // Whether the samples of a pixel see one smooth piece of surface, so that one colour will do for all of them.
-  bool SameSurface(const std::array<int32_t, kSamples>& hits) const {
-    if (hits[0] == VisibilityImage::kNothing) return false;
-    for (const int32_t hit : hits) {
-      if (hit == hits[0]) continue;
-      if (hit == VisibilityImage::kNothing) return false;
-      const auto a = static_cast<size_t>(hits[0]);
-      const auto b = static_cast<size_t>(hit);
-      if (scene_.surface_of_triangle[a] != scene_.surface_of_triangle[b]) return false;
-      // Neighbours on a smooth surface share a vertex; a fold that hides a part of the same surface does not.
-      if (!ShareVertex(scene_.triangles[a], scene_.triangles[b])) return false;
+Eigen::Vector3d RayThrough(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays, int u_px,
+                           int v_px) {
+  if (lens_rays.empty()) return camera.Unproject(u_px, v_px);
+  return lens_rays[static_cast<size_t>(v_px) * static_cast<size_t>(camera.width_px) + static_cast<size_t>(u_px)]
+      .homogeneous();
+}
+
+}  // namespace
+
+FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera)
+    : scene_(scene), camera_(camera), fine_camera_(Supersampled(camera, kSamplesAcross)) {
+  if (!camera.HasDistortion()) return;
+  bvh_ = std::make_unique<Bvh>(scene.positions_world, scene.triangles);
+  center_rays_ = LensRays(camera, 1);
+  fine_rays_ = LensRays(camera, kSamplesAcross);
+}
+
+VisibilityImage FrameRenderer::Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
+                                    const SE3<World, Camera>& T_world_camera) const {
+  if (!bvh_) return Rasterize(camera, T_world_camera, scene_.Soup(), {.cull_back_faces = true});
+  VisibilityImage image;
+  image.width_px = camera.width_px;
+  image.height_px = camera.height_px;
+  image.triangle.assign(lens_rays.size(), VisibilityImage::kNothing);
+  image.inverse_depth_mu.assign(lens_rays.size(), 0.0F);
+  const Eigen::Vector3f origin_m = T_world_camera.translation().cast<float>();
+  const Eigen::Matrix3d rotation = T_world_camera.RotationMatrix();
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, lens_rays.size(), 1024), [&](const auto& range) {
+    for (size_t i = range.begin(); i < range.end(); ++i) {
+      const Eigen::Vector3d direction = rotation * lens_rays[i].homogeneous();
+      const std::optional<Bvh::Hit> hit = bvh_->Nearest(origin_m, direction.cast<float>());
+      if (!hit) continue;
+      image.triangle[i] = static_cast<int32_t>(hit->triangle);
+      image.inverse_depth_mu[i] = 1 / hit->t;  // the ray's z is 1 in the camera frame
     }
-    return true;
-  }
+  });
+  return image;
+}
 
- private:
-  static bool ShareVertex(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
-    return std::any_of(a.begin(), a.end(), [&](uint32_t i) { return i == b[0] || i == b[1] || i == b[2]; });
-  }
-
-  const Scene& scene_;
-  const CameraModel& camera_;
-  Eigen::Matrix3d rotation_;
-  Eigen::Vector3d origin_;
-};
+// Light that comes from where the ray meets the triangle; `pixel_share` is the side of the area that the colour stands
+// for, in pixels.
+Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
+                            const SE3<World, Camera>& T_world_camera, float inverse_depth, float pixel_share) const {
+  const std::array<uint32_t, 3>& corner = scene_.triangles[static_cast<size_t>(triangle)];
+  const std::array<Eigen::Vector3f, 3> world = {scene_.positions_world[corner[0]], scene_.positions_world[corner[1]],
+                                                scene_.positions_world[corner[2]]};
+  const Eigen::Vector3d ray = T_world_camera.rotation() * ray_camera;
+  // A pixel's centre may lie just outside the triangle that one of its samples hit.
+  Eigen::Vector3f weights = Barycentrics(world, T_world_camera.translation(), ray).cwiseMax(0.0F);
+  weights /= weights.sum();
+  const auto blend = [&](const auto& attribute) -> Eigen::Vector3f {
+    return weights.x() * attribute[corner[0]] + weights.y() * attribute[corner[1]] + weights.z() * attribute[corner[2]];
+  };
+  const Eigen::Vector3f normal_world = (world[1] - world[0]).cross(world[2] - world[0]).normalized();
+  const auto& local = scene_.positions_local;
+  const Eigen::Vector3f normal_local =
+      (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
+  // A slanted surface shows more of itself in one direction of the pixel but not in the other: take the mean of both.
+  const float cosine = std::abs(normal_world.dot(ray.cast<float>().normalized()));
+  const float footprint_m =
+      pixel_share / (inverse_depth * static_cast<float>(camera_.fx_px) * std::sqrt(std::max(cosine, 0.05F)));
+  const Material& material = scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].material;
+  return Albedo(material, blend(local), normal_local, footprint_m).cwiseProduct(blend(scene_.irradiance));
+}
 
 // Mean colour of pixel (u, v) from the samples of the finer image inside it.
-Rgb PixelColor(const Shader& shader, const VisibilityImage& fine, int u_px, int v_px) {
+Rgb FrameRenderer::PixelColor(const VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
+                              int v_px) const {
   std::array<int32_t, kSamples> hits;
   std::array<float, kSamples> inverse_depths;
   for (int k = 0; k < kSamples; ++k) {
@@ -99,38 +126,36 @@ Rgb PixelColor(const Shader& shader, const VisibilityImage& fine, int u_px, int 
     hits[k] = fine.triangle[index];
     inverse_depths[k] = fine.inverse_depth_mu[index];
   }
-  if (shader.SameSurface(hits)) return shader.Radiance(hits[0], u_px, v_px, inverse_depths[0], 1);
+  if (SameSurface(scene_, hits)) {
+    const Eigen::Vector3d center = RayThrough(camera_, center_rays_, u_px, v_px);
+    if (center.allFinite()) return Radiance(hits[0], center, T_world_camera, inverse_depths[0], 1);
+  }
   Rgb sum = Rgb::Zero();
   for (int k = 0; k < kSamples; ++k) {
     if (hits[k] == VisibilityImage::kNothing) continue;
-    const double du_px = (k % kSamplesAcross + 0.5) / kSamplesAcross - 0.5;
-    const double dv_px = (k / kSamplesAcross + 0.5) / kSamplesAcross - 0.5;
-    sum += shader.Radiance(hits[k], u_px + du_px, v_px + dv_px, inverse_depths[k], 1.0F / kSamplesAcross);
+    const Eigen::Vector3d ray = RayThrough(fine_camera_, fine_rays_, u_px * kSamplesAcross + k % kSamplesAcross,
+                                           v_px * kSamplesAcross + k / kSamplesAcross);
+    sum += Radiance(hits[k], ray, T_world_camera, inverse_depths[k], 1.0F / kSamplesAcross);
   }
   return sum / kSamples;
 }
 
-}  // namespace
-
-TrueFrame RenderFrame(const Scene& scene, const CameraModel& camera, const SE3<World, Camera>& T_world_camera) {
-  const RasterOptions options{.cull_back_faces = true};
-  const VisibilityImage centers = Rasterize(camera, T_world_camera, scene.Soup(), options);
-  const VisibilityImage fine = Rasterize(Supersampled(camera, kSamplesAcross), T_world_camera, scene.Soup(), options);
-  const Shader shader(scene, camera, T_world_camera);
-
+TrueFrame FrameRenderer::Render(const SE3<World, Camera>& T_world_camera) const {
+  const VisibilityImage centers = Look(camera_, center_rays_, T_world_camera);
+  const VisibilityImage fine = Look(fine_camera_, fine_rays_, T_world_camera);
   TrueFrame frame;
-  frame.color_bgr.create(camera.height_px, camera.width_px, CV_8UC3);
-  frame.labels.create(camera.height_px, camera.width_px, CV_8UC1);
-  frame.depth_m.create(camera.height_px, camera.width_px, CV_32FC1);
-  tbb::parallel_for(0, camera.height_px, [&](int v) {
-    for (int u = 0; u < camera.width_px; ++u) {
+  frame.color_bgr.create(camera_.height_px, camera_.width_px, CV_8UC3);
+  frame.labels.create(camera_.height_px, camera_.width_px, CV_8UC1);
+  frame.depth_m.create(camera_.height_px, camera_.width_px, CV_32FC1);
+  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+    for (int u = 0; u < camera_.width_px; ++u) {
       const int32_t triangle = centers.triangle[centers.Index(u, v)];
       frame.depth_m.at<float>(v, u) = centers.Depth(u, v);
       frame.labels.at<uint8_t>(v, u) =
           triangle == VisibilityImage::kNothing
               ? uint8_t{0}
-              : scene.surfaces[scene.surface_of_triangle[static_cast<size_t>(triangle)]].label;
-      const Rgb color = PixelColor(shader, fine, u, v);
+              : scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].label;
+      const Rgb color = PixelColor(fine, T_world_camera, u, v);
       frame.color_bgr.at<cv::Vec3b>(v, u) = {ToSrgb8(color.z()), ToSrgb8(color.y()), ToSrgb8(color.x())};
     }
   });

@@ -5,6 +5,7 @@
 
 #include "client/synth/bvh.h"
 #include "client/synth/random.h"
+#include "common/lens.h"
 
 namespace romap::synth {
 namespace {
@@ -88,7 +89,8 @@ void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera,
     const Eigen::Vector3d normal = T_camera_world.rotation() * normals_world_[i].cast<double>();
     const double cosine = -normal.dot(p) / p.norm();
     if (cosine < kMinCosine) continue;
-    const Eigen::Vector2d pixel = camera.Project(p);
+    Eigen::Vector2d pixel = camera.Project(p);
+    if (camera.HasDistortion()) pixel = DistortPixel(camera, pixel);
     if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < camera.width_px - 0.5 &&
           pixel.y() < camera.height_px - 0.5)) {
       continue;

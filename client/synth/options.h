@@ -30,6 +30,9 @@ absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text);
 
 enum class ImageFormat { kPng, kJpeg };
 
+// What bends the rays: nothing, OpenCV's k1 k2 p1 p2 k3, or an equidistant fisheye that sees 127 degrees across.
+enum class SynthLens { kPinhole, kRadialTangential, kFisheye };
+
 // What sequence to make. Everything in it follows from these numbers.
 struct SynthOptions {
   uint64_t seed = 1;
@@ -43,6 +46,7 @@ struct SynthOptions {
   double elevation_deg = 35;  // of the camera above the table, 5..80; the hand wanders about it
   int width_px = 640;         // 32..4096
   int height_px = 480;        // 32..4096
+  SynthLens lens = SynthLens::kPinhole;    // colours, masks and depth are all as the lens shows them
   ImageFormat format = ImageFormat::kPng;  // of the colour images
   // Faults, all off by default.
   double mask_jitter_px = 0;          // the masks' borders are displaced by up to about so much, 0..50

@@ -64,7 +64,7 @@ cv::Mat DepthUnits(const cv::Mat& depth_m) {
 class SequenceMaker {
  public:
   SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
-      : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)) {
+      : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)), renderer_(scene, camera_) {
     path_ = MakeCameraPath(options, scene, camera_);
     plans_ = PlanFrames(options);
     detections_.resize(path_.size());
@@ -137,7 +137,7 @@ class SequenceMaker {
     const FramePlan& plan = plans_[static_cast<size_t>(i)];
     if (plan.missing || plan.shown != static_cast<size_t>(i)) return absl::OkStatus();
     const SE3<World, Camera>& T_world_camera = path_[static_cast<size_t>(i)];
-    TrueFrame frame = RenderFrame(scene_, camera_, T_world_camera);
+    TrueFrame frame = renderer_.Render(T_world_camera);
     const cv::Vec2d motion_px = SceneMotion(static_cast<size_t>(i), CentreDepth_m(frame.depth_m));
     if (plan.black) {
       frame.labels.setTo(0);
@@ -201,7 +201,8 @@ class SequenceMaker {
   const SynthOptions& options_;
   const std::string& dir_;
   const Scene& scene_;
-  CameraModel camera_;
+  const CameraModel camera_;
+  const FrameRenderer renderer_;
   std::vector<SE3<World, Camera>> path_;
   std::vector<FramePlan> plans_;
   std::vector<std::vector<SynthDetection>> detections_;   // per frame

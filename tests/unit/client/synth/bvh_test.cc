@@ -56,6 +56,45 @@ TEST(Bvh, FindsOcclusionAsTestingEveryTriangleDoes) {
   EXPECT_LT(occluded, 900);
 }
 
+TEST(Bvh, FindsTheNearestFrontAsTestingEveryTriangleDoes) {
+  Random random(11);
+  const auto coordinate = [&](double reach) { return static_cast<float>(random.Uniform(-reach, reach)); };
+  std::vector<Point> positions;
+  std::vector<std::array<uint32_t, 3>> triangles;
+  for (uint32_t i = 0; i < 400; ++i) {
+    const Point center(coordinate(1), coordinate(1), coordinate(1));
+    for (int k = 0; k < 3; ++k) positions.push_back(center + Point(coordinate(0.2), coordinate(0.2), coordinate(0.2)));
+    triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const Bvh bvh(positions, triangles);
+  int hits = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Point from(coordinate(1.5), coordinate(1.5), coordinate(1.5));
+    const Point along(coordinate(1), coordinate(1), coordinate(1));
+    double nearest = std::numeric_limits<double>::infinity();
+    uint32_t expected = 0;
+    for (uint32_t k = 0; k < triangles.size(); ++k) {
+      const Point ab = positions[3 * k + 1] - positions[3 * k];
+      const Point ac = positions[3 * k + 2] - positions[3 * k];
+      if (along.dot(ab.cross(ac)) >= 0) continue;
+      Eigen::Matrix3d edges;
+      edges << ab.cast<double>(), ac.cast<double>(), -along.cast<double>();
+      const Eigen::Vector3d uvt = edges.fullPivLu().solve((from - positions[3 * k]).cast<double>());
+      if (uvt.x() < 0 || uvt.y() < 0 || uvt.x() + uvt.y() > 1 || uvt.z() <= 0 || uvt.z() >= nearest) continue;
+      nearest = uvt.z();
+      expected = k;
+    }
+    const auto hit = bvh.Nearest(from, along);
+    ASSERT_EQ(hit.has_value(), std::isfinite(nearest)) << "ray " << i;
+    if (!hit) continue;
+    ++hits;
+    EXPECT_EQ(hit->triangle, expected) << "ray " << i;
+    EXPECT_NEAR(hit->t, nearest, 1e-4 * nearest + 1e-5);
+  }
+  EXPECT_GT(hits, 100);
+  EXPECT_FALSE(bvh.Nearest(Point::Zero(), Point::Constant(std::numeric_limits<float>::quiet_NaN())).has_value());
+}
+
 TEST(Bvh, TakesNothing) {
   const Bvh bvh({}, {});
   EXPECT_FALSE(bvh.Occluded(Point::Zero(), Point::UnitZ(), 0, 1));

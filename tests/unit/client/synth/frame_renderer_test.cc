@@ -1,0 +1,111 @@
+#include "client/synth/frame_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "client/synth/camera_path.h"
+#include "client/synth/lens_rays.h"
+#include "client/synth/lighting.h"
+#include "client/synth/solid.h"
+
+namespace romap::synth {
+namespace {
+
+// The pixel that OpenCV's documentation says the lens sends a ray (x, y, 1) to.
+Eigen::Vector2d PixelByTheBook(const CameraModel& camera, double x, double y) {
+  const auto& k = camera.distortion;
+  const double r2 = x * x + y * y;
+  Eigen::Vector2d bent;
+  if (camera.lens == LensModel::kFisheye) {
+    const double r = std::sqrt(r2);
+    const double t = std::atan(r);
+    const double t2 = t * t;
+    const double bent_t = t * (1 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
+    bent = (r > 0 ? bent_t / r : 1) * Eigen::Vector2d(x, y);
+  } else {
+    const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+    bent = {x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x),
+            y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y};
+  }
+  return {camera.fx_px * bent.x() + camera.cx_px, camera.fy_px * bent.y() + camera.cy_px};
+}
+
+TEST(LensRays, ObeyTheLensExactly) {
+  for (const SynthLens lens : {SynthLens::kRadialTangential, SynthLens::kFisheye}) {
+    const CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120, .lens = lens});
+    for (const int across : {1, 2}) {
+      const auto rays = LensRays(camera, across);
+      ASSERT_EQ(rays.size(), 160U * 120U * static_cast<size_t>(across * across));
+      for (int v = 0; v < 120 * across; ++v) {
+        for (int u = 0; u < 160 * across; ++u) {
+          const Eigen::Vector2d& ray = rays[static_cast<size_t>(v * 160 * across + u)];
+          // Sample (u, v) of the finer image as a place in the coarse one.
+          const Eigen::Vector2d pixel_px((u + 0.5) / across - 0.5, (v + 0.5) / across - 0.5);
+          ASSERT_LT((PixelByTheBook(camera, ray.x(), ray.y()) - pixel_px).norm(), 1e-4) << u << ' ' << v;
+        }
+      }
+    }
+  }
+}
+
+// A chequered ball before a chequered wall.
+Scene BallScene() {
+  Scene scene;
+  Random random(5);
+  AddSurface(scene, RoundedBox(Point(0, 0, -0.5F), Point(2, 2, 0.05F), 0.01F, 0.1F), {},
+             RandomMaterial(Pattern::kChecks, 0.1F, random), 0);
+  AddSurface(scene, Ellipsoid(Point(0.05F, 0.02F, 0.2F), Point(0.2F, 0.15F, 0.2F)), {},
+             RandomMaterial(Pattern::kChecks, 0.05F, random), 1);
+  scene.lights = {{Point(0, 0.5F, 2), Point(0.2F, 0, 0), Point(0, 0.2F, 0), Rgb::Constant(2)}};
+  BakeLight(scene);
+  return scene;
+}
+
+// From above, looking down.
+SE3<World, Camera> Above() {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitX())), Eigen::Vector3d(0.1, 0, 1.2)};
+}
+
+TEST(FrameRenderer, ALensThatHardlyBendsShowsWhatThePinholeShows) {
+  const Scene scene = BallScene();
+  CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120});
+  const TrueFrame pinhole = FrameRenderer(scene, camera).Render(Above());
+  camera.distortion[0] = 1e-9;  // rays are followed now, instead of triangles drawn
+  const TrueFrame lens = FrameRenderer(scene, camera).Render(Above());
+  EXPECT_GT(cv::countNonZero(pinhole.labels), 1000);
+  EXPECT_LE(cv::countNonZero(pinhole.labels != lens.labels), 4) << "but for a tie at an edge";
+  EXPECT_LE(cv::countNonZero(cv::abs(pinhole.depth_m - lens.depth_m) > 1e-3), 4);
+  cv::Mat difference;
+  cv::absdiff(pinhole.color_bgr, lens.color_bgr, difference);
+  EXPECT_LE(cv::countNonZero(difference.reshape(1) > 8), 60);
+}
+
+TEST(FrameRenderer, ALensBendsColourMaskAndDepthAlike) {
+  const Scene scene = BallScene();
+  for (const SynthLens lens : {SynthLens::kRadialTangential, SynthLens::kFisheye}) {
+    const CameraModel camera = SynthCamera({.width_px = 320, .height_px = 240, .lens = lens});
+    const TrueFrame frame = FrameRenderer(scene, camera).Render(Above());
+    // The wall's top is at z = -0.45: 1.65 m before the camera, wherever the pixel.
+    int wall_pixels = 0;
+    for (int v = 0; v < 240; v += 7) {
+      for (int u = 0; u < 320; u += 7) {
+        if (frame.labels.at<uint8_t>(v, u) != 0 || frame.depth_m.at<float>(v, u) == 0) continue;
+        ++wall_pixels;
+        EXPECT_NEAR(frame.depth_m.at<float>(v, u), 1.65, 2e-3) << u << ' ' << v;
+      }
+    }
+    EXPECT_GT(wall_pixels, 300);
+    // The ball's nearest point is at (0.05, 0.02, 0.4), 0.8 m before the camera.
+    const Eigen::Vector3d top = Above().Inverse() * Eigen::Vector3d(0.05, 0.02, 0.4);
+    const Eigen::Vector2d pixel_px = PixelByTheBook(camera, top.x() / top.z(), top.y() / top.z());
+    const int u = static_cast<int>(std::lround(pixel_px.x()));
+    const int v = static_cast<int>(std::lround(pixel_px.y()));
+    EXPECT_EQ(frame.labels.at<uint8_t>(v, u), 1);
+    EXPECT_NEAR(frame.depth_m.at<float>(v, u), 0.8, 2e-3);
+  }
+}
+
+}  // namespace
+}  // namespace romap::synth
