@@ -20,8 +20,13 @@ absl::Status ValidateCameraModel(const CameraModel& camera) {
     return InvalidArgument("camera: principal point cx={} cy={} px is far outside the {}x{} image", camera.cx_px,
                            camera.cy_px, camera.width_px, camera.height_px);
   }
+  const bool fisheye = camera.lens == LensModel::kFisheye;
+  const char* names = fisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3";
   for (double k : camera.distortion) {
-    if (!std::isfinite(k)) return InvalidArgument("camera: distortion (k1 k2 p1 p2 k3) must be finite numbers");
+    if (!std::isfinite(k)) return InvalidArgument("camera: distortion ({}) must be finite numbers", names);
+  }
+  if (fisheye && camera.distortion[4] != 0) {
+    return InvalidArgument("camera: a fisheye lens has four distortion coefficients ({}), not a fifth", names);
   }
   return absl::OkStatus();
 }

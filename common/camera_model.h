@@ -7,7 +7,13 @@
 
 namespace romap {
 
-// Pinhole camera with radial-tangential distortion (OpenCV's k1 k2 p1 p2 k3). Pixel centres lie at integer coordinates.
+// How a lens bends rays.
+enum class LensModel {
+  kRadialTangential,  // OpenCV's k1 k2 p1 p2 k3; with all of them 0 a pinhole
+  kFisheye,           // equidistant with OpenCV's fisheye coefficients k1 k2 k3 k4 (Kannala and Brandt, PAMI 2006)
+};
+
+// Pinhole camera behind a lens. Pixel centres lie at integer coordinates. See common/lens.h for what the lens does.
 struct CameraModel {
   int width_px = 0;
   int height_px = 0;
@@ -15,7 +21,8 @@ struct CameraModel {
   double fy_px = 0;
   double cx_px = 0;
   double cy_px = 0;
-  std::array<double, 5> distortion{};  // k1 k2 p1 p2 k3
+  std::array<double, 5> distortion{};  // coefficients of `lens`, the fifth of a fisheye is 0
+  LensModel lens = LensModel::kRadialTangential;
 
   // Pinhole projection of a point in the camera frame (z > 0) to pixels, without distortion.
   Eigen::Vector2d Project(const Eigen::Vector3d& p_camera) const {
@@ -25,17 +32,30 @@ struct CameraModel {
   Eigen::Vector3d Unproject(double u_px, double v_px) const {
     return {(u_px - cx_px) / fx_px, (v_px - cy_px) / fy_px, 1.0};
   }
+  // False for a pinhole. A fisheye bends rays even when its coefficients are all 0.
   bool HasDistortion() const {
+    if (lens == LensModel::kFisheye) return true;
     for (double k : distortion) {
       if (k != 0) return true;
     }
     return false;
   }
+  // The same camera with its lens taken off.
+  CameraModel Pinhole() const {
+    CameraModel pinhole = *this;
+    pinhole.lens = LensModel::kRadialTangential;
+    pinhole.distortion = {};
+    return pinhole;
+  }
   bool operator==(const CameraModel&) const = default;
 };
 
+// How many distortion coefficients a lens has.
+inline int CoefficientCount(LensModel lens) { return lens == LensModel::kFisheye ? 4 : 5; }
+
 // INVALID_ARGUMENT naming the first field that cannot be (size outside 16..8192 px, focal length not positive or not
-// finite, principal point outside the image by more than its size, distortion not finite).
+// finite, principal point outside the image by more than its size, distortion not finite, or more coefficients than the
+// lens has).
 absl::Status ValidateCameraModel(const CameraModel& camera);
 
 }  // namespace romap

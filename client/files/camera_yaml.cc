@@ -1,6 +1,7 @@
 #include "client/files/camera_yaml.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "client/files/text_file.h"
 #include "client/files/yaml_value.h"
@@ -25,6 +26,33 @@ absl::Status ReadSide(const YAML::Node& root, const std::string& key, const std:
   return absl::OkStatus();
 }
 
+struct LensName {
+  const char* name;
+  LensModel lens;
+  const char* coefficients;
+};
+constexpr LensName kLensNames[] = {{"radial-tangential", LensModel::kRadialTangential, "k1 k2 p1 p2 k3"},
+                                   {"fisheye", LensModel::kFisheye, "k1 k2 k3 k4, equidistant"}};
+
+const LensName& NameOf(LensModel lens) { return kLensNames[lens == LensModel::kFisheye ? 1 : 0]; }
+
+absl::Status ReadLens(const YAML::Node& root, const std::string& path, CameraModel* camera) {
+  const YAML::Node node = root["lens"];
+  const std::string text = YamlText(root, "lens", node ? "" : kLensNames[0].name);
+  const auto* known = std::find_if(std::begin(kLensNames), std::end(kLensNames),
+                                   [&](const LensName& candidate) { return text == candidate.name; });
+  if (known == std::end(kLensNames)) {
+    return InvalidArgument("{}:{}: 'lens' is '{}', should be {} or {}", path, node.Mark().line + 1, text,
+                           kLensNames[0].name, kLensNames[1].name);
+  }
+  camera->lens = known->lens;
+  if (!root["distortion"]) return absl::OkStatus();
+  const auto count = static_cast<size_t>(CoefficientCount(camera->lens));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<double> k, YamlNumbers(root, "distortion", count, path));
+  std::copy(k.begin(), k.end(), camera->distortion.begin());
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path) {
@@ -37,11 +65,7 @@ absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(camera.fy_px, YamlNumber(root, "fy", path));
   ROMAP_ASSIGN_OR_RETURN(camera.cx_px, YamlNumber(root, "cx", path));
   ROMAP_ASSIGN_OR_RETURN(camera.cy_px, YamlNumber(root, "cy", path));
-  if (root["distortion"]) {
-    ROMAP_ASSIGN_OR_RETURN(const std::vector<double> k,
-                           YamlNumbers(root, "distortion", camera.distortion.size(), path));
-    std::copy(k.begin(), k.end(), camera.distortion.begin());
-  }
+  ROMAP_RETURN_IF_ERROR(ReadLens(root, path, &camera));
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "fps", path, &result.fps));
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "depth_scale", path, &result.depth_scale));
   if (absl::Status status = ValidateCameraModel(camera); !status.ok()) {
@@ -52,11 +76,13 @@ absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path) {
 
 absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& value) {
   const CameraModel& camera = value.camera;
+  const LensName& lens = NameOf(camera.lens);
   std::string text = fmt::format(
-      "# pinhole camera; the integer pixel (u, v) is the pixel centre\n"
-      "width: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\ndistortion: [{}]  # k1 k2 p1 p2 k3\nfps: {}\n",
-      camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
-      fmt::join(camera.distortion, ", "), value.fps);
+      "# the integer pixel (u, v) is the pixel centre\n"
+      "width: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\nlens: {}\ndistortion: [{}]  # {}\nfps: {}\n",
+      camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, lens.name,
+      fmt::join(camera.distortion.begin(), camera.distortion.begin() + CoefficientCount(camera.lens), ", "),
+      lens.coefficients, value.fps);
   if (value.depth_scale > 0) {
     text += fmt::format("depth_scale: {}  # z = value * depth_scale; z depth, not ray length\n", value.depth_scale);
   }

@@ -33,6 +33,13 @@ inline constexpr std::array<EnumPair<DepthEncoding, v1::DepthEncoding>, 2> kDept
     {DepthEncoding::kRawUint16, v1::DEPTH_ENCODING_RAW_UINT16},
 }};
 
+// LENS_MODEL_UNSPECIFIED may come in and means radial-tangential, as before there was a choice.
+inline constexpr std::array<EnumPair<LensModel, v1::LensModel>, 3> kLensModels{{
+    {LensModel::kRadialTangential, v1::LENS_MODEL_RADIAL_TANGENTIAL},
+    {LensModel::kRadialTangential, v1::LENS_MODEL_UNSPECIFIED},
+    {LensModel::kFisheye, v1::LENS_MODEL_FISHEYE},
+}};
+
 // FRAME_MODE_UNSPECIFIED may come in and means replay.
 inline constexpr std::array<EnumPair<FrameMode, v1::FrameMode>, 3> kFrameModes{{
     {FrameMode::kReplay, v1::FRAME_MODE_REPLAY},

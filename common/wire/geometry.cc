@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/wire/enums.h"
+
 namespace romap::wire {
 namespace {
 
@@ -37,7 +39,11 @@ v1::Camera ToProto(const CameraModel& camera) {
   proto.set_fy_px(camera.fy_px);
   proto.set_cx_px(camera.cx_px);
   proto.set_cy_px(camera.cy_px);
-  if (camera.HasDistortion()) proto.mutable_distortion()->Add(camera.distortion.begin(), camera.distortion.end());
+  proto.set_lens(EnumToProto(kLensModels, camera.lens));
+  if (camera.HasDistortion()) {
+    proto.mutable_distortion()->Add(camera.distortion.begin(),
+                                    camera.distortion.begin() + CoefficientCount(camera.lens));
+  }
   return proto;
 }
 
@@ -71,9 +77,11 @@ absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::
   camera.fy_px = proto.fy_px();
   camera.cx_px = proto.cx_px();
   camera.cy_px = proto.cy_px();
-  if (proto.distortion_size() != 0 && proto.distortion_size() != static_cast<int>(camera.distortion.size())) {
-    return InvalidArgument("{}.distortion: has {} coefficients, must have none or five (k1 k2 p1 p2 k3)", where,
-                           proto.distortion_size());
+  ROMAP_ASSIGN_OR_RETURN(camera.lens, EnumFromProto(kLensModels, proto.lens(), where + ".lens"));
+  if (proto.distortion_size() != 0 && proto.distortion_size() != CoefficientCount(camera.lens)) {
+    return InvalidArgument(
+        "{}.distortion: has {} coefficients, must have none or {}", where, proto.distortion_size(),
+        camera.lens == LensModel::kFisheye ? "four (k1 k2 k3 k4 of a fisheye)" : "five (k1 k2 p1 p2 k3)");
   }
   std::copy(proto.distortion().begin(), proto.distortion().end(), camera.distortion.begin());
   return camera;

@@ -32,7 +32,8 @@ v1::RigidTransform ToProto(const SE3<To, From>& transform) {
 absl::StatusOr<Eigen::Vector3d> VectorFromProto(const v1::Vector3& proto, const std::string& where);
 // Finite, norm within 0.001 of 1; the result is normalised.
 absl::StatusOr<Eigen::Quaterniond> QuaternionFromProto(const v1::Quaternion& proto, const std::string& where);
-// Sizes that fit and 0 or 5 distortion coefficients; whether such a camera can be is ValidateCameraModel's question.
+// Sizes that fit, a lens that is known, and none or all of its distortion coefficients; whether such a camera can be is
+// ValidateCameraModel's question.
 absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::string& where);
 
 // The caller names the frames: TransformFromProto<World, Camera>(frame.t_world_camera(), "frame.t_world_camera").

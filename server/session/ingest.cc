@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
@@ -68,13 +67,8 @@ void ListAllLabels(Frame& frame) {
 
 }  // namespace
 
-Ingest::Ingest(const CameraModel& camera) : camera_(camera), pinhole_(camera) {
-  if (!camera_.HasDistortion()) return;
-  pinhole_.distortion = {};
-  const cv::Matx33d k(camera_.fx_px, 0, camera_.cx_px, 0, camera_.fy_px, camera_.cy_px, 0, 0, 1);
-  const cv::Mat distortion(1, 5, CV_64F, camera_.distortion.data());
-  cv::initUndistortRectifyMap(k, distortion, cv::noArray(), k, {camera_.width_px, camera_.height_px}, CV_16SC2, map_x_,
-                              map_y_);
+Ingest::Ingest(const CameraModel& camera) : camera_(camera) {
+  if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
 }
 
 absl::Status Ingest::CheckOrder(const FrameInput& input) const {
@@ -96,7 +90,7 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   auto frame = std::make_shared<Frame>();
   frame->frame_id = input.frame_id;
   frame->timestamp_ns = input.timestamp_ns;
-  frame->camera = pinhole_;
+  frame->camera = camera_.Pinhole();
   frame->instances = input.instances;
   frame->T_world_camera = input.T_world_camera;
   if (input.gravity_camera) frame->gravity_camera = input.gravity_camera->normalized();
@@ -104,7 +98,7 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   ROMAP_ASSIGN_OR_RETURN(frame->labels, DecodeLabels(input, camera_));
   ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
   frame->has_masks = !frame->labels.empty();
-  if (!map_x_.empty()) Undistort(*frame);
+  if (camera_.HasDistortion()) Undistort(*frame);
   if (frame->has_masks) ListAllLabels(*frame);
 
   any_accepted_ = true;
@@ -114,11 +108,13 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
 }
 
 void Ingest::Undistort(Frame& frame) const {
+  cv::cvtColor(frame.image_bgr, frame.source_grey, cv::COLOR_BGR2GRAY);
+  frame.source_camera = camera_;
   // Labels and depth must not be blended; what comes from outside the image is black, unlabelled and without depth.
   const auto remap = [&](cv::Mat& image, int interpolation) {
     if (image.empty()) return;
     cv::Mat undistorted;
-    cv::remap(image, undistorted, map_x_, map_y_, interpolation, cv::BORDER_CONSTANT);
+    cv::remap(image, undistorted, maps_.xy, maps_.fraction, interpolation, cv::BORDER_CONSTANT);
     image = undistorted;
   };
   remap(frame.image_bgr, cv::INTER_LINEAR);

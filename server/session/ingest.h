@@ -4,8 +4,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <opencv2/core/mat.hpp>
 
+#include "common/lens.h"
 #include "common/messages.h"
 
 namespace romap {
@@ -24,8 +24,7 @@ class Ingest {
   void Undistort(Frame& frame) const;
 
   CameraModel camera_;     // as the client gave it
-  CameraModel pinhole_;    // the same without distortion
-  cv::Mat map_x_, map_y_;  // undistortion maps, empty for a pinhole
+  UndistortionMaps maps_;  // empty for a pinhole
   bool any_accepted_ = false;
   uint64_t last_frame_id_ = 0;
   int64_t last_timestamp_ns_ = 0;

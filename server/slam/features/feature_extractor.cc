@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
+#include "common/lens.h"
 #include "server/slam/features/steered_brief.h"
 
 namespace romap {
@@ -22,6 +24,17 @@ const std::array<double, kOctaves> kOctaveScales = [] {
 
 cv::Rect Describable(const cv::Mat& image) {
   return {kPatchBorder_px, kPatchBorder_px, image.cols - 2 * kPatchBorder_px, image.rows - 2 * kPatchBorder_px};
+}
+
+// False for NaN too.
+bool IsInside(const CameraModel& camera, const Eigen::Vector2f& pixel_px) {
+  return pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() <= static_cast<float>(camera.width_px - 1) &&
+         pixel_px.y() <= static_cast<float>(camera.height_px - 1);
+}
+
+bool IsSet(const cv::Mat& mask, const Eigen::Vector2f& pixel_px) {
+  return mask.at<uint8_t>(static_cast<int>(std::lround(pixel_px.y())), static_cast<int>(std::lround(pixel_px.x()))) !=
+         0;
 }
 
 // Takes the pixels around a feature out of `free`.
@@ -71,16 +84,25 @@ void FeatureExtractor::LookAt(const Frame& frame) {
   pyramid_.Build(picture.channels() == 3 ? grey_ : picture, kMinImageSide_px);
 }
 
+std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame, int octave,
+                                                             const Corners& corners) const {
+  std::vector<Eigen::Vector2f> pixels_px;
+  pixels_px.reserve(corners.size());
+  for (const cv::KeyPoint& corner : corners) pixels_px.push_back(pyramid_.ToFullSize(octave, corner.pt));
+  return frame.source_grey.empty() ? pixels_px : UndistortPixels(frame.source_camera, pixels_px);
+}
+
 // From the coarsest octave on, so that what an octave cannot fill goes to the finer ones, which have more to choose
 // from.
-std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const FindCorners& find, int count) const {
+std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const Frame& frame, int count,
+                                                                         const FindCorners& find) const {
   std::vector<Candidate> candidates;
-  auto left = static_cast<size_t>(count);
   for (int octave = pyramid_.octaves() - 1; octave >= 0; --octave) {
-    for (const cv::KeyPoint& corner : find(octave, Share(left, octave))) {
-      candidates.push_back({corner.pt, octave, pyramid_.ToFullSize(octave, corner.pt)});
+    const Corners corners = find(octave, Share(static_cast<size_t>(count) - candidates.size(), octave));
+    const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
+    for (size_t i = 0; i < corners.size(); ++i) {
+      if (IsInside(frame.camera, pixels_px[i])) candidates.push_back({corners[i].pt, octave, pixels_px[i]});
     }
-    left = static_cast<size_t>(count) - candidates.size();
   }
   return candidates;
 }
@@ -93,32 +115,34 @@ std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
                                                 config_.scene_fast_min_threshold),
                         image.size(), count);
   };
-  return Describe(frame, FindInOctaves(find, config_.scene_features));
+  return Describe(frame, FindInOctaves(frame, config_.scene_features, find));
 }
 
 std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const std::vector<Feature>& have) {
   if (frame.labels.empty() || config_.object_features == 0) return {};
   const cv::Mat inside = frame.labels > 0;
-  const cv::Rect box_px = cv::boundingRect(inside);
+  cv::Rect box_px = cv::boundingRect(inside);
   if (box_px.empty()) return {};
   LookAt(frame);
+  // A lens may show the objects anywhere else than the pinhole image does.
+  if (!frame.source_grey.empty()) box_px = cv::Rect(cv::Point(), frame.source_grey.size());
   cv::Mat free;
   const auto find = [&](int octave, size_t count) {
-    const cv::Mat& image = pyramid_.sharp(octave);
     inside.copyTo(free);
     for (const Feature& feature : have) {
       if (feature.octave == octave) Occupy(free, feature);
     }
+    const cv::Mat& image = pyramid_.sharp(octave);
     const cv::Rect part = Describable(image) & pyramid_.Part(octave, box_px);
-    Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
-    std::erase_if(corners, [&](const cv::KeyPoint& corner) {
-      const Eigen::Vector2f pixel_px = pyramid_.ToFullSize(octave, corner.pt);
-      return free.at<uint8_t>(static_cast<int>(std::lround(pixel_px.y())),
-                              static_cast<int>(std::lround(pixel_px.x()))) == 0;
-    });
-    return SpreadEvenly(corners, image.size(), count);
+    const Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
+    const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
+    Corners fitting;
+    for (size_t i = 0; i < corners.size(); ++i) {
+      if (IsInside(frame.camera, pixels_px[i]) && IsSet(free, pixels_px[i])) fitting.push_back(corners[i]);
+    }
+    return SpreadEvenly(std::move(fitting), image.size(), count);
   };
-  return Describe(frame, FindInOctaves(find, config_.object_features));
+  return Describe(frame, FindInOctaves(frame, config_.object_features, find));
 }
 
 std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) {

@@ -46,7 +46,9 @@ class FeatureExtractor {
   using FindCorners = std::function<Corners(int octave, size_t count)>;
 
   void LookAt(const Frame& frame);
-  std::vector<Candidate> FindInOctaves(const FindCorners& find, int count) const;
+  // NaN or outside the image where the pinhole camera does not see the corner.
+  std::vector<Eigen::Vector2f> PinholePixels(const Frame& frame, int octave, const Corners& corners) const;
+  std::vector<Candidate> FindInOctaves(const Frame& frame, int count, const FindCorners& find) const;
   std::vector<Feature> Describe(const Frame& frame, const std::vector<Candidate>& candidates);
 
   const SlamConfig config_;

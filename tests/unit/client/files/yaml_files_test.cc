@@ -34,6 +34,17 @@ TEST(CameraYaml, WhatIsWrittenIsReadBack) {
   std::filesystem::remove(path);
 }
 
+TEST(CameraYaml, AFisheyeIsReadBack) {
+  const std::string path = TempPath("camera.yaml");
+  CameraYaml camera;
+  camera.camera = {640, 480, 300, 301, 319.5, 239.5, {-0.01, 0.02, 1e-4, -2e-4, 0}, LensModel::kFisheye};
+  ASSERT_TRUE(WriteCameraYaml(path, camera).ok());
+  const auto read = ReadCameraYaml(path);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->camera, camera.camera);
+  std::filesystem::remove(path);
+}
+
 TEST(CameraYaml, SaysWhatIsWrong) {
   const std::string path = TempPath("camera.yaml");
   const std::string good = "width: 64\nheight: 48\nfx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\n";
@@ -44,6 +55,9 @@ TEST(CameraYaml, SaysWhatIsWrong) {
            {"width: 64.5\nheight: 48\n", "'width' is 64.5, should be a whole number"},
            {"width: 64\nheight: .nan\n", "camera.yaml:2: 'height' is not a finite number"},
            {good + "distortion: [0, 0, 0]\n", "camera.yaml:7: 'distortion' should be a list of 5 numbers"},
+           {good + "lens: fisheye\ndistortion: [0, 0, 0, 0, 0]\n",
+            "camera.yaml:8: 'distortion' should be a list of 4 numbers"},
+           {good + "lens: wide\n", "camera.yaml:7: 'lens' is 'wide', should be radial-tangential or fisheye"},
            {good + "fps: 0\n", "'fps' is 0, should be positive"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(ErrorOf(ReadCameraYaml(path).status()), HasSubstr(message));

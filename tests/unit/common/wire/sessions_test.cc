@@ -32,6 +32,23 @@ TEST(WireSessions, OptionsComeBack) {
   EXPECT_EQ(got->mode, FrameMode::kLive);
 }
 
+TEST(WireSessions, AFisheyeComesBackWithItsFourCoefficients) {
+  CameraModel camera = SomeCamera();
+  camera.lens = LensModel::kFisheye;
+  camera.distortion = {0.1, 0.2, 0.3, 0.4, 0};
+  v1::CreateSessionRequest proto = ToProto(SessionOptions{.name = "", .camera = camera});
+  EXPECT_EQ(proto.camera().distortion_size(), 4);
+  EXPECT_EQ(FromProto(proto)->camera, camera);
+  proto.mutable_camera()->add_distortion(0.5);
+  EXPECT_THAT(Message(FromProto(proto).status()), HasSubstr("has 5 coefficients, must have none or four"));
+}
+
+TEST(WireSessions, AnUnsaidLensIsRadialTangential) {
+  v1::CreateSessionRequest proto = ToProto(SessionOptions{.name = "", .camera = SomeCamera()});
+  proto.mutable_camera()->clear_lens();
+  EXPECT_EQ(FromProto(proto)->camera, SomeCamera());
+}
+
 TEST(WireSessions, AnUnsaidModeMeansReplay) {
   v1::CreateSessionRequest proto = ToProto(SessionOptions{.name = "", .camera = SomeCamera()});
   proto.clear_mode();
@@ -46,6 +63,9 @@ TEST(WireSessions, ImpossibleOptionsAreNamed) {
   proto = good;
   proto.mutable_camera()->mutable_distortion()->RemoveLast();
   EXPECT_THAT(Message(FromProto(proto).status()), HasSubstr("camera.distortion: has 4 coefficients"));
+  proto = good;
+  proto.mutable_camera()->set_lens(static_cast<v1::LensModel>(9));
+  EXPECT_THAT(Message(FromProto(proto).status()), HasSubstr("camera.lens: value 9"));
   proto = good;
   proto.mutable_camera()->set_width_px(0xffffffff);
   EXPECT_THAT(Message(FromProto(proto).status()), HasSubstr("4294967295x480"));

@@ -213,5 +213,40 @@ TEST(IngestTest, DistortionIsTakenOut) {
   EXPECT_NEAR(moments.m01 / moments.m00, 60 * y + 23.5, 0.8);
 }
 
+// A white dot at `center` of a picture of kCamera's size, after Accept() by a session with `camera`.
+std::shared_ptr<const Frame> AcceptDot(const CameraModel& camera, const Eigen::Vector2d& center) {
+  cv::Mat image = cv::Mat::zeros(48, 64, CV_8UC3);
+  cv::circle(image, cv::Point(static_cast<int>(std::lround(center.x())), static_cast<int>(std::lround(center.y()))), 1,
+             cv::Scalar::all(255), -1);
+  FrameInput input = GoodFrame();
+  input.image = Encode(".png", image);
+  return Ingest(camera).Accept(input).value();
+}
+
+TEST(IngestTest, AFisheyeImageBecomesAPinholeImage) {
+  CameraModel fisheye = kCamera;
+  fisheye.lens = LensModel::kFisheye;
+  fisheye.distortion = {0.05, -0.01, 0, 0, 0};
+  const double theta = 0.35;  // of a ray to the right
+  const double bent = theta * (1 + 0.05 * theta * theta - 0.01 * std::pow(theta, 4));
+  const auto frame = AcceptDot(fisheye, {60 * bent + 31.5, 23.5});
+  EXPECT_EQ(frame->camera, kCamera);
+  cv::Mat gray;
+  cv::cvtColor(frame->image_bgr, gray, cv::COLOR_BGR2GRAY);
+  const cv::Moments moments = cv::moments(gray);
+  EXPECT_NEAR(moments.m10 / moments.m00, 60 * std::tan(theta) + 31.5, 0.8);
+}
+
+TEST(IngestTest, ThePictureIsKeptAsADistortingLensGaveIt) {
+  CameraModel distorted = kCamera;
+  distorted.distortion = {-0.2, 0.05, 0.001, -0.001, 0};
+  const auto frame = AcceptDot(distorted, {50, 10});
+  EXPECT_EQ(frame->source_camera, distorted);
+  ASSERT_EQ(frame->source_grey.type(), CV_8UC1);
+  ASSERT_EQ(frame->source_grey.size(), cv::Size(64, 48));
+  EXPECT_EQ(frame->source_grey.at<uint8_t>(10, 50), 255);
+  EXPECT_TRUE(AcceptDot(kCamera, {50, 10})->source_grey.empty());
+}
+
 }  // namespace
 }  // namespace romap

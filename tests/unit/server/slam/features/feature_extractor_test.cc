@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
 
+#include "common/lens.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap {
@@ -81,6 +84,131 @@ TEST(FeatureExtractor, ABlackOrTinyImageHasNone) {
   EXPECT_TRUE(FeatureExtractor(SlamConfig{}).Extract(*tiny.Render(1, TexturedWorld::OrbitPose(0))).empty());
   const TexturedWorld small(48, 48);  // just large enough to look at, too small for the upper octaves
   FeatureExtractor(SlamConfig{}).Extract(*small.Render(1, TexturedWorld::OrbitPose(0)));
+}
+
+// The frame as it would be had its pinhole image come from a camera with this lens.
+Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
+  Frame frame = pinhole;
+  frame.source_camera = source_camera;
+  std::vector<Eigen::Vector2f> pixels_px;
+  for (int v = 0; v < source_camera.height_px; ++v) {
+    for (int u = 0; u < source_camera.width_px; ++u) pixels_px.emplace_back(u, v);
+  }
+  const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(source_camera, pixels_px);
+  const cv::Mat map(source_camera.height_px, source_camera.width_px, CV_32FC2,
+                    const_cast<Eigen::Vector2f*>(pinhole_px.data()));
+  cv::Mat grey;
+  cv::cvtColor(pinhole.image_bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::remap(grey, frame.source_grey, map, cv::noArray(), cv::INTER_CUBIC);
+  return frame;
+}
+
+struct Agreement {
+  int matches = 0;
+  int near = 0;  // within a pixel of where they should be
+};
+
+// Of the fine features, whose positions are good to a pixel: how many look like one of `others`, and are where it is.
+Agreement Compare(const std::vector<Feature>& features, const std::vector<Feature>& others) {
+  Agreement agreement;
+  for (const Feature& feature : features) {
+    if (feature.octave > 1) continue;
+    const auto alike = std::min_element(others.begin(), others.end(), [&](const Feature& a, const Feature& b) {
+      return HammingDistance(a.descriptor, feature.descriptor) < HammingDistance(b.descriptor, feature.descriptor);
+    });
+    if (alike == others.end() || HammingDistance(alike->descriptor, feature.descriptor) > 40) continue;
+    ++agreement.matches;
+    if ((alike->pixel_px - feature.pixel_px).norm() < 1) ++agreement.near;
+  }
+  return agreement;
+}
+
+class FeatureExtractorLens : public testing::TestWithParam<LensModel> {};
+
+TEST_P(FeatureExtractorLens, FeaturesAreWhereThePinholeCameraSeesThem) {
+  const TexturedWorld world(640, 480);
+  const auto pinhole = world.Render(1, TexturedWorld::OrbitPose(0), 0);
+  CameraModel camera = world.camera();
+  camera.lens = GetParam();
+  camera.distortion = camera.lens == LensModel::kFisheye ? std::array<double, 5>{-0.02, 0.005, 0, 0, 0}
+                                                         : std::array<double, 5>{-0.2, 0.04, 0.001, -0.001, 0};
+  const Frame distorted = SeenThrough(camera, *pinhole);
+  FeatureExtractor extractor{SlamConfig{}};
+  const std::vector<Feature> expected = extractor.ExtractScene(*pinhole);
+  const std::vector<Feature> features = extractor.ExtractScene(distorted);
+  const Agreement scene = Compare(features, expected);
+  EXPECT_GT(scene.matches, 100);
+  EXPECT_GT(scene.near, 0.9 * scene.matches);
+
+  const std::vector<Feature> object_features = extractor.ExtractObjects(distorted, features);
+  const Agreement objects = Compare(object_features, extractor.ExtractObjects(*pinhole, {}));
+  EXPECT_GT(objects.matches, 20);
+  EXPECT_GT(objects.near, 0.9 * objects.matches);
+  for (const Feature& feature : object_features) {
+    EXPECT_NE(distorted.labels.at<uint16_t>(static_cast<int>(std::lround(feature.pixel_px.y())),
+                                            static_cast<int>(std::lround(feature.pixel_px.x()))),
+              0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Lenses, FeatureExtractorLens,
+                         testing::Values(LensModel::kRadialTangential, LensModel::kFisheye),
+                         [](const auto& info) { return info.index == 0 ? "RadialTangential" : "Fisheye"; });
+
+TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
+  const TexturedWorld world;
+  Frame frame = *world.Render(1, TexturedWorld::OrbitPose(0));
+  cv::cvtColor(frame.image_bgr, frame.source_grey, cv::COLOR_BGR2GRAY);
+  frame.source_camera = frame.camera;
+  frame.source_camera.lens = LensModel::kFisheye;
+  frame.source_camera.fx_px = frame.source_camera.fy_px = 100;  // sees twice as far to all sides
+  frame.camera = frame.source_camera.Pinhole();
+  const std::vector<Feature> features = FeatureExtractor(SlamConfig{}).ExtractScene(frame);
+  EXPECT_GT(features.size(), 100);
+  for (const Feature& feature : features) {
+    EXPECT_TRUE(cv::Rect2f(0, 0, 319, 239).contains({feature.pixel_px.x(), feature.pixel_px.y()}));
+  }
+}
+
+TEST(FeatureExtractor, ObjectFeaturesRepeatNoSceneFeature) {
+  const TexturedWorld world;
+  const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
+  FeatureExtractor extractor{SlamConfig{}};
+  const std::vector<Feature> scene = extractor.ExtractScene(*frame);
+  const std::vector<Feature> objects = extractor.ExtractObjects(*frame, scene);
+  EXPECT_GT(objects.size(), 50);
+  for (const Feature& feature : objects) {
+    EXPECT_TRUE(std::none_of(scene.begin(), scene.end(), [&](const Feature& other) {
+      return other.octave == feature.octave && (other.pixel_px - feature.pixel_px).norm() < feature.octave_scale;
+    }));
+  }
+}
+
+TEST(FeatureExtractor, TurnsItsAnglesAndPositionsWithTheImage) {
+  const TexturedWorld world(400, 400);
+  Frame frame = *world.Render(1, TexturedWorld::LookAt({0, 0, 2}, {0, 0, 0}), 0);
+  FeatureExtractor extractor{SlamConfig{}};
+  const std::vector<Feature> upright = extractor.ExtractScene(frame);
+  cv::Mat turned_bgr;
+  cv::rotate(frame.image_bgr, turned_bgr, cv::ROTATE_90_CLOCKWISE);
+  frame.image_bgr = turned_bgr;
+  std::vector<Feature> turned = extractor.ExtractScene(frame);
+  for (Feature& feature : turned) {
+    feature.pixel_px = {feature.pixel_px.y(), 399 - feature.pixel_px.x()};  // turned back
+  }
+  int same = 0, turned_along = 0, described_alike = 0;
+  for (const Feature& feature : upright) {
+    for (const Feature& other : turned) {
+      if (other.octave != feature.octave || (other.pixel_px - feature.pixel_px).norm() > 0.5) continue;
+      ++same;
+      const double turn_rad = std::remainder(other.angle_rad - feature.angle_rad, 2 * std::numbers::pi);
+      if (std::abs(turn_rad - std::numbers::pi / 2) < 0.1) ++turned_along;
+      if (HammingDistance(feature.descriptor, other.descriptor) < 30) ++described_alike;
+    }
+  }
+  EXPECT_GT(same, 300);
+  EXPECT_GT(turned_along, 0.95 * same);
+  EXPECT_GT(described_alike, 0.95 * same);
 }
 
 }  // namespace
