@@ -101,6 +101,9 @@ class Sim3 {
   Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
 };
 
+// Shortest rotation that takes the direction `from` to the direction `to`; lengths do not matter.
+Eigen::Quaterniond ShortestRotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 // Shortest rotation that takes world +z to `up_world` (unit length): the orientation of a cuboid whose yaw is 0.
 Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world);
 

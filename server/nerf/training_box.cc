@@ -9,13 +9,7 @@ namespace {
 
 constexpr double kSmallestMargin = 0.02;  // of the longest side: room for the surface of sheets
 constexpr double kSmallestFill = 0.4;     // of the volume; a cuboid that shrank below deserves a finer grid
-constexpr double kMostLean_rad = 0.2;
-
-// The shortest rotation that takes `up` (unit length) to z, unless they are far apart.
-Eigen::Quaterniond Straighten(const Eigen::Vector3d& up) {
-  if (up.z() < std::cos(kMostLean_rad)) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(1 + up.z(), up.y(), -up.x(), 0).normalized();
-}
+constexpr double kMostLean_rad = 0.2;     // between a box that was turned and an upright cuboid
 
 }  // namespace
 
@@ -34,9 +28,10 @@ TrainingBox TrainingBox::Moved(const Sim3<World, World>& S_new_old) const {
 
 bool TrainingBox::StillFits(const Cuboid& cuboid) const {
   const SE3<Object, World> T_object_world = T_world_object.Inverse();
-  const Eigen::Quaterniond leaning = T_object_world.rotation() * cuboid.T_world_object.rotation();
-  const SE3<Object, Object> T_object_cuboid(Straighten(leaning * Eigen::Vector3d::UnitZ()) * leaning,
-                                            T_object_world * cuboid.T_world_object.translation());
+  Eigen::Quaterniond rotation = T_object_world.rotation() * cuboid.T_world_object.rotation();
+  const Eigen::Vector3d up = rotation * Eigen::Vector3d::UnitZ();
+  if (up.z() > std::cos(kMostLean_rad)) rotation = ShortestRotation(up, Eigen::Vector3d::UnitZ()) * rotation;
+  const SE3<Object, Object> T_object_cuboid(rotation, T_object_world * cuboid.T_world_object.translation());
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
     const Eigen::Vector3d p = T_object_cuboid * sign.cwiseProduct(cuboid.half_extents);

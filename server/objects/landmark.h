@@ -34,8 +34,9 @@ struct Landmark {
   std::optional<uint64_t> last_track_id;
   std::map<std::string, double> class_evidence;  // sum of detection scores
   std::map<LandmarkKey, uint64_t> seen_beside;   // frames in which both had a mask: they are two things
+  std::vector<KeyframeId> keyframes;             // in which it was seen for certain
 
-  // Geometry.
+  // Geometry, always as of the newest correction of the map.
   ObjectShape shape;
   bool needs_fit = false;                   // silhouettes came since the last fit
   std::optional<Cuboid> cuboid;             // newest fit
@@ -45,6 +46,9 @@ struct Landmark {
 
   ViewPicker views;
   std::optional<ObjectUpdate> published;
+  // What corrections did to its space since clients and its field were last told; nullopt: nothing. They know no more
+  // than `published` and the views sent, so what is not worth telling by itself adds up here.
+  std::optional<Sim3<World, World>> S_now_told;
 
   // The class with most evidence and its share; ties go to the alphabet.
   std::pair<std::string, double> BestClass() const {

@@ -146,6 +146,10 @@ ObjectMapper::Output ObjectMapper::Finish() {
   MergeDuplicates(&output);
   Output last;
   PublishAll(keys, &last);
+  for (const auto& landmark : landmarks_) {
+    // Small corrections that waited for more.
+    if (landmark->published && landmark->S_now_told) Publish(*landmark, /*force=*/true, &last);
+  }
   Append(std::move(last), &output);
   return output;
 }
@@ -177,6 +181,7 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
     if (z_mu > 0) depths.push_back(z_mu);
   }
   if (depths.empty()) return;
+  last_keyframe_ = view.id;
   std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
   scene_depth_mu_ = depths[depths.size() / 2];
 }
@@ -192,6 +197,7 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
     const Detection& detection = current_.detections[d];
     Landmark& landmark = *FindLandmark(current_.keys[d]);
     ++landmark.keyframe_sightings;
+    landmark.keyframes.push_back(view.id);
     Silhouette silhouette = MakeSilhouette(view, masks, detection, d);
     UpdateNeighbours(cuboids, &silhouette);
     landmark.needs_fit |= landmark.shape.AddSilhouette(std::move(silhouette));
@@ -258,7 +264,7 @@ void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
     if (!landmark.cuboid) landmark.body_world = positions;
     return;
   }
-  landmark.cuboid = fit->cuboid;
+  landmark.cuboid = Upright(fit->cuboid, up_world_);
   landmark.body_world = fit->body_world;
   landmark.parallax_rad = fit->parallax_rad;
   landmark.points.clear();

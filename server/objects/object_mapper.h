@@ -7,6 +7,7 @@
 
 #include "common/messages.h"
 #include "server/objects/association.h"
+#include "server/objects/correction.h"
 #include "server/objects/detections.h"
 #include "server/objects/landmark.h"
 #include "server/objects/objects_config.h"
@@ -33,6 +34,12 @@ class ObjectMapper {
   Output ObserveFrame(const TrackedFrame& tracked);
   // Right after ObserveFrame of the same frame, when it is a keyframe.
   Output ObserveKeyframe(const KeyframeView& view);
+  // The map was corrected, as the stage before this one says of what it handed on so far. Each object goes along with
+  // the keyframes that saw it (MeanMotion). What changed noticeably is told: the cuboid in an ObjectUpdate, and to the
+  // field, in ObjectViews, the motion of the object's space and the views that moved against the object.
+  Output Correct(const MapCorrection& correction);
+  // The map was begun anew and all poses so far are void: every object goes. Ids are not used again.
+  Output Reset();
   // No more frames: the last fits and all views that still wait.
   Output Finish();
 
@@ -65,8 +72,12 @@ class ObjectMapper {
   void Merge(Landmark& from, Landmark& into, Output* output);
   bool AreTheSame(const Landmark& a, const Landmark& b) const;
   void Publish(Landmark& landmark, bool force, Output* output);
-  void SendViews(Landmark& landmark, bool cuboid_changed, Output* output);
+  std::vector<ObjectView> TakeViews(Landmark& landmark, const Cuboid& cuboid);
   void PublishAll(const std::vector<LandmarkKey>& keys, Output* output);
+
+  // Per correction.
+  void CorrectLandmark(Landmark& landmark, const KeyframeCorrections& keyframes);
+  Cuboid ToldCuboid(const Landmark& landmark) const;
 
   Landmark* FindLandmark(LandmarkKey key);
 
@@ -76,6 +87,7 @@ class ObjectMapper {
   CurrentFrame current_;
   Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
   uint64_t frame_index_ = 0;
+  KeyframeId last_keyframe_;
   double scene_depth_mu_ = 0;  // median depth of the map points in the last keyframe; 0 = unknown
   LandmarkKey last_key_ = 0;
   uint64_t last_id_ = 0;

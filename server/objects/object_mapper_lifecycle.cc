@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "common/map_motion.h"
 #include "server/objects/angles.h"
 #include "server/objects/object_mapper.h"
 
@@ -29,6 +31,19 @@ bool DiffersNotably(const Cuboid& a, const Cuboid& b, const ObjectsConfig& confi
   const double growth = 2 * (a.half_extents - b.half_extents).cwiseAbs().maxCoeff();
   const double turn_rad = a.T_world_object.rotation().angularDistance(b.T_world_object.rotation());
   return std::max(shift, growth) > config.update_change_share * size || turn_rad > config.update_yaw_deg * kRadPerDeg;
+}
+
+// Whether what was told of a cuboid is noticeably wrong since the map was corrected. `S_now_told` also turns meshes in
+// ways that do not show in an upright cuboid.
+bool MovedNoticeably(const Cuboid& told, const Cuboid& now, const Sim3<World, World>& S_now_told) {
+  constexpr double kShiftShare = 0.005;
+  constexpr double kScaleShare = 0.002;
+  constexpr double kTurnRad = 0.2 * kRadPerDeg;
+  const double size = 2 * told.half_extents.maxCoeff();
+  const double shift = (now.T_world_object.translation() - told.T_world_object.translation()).norm();
+  const double turn_rad = std::max(now.T_world_object.rotation().angularDistance(told.T_world_object.rotation()),
+                                   S_now_told.rotation().angularDistance(Eigen::Quaterniond::Identity()));
+  return shift > kShiftShare * size || turn_rad > kTurnRad || std::abs(std::log(S_now_told.scale())) > kScaleShare;
 }
 
 }  // namespace
@@ -100,6 +115,7 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   into.seen_beside.erase(into.key);
   into.sightings += from.sightings;
   into.keyframe_sightings += from.keyframe_sightings;
+  into.keyframes.insert(into.keyframes.end(), from.keyframes.begin(), from.keyframes.end());
   if (from.last_frame > into.last_frame) {
     into.last_frame = from.last_frame;
     into.last_box_px = from.last_box_px;
@@ -132,40 +148,70 @@ void ObjectMapper::PublishAll(const std::vector<LandmarkKey>& keys, Output* outp
   }
 }
 
+// The cuboid that was told, as it stands after the corrections since.
+Cuboid ObjectMapper::ToldCuboid(const Landmark& landmark) const {
+  const Sim3<World, World> S_now_told = landmark.S_now_told.value_or(Sim3<World, World>());
+  return Upright(Moved(S_now_told, landmark.published->cuboid), up_world_);
+}
+
 void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
   if (!landmark.cuboid) return;
   const auto [class_name, class_score] = landmark.BestClass();
   const bool first = !landmark.published;
-  const bool cuboid_changed = first || DiffersNotably(landmark.published->cuboid, *landmark.cuboid, config_);
+  if (first) landmark.S_now_told.reset();
+  const Cuboid told = first ? *landmark.cuboid : ToldCuboid(landmark);
+  const bool cuboid_changed = first || DiffersNotably(told, *landmark.cuboid, config_);
+  const Cuboid& cuboid = cuboid_changed ? *landmark.cuboid : told;
   const bool text_changed =
       first || landmark.published->class_name != class_name || landmark.published->state != landmark.state;
-  if (force || cuboid_changed || text_changed) {
+  const bool moved =
+      !first && MovedNoticeably(landmark.published->cuboid, told, landmark.S_now_told.value_or(Sim3<World, World>()));
+  ObjectViews views{.object = landmark.id, .cuboid = cuboid};
+  views.new_views = TakeViews(landmark, cuboid);
+  views.corrected_views = landmark.views.TakeCorrectedPoses(cuboid);
+  const bool views_changed = !views.new_views.empty() || !views.corrected_views.empty();
+  const bool tell = force || cuboid_changed || text_changed || moved;
+  if (!tell && !views_changed) return;
+  // Whatever is told is told in the corrected world, so the receivers must get there first.
+  views.S_new_old = std::exchange(landmark.S_now_told, std::nullopt);
+  if (tell || views.S_new_old) {
     landmark.published = ObjectUpdate{.id = landmark.id,
                                       .revision = ++landmark.revision,
                                       .state = landmark.state,
                                       .class_name = class_name,
                                       .class_score = class_score,
-                                      .cuboid = cuboid_changed ? *landmark.cuboid : landmark.published->cuboid,
+                                      .cuboid = cuboid,
                                       .observations = landmark.sightings,
                                       .T_world_mesh = {}};
     output->events.emplace_back(*landmark.published);
   }
-  SendViews(landmark, cuboid_changed, output);
+  if (cuboid_changed || moved || views_changed || views.S_new_old) output->views.push_back(std::move(views));
 }
 
-void ObjectMapper::SendViews(Landmark& landmark, bool cuboid_changed, Output* output) {
+std::vector<ObjectView> ObjectMapper::TakeViews(Landmark& landmark, const Cuboid& cuboid) {
   std::vector<ViewContext::Neighbour> neighbours;
   for (const auto& other : landmarks_) {
     if (other->published && other->key != landmark.key) neighbours.push_back({other->key, other->published->cuboid});
   }
-  ObjectViews views{.object = landmark.id, .cuboid = landmark.published->cuboid, .new_views = {}};
-  views.new_views = landmark.views.Take({.object = landmark.id,
-                                         .cuboid = landmark.published->cuboid,
-                                         .body_world = landmark.body_world,
-                                         .object_points = landmark.points,
-                                         .registry = &registry_,
-                                         .neighbours = neighbours});
-  if (cuboid_changed || !views.new_views.empty()) output->views.push_back(std::move(views));
+  return landmark.views.Take({.object = landmark.id,
+                              .cuboid = cuboid,
+                              .body_world = landmark.body_world,
+                              .object_points = landmark.points,
+                              .registry = &registry_,
+                              .neighbours = neighbours});
+}
+
+ObjectMapper::Output ObjectMapper::Reset() {
+  Output output;
+  for (const auto& landmark : landmarks_) {
+    if (!landmark->published) continue;
+    output.events.emplace_back(ObjectRemoved{.id = landmark->id, .reason = "the map was begun anew"});
+  }
+  landmarks_.clear();
+  registry_ = {};
+  current_ = {};
+  scene_depth_mu_ = 0;
+  return output;
 }
 
 }  // namespace romap

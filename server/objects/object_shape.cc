@@ -67,6 +67,27 @@ void ObjectShape::MakeRoom() {
   silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(worst));
 }
 
+bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes,
+                          const std::optional<Cuboid>& cuboid) {
+  constexpr double kLeastShift_px = 0.5;  // masks are not exact to less
+  bool changed = false;
+  hull_.Move(S_new_old);
+  for (Silhouette& silhouette : silhouettes_) {
+    Move(S_new_old, &silhouette);
+    const auto corrected = keyframes.find(silhouette.keyframe);
+    if (corrected != keyframes.end()) silhouette.corrected_T_world_camera = corrected->second.T_world_camera;
+    if (cuboid && LargestShift_px(*cuboid, silhouette.camera, silhouette.T_world_camera,
+                                  silhouette.corrected_T_world_camera) < kLeastShift_px) {
+      continue;
+    }
+    if (!hull_.empty()) hull_.Remove(silhouette);
+    ApplyCorrectedPose(&silhouette);
+    if (!hull_.empty()) hull_.Add(silhouette);
+    changed = true;
+  }
+  return changed;
+}
+
 std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surroundings& surroundings) const {
   constexpr double kGoodParallaxRad = 15 * kRadPerDeg;
   constexpr double kLeastParallaxRad = 5 * kRadPerDeg;
@@ -95,6 +116,16 @@ void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundin
     UpdateNeighbours(*surroundings.neighbours, &silhouette);
     hull_.Add(silhouette);
   }
+}
+
+// Corrections turn the grid with its object; a fit needs it upright.
+void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
+  constexpr double kMostTiltRad = 0.3 * kRadPerDeg;
+  HullRegion region = hull_.region();
+  const Eigen::Vector3d z = region.R_world_grid.col(2);
+  if (AngleBetween(z, surroundings.up_world) < kMostTiltRad) return;
+  region.R_world_grid = ShortestRotation(z, surroundings.up_world) * region.R_world_grid;
+  Carve(region, surroundings);
 }
 
 // A bad mask must not eat the object, but every silhouette that may err makes the hull wider.
@@ -185,6 +216,7 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
           surroundings);
   };
   if (hull_.empty()) start_over();
+  StraightenRegion(surroundings);
   RefocusRegion(*extent, surroundings);
 
   CuboidEvidence evidence;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "server/objects/correction.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/silhouette.h"
 #include "server/objects/silhouette_hull.h"
@@ -35,6 +36,11 @@ class ObjectShape {
   bool AddSilhouette(Silhouette silhouette);
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
 
+  // The map was corrected: `S_new_old` happened to the space the object stands in, and its keyframes have new poses.
+  // `cuboid`: the object's, moved already. True when some masks now say something else about the object.
+  bool Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes,
+               const std::optional<Cuboid>& cuboid);
+
   // The box as of now; nullopt while masks and points do not say where the object is.
   std::optional<Fit> Update(const Surroundings& surroundings, const std::optional<Cuboid>& previous);
 
@@ -48,6 +54,7 @@ class ObjectShape {
   bool IsRedundant(const Silhouette& silhouette) const;
   void MakeRoom();
   void Carve(const HullRegion& region, const Surroundings& surroundings);
+  void StraightenRegion(const Surroundings& surroundings);
   void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
   HullVotes StrictVotes() const;
   HullVotes LenientVotes() const;

@@ -15,6 +15,15 @@ void PointRegistry::UpdatePositions(const KeyframeView& view) {
   }
 }
 
+void PointRegistry::MovePoints(const std::vector<MapPoint>& points) {
+  for (const MapPoint& point : points) {
+    const auto entry = points_.find(point.id);
+    if (entry != points_.end() && point.position_world.allFinite()) {
+      entry->second.position_world = point.position_world;
+    }
+  }
+}
+
 void PointRegistry::Vote(MapPointId point, LandmarkKey key) {
   const auto entry = points_.find(point);
   if (entry == points_.end()) return;

@@ -20,6 +20,8 @@ class PointRegistry {
  public:
   // Takes over positions and removals of a keyframe. Points without a finite position are forgotten.
   void UpdatePositions(const KeyframeView& view);
+  // New positions of points after a correction. Points that are not known (any more) are passed over.
+  void MovePoints(const std::vector<MapPoint>& points);
   // The point was seen under the mask of landmark `key`, or under none (kBackgroundKey).
   void Vote(MapPointId point, LandmarkKey key);
   // Votes for `from` count for `into` from now on.

@@ -51,6 +51,16 @@ std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
   return rays;
 }
 
+Eigen::Matrix<double, 3, 4> ProjectionOf(const Silhouette& silhouette) {
+  const CameraModel& camera = silhouette.camera;
+  const int stride = silhouette.masks->stride_px;
+  Eigen::Matrix3d K;
+  K << camera.fx_px / stride, 0, camera.cx_px / stride,  //
+      0, camera.fy_px / stride, camera.cy_px / stride,   //
+      0, 0, 1;
+  return K * silhouette.T_world_camera.Inverse().Matrix().topRows<3>();
+}
+
 }  // namespace
 
 std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
@@ -75,10 +85,10 @@ std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std:
 
 Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
                           const Detection& detection, size_t detection_index) {
-  const int stride = masks->stride_px;
   Silhouette silhouette{.keyframe = view.id,
                         .camera = view.frame->camera,
                         .T_world_camera = view.T_world_camera,
+                        .corrected_T_world_camera = view.T_world_camera,
                         .P_image_world = {},
                         .masks = std::move(masks),
                         .index = static_cast<uint8_t>(std::min<size_t>(detection_index + 1, kOtherMask)),
@@ -86,14 +96,32 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
                         .outline_rays_world = {}};
-  const CameraModel& camera = silhouette.camera;
-  Eigen::Matrix3d K;
-  K << camera.fx_px / stride, 0, camera.cx_px / stride,  //
-      0, camera.fy_px / stride, camera.cy_px / stride,   //
-      0, 0, 1;
-  silhouette.P_image_world = K * view.T_world_camera.Inverse().Matrix().topRows<3>();
+  silhouette.P_image_world = ProjectionOf(silhouette);
   silhouette.outline_rays_world = OutlineRays(silhouette);
   return silhouette;
+}
+
+void Move(const Sim3<World, World>& S_new_old, Silhouette* silhouette) {
+  const Sim3<World, World> S_old_new = S_new_old.Inverse();
+  const Eigen::Matrix3d turn_and_scale = S_old_new.scale() * S_old_new.rotation().toRotationMatrix();
+  auto& P = silhouette->P_image_world;
+  P.col(3) += P.leftCols<3>() * S_old_new.translation();
+  P.leftCols<3>() *= turn_and_scale;
+  for (auto& neighbour : silhouette->neighbours) {
+    if (!neighbour) continue;
+    neighbour->offset += neighbour->M * S_old_new.translation();
+    neighbour->M *= turn_and_scale;
+  }
+  silhouette->T_world_camera = S_new_old.Moved(silhouette->T_world_camera);
+  for (Eigen::Vector3d& ray : silhouette->outline_rays_world) ray = S_new_old.rotation() * ray;
+}
+
+void ApplyCorrectedPose(Silhouette* silhouette) {
+  const Eigen::Quaterniond turn =
+      silhouette->corrected_T_world_camera.rotation() * silhouette->T_world_camera.rotation().conjugate();
+  silhouette->T_world_camera = silhouette->corrected_T_world_camera;
+  silhouette->P_image_world = ProjectionOf(*silhouette);
+  for (Eigen::Vector3d& ray : silhouette->outline_rays_world) ray = turn * ray;
 }
 
 void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette) {

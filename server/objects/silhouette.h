@@ -40,7 +40,10 @@ struct UnitBox {
 struct Silhouette {
   KeyframeId keyframe;
   CameraModel camera;
+  // All that follows is made with this pose. Corrections that change it against the object are collected apart until
+  // they are worth the work.
   SE3<World, Camera> T_world_camera;
+  SE3<World, Camera> corrected_T_world_camera;
   Eigen::Matrix<double, 3, 4> P_image_world;  // projection to homogeneous thinned pixels
   std::shared_ptr<const KeyframeMasks> masks;
   uint8_t index = 0;  // of the object in `masks`
@@ -81,6 +84,12 @@ struct Silhouette {
 // Its neighbours are unknown yet.
 Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
                           const Detection& detection, size_t detection_index);
+
+// The silhouette goes along with its object: it still sees the same in every place.
+void Move(const Sim3<World, World>& S_new_old, Silhouette* silhouette);
+
+// Takes over the corrected pose.
+void ApplyCorrectedPose(Silhouette* silhouette);
 
 // Tells a silhouette where the other things of its picture stand, as far as their cuboids are known.
 void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette);

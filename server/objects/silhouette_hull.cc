@@ -12,6 +12,12 @@ void SilhouetteHull::Reset(const HullRegion& region, int cells) {
   outside_.assign(count, 0);
 }
 
+void SilhouetteHull::Move(const Sim3<World, World>& S_new_old) {
+  region_.R_world_grid = S_new_old.rotation() * region_.R_world_grid;
+  region_.center_world = S_new_old * region_.center_world;
+  region_.half_extents *= S_new_old.scale();
+}
+
 void SilhouetteHull::Vote(const Silhouette& silhouette, int weight) {
   const Eigen::Matrix3d M = silhouette.P_image_world.leftCols<3>() * region_.R_world_grid;
   const Eigen::Vector3d origin =

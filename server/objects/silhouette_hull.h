@@ -8,7 +8,8 @@
 
 namespace romap {
 
-// An upright box of space. The Grid frame has its origin in the middle and z along up_world; it is not turned by a yaw.
+// An upright box of space. The Grid frame has its origin in the middle and z along up_world, from which corrections of
+// the map may tilt it a little.
 struct HullRegion {
   Eigen::Matrix3d R_world_grid = Eigen::Matrix3d::Identity();
   Eigen::Vector3d center_world = Eigen::Vector3d::Zero();
@@ -35,6 +36,9 @@ class SilhouetteHull {
   void Reset(const HullRegion& region, int cells);
   void Add(const Silhouette& silhouette) { Vote(silhouette, 1); }
   void Remove(const Silhouette& silhouette) { Vote(silhouette, -1); }
+
+  // The region goes along with its space, and so must all silhouettes that voted: then every vote stays right.
+  void Move(const Sim3<World, World>& S_new_old);
 
   bool empty() const { return cells_ == 0; }
   const HullRegion& region() const { return region_; }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "common/map_motion.h"
 #include "server/objects/angles.h"
 #include "server/objects/projection.h"
 
@@ -156,8 +157,8 @@ bool ViewPicker::IsNewDirection(const Eigen::Vector3d& camera_center, const Eige
                                 double angle_rad) const {
   constexpr double kNewDistanceRatio = 1.5;
   const Eigen::Vector3d direction = camera_center - object_center;
-  return std::all_of(taken_.begin(), taken_.end(), [&](const ObjectView& view) {
-    const Eigen::Vector3d other = view.T_world_camera.translation() - object_center;
+  return std::all_of(taken_.begin(), taken_.end(), [&](const Taken& taken) {
+    const Eigen::Vector3d other = taken.view.T_world_camera.translation() - object_center;
     const double ratio = direction.norm() / other.norm();
     const bool new_distance = ratio > kNewDistanceRatio || ratio < 1 / kNewDistanceRatio;
     return AngleBetween(direction, other) >= (new_distance ? 0.4 : 1.0) * angle_rad;
@@ -185,8 +186,8 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
       spdlog::debug("objects: {}: {} is no view: {}", context.object.ToString(), candidate.keyframe.ToString(), doubt);
       continue;
     }
-    taken_.push_back(MakeView(candidate, context));
-    views.push_back(taken_.back());
+    views.push_back(MakeView(candidate, context));
+    taken_.push_back({views.back(), views.back().T_world_camera});
     spdlog::debug("objects: {}: {} becomes view {}", context.object.ToString(), candidate.keyframe.ToString(),
                   taken_.size());
   }
@@ -196,16 +197,44 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
 
 std::vector<ObjectView> ViewPicker::Adopt(ViewPicker&& other, ObjectId object, const Eigen::Vector3d& center_world) {
   std::vector<ObjectView> adopted;
-  for (ObjectView& view : other.taken_) {
+  for (auto& [view, told_T_world_camera] : other.taken_) {
     if (taken_.size() >= static_cast<size_t>(config_.max_views)) break;
     const double angle_rad = config_.view_angle_deg * kRadPerDeg;
     if (!IsNewDirection(view.T_world_camera.translation(), center_world, angle_rad)) continue;
     view.object = object;
-    taken_.push_back(view);
+    taken_.push_back({view, view.T_world_camera});
     adopted.push_back(std::move(view));
   }
   for (ViewCandidate& candidate : other.waiting_) Offer(std::move(candidate));
   return adopted;
+}
+
+void ViewPicker::Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes) {
+  for (ViewCandidate& candidate : waiting_) {
+    const auto corrected = keyframes.find(candidate.keyframe);
+    if (corrected != keyframes.end()) candidate.T_world_camera = corrected->second.T_world_camera;
+  }
+  for (Taken& taken : taken_) {
+    taken.told_T_world_camera = S_new_old.Moved(taken.told_T_world_camera);
+    const auto corrected = keyframes.find(taken.view.keyframe);
+    if (corrected == keyframes.end()) continue;
+    taken.view = Moved(corrected->second.S_new_old, std::move(taken.view));  // its depths follow the scale
+    taken.view.T_world_camera = corrected->second.T_world_camera;
+  }
+}
+
+std::vector<ViewPose> ViewPicker::TakeCorrectedPoses(const Cuboid& cuboid) {
+  constexpr double kLeastShift_px = 0.3;
+  std::vector<ViewPose> poses;
+  for (Taken& taken : taken_) {
+    const SE3<World, Camera>& T_world_camera = taken.view.T_world_camera;
+    if (LargestShift_px(cuboid, taken.view.camera, taken.told_T_world_camera, T_world_camera) < kLeastShift_px) {
+      continue;
+    }
+    poses.push_back({taken.view.keyframe, T_world_camera});
+    taken.told_T_world_camera = T_world_camera;
+  }
+  return poses;
 }
 
 void ViewPicker::RenameNeighbour(LandmarkKey from, LandmarkKey into) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/messages.h"
+#include "server/objects/correction.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"
 
@@ -62,12 +63,24 @@ class ViewPicker {
   // Takes over the views of an object that turned out to be this one; returns those that were new to this one, renamed.
   std::vector<ObjectView> Adopt(ViewPicker&& other, ObjectId object, const Eigen::Vector3d& center_world);
 
+  // The map was corrected: `S_new_old` happened to the object's space, and keyframes have new poses.
+  void Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes);
+  // The views that stand noticeably elsewhere against the object, a `cuboid` of the present, than was told; smaller
+  // changes wait until they have added up. The answer counts as told.
+  std::vector<ViewPose> TakeCorrectedPoses(const Cuboid& cuboid);
+
   // Landmark `from` is called `into` from now on.
   void RenameNeighbour(LandmarkKey from, LandmarkKey into);
 
   size_t count() const { return taken_.size(); }
 
  private:
+  struct Taken {
+    ObjectView view;  // pixels are shared with what was sent
+    // Its pose as the receiver has it, once it has moved the view along with the object.
+    SE3<World, Camera> told_T_world_camera;
+  };
+
   bool IsNewDirection(const Eigen::Vector3d& camera_center, const Eigen::Vector3d& object_center,
                       double angle_rad) const;
   bool IsSharp(double sharpness) const;
@@ -75,7 +88,7 @@ class ViewPicker {
   ObjectsConfig config_;
   std::vector<ViewCandidate> waiting_;
   std::vector<double> sharpness_history_;
-  std::vector<ObjectView> taken_;  // pixels are shared with what was sent
+  std::vector<Taken> taken_;
 };
 
 }  // namespace romap
