@@ -1,0 +1,140 @@
+#include "common/wire/recording.h"
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "common/status.h"
+#include "common/wire/frame.h"
+#include "common/wire/sessions.h"
+#include "romap/v1/mapping.pb.h"
+
+namespace romap::wire {
+namespace {
+
+constexpr char kMagic[] = "ROMAPREC";
+constexpr size_t kMagicBytes = sizeof(kMagic) - 1;
+constexpr uint32_t kVersion = 1;
+constexpr size_t kNumberBytes = 4;
+
+std::string NumberBytes(uint32_t number) {
+  std::string bytes(kNumberBytes, '\0');
+  for (size_t i = 0; i < kNumberBytes; ++i) bytes[i] = static_cast<char>(number >> (8 * i));
+  return bytes;
+}
+
+std::optional<uint32_t> ReadNumber(std::ifstream& file) {
+  std::array<char, kNumberBytes> bytes;
+  if (!file.read(bytes.data(), bytes.size())) return std::nullopt;
+  uint32_t number = 0;
+  for (size_t i = 0; i < kNumberBytes; ++i) {
+    number |= static_cast<uint32_t>(static_cast<unsigned char>(bytes[i])) << (8 * i);
+  }
+  return number;
+}
+
+std::optional<std::string> ReadBytes(std::ifstream& file, uint32_t length) {
+  std::string bytes(length, '\0');
+  if (!file.read(bytes.data(), length)) return std::nullopt;
+  return bytes;
+}
+
+std::string Record(const google::protobuf::MessageLite& message) {
+  const std::string bytes = message.SerializeAsString();
+  return NumberBytes(static_cast<uint32_t>(bytes.size())) + bytes;
+}
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(const std::string& path)
+    : path_(path), file_(path, std::ios::binary | std::ios::trunc) {}
+
+absl::StatusOr<std::unique_ptr<RecordingWriter>> RecordingWriter::Create(const std::string& path,
+                                                                         const SessionOptions& options) {
+  std::unique_ptr<RecordingWriter> writer(new RecordingWriter(path));
+  if (!writer->file_) return FailedPrecondition("{}: the recording cannot be made there", path);
+  ROMAP_RETURN_IF_ERROR(writer->Write(kMagic + NumberBytes(kVersion) + Record(ToProto(options))));
+  return writer;
+}
+
+absl::Status RecordingWriter::Append(FrameInput frame) { return Write(Record(ToProto(std::move(frame)))); }
+
+absl::Status RecordingWriter::Write(const std::string& bytes) {
+  file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file_.flush();
+  if (file_) return absl::OkStatus();
+  return absl::ResourceExhaustedError(fmt::format("{}: the recording cannot be written on, is the disk full?", path_));
+}
+
+absl::StatusOr<Recording> Recording::Open(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return NotFound("{}: no such file", path);
+  std::ifstream file(path, std::ios::binary);
+  const uint64_t file_bytes = std::filesystem::file_size(path, error);
+  if (!file || error) return InvalidArgument("{}: not a file that can be read", path);
+  Recording recording;
+  recording.path_ = path;
+  ROMAP_RETURN_IF_ERROR(recording.ReadHead(file));
+  ROMAP_RETURN_IF_ERROR(recording.FindFrames(file, file_bytes));
+  return recording;
+}
+
+absl::Status Recording::ReadHead(std::ifstream& file) {
+  if (ReadBytes(file, kMagicBytes) != kMagic) {
+    return InvalidArgument("{}: not a recording, it should begin with {}", path_, kMagic);
+  }
+  const std::optional<uint32_t> version = ReadNumber(file);
+  if (!version) return InvalidArgument("{}: cut off within its first bytes, nothing can be replayed", path_);
+  if (*version != kVersion) {
+    return InvalidArgument("{}: a recording of version {}, this program reads version {}", path_, *version, kVersion);
+  }
+  const std::optional<uint32_t> length = ReadNumber(file);
+  const std::optional<std::string> bytes = length && *length < (1U << 20) ? ReadBytes(file, *length) : std::nullopt;
+  v1::CreateSessionRequest request;
+  if (!bytes || !request.ParseFromString(*bytes)) {
+    return InvalidArgument("{}: its first record should be a CreateSessionRequest, but is damaged or cut off", path_);
+  }
+  auto options = FromProto(request);
+  if (!options.ok()) return InvalidArgument("{}: session options: {}", path_, Message(options.status()));
+  options_ = *std::move(options);
+  return absl::OkStatus();
+}
+
+absl::Status Recording::FindFrames(std::ifstream& file, uint64_t file_bytes) {
+  uint64_t offset = static_cast<uint64_t>(file.tellg());
+  while (offset < file_bytes) {
+    const std::optional<uint32_t> length = ReadNumber(file);
+    const uint64_t begin = offset + kNumberBytes;
+    if (!length || begin + *length > file_bytes) {
+      lost_bytes_ = file_bytes - offset;
+      break;
+    }
+    const std::optional<std::string> bytes = ReadBytes(file, *length);
+    v1::Frame frame;
+    if (!bytes || !frame.ParseFromString(*bytes)) {
+      return InvalidArgument("{}: record {} (at byte {}) should be a Frame, but is damaged", path_, frames_.size() + 1,
+                             begin);
+    }
+    frames_.push_back({begin, *length, frame.timestamp_ns(), frame.has_masks()});
+    offset = begin + *length;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<FrameInput> Recording::Load(size_t index) const {
+  if (index >= frames_.size()) return InvalidArgument("{}: no frame {}, there are {}", path_, index, frames_.size());
+  const Place& place = frames_[index];
+  std::ifstream file(path_, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(place.offset));
+  const std::optional<std::string> bytes = file ? ReadBytes(file, place.length) : std::nullopt;
+  v1::Frame proto;
+  if (!bytes || !proto.ParseFromString(*bytes)) {
+    return InvalidArgument("{}: frame {} can no longer be read, was the file changed?", path_, index + 1);
+  }
+  auto frame = FromProto(std::move(proto));
+  if (!frame.ok()) return InvalidArgument("{}: frame {}: {}", path_, index + 1, Message(frame.status()));
+  return frame;
+}
+
+}  // namespace romap::wire

@@ -1,0 +1,154 @@
+#include "common/wire/recording.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "common/status.h"
+#include "tests/support/subprocess.h"
+
+namespace romap::wire {
+namespace {
+
+using testing_support::TemporaryFolder;
+
+SessionOptions Options() {
+  SessionOptions options;
+  options.name = "desk";
+  options.camera = {.width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 61, .cx_px = 32, .cy_px = 24};
+  options.mode = FrameMode::kLive;
+  return options;
+}
+
+FrameInput NumberedFrame(uint64_t number) {
+  FrameInput frame;
+  frame.frame_id = number;
+  frame.timestamp_ns = static_cast<int64_t>(number) * 40000000;
+  frame.image_encoding = ImageEncoding::kPng;
+  frame.image = std::string(100 + number, 'i');
+  if (number % 2 == 0) {
+    frame.mask_encoding = MaskEncoding::kLabelPng;
+    frame.label_png = "mask";
+    frame.instances = {{.label = 3, .class_name = "mug", .score = 0.5, .track_id = 8}};
+  }
+  frame.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3.25));
+  return frame;
+}
+
+class RecordingTest : public ::testing::Test {
+ protected:
+  std::string path() const { return folder_ / "session.romaprec"; }
+
+  void WriteFrames(uint64_t count) const {
+    auto writer = RecordingWriter::Create(path(), Options());
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    for (uint64_t i = 1; i <= count; ++i) ASSERT_TRUE((*writer)->Append(NumberedFrame(i)).ok());
+  }
+
+  std::string Bytes() const {
+    std::ifstream file(path(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void SetBytes(const std::string& bytes) const { std::ofstream(path(), std::ios::binary) << bytes; }
+  std::string OpenError() const {
+    const auto recording = Recording::Open(path());
+    EXPECT_EQ(recording.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(Message(recording.status()).find('\n'), std::string::npos);
+    return Message(recording.status());
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(RecordingTest, GivesBackWhatWasWritten) {
+  WriteFrames(5);
+  const auto recording = Recording::Open(path());
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  EXPECT_EQ(recording->options().name, "desk");
+  EXPECT_EQ(recording->options().camera, Options().camera);
+  EXPECT_EQ(recording->options().mode, FrameMode::kLive);
+  EXPECT_EQ(recording->lost_bytes(), 0U);
+  ASSERT_EQ(recording->size(), 5U);
+  for (size_t i : {4U, 0U, 3U}) {  // in any order
+    const FrameInput expected = NumberedFrame(i + 1);
+    EXPECT_EQ(recording->timestamp_ns(i), expected.timestamp_ns);
+    EXPECT_EQ(recording->has_mask(i), expected.mask_encoding == MaskEncoding::kLabelPng);
+    const auto frame = recording->Load(i);
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_EQ(frame->frame_id, expected.frame_id);
+    EXPECT_EQ(frame->image, expected.image);
+    EXPECT_EQ(frame->label_png, expected.label_png);
+    EXPECT_EQ(frame->instances.size(), expected.instances.size());
+    EXPECT_EQ(frame->T_world_camera->translation(), expected.T_world_camera->translation());
+  }
+  EXPECT_EQ(recording->Load(5).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(RecordingTest, AFrameIsOnDiskAsSoonAsItWasAppended) {
+  auto writer = RecordingWriter::Create(path(), Options());
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  ASSERT_TRUE((*writer)->Append(NumberedFrame(1)).ok());
+  const auto recording = Recording::Open(path());  // the writer is still there
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  EXPECT_EQ(recording->size(), 1U);
+}
+
+TEST_F(RecordingTest, LosesOnlyTheRecordThatIsCutOff) {
+  WriteFrames(3);
+  const std::string whole = Bytes();
+  WriteFrames(2);
+  const size_t two_frames = Bytes().size();
+  for (size_t size = two_frames; size < whole.size(); ++size) {
+    SetBytes(whole.substr(0, size));
+    const auto recording = Recording::Open(path());
+    ASSERT_TRUE(recording.ok()) << size << ": " << recording.status();
+    ASSERT_EQ(recording->size(), 2U) << size;
+    ASSERT_EQ(recording->lost_bytes(), size - two_frames);
+    ASSERT_TRUE(recording->Load(1).ok());
+  }
+}
+
+TEST_F(RecordingTest, SaysWhatIsNoRecording) {
+  EXPECT_EQ(Recording::Open(path()).status().code(), absl::StatusCode::kNotFound);
+  SetBytes("");
+  EXPECT_NE(OpenError().find("not a recording"), std::string::npos);
+  SetBytes("\x89PNG\r\n\x1a\n and more");
+  EXPECT_NE(OpenError().find(path() + ": not a recording, it should begin with ROMAPREC"), std::string::npos);
+  std::filesystem::remove(path());
+  std::filesystem::create_directory(path());
+  EXPECT_NE(OpenError().find("not a file"), std::string::npos);
+}
+
+TEST_F(RecordingTest, SaysWhichVersionItReads) {
+  WriteFrames(1);
+  std::string bytes = Bytes();
+  bytes[8] = 7;
+  SetBytes(bytes);
+  EXPECT_NE(OpenError().find("version 7, this program reads version 1"), std::string::npos);
+}
+
+TEST_F(RecordingTest, NamesTheDamagedRecord) {
+  WriteFrames(2);
+  const std::string whole = Bytes();
+  for (const size_t size : {8U, 10U, 14U, 20U}) {  // no whole head is left
+    SetBytes(whole.substr(0, size));
+    EXPECT_NE(OpenError().find(path()), std::string::npos) << size;
+  }
+  std::string damaged = whole;
+  damaged[damaged.find("iii") - 2] = '\x7f';  // the length of the image of frame 1
+  SetBytes(damaged);
+  EXPECT_NE(OpenError().find("record 1"), std::string::npos);
+}
+
+TEST_F(RecordingTest, SaysWhereItCannotBeMade) {
+  const auto writer = RecordingWriter::Create(folder_ / "missing/session.romaprec", Options());
+  EXPECT_EQ(writer.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_NE(Message(writer.status()).find("missing/session.romaprec"), std::string::npos);
+  const auto full = RecordingWriter::Create("/dev/full", Options());
+  EXPECT_EQ(full.status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+}  // namespace
+}  // namespace romap::wire
