@@ -11,11 +11,24 @@
 
 namespace romap {
 
-// Least-squares similarity p_to = S * p_from (Umeyama 1991). `fix_scale`: scale is 1. nullopt: fewer than three points,
-// or all on a line.
+// p_to = scale * rotation * p_from + translation, without the names of the frames.
+struct PointAlignment {
+  double scale = 1;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+std::optional<PointAlignment> AlignPointSets(std::span<const Eigen::Vector3d> p_from,
+                                             std::span<const Eigen::Vector3d> p_to, bool fix_scale);
+
+// Least-squares similarity p_to = S * p_from (Umeyama 1991) of points that correspond by index. `fix_scale`: scale
+// is 1. nullopt: fewer than three points, different numbers, or all on a line.
 template <class To, class From>
 std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_from,
-                                          std::span<const Eigen::Vector3d> p_to, bool fix_scale);
+                                          std::span<const Eigen::Vector3d> p_to, bool fix_scale) {
+  const std::optional<PointAlignment> alignment = AlignPointSets(p_from, p_to, fix_scale);
+  if (!alignment) return std::nullopt;
+  return Sim3<To, From>(alignment->scale, Eigen::Quaterniond(alignment->rotation), alignment->translation);
+}
 
 // A landmark that two keyframes see, each with its own opinion of where it is.
 struct SimilarityMatch {

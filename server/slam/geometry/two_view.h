@@ -27,29 +27,36 @@ enum class TwoViewOutcome {
 struct TwoViewOptions {
   int min_matches = 80;
   int min_points = 50;            // triangulated, before both cameras, with small reprojection errors
-  double min_parallax_deg = 1.0;  // of the points' rays, in the median
-  int max_iterations = 200;       // RANSAC
+  double min_parallax_deg = 1.5;  // of the agreeing matches' rays, in the median, those of distant points included
+  // A mere turn that explains this share of what the best motion explains is taken for the truth.
+  double max_turn_share = 0.6;
+  // Another motion that explains this share of what the best one explains makes the matter ambiguous.
+  double max_rival_share = 0.88;
+  // By the covariance of the refined motion, in its least certain direction.
+  double max_rotation_sigma_deg = 0.6;
+  double max_direction_sigma_deg = 3;
+  int max_iterations = 200;  // RANSAC
   uint64_t seed = 1;
 };
 
 struct TwoViewResult {
   TwoViewOutcome outcome = TwoViewOutcome::kTooFewMatches;
-  bool from_homography = false;                              // which of the two models was chosen
-  SE3<Camera, Camera> T_first_second;                        // second camera to first camera; |translation| = 1
+  bool from_homography = false;        // the homography explained the matches about as well: the scene is nearly planar
+  SE3<Camera, Camera> T_first_second;  // second camera to first camera; |translation| = 1
   std::vector<std::optional<Eigen::Vector3d>> points_first;  // per match: in the first camera's frame, if usable
   int points = 0;
   double parallax_rad = 0;  // median over the points
 };
 
-// Structure and motion from two views of one camera, without any prior (Hartley and Zisserman; Mur-Artal et al., 2015,
-// section IV): a homography and a fundamental matrix are fitted in parallel by RANSAC on the same minimal samples,
-// scored by symmetric transfer errors in the same way, and the homography is taken when its share of the score says
-// that the scene is (nearly) planar. Its motions (Malis and Vargas 2007; cv::decomposeHomographyMat) or the essential
-// matrix's four are told apart by the points that they put before both cameras.
+// Structure and motion from two views of one calibrated camera, without any prior. RANSAC fits a homography and an
+// essential matrix to the same samples (as Mur-Artal et al., 2015, section IV, but with the five points of Nister 2004
+// instead of eight: planes are no special case to them, and outliers hurt less). The motions of both models (of the
+// homography: Malis and Vargas 2007) are refined, and the one that most matches agree with, before both cameras, is
+// returned if nothing speaks against it: neither a mere turn, nor a rival motion, nor its own uncertainty.
 TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMatch> matches,
                            const TwoViewOptions& options);
 
-// One line for people: "too little parallax: 0.4 deg, 1.0 needed".
+// A few words for people: "too little parallax: the camera stood still or only turned".
 const char* Describe(TwoViewOutcome outcome);
 
 }  // namespace romap

@@ -1,0 +1,183 @@
+#include "server/slam/geometry/epipolar.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "server/slam/geometry/rotation.h"
+
+namespace romap {
+namespace {
+
+constexpr int kRefineRounds = 4;
+constexpr int kIterationsPerRound = 6;
+// The first round listens to matches this many times further off than the bound: the start comes from five noisy
+// points.
+constexpr double kFirstRoundReach = 4;
+// Parallax over the angle of a pixel's noise from which on a depth is known to about a third.
+constexpr double kSignificantParallax = 4;
+
+// The epipolar constraint of one match and its slope.
+struct EpipolarLines {
+  double algebraic = 0;          // second^T * E * first
+  Eigen::Vector3d first_slope;   // its derivative by the first pixel, over the focal lengths once more: in rays per px
+  Eigen::Vector3d second_slope;  // and by the second pixel
+  double slope2 = 0;             // squared length of its derivative by all four pixel coordinates
+};
+
+EpipolarLines LinesOf(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
+  EpipolarLines lines;
+  const Eigen::Vector3d second_line = essential * match.first;
+  const Eigen::Vector3d first_line = essential.transpose() * match.second;
+  const Eigen::Array3d inverse_focal2(1 / (camera.fx_px * camera.fx_px), 1 / (camera.fy_px * camera.fy_px), 0);
+  lines.algebraic = match.second.dot(second_line);
+  lines.first_slope = first_line.array() * inverse_focal2;
+  lines.second_slope = second_line.array() * inverse_focal2;
+  lines.slope2 = lines.first_slope.dot(first_line) + lines.second_slope.dot(second_line);
+  return lines;
+}
+
+// Two unit vectors that are perpendicular to `direction` and to each other.
+Eigen::Matrix<double, 3, 2> AxesAcross(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> axes;
+  axes.col(0) = direction.unitOrthogonal();
+  axes.col(1) = direction.cross(axes.col(0));
+  return axes;
+}
+
+double AngleSigma_rad(const Eigen::MatrixXd& covariance) {
+  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(covariance).eigenvalues().maxCoeff();
+  return largest >= 0 ? std::sqrt(largest) : std::numeric_limits<double>::infinity();
+}
+
+// Standard deviations by the information of the inliers; noise that is larger than the matches claim counts.
+void SetSigmas(const MotionEquations& equations, int inliers, RefinedMotion& refined) {
+  refined.rotation_sigma_rad = refined.direction_sigma_rad = std::numeric_limits<double>::infinity();
+  const Eigen::LDLT<MotionEquations::Matrix> information(equations.hessian);
+  if (inliers <= 5 || !information.isPositive() || !(information.rcond() > 1e-14)) return;
+  const double noise = std::max(1.0, equations.cost / (inliers - 5));
+  const MotionEquations::Matrix covariance = noise * information.solve(MotionEquations::Matrix::Identity());
+  refined.rotation_sigma_rad = AngleSigma_rad(covariance.topLeftCorner<3, 3>());
+  refined.direction_sigma_rad = AngleSigma_rad(covariance.bottomRightCorner<2, 2>());
+}
+
+}  // namespace
+
+std::vector<RayMatch> RaysOf(const CameraModel& camera, std::span<const TwoViewMatch> matches) {
+  std::vector<RayMatch> rays;
+  rays.reserve(matches.size());
+  for (const TwoViewMatch& match : matches) {
+    rays.push_back({camera.Unproject(match.first_px.x(), match.first_px.y()),
+                    camera.Unproject(match.second_px.x(), match.second_px.y()), match.sigma_px});
+  }
+  return rays;
+}
+
+Eigen::Matrix3d Motion::Essential() const { return Skew(direction) * rotation; }
+
+double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
+  const EpipolarLines lines = LinesOf(camera, essential, match);
+  return lines.algebraic * lines.algebraic / (lines.slope2 * match.sigma_px * match.sigma_px);
+}
+
+RayMatch NearestObedient(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
+  const EpipolarLines lines = LinesOf(camera, essential, match);
+  if (!(lines.slope2 > 0)) return match;
+  const double shift = lines.algebraic / lines.slope2;
+  RayMatch obedient = match;
+  obedient.first -= shift * lines.first_slope;
+  obedient.second -= shift * lines.second_slope;
+  return obedient;
+}
+
+RayMeeting MeetingOf(const CameraModel& camera, const Motion& motion, const RayMatch& match) {
+  const Eigen::Vector3d first_turned = motion.rotation * match.first;
+  const Eigen::Vector3d normal = first_turned.cross(match.second);
+  const double normal2 = normal.squaredNorm();
+  RayMeeting meeting;
+  meeting.parallax_rad = std::atan2(std::sqrt(normal2), first_turned.dot(match.second));
+  meeting.is_significant = meeting.parallax_rad > kSignificantParallax * match.sigma_px / camera.fx_px;
+  if (normal2 == 0) return meeting;
+  meeting.first_depth = -motion.direction.cross(match.second).dot(normal) / normal2;
+  meeting.second_depth = -motion.direction.cross(first_turned).dot(normal) / normal2;
+  return meeting;
+}
+
+double Support(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d essential = motion.Essential();
+  double support = 0;
+  for (const RayMatch& match : matches) {
+    const double chi2 = SampsonChi2(camera, essential, match);
+    if (!(chi2 < kEpipolarChi2Bound)) continue;
+    const RayMeeting meeting = MeetingOf(camera, motion, match);
+    if (!meeting.is_significant || meeting.IsBeforeBoth()) support += 1 - chi2 / kEpipolarChi2Bound;
+  }
+  return support;
+}
+
+void AddEpipolarError(const CameraModel& camera, const Motion& motion, const RayMatch& match,
+                      MotionEquations& equations) {
+  const EpipolarLines lines = LinesOf(camera, motion.Essential(), match);
+  if (!(lines.slope2 > 0)) return;  // both points at the epipoles: any motion along this direction explains them
+
+  // Derivatives of E * first and E^T * second.
+  const Eigen::Vector3d first_turned = motion.rotation * match.first;
+  const Eigen::Vector3d across = match.second.cross(motion.direction);
+  const Eigen::Matrix<double, 3, 2> axes = AxesAcross(motion.direction);
+  Eigen::Matrix<double, 3, 5> d_second_line;
+  d_second_line.leftCols<3>() = -Skew(motion.direction) * Skew(first_turned);
+  Eigen::Matrix<double, 3, 5> d_first_line;
+  d_first_line.leftCols<3>() = motion.rotation.transpose() * Skew(across);
+  for (int k = 0; k < 2; ++k) {
+    d_second_line.col(3 + k) = axes.col(k).cross(first_turned);
+    d_first_line.col(3 + k) = motion.rotation.transpose() * match.second.cross(axes.col(k));
+  }
+  const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
+  const double error = lines.algebraic * scale;
+  const MotionEquations::Vector d_half_slope2 =
+      d_second_line.transpose() * lines.second_slope + d_first_line.transpose() * lines.first_slope;
+  const MotionEquations::Vector derivative =
+      scale * (d_second_line.transpose() * match.second - (lines.algebraic / lines.slope2) * d_half_slope2);
+  equations.Add(derivative, error, HuberWeight(error * error, kEpipolarChi2Bound));
+  equations.cost += HuberCost(error * error, kEpipolarChi2Bound);
+}
+
+Motion Moved(const Motion& motion, const MotionEquations::Vector& step) {
+  return {ExpRotation(step.head<3>()) * motion.rotation,
+          (motion.direction + AxesAcross(motion.direction) * step.tail<2>()).normalized()};
+}
+
+RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::span<const RayMatch> matches) {
+  RefinedMotion refined{.motion = start};
+  std::vector<RayMatch> inliers;
+  inliers.reserve(matches.size());
+  MotionEquations equations;
+  for (int round = 0; round < kRefineRounds; ++round) {
+    const double reach = round == 0 ? kFirstRoundReach * kFirstRoundReach : 1.0;
+    const Eigen::Matrix3d essential = refined.motion.Essential();
+    inliers.clear();
+    for (const RayMatch& match : matches) {
+      if (SampsonChi2(camera, essential, match) < reach * kEpipolarChi2Bound) inliers.push_back(match);
+    }
+    const auto linearise = [&](const Motion& at) {
+      MotionEquations sums;
+      for (const RayMatch& match : inliers) AddEpipolarError(camera, at, match, sums);
+      return sums;
+    };
+    const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
+    equations = Minimise<5>(kIterationsPerRound, linearise, move, refined.motion);
+  }
+  // The errors do not tell forth from back; the sides of the cameras that the points are on do.
+  const Motion opposite{refined.motion.rotation, -refined.motion.direction};
+  const double opposite_support = Support(camera, opposite, matches);
+  refined.support = Support(camera, refined.motion, matches);
+  if (opposite_support > refined.support) {
+    refined.motion = opposite;
+    refined.support = opposite_support;
+  }
+  SetSigmas(equations, static_cast<int>(inliers.size()), refined);
+  return refined;
+}
+
+}  // namespace romap

@@ -1,0 +1,138 @@
+#include "server/slam/geometry/homography.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+
+namespace romap {
+namespace {
+
+constexpr int kPolishRounds = 5;
+constexpr int kTurnRounds = 5;
+// Below this share of the distance to the plane, a motion is no motion but rounding.
+constexpr double kNoTranslation = 1e-9;
+
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+  signs.z() = svd.matrixU().determinant() * svd.matrixV().determinant();
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+std::vector<RayMatch> ExplainedBy(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                                  std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d inverse = homography.inverse();
+  std::vector<RayMatch> explained;
+  for (const RayMatch& match : matches) {
+    if (TransferChi2(camera, homography, inverse, match) < kTransferChi2Bound) explained.push_back(match);
+  }
+  return explained;
+}
+
+// Squared distance in pixels of the points through which two rays pass; infinite for a ray that points backwards.
+double Distance2_px(const CameraModel& camera, const Eigen::Vector3d& mapped, const Eigen::Vector3d& seen) {
+  if (!(mapped.z() > 0)) return std::numeric_limits<double>::infinity();
+  return (camera.Project(mapped) - camera.Project(seen)).squaredNorm();
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix3d> FitHomography(std::span<const RayMatch> matches) {
+  if (matches.size() < 4) return std::nullopt;
+  using Row = Eigen::Matrix<double, 9, 1>;
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  for (const RayMatch& match : matches) {
+    Row row = Row::Zero();
+    row.segment<3>(0) = match.first;
+    row.segment<3>(6) = -match.second.x() * match.first;
+    normal.noalias() += row * row.transpose();
+    row.segment<3>(0).setZero();
+    row.segment<3>(3) = match.first;
+    row.segment<3>(6) = -match.second.y() * match.first;
+    normal.noalias() += row * row.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
+  const Row smallest = solver.eigenvectors().col(0);
+  Eigen::Matrix3d homography = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(smallest.data());
+  const double determinant = homography.determinant();
+  if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
+  return homography / std::cbrt(determinant);  // determinant 1, so that points before the camera stay there
+}
+
+double TransferChi2(const CameraModel& camera, const Eigen::Matrix3d& homography, const Eigen::Matrix3d& inverse,
+                    const RayMatch& match) {
+  const double forth = Distance2_px(camera, homography * match.first, match.second);
+  const double back = Distance2_px(camera, inverse * match.second, match.first);
+  return std::max(forth, back) / (match.sigma_px * match.sigma_px);
+}
+
+double TransferSupport(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                       std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d inverse = homography.inverse();
+  double support = 0;
+  for (const RayMatch& match : matches) {
+    support += std::max(0.0, 1 - TransferChi2(camera, homography, inverse, match) / kTransferChi2Bound);
+  }
+  return support;
+}
+
+Eigen::Matrix3d PolishHomography(const CameraModel& camera, const Eigen::Matrix3d& start,
+                                 std::span<const RayMatch> matches) {
+  Eigen::Matrix3d best = start;
+  double best_support = TransferSupport(camera, best, matches);
+  for (int round = 0; round < kPolishRounds; ++round) {
+    const std::optional<Eigen::Matrix3d> polished = FitHomography(ExplainedBy(camera, best, matches));
+    if (!polished) break;
+    const double support = TransferSupport(camera, *polished, matches);
+    if (!(support > best_support)) break;
+    best = *polished;
+    best_support = support;
+  }
+  return best;
+}
+
+std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography) {
+  cv::Matx33d matrix;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) matrix(row, column) = homography(row, column);
+  }
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  std::vector<Motion> motions;
+  try {
+    cv::decomposeHomographyMat(matrix, cv::Matx33d::eye(), rotations, translations, cv::noArray());
+  } catch (const cv::Exception&) {
+    return motions;  // a homography that no motion causes
+  }
+  for (size_t i = 0; i < rotations.size(); ++i) {
+    // OpenCV's matrices are row-major.
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(rotations[i].ptr<double>());
+    const Eigen::Map<const Eigen::Vector3d> translation(translations[i].ptr<double>());
+    if (!rotation.allFinite() || !(translation.norm() > kNoTranslation)) continue;
+    motions.push_back({rotation, translation.normalized()});
+  }
+  return motions;
+}
+
+Eigen::Matrix3d FitTurn(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                        std::span<const RayMatch> matches) {
+  Eigen::Matrix3d turn = NearestRotation(homography);
+  double support = TransferSupport(camera, turn, matches);
+  for (int round = 0; round < kTurnRounds; ++round) {
+    // Kabsch 1976 on unit rays.
+    Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
+    for (const RayMatch& match : ExplainedBy(camera, turn, matches)) {
+      correlation += match.second.normalized() * match.first.normalized().transpose();
+    }
+    const Eigen::Matrix3d candidate = NearestRotation(correlation);
+    const double candidate_support = TransferSupport(camera, candidate, matches);
+    if (!(candidate_support > support)) break;
+    turn = candidate;
+    support = candidate_support;
+  }
+  return turn;
+}
+
+}  // namespace romap

@@ -1,0 +1,88 @@
+#include "server/slam/geometry/motion_ranking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/slam/geometry/homography.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegree_rad = std::numbers::pi / 180;
+// Two starts that led this near to each other found the same minimum.
+constexpr double kSameRotation_rad = 0.02 * kDegree_rad;
+constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
+// Minima that are this near to each other do not contradict each other.
+constexpr double kNearRotation_rad = 1 * kDegree_rad;
+constexpr double kNearDirection_rad = 10 * kDegree_rad;
+constexpr double kMedianChi2 = 0.4549;  // of chi-square with one degree of freedom
+constexpr double kLeastNoise = 0.25;    // of what the matches claim
+
+std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const Motion> starts,
+                                     std::span<const RayMatch> matches) {
+  std::vector<RefinedMotion> refined;
+  for (const Motion& start : starts) {
+    const RefinedMotion candidate = RefineMotion(camera, start, matches);
+    const bool is_known = std::any_of(refined.begin(), refined.end(), [&](const RefinedMotion& other) {
+      return AreAlike(other.motion, candidate.motion, kSameRotation_rad, kSameDirection_rad);
+    });
+    if (!is_known) refined.push_back(candidate);
+  }
+  std::stable_sort(refined.begin(), refined.end(),
+                   [](const RefinedMotion& a, const RefinedMotion& b) { return a.support > b.support; });
+  return refined;
+}
+
+// The noise of the agreeing matches over what they claim, by the median: a claim that is too large hides how much
+// better one motion is than another. Never more than 1: matches that scatter more than they claim may be wrong.
+double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d essential = motion.Essential();
+  std::vector<double> chi2s;
+  for (const RayMatch& match : matches) {
+    const double chi2 = SampsonChi2(camera, essential, match);
+    if (chi2 < kEpipolarChi2Bound) chi2s.push_back(chi2);
+  }
+  if (chi2s.empty()) return 1;
+  const auto middle = chi2s.begin() + static_cast<std::ptrdiff_t>(chi2s.size() / 2);
+  std::nth_element(chi2s.begin(), middle, chi2s.end());
+  return std::clamp(std::sqrt(*middle / kMedianChi2), kLeastNoise, 1.0);
+}
+
+// Along the axes and halfway between them; a direction and its opposite are one start.
+void AddAllDirections(const Eigen::Matrix3d& rotation, std::vector<Motion>& starts) {
+  static const Eigen::Vector3d kDirections[] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0}, {1, -1, 0},
+                                                {1, 0, 1}, {1, 0, -1}, {0, 1, 1}, {0, 1, -1}};
+  for (const Eigen::Vector3d& direction : kDirections) starts.push_back({rotation, direction.normalized()});
+}
+
+}  // namespace
+
+double MotionRanking::RivalSupport() const {
+  for (const RefinedMotion& rival : motions) {
+    if (!AreAlike(motions.front().motion, rival.motion, kNearRotation_rad, kNearDirection_rad)) return rival.support;
+  }
+  return 0;
+}
+
+MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches) {
+  MotionRanking ranking;
+  ranking.matches.assign(matches.begin(), matches.end());
+  std::vector<Motion> starts = search.motions;
+  if (search.homography) {
+    const std::vector<Motion> of_plane = MotionsOf(*search.homography);
+    starts.insert(starts.end(), of_plane.begin(), of_plane.end());
+  }
+  ranking.motions = RefineAll(camera, starts, ranking.matches);
+  if (ranking.motions.empty()) return ranking;
+
+  const double noise = NoiseOverClaim(camera, ranking.motions.front().motion, matches);
+  for (RayMatch& match : ranking.matches) match.sigma_px *= noise;
+  starts.clear();
+  for (const RefinedMotion& refined : ranking.motions) starts.push_back(refined.motion);
+  AddAllDirections(ranking.motions.front().motion.rotation, starts);
+  ranking.motions = RefineAll(camera, starts, ranking.matches);
+  return ranking;
+}
+
+}  // namespace romap

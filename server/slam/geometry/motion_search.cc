@@ -1,0 +1,169 @@
+#include "server/slam/geometry/motion_search.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <opencv2/calib3d.hpp>
+#include <random>
+
+#include "server/slam/geometry/homography.h"
+#include "server/slam/geometry/random_sample.h"
+
+namespace romap {
+namespace {
+
+constexpr int kSampleSize = 5;
+constexpr size_t kMaxMotions = 6;
+// Models that explain at least this share of what the best explains are kept as its rivals.
+constexpr double kRivalShare = 0.6;
+// Motions from five noisy matches that are this near to each other lead to the same when refined.
+constexpr double kAlikeRotation_rad = 0.03;
+constexpr double kAlikeDirection_rad = 0.25;
+
+using Sample = std::array<RayMatch, kSampleSize>;
+
+// The up to ten essential matrices of five matches.
+std::vector<Eigen::Matrix3d> EssentialsOf(const Sample& sample) {
+  std::array<cv::Point2d, kSampleSize> first;
+  std::array<cv::Point2d, kSampleSize> second;
+  for (int i = 0; i < kSampleSize; ++i) {
+    first[i] = {sample[i].first.x(), sample[i].first.y()};
+    second[i] = {sample[i].second.x(), sample[i].second.y()};
+  }
+  std::vector<Eigen::Matrix3d> essentials;
+  cv::Mat stacked;
+  try {
+    // Of five matches OpenCV returns all solutions of its minimal solver, one below the other, without a search.
+    stacked = cv::findEssentialMat(first, second, cv::Matx33d::eye(), cv::RANSAC);
+  } catch (const cv::Exception&) {
+    return essentials;  // a degenerate sample
+  }
+  for (int row = 0; row + 3 <= stacked.rows; row += 3) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> essential(stacked.ptr<double>(row));
+    if (essential.allFinite()) essentials.push_back(essential);
+  }
+  return essentials;
+}
+
+struct Score {
+  double support = 0;
+  int inliers = 0;
+};
+
+Score ScoreOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
+  Score score;
+  for (const RayMatch& match : matches) {
+    const double chi2 = SampsonChi2(camera, essential, match);
+    if (!(chi2 < kEpipolarChi2Bound)) continue;
+    score.support += 1 - chi2 / kEpipolarChi2Bound;
+    ++score.inliers;
+  }
+  return score;
+}
+
+// Of the four motions of an essential matrix (Hartley and Zisserman, result 9.19) the one that puts most matches before
+// both cameras.
+Motion MotionOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d quarter_turn;
+  quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  Motion best;
+  double best_support = -1;
+  for (const Eigen::Matrix3d& middle : {quarter_turn, Eigen::Matrix3d(quarter_turn.transpose())}) {
+    Eigen::Matrix3d rotation = svd.matrixU() * middle * svd.matrixV().transpose();
+    if (rotation.determinant() < 0) rotation = -rotation;
+    for (const double sign : {1.0, -1.0}) {
+      const Motion motion{rotation, sign * svd.matrixU().col(2)};
+      const double support = Support(camera, motion, matches);
+      if (support <= best_support) continue;
+      best = motion;
+      best_support = support;
+    }
+  }
+  return best;
+}
+
+// The best motions so far, no two alike.
+class Shortlist {
+ public:
+  // The support that a motion needs to be listed.
+  double Threshold() const {
+    const double share = entries_.empty() ? 0.0 : kRivalShare * entries_.front().support;
+    return entries_.size() < kMaxMotions ? share : std::max(share, entries_.back().support);
+  }
+
+  void Offer(const Motion& motion, double support) {
+    for (const Entry& entry : entries_) {
+      if (entry.support >= support && AreAlike(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad)) return;
+    }
+    std::erase_if(entries_, [&](const Entry& entry) {
+      return AreAlike(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad);
+    });
+    const auto position =
+        std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.support < support; });
+    entries_.insert(position, {motion, support});
+    if (entries_.size() > kMaxMotions) entries_.pop_back();
+  }
+
+  std::vector<Motion> Motions() const {
+    std::vector<Motion> motions;
+    for (const Entry& entry : entries_) {
+      if (entry.support >= kRivalShare * entries_.front().support) motions.push_back(entry.motion);
+    }
+    return motions;
+  }
+
+ private:
+  struct Entry {
+    Motion motion;
+    double support = 0;
+  };
+  std::vector<Entry> entries_;  // best first
+};
+
+}  // namespace
+
+bool AreAlike(const Motion& a, const Motion& b, double rotation_rad, double direction_rad) {
+  const double turn_rad = Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle();
+  return turn_rad < rotation_rad && a.direction.dot(b.direction) > std::cos(direction_rad);
+}
+
+MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
+                           uint64_t seed) {
+  MotionSearch search;
+  if (matches.size() < kSampleSize) return search;
+  const int count = static_cast<int>(matches.size());
+  std::mt19937_64 random(seed);
+  Shortlist shortlist;
+  int needed = max_iterations;
+  for (int iteration = 0; iteration < needed; ++iteration) {
+    Sample sample;
+    const std::array<int, kSampleSize> indices = SampleDistinct<kSampleSize>(count, random);
+    std::transform(indices.begin(), indices.end(), sample.begin(), [&](int index) { return matches[index]; });
+
+    for (const Eigen::Matrix3d& essential : EssentialsOf(sample)) {
+      const Score score = ScoreOf(camera, essential, matches);
+      if (score.support <= shortlist.Threshold()) continue;
+      shortlist.Offer(MotionOf(camera, essential, matches), score.support);
+      if (score.support <= search.essential_support) continue;
+      search.essential_support = score.support;
+      needed = SamplesNeeded(static_cast<double>(score.inliers) / count, kSampleSize, max_iterations);
+    }
+    if (const auto homography = FitHomography(std::span(sample).first<4>())) {
+      const double support = TransferSupport(camera, *homography, matches);
+      if (support > search.homography_support) {
+        search.homography_support = support;
+        search.homography = homography;
+      }
+    }
+  }
+  search.motions = shortlist.Motions();
+  if (search.homography) {
+    search.homography = PolishHomography(camera, *search.homography, matches);
+    search.homography_support = TransferSupport(camera, *search.homography, matches);
+  }
+  return search;
+}
+
+}  // namespace romap

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <random>
+
+namespace romap {
+
+// K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
+// libraries and the same seed is to give the same map everywhere.
+template <int K>
+std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
+  std::array<int, K> sample;
+  for (int k = 0; k < K; ++k) {
+    const auto chosen_end = sample.begin() + k;
+    do {
+      sample[k] = static_cast<int>(random() % static_cast<uint64_t>(count));
+    } while (std::find(sample.begin(), chosen_end, sample[k]) != chosen_end);
+  }
+  return sample;
+}
+
+// How many samples of `size` matches RANSAC needs until one of them is free of outliers with 99.9 % certainty (Fischler
+// and Bolles 1981), at most `limit`.
+inline int SamplesNeeded(double inlier_share, int size, int limit) {
+  constexpr double kLogOfMissing = -6.907755;  // log(0.001)
+  const double clean = std::pow(inlier_share, size);
+  if (clean >= 1) return 1;
+  const double needed = std::ceil(kLogOfMissing / std::log1p(-clean));
+  return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also when clean is 0: needed is infinite
+}
+
+}  // namespace romap

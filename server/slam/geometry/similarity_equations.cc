@@ -1,0 +1,80 @@
+#include "server/slam/geometry/similarity_equations.h"
+
+#include <cmath>
+
+#include "server/slam/geometry/rotation.h"
+
+namespace romap {
+namespace {
+
+// What a match costs that a step takes behind a camera: see reprojection.cc.
+constexpr double kCostBehindCamera = 1e4;
+// Keeps the normal equations regular where the scale is not asked for.
+constexpr double kIdleInformation = 1;
+
+using PointDerivative = Eigen::Matrix<double, 3, 7>;
+
+// Derivative of the pixel by the point, over the standard deviation.
+Eigen::Matrix<double, 2, 3> ProjectionDerivative(const CameraModel& camera, const Eigen::Vector3d& p, double sigma_px) {
+  const double inverse_z = 1 / p.z();
+  const double fx = camera.fx_px * inverse_z / sigma_px;
+  const double fy = camera.fy_px * inverse_z / sigma_px;
+  Eigen::Matrix<double, 2, 3> derivative;
+  derivative << fx, 0, -fx * p.x() * inverse_z, 0, fy, -fy * p.y() * inverse_z;
+  return derivative;
+}
+
+void AddPixel(const Eigen::Matrix<double, 2, 7>& derivative, const Eigen::Vector2d& error, double bound,
+              SimilarityEquations& equations) {
+  const double chi2 = error.squaredNorm();
+  const double weight = HuberWeight(chi2, bound);
+  for (int row = 0; row < 2; ++row) equations.Add(derivative.row(row).transpose(), error[row], weight);
+  equations.cost += HuberCost(chi2, bound);
+}
+
+}  // namespace
+
+SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match) {
+  SimilarityErrors errors;
+  errors.second_in_first = similarity.scale * (similarity.rotation * match.p_second) + similarity.translation;
+  errors.first_in_second =
+      similarity.rotation.transpose() * (match.p_first - similarity.translation) / similarity.scale;
+  errors.is_before_both = errors.second_in_first.z() > 0 && errors.first_in_second.z() > 0;
+  if (!errors.is_before_both) return errors;
+  errors.first = (camera.Project(errors.second_in_first) - match.first_px) / match.first_sigma_px;
+  errors.second = (camera.Project(errors.first_in_second) - match.second_px) / match.second_sigma_px;
+  return errors;
+}
+
+void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match,
+                         const SimilarityOptions& options, SimilarityEquations& equations) {
+  const SimilarityErrors errors = ErrorsOf(camera, similarity, match);
+  if (!errors.is_before_both) {
+    equations.cost += kCostBehindCamera;
+    return;
+  }
+  // The step moves the point of the second in the first camera's frame; on the point of the first, it acts backwards.
+  PointDerivative moved_first;
+  moved_first << Eigen::Matrix3d::Identity(), -Skew(errors.second_in_first), errors.second_in_first;
+  PointDerivative moved_back;
+  moved_back << Eigen::Matrix3d::Identity(), -Skew(match.p_first), match.p_first;
+  PointDerivative moved_second = -similarity.rotation.transpose() * moved_back / similarity.scale;
+  if (options.fix_scale) {
+    moved_first.col(6).setZero();
+    moved_second.col(6).setZero();
+    equations.hessian(6, 6) += kIdleInformation;
+  }
+  AddPixel(ProjectionDerivative(camera, errors.second_in_first, match.first_sigma_px) * moved_first, errors.first,
+           options.chi2_bound, equations);
+  AddPixel(ProjectionDerivative(camera, errors.first_in_second, match.second_sigma_px) * moved_second, errors.second,
+           options.chi2_bound, equations);
+}
+
+Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step) {
+  const double growth = std::exp(step[6]);
+  const Eigen::Matrix3d turn = ExpRotation(step.segment<3>(3));
+  return {growth * similarity.scale, turn * similarity.rotation,
+          growth * (turn * similarity.translation) + step.head<3>()};
+}
+
+}  // namespace romap

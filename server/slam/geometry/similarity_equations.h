@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/camera_model.h"
+#include "server/slam/geometry/levenberg_marquardt.h"
+#include "server/slam/geometry/similarity.h"
+
+namespace romap {
+
+// A similarity as the inner loops want it: p_first = scale * rotation * p_second + translation.
+struct Similarity {
+  double scale = 1;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+// What a match says against a similarity, in units of the pixels' standard deviations: the second's point seen by the
+// first camera, and the first's by the second.
+struct SimilarityErrors {
+  Eigen::Vector3d second_in_first;  // the points, each in the other camera's frame
+  Eigen::Vector3d first_in_second;
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  Eigen::Vector2d second = Eigen::Vector2d::Zero();
+  bool is_before_both = false;  // else there are no errors
+};
+
+SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match);
+
+using SimilarityEquations = NormalEquations<7>;
+
+// Adds both errors of a match, each with Huber's weight at the options' bound. With a fixed scale the seventh parameter
+// has no effect. Parameters as in MovedSimilarity.
+void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match,
+                         const SimilarityOptions& options, SimilarityEquations& equations);
+
+// p_first' = exp(growth) * Exp(turn) * p_first + shift, with step = (shift, turn, growth).
+Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step);
+
+}  // namespace romap

@@ -1,0 +1,92 @@
+#include "server/slam/geometry/two_view.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include "server/slam/geometry/epipolar.h"
+#include "server/slam/geometry/homography.h"
+#include "server/slam/geometry/motion_ranking.h"
+#include "server/slam/geometry/motion_search.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegree_rad = std::numbers::pi / 180;
+// The homography's share of the support of both models from which on the scene counts as planar (Mur-Artal et al.
+// 2015).
+constexpr double kPlanarShare = 0.45;
+
+// Fills in the points, their number and the parallax; returns the number of matches that agree with the motion.
+int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches,
+                TwoViewResult& result) {
+  const Eigen::Matrix3d essential = motion.Essential();
+  std::vector<double> parallaxes_rad;
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (!(SampsonChi2(camera, essential, matches[i]) < kEpipolarChi2Bound)) continue;
+    const RayMatch obedient = NearestObedient(camera, essential, matches[i]);
+    const RayMeeting meeting = MeetingOf(camera, motion, obedient);
+    if (meeting.is_significant && !meeting.IsBeforeBoth()) continue;
+    parallaxes_rad.push_back(meeting.parallax_rad);
+    if (!meeting.is_significant) continue;
+    result.points_first[i] = meeting.first_depth * obedient.first;
+    ++result.points;
+  }
+  if (parallaxes_rad.empty()) return 0;
+  const auto middle = parallaxes_rad.begin() + static_cast<std::ptrdiff_t>(parallaxes_rad.size() / 2);
+  std::nth_element(parallaxes_rad.begin(), middle, parallaxes_rad.end());
+  result.parallax_rad = *middle;
+  return static_cast<int>(parallaxes_rad.size());
+}
+
+// How much of the matches a camera explains that only turned.
+double TurnSupport(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches) {
+  return search.homography ? TransferSupport(camera, FitTurn(camera, *search.homography, matches), matches) : 0;
+}
+
+}  // namespace
+
+TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMatch> matches,
+                           const TwoViewOptions& options) {
+  TwoViewResult result;
+  result.points_first.resize(matches.size());
+  if (static_cast<int>(matches.size()) < options.min_matches) return result;
+  const std::vector<RayMatch> rays = RaysOf(camera, matches);
+  const MotionSearch search = SearchMotions(camera, rays, options.max_iterations, options.seed);
+  const MotionRanking ranking = RankMotions(camera, search, rays);
+  if (ranking.motions.empty()) return result;
+
+  const RefinedMotion& best = ranking.motions.front();
+  result.T_first_second = SE3<Camera, Camera>(best.motion.rotation, best.motion.direction).Inverse();
+  result.from_homography =
+      search.homography_support > kPlanarShare * (search.homography_support + search.essential_support);
+  const int agreeing = Triangulate(camera, best.motion, ranking.matches, result);
+  if (agreeing < options.min_points) return result;
+
+  if (TurnSupport(camera, search, ranking.matches) > options.max_turn_share * best.support ||
+      result.points < options.min_points || result.parallax_rad < options.min_parallax_deg * kDegree_rad ||
+      best.rotation_sigma_rad > options.max_rotation_sigma_deg * kDegree_rad ||
+      best.direction_sigma_rad > options.max_direction_sigma_deg * kDegree_rad) {
+    result.outcome = TwoViewOutcome::kTooLittleParallax;
+  } else if (ranking.RivalSupport() > options.max_rival_share * best.support) {
+    result.outcome = TwoViewOutcome::kAmbiguous;
+  } else {
+    result.outcome = TwoViewOutcome::kOk;
+  }
+  return result;
+}
+
+const char* Describe(TwoViewOutcome outcome) {
+  switch (outcome) {
+    case TwoViewOutcome::kOk:
+      return "found";
+    case TwoViewOutcome::kTooFewMatches:
+      return "too few matches agree on one motion";
+    case TwoViewOutcome::kTooLittleParallax:
+      return "too little parallax: the camera stood still or only turned";
+    case TwoViewOutcome::kAmbiguous:
+      return "two motions explain the matches about equally well";
+  }
+  return "unknown";
+}
+
+}  // namespace romap
