@@ -67,11 +67,11 @@ class BundleSolver {
   std::vector<uint8_t> varied_points_;   // per point
 
   RefreshCameras refresh_{&cameras_};
-  ceres::HuberLoss reprojection_loss_{std::sqrt(kChi2Bound2)};
-  ceres::HuberLoss depth_loss_{std::sqrt(kChi2Bound1)};
+  ceres::HuberLoss loss_{std::sqrt(kChi2Bound2)};
+  ceres::HuberLoss depth_loss_{std::sqrt(kChi2Bound3)};
   // Costs cannot be moved, hence no vectors.
-  std::deque<ReprojectionCost> reprojection_costs_;
-  std::deque<InverseDepthCost> depth_costs_;
+  std::deque<ReprojectionCost> costs_;
+  std::deque<ReprojectionDepthCost> depth_costs_;
   std::deque<PosePriorCost> prior_costs_;
   ceres::Problem ceres_;  // last: it refers to all the others
 };
@@ -153,11 +153,13 @@ void BundleSolver::AddObservations() {
     double* increment = camera.increment.data();
     double* point = points_[observation.point].data();
 
-    reprojection_costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px);
-    ceres_.AddResidualBlock(&reprojection_costs_.back(), &reprojection_loss_, increment, point);
     if (HasDepth(observation)) {
-      depth_costs_.emplace_back(&camera, observation.depth_mu / unit_mu_, observation.depth_sigma_mu / unit_mu_);
+      depth_costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px,
+                                observation.depth_mu / unit_mu_, observation.depth_sigma_mu / unit_mu_);
       ceres_.AddResidualBlock(&depth_costs_.back(), &depth_loss_, increment, point);
+    } else {
+      costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px);
+      ceres_.AddResidualBlock(&costs_.back(), &loss_, increment, point);
     }
     if (camera_fixed) ceres_.SetParameterBlockConstant(increment);
     if (point_fixed) ceres_.SetParameterBlockConstant(point);
@@ -247,9 +249,10 @@ bool BundleSolver::WriteBack() const {
 
 void RunBundle(BundleProblem& problem, const std::vector<uint8_t>& use, const BundleOptions& options,
                int max_iterations, BundleRun& run) {
-  run.usable = run.converged = run.aborted = false;
+  run.usable = run.converged = false;
   run.iterations = 0;
-  if (max_iterations <= 0) return;
+  run.aborted = options.abort != nullptr && options.abort->load(std::memory_order_relaxed);
+  if (run.aborted || max_iterations <= 0) return;
   BundleSolver(problem, use).Run(options, max_iterations, run);
 }
 

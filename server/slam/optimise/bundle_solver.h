@@ -7,8 +7,7 @@
 
 namespace romap {
 
-// The 95 % bounds of the chi-square distribution with one, two and three degrees of freedom.
-inline constexpr double kChi2Bound1 = 3.841;
+// The 95 % bounds of the chi-square distribution with two and three degrees of freedom.
 inline constexpr double kChi2Bound2 = 5.991;
 inline constexpr double kChi2Bound3 = 7.815;
 

@@ -7,19 +7,33 @@
 namespace romap {
 namespace {
 
-using Vector3Map = Eigen::Map<const Eigen::Vector3d>;
-using RowVector3 = Eigen::RowVector3d;
-using CameraJacobian = Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>>;
-using PointJacobian = Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>;
-
-// In units of sigma, per axis; far beyond any bound, and Huber's loss makes it grow only linearly.
+// In units of sigma, per residual; far beyond any bound, and Huber's loss makes it grow only linearly.
 constexpr double kResidualWithoutImage = 100;
 
-void SetWithoutImage(double* residuals, double** jacobians) {
-  residuals[0] = residuals[1] = kResidualWithoutImage;
+Eigen::Vector3d PointInCamera(const CameraState& state, const double* p_world) {
+  return state.R_camera_world * (Eigen::Map<const Eigen::Vector3d>(p_world) - state.t_world_camera);
+}
+
+void SetWithoutImage(int rows, double* residuals, double** jacobians) {
+  std::fill_n(residuals, rows, kResidualWithoutImage);
   if (jacobians == nullptr) return;
-  if (jacobians[0] != nullptr) std::fill_n(jacobians[0], 12, 0.0);
-  if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 6, 0.0);
+  if (jacobians[0] != nullptr) std::fill_n(jacobians[0], 6 * rows, 0.0);
+  if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 3 * rows, 0.0);
+}
+
+// Row `row` of the Jacobians from the derivative of its residual by the point in the camera's frame: when the camera
+// turns, that point moves by Hat(p_camera) times the turn, when it shifts, by minus the shift.
+void SetJacobianRow(int row, const CameraState& state, const Eigen::Vector3d& p_camera,
+                    const Eigen::RowVector3d& by_p_camera, double** jacobians) {
+  if (jacobians[0] != nullptr) {
+    Eigen::Map<Eigen::Matrix<double, 1, 6>> by_camera(jacobians[0] + 6 * row);
+    by_camera.head<3>().noalias() = by_p_camera.cross(p_camera.transpose()) * state.rotation_jacobian;
+    by_camera.tail<3>().noalias() = -by_p_camera * state.translation_jacobian;
+  }
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<Eigen::RowVector3d> by_point(jacobians[1] + 3 * row);
+    by_point.noalias() = by_p_camera * state.R_camera_world;
+  }
 }
 
 }  // namespace
@@ -33,10 +47,9 @@ ReprojectionCost::ReprojectionCost(const CameraModel& camera, const CameraState*
       weight_y_(camera.fy_px / sigma_px) {}
 
 bool ReprojectionCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const CameraState& state = *state_;
-  const Eigen::Vector3d p_camera = state.R_camera_world * (Vector3Map(parameters[1]) - state.t_world_camera);
+  const Eigen::Vector3d p_camera = PointInCamera(*state_, parameters[1]);
   if (p_camera.z() < kMinBundleDepth) {
-    SetWithoutImage(residuals, jacobians);
+    SetWithoutImage(2, residuals, jacobians);
     return true;
   }
   const double inverse_z = 1 / p_camera.z();
@@ -45,56 +58,30 @@ bool ReprojectionCost::Evaluate(double const* const* parameters, double* residua
   residuals[0] = weight_x_ * (x - measured_x_);
   residuals[1] = weight_y_ * (y - measured_y_);
   if (jacobians == nullptr) return true;
-
-  // Of the residuals by the point in the camera's frame.
-  const RowVector3 dx(weight_x_ * inverse_z, 0, -weight_x_ * inverse_z * x);
-  const RowVector3 dy(0, weight_y_ * inverse_z, -weight_y_ * inverse_z * y);
-  if (jacobians[0] != nullptr) {
-    // A camera's turn moves the point by Hat(p_camera), its shift by -1 (both in its own frame).
-    const RowVector3 turn_x(weight_x_ * x * y, -weight_x_ * (1 + x * x), weight_x_ * y);
-    const RowVector3 turn_y(weight_y_ * (1 + y * y), -weight_y_ * x * y, -weight_y_ * x);
-    CameraJacobian jacobian(jacobians[0]);
-    jacobian.block<1, 3>(0, 0).noalias() = turn_x * state.rotation_jacobian;
-    jacobian.block<1, 3>(1, 0).noalias() = turn_y * state.rotation_jacobian;
-    jacobian.block<1, 3>(0, 3).noalias() = -dx * state.translation_jacobian;
-    jacobian.block<1, 3>(1, 3).noalias() = -dy * state.translation_jacobian;
-  }
-  if (jacobians[1] != nullptr) {
-    PointJacobian jacobian(jacobians[1]);
-    jacobian.row(0).noalias() = dx * state.R_camera_world;
-    jacobian.row(1).noalias() = dy * state.R_camera_world;
-  }
+  SetJacobianRow(0, *state_, p_camera, weight_x_ * inverse_z * Eigen::RowVector3d(1, 0, -x), jacobians);
+  SetJacobianRow(1, *state_, p_camera, weight_y_ * inverse_z * Eigen::RowVector3d(0, 1, -y), jacobians);
   return true;
 }
 
-InverseDepthCost::InverseDepthCost(const CameraState* state, double depth, double depth_sigma)
-    : state_(state), measured_(1 / depth), weight_(depth * depth / depth_sigma) {}
+ReprojectionDepthCost::ReprojectionDepthCost(const CameraModel& camera, const CameraState* state,
+                                             const Eigen::Vector2d& pixel_px, double sigma_px, double depth,
+                                             double depth_sigma)
+    : reprojection_(camera, state, pixel_px, sigma_px),
+      state_(state),
+      measured_(1 / depth),
+      weight_(depth * depth / depth_sigma) {}
 
-bool InverseDepthCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const CameraState& state = *state_;
-  const Eigen::Vector3d p_camera = state.R_camera_world * (Vector3Map(parameters[1]) - state.t_world_camera);
+bool ReprojectionDepthCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+  const Eigen::Vector3d p_camera = PointInCamera(*state_, parameters[1]);
   if (p_camera.z() < kMinBundleDepth) {
-    SetWithoutImage(residuals, jacobians);
+    SetWithoutImage(3, residuals, jacobians);
     return true;
   }
+  reprojection_.Evaluate(parameters, residuals, jacobians);  // the first two rows
   const double inverse_z = 1 / p_camera.z();
-  residuals[0] = weight_ * (inverse_z - measured_);
-  residuals[1] = 0;
+  residuals[2] = weight_ * (inverse_z - measured_);
   if (jacobians == nullptr) return true;
-
-  const double by_z = -weight_ * inverse_z * inverse_z;
-  if (jacobians[0] != nullptr) {
-    const RowVector3 turn(-by_z * p_camera.y(), by_z * p_camera.x(), 0);
-    CameraJacobian jacobian(jacobians[0]);
-    jacobian.block<1, 3>(0, 0).noalias() = turn * state.rotation_jacobian;
-    jacobian.block<1, 3>(0, 3) = -by_z * state.translation_jacobian.row(2);
-    jacobian.row(1).setZero();
-  }
-  if (jacobians[1] != nullptr) {
-    PointJacobian jacobian(jacobians[1]);
-    jacobian.row(0) = by_z * state.R_camera_world.row(2);
-    jacobian.row(1).setZero();
-  }
+  SetJacobianRow(2, *state_, p_camera, Eigen::RowVector3d(0, 0, -weight_ * inverse_z * inverse_z), jacobians);
   return true;
 }
 

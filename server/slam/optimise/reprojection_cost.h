@@ -32,15 +32,16 @@ class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
   double weight_x_, weight_y_;      // focal length / sigma
 };
 
-// Error of the inverse depth. The second residual is always zero: with all residual blocks of the points two high,
-// Ceres eliminates points by code compiled for blocks of 2, 3, 6, which saves more than the empty row costs.
-class InverseDepthCost final : public ceres::SizedCostFunction<2, 6, 3> {
+// Pixel error (x, y) and error of the inverse depth.
+class ReprojectionDepthCost final : public ceres::SizedCostFunction<3, 6, 3> {
  public:
-  InverseDepthCost(const CameraState* state, double depth, double depth_sigma);
+  ReprojectionDepthCost(const CameraModel& camera, const CameraState* state, const Eigen::Vector2d& pixel_px,
+                        double sigma_px, double depth, double depth_sigma);
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
+  ReprojectionCost reprojection_;
   const CameraState* state_;
   double measured_;  // 1 / depth
   double weight_;    // 1 / sigma of the inverse depth

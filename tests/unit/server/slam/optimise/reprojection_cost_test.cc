@@ -56,22 +56,36 @@ TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
   EXPECT_TRUE(by_point.isZero());
 }
 
-TEST(InverseDepthCost, IsTheErrorOfInverseDepthInSigmas) {
+TEST(ReprojectionDepthCost, AddsTheErrorOfInverseDepthInSigmas) {
   Sight sight({0.3, -0.2, 2.0});
+  const CameraModel model = BundleWorldCamera();
+  const Eigen::Vector2d pixel_px = model.Project({0.3, -0.2, 2.0}) + Eigen::Vector2d(3, -4);
   // sigma of 1 / depth is 0.1 / 2.5^2.
-  const InverseDepthCost cost(&sight.camera, 2.5, 0.1);
-  Eigen::Vector2d residual;
+  const ReprojectionDepthCost cost(model, &sight.camera, pixel_px, 2, 2.5, 0.1);
+  Eigen::Vector3d residual;
   ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), nullptr));
-  EXPECT_NEAR(residual[0], (1 / 2.0 - 1 / 2.5) / (0.1 / 6.25), 1e-9);
-  EXPECT_EQ(residual[1], 0);
+  EXPECT_LT((residual - Eigen::Vector3d(-1.5, 2, (1 / 2.0 - 1 / 2.5) / (0.1 / 6.25))).norm(), 1e-9);
 }
 
-TEST(InverseDepthCost, JacobiansMatchFiniteDifferences) {
+TEST(ReprojectionDepthCost, JacobiansMatchFiniteDifferences) {
   for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
     Sight sight({0.3, -0.2, 1.5}, turn_rad);
-    const InverseDepthCost cost(&sight.camera, 1.4, 0.05);
+    const ReprojectionDepthCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1.7, 1.4, 0.001);
     ExpectJacobiansMatch(cost, sight.Parameters(), [&] { sight.camera.Refresh(); });
   }
+}
+
+TEST(ReprojectionDepthCost, APointBehindTheCameraCostsButDoesNotFail) {
+  Sight sight({0.3, -0.2, -1.5});
+  const ReprojectionDepthCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1, 1.4, 0.05);
+  Eigen::Vector3d residual;
+  Eigen::Matrix<double, 3, 6, Eigen::RowMajor> by_camera;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
+  double* jacobians[] = {by_camera.data(), by_point.data()};
+  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), jacobians));
+  EXPECT_GT(residual.minCoeff(), 50);
+  EXPECT_TRUE(by_camera.isZero());
+  EXPECT_TRUE(by_point.isZero());
 }
 
 TEST(PosePriorCost, IsTheDistanceInSigmas) {
