@@ -1,0 +1,94 @@
+#include "server/slam/geometry/epipolar.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/server/slam/geometry/gradient_check.h"
+#include "tests/unit/server/slam/geometry/synthetic_scene.h"
+
+namespace romap {
+namespace {
+
+Motion TestMotion() { return {Turn(3, -5, 8).toRotationMatrix(), Eigen::Vector3d(0.8, -0.1, 0.3).normalized()}; }
+
+// A match of a point before both cameras, `off_px` from the truth in the second picture.
+RayMatch MatchOf(const CameraModel& camera, const Eigen::Vector3d& p_first, const Eigen::Vector2d& off_px) {
+  const Motion motion = TestMotion();
+  const Eigen::Vector2d first_px = camera.Project(p_first);
+  const Eigen::Vector2d second_px = camera.Project(motion.rotation * p_first + motion.direction) + off_px;
+  return {camera.Unproject(first_px.x(), first_px.y()), camera.Unproject(second_px.x(), second_px.y()), 1.5};
+}
+
+TEST(Epipolar, ExactMatchesObeyAndMeetWhereTheyAre) {
+  const CameraModel camera = TestCamera();
+  const Eigen::Vector3d p_first(0.4, -0.3, 5);
+  const RayMatch match = MatchOf(camera, p_first, {0, 0});
+  EXPECT_NEAR(SampsonChi2(camera, TestMotion().Essential(), match), 0, 1e-18);
+  const RayMeeting meeting = MeetingOf(camera, TestMotion(), match);
+  EXPECT_NEAR(meeting.first_depth, 5, 1e-9);
+  EXPECT_NEAR(meeting.second_depth, (TestMotion().rotation * p_first + TestMotion().direction).z(), 1e-9);
+  EXPECT_TRUE(meeting.is_significant);
+  EXPECT_TRUE(meeting.IsBeforeBoth());
+}
+
+TEST(Epipolar, TheSampsonErrorIsTheDistanceToTheNearestObedientMatch) {
+  const CameraModel camera = TestCamera();
+  const Eigen::Matrix3d essential = TestMotion().Essential();
+  const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, {2, -3});
+  const RayMatch obedient = NearestObedient(camera, essential, match);
+  const double moved2_px2 = (camera.Project(obedient.first) - camera.Project(match.first)).squaredNorm() +
+                            (camera.Project(obedient.second) - camera.Project(match.second)).squaredNorm();
+  const double chi2 = SampsonChi2(camera, essential, match);
+  EXPECT_GT(chi2, 0.1);
+  EXPECT_NEAR(moved2_px2 / (1.5 * 1.5), chi2, 1e-9);
+  EXPECT_LT(SampsonChi2(camera, essential, obedient), 1e-4 * chi2);
+}
+
+TEST(Epipolar, TheOppositeDirectionPutsPointsBehind) {
+  const CameraModel camera = TestCamera();
+  const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, {0, 0});
+  const Motion opposite{TestMotion().rotation, -TestMotion().direction};
+  EXPECT_FALSE(MeetingOf(camera, opposite, match).IsBeforeBoth());
+  EXPECT_EQ(Support(camera, opposite, {&match, 1}), 0);
+  EXPECT_NEAR(Support(camera, TestMotion(), {&match, 1}), 1, 1e-12);
+}
+
+TEST(Epipolar, GradientAgreesWithDifferencesOfTheCost) {
+  const CameraModel camera = TestCamera();
+  const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
+  for (const Eigen::Vector2d& off_px :
+       {Eigen::Vector2d(1, -2), Eigen::Vector2d(-6, 12)}) {  // within Huber's bound, beyond
+    const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, off_px);
+    const auto linearise = [&](const Motion& at) {
+      MotionEquations equations;
+      AddEpipolarError(camera, at, match, equations);
+      return equations;
+    };
+    ExpectGradientOfCost<5>(linearise, move, TestMotion());
+  }
+}
+
+TEST(Epipolar, SigmasTellTheErrorsThatNoiseCauses) {
+  const CameraModel camera = TestCamera();
+  const Motion truth = TestMotion();
+  double rotation2 = 0;
+  double claimed2 = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    Noise noise(seed);
+    std::vector<RayMatch> matches;
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector2d pixel_px = noise.Pixel(camera);
+      const Eigen::Vector3d p_first = noise.Uniform(4, 9) * camera.Unproject(pixel_px.x(), pixel_px.y());
+      matches.push_back(MatchOf(camera, p_first, noise.Normal2(1.5)));
+      matches.back().sigma_px = 1.5 / std::sqrt(2);  // the noise of one picture, shared by two
+    }
+    const RefinedMotion refined = RefineMotion(camera, truth, matches);
+    const double error_rad = Eigen::AngleAxisd(truth.rotation.transpose() * refined.motion.rotation).angle();
+    rotation2 += error_rad * error_rad;
+    claimed2 += refined.rotation_sigma_rad * refined.rotation_sigma_rad;
+  }
+  EXPECT_GT(rotation2, 0.4 * claimed2);
+  EXPECT_LT(rotation2, 4 * claimed2);  // three axes, and the outliers' share cut off
+}
+
+}  // namespace
+}  // namespace romap
