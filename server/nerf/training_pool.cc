@@ -56,7 +56,7 @@ struct TrainingPool::Lease {
   int threads = 1;
 };
 
-TrainingPool::TrainingPool(const NerfConfig& config, int threads) : config_(config), threads_(std::max(1, threads)) {
+TrainingPool::TrainingPool(const NerfConfig& config, int threads) : config_(config), threads_(std::max(0, threads)) {
   for (int i = 0; i < threads_; ++i) workers_.emplace_back([this] { Work(); });
 }
 
@@ -157,6 +157,7 @@ void TrainingPool::Unregister(uint64_t client_id) {
 
 bool TrainingPool::Complete(const Client& client, const Job& job, Clock::time_point now) const {
   if (client.finished) return true;
+  if (threads_ == 0) return false;  // time does not count
   const std::chrono::duration<double> quiet = now - job.last_view_time;
   return quiet.count() >= config_.settle_time_s && job.views >= config_.min_views;
 }
@@ -180,13 +181,13 @@ std::optional<TrainingPool::Clock::time_point> TrainingPool::NextSettleTime() co
 }
 
 // Takes the neediest object of the client whose turn it is.
-std::optional<TrainingPool::Lease> TrainingPool::Next(Clock::time_point now) {
+std::optional<TrainingPool::Lease> TrainingPool::Next(Clock::time_point now, std::optional<uint64_t> only_client) {
   Client* best_client = nullptr;
   std::shared_ptr<Job> best;
   auto best_key = std::tuple(0, uint64_t{0}, 0.0);
   int busy = 0;
   for (const auto& [id, client] : clients_) {
-    if (client->closing) continue;
+    if (client->closing || (only_client && id != *only_client)) continue;
     busy += client->leases;
     for (const auto& [object, job] : client->jobs) {
       if (!Runnable(*client, *job, now)) continue;
@@ -221,25 +222,39 @@ void TrainingPool::Work() {
       }
       continue;
     }
-    lock.unlock();
-    std::string failure;
-    try {
-      RunSlice(*lease);
-    } catch (const std::exception& e) {  // from a library, or out of memory: costs this object, not the server
-      failure = e.what();
-    }
-    lock.lock();
-    if (!failure.empty()) {
-      spdlog::error("{}: training failed and is given up: {}", lease->job->id.ToString(), failure);
-      auto& jobs = lease->client->jobs;
-      std::erase_if(jobs, [&](const auto& entry) { return entry.second == lease->job; });
-      lease->client->given_up.insert(lease->job->id);
-    }
-    lease->job->leased = false;
-    --lease->client->leases;
-    work_changed_.notify_one();
-    lease_returned_.notify_all();
+    Serve(*lease, lock);
   }
+}
+
+void TrainingPool::TrainSlices(uint64_t client, int count) {
+  std::unique_lock lock(mutex_);
+  for (int i = 0; i < count; ++i) {
+    std::optional<Lease> lease = Next(Clock::now(), client);
+    if (!lease) return;
+    Serve(*lease, lock);
+  }
+}
+
+// Runs the slice of a lease without the lock and gives the lease back.
+void TrainingPool::Serve(Lease& lease, std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  std::string failure;
+  try {
+    RunSlice(lease);
+  } catch (const std::exception& e) {  // from a library, or out of memory: costs this object, not the server
+    failure = e.what();
+  }
+  lock.lock();
+  if (!failure.empty()) {
+    spdlog::error("{}: training failed and is given up: {}", lease.job->id.ToString(), failure);
+    auto& jobs = lease.client->jobs;
+    std::erase_if(jobs, [&](const auto& entry) { return entry.second == lease.job; });
+    lease.client->given_up.insert(lease.job->id);
+  }
+  lease.job->leased = false;
+  --lease.client->leases;
+  work_changed_.notify_one();
+  lease_returned_.notify_all();
 }
 
 void TrainingPool::GiveTo(ObjectField& field, ObjectViews offer) {
@@ -289,9 +304,9 @@ void TrainingPool::RunSlice(Lease& lease) {
 bool TrainingPool::ShouldSend(const Job& job, bool budget_used) const {
   if (job.steps == 0 || job.steps == job.sent_steps) return false;
   if (budget_used) return true;
+  if (job.steps >= job.sent_steps + static_cast<uint64_t>(config_.snapshot_interval_steps)) return true;
   const std::chrono::duration<double> age = Clock::now() - job.sent_time;
-  return job.steps >= job.sent_steps + static_cast<uint64_t>(config_.snapshot_interval_steps) ||
-         age.count() >= config_.snapshot_interval_s;
+  return threads_ > 0 && age.count() >= config_.snapshot_interval_s;
 }
 
 }  // namespace romap

@@ -20,10 +20,13 @@ namespace romap {
 // The server's workers that train the objects of all clients (paper: one thread pool trains all models). An object is
 // leased to one worker for a slice of steps and queued again: clients take turns, and within a client the object goes
 // first that is furthest from its budget. The budget of an object grows with its views (TrainingPlan). Thread-safe.
+//
+// A pool without workers trains only in TrainSlices(), on the caller's thread: what it does then depends on the order
+// of the calls alone, never on time.
 class TrainingPool {
  public:
-  // Receives snapshots on worker threads, no two at a time of the same object, with no lock held. Must not call
-  // Unregister().
+  // Receives snapshots on worker threads (or in TrainSlices()), no two at a time of the same object, with no lock held.
+  // Must not call Unregister().
   using Sink = std::function<void(FieldSnapshot)>;
 
   struct Progress {
@@ -33,7 +36,7 @@ class TrainingPool {
     double progress = 0;       // 0..1, mean over objects of steps done / steps planned; 1 without objects
   };
 
-  // `threads` >= 1 workers.
+  // `threads` workers; 0 = none.
   TrainingPool(const NerfConfig& config, int threads);
   // Ends all clients; running slices are finished first.
   ~TrainingPool();
@@ -49,6 +52,9 @@ class TrainingPool {
   void Remove(uint64_t client, ObjectId object);
   // No more views will come: every object is trained to the end of its plan.
   void Finish(uint64_t client);
+  // For a pool without workers: trains this client's objects for at most `count` slices; fewer when there is nothing
+  // more to do.
+  void TrainSlices(uint64_t client, int count);
   Progress GetProgress(uint64_t client) const;
   // Nothing is being trained, waits to be, or would be if only time passed. Objects without enough views do not count.
   bool Idle(uint64_t client) const;
@@ -62,7 +68,8 @@ class TrainingPool {
   struct Lease;
 
   void Work();
-  std::optional<Lease> Next(Clock::time_point now);
+  std::optional<Lease> Next(Clock::time_point now, std::optional<uint64_t> only_client = std::nullopt);
+  void Serve(Lease& lease, std::unique_lock<std::mutex>& lock);
   void RunSlice(Lease& lease);
   static void GiveTo(ObjectField& field, ObjectViews offer);
   bool ShouldSend(const Job& job, bool budget_used) const;
@@ -71,7 +78,7 @@ class TrainingPool {
   std::optional<Clock::time_point> NextSettleTime() const;
 
   const NerfConfig config_;
-  const int threads_;
+  const int threads_;  // 0: by hand
   mutable std::mutex mutex_;
   std::condition_variable work_changed_;  // something became runnable, or stop
   std::condition_variable lease_returned_;

@@ -27,7 +27,9 @@ absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const MeshCon
 
 }  // namespace
 
-Mesher::Mesher(const MeshConfig& config) : config_(config), thread_([this] { Run(); }) {}
+Mesher::Mesher(const MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
+  if (threading == Threading::kOwnThread) thread_ = std::thread([this] { Run(); });
+}
 
 Mesher::~Mesher() {
   {
@@ -35,7 +37,7 @@ Mesher::~Mesher() {
     stopping_ = true;
     changed_.notify_all();
   }
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 uint64_t Mesher::Register(Sink sink) {
@@ -53,8 +55,14 @@ void Mesher::Unregister(uint64_t client) {
 }
 
 void Mesher::Offer(uint64_t client, FieldSnapshot snapshot) {
-  std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   if (!sinks_.contains(client)) return;
+  if (threading_ == Threading::kCaller) {
+    const Sink sink = sinks_.at(client);
+    lock.unlock();
+    Serve(sink, snapshot);
+    return;
+  }
   auto& slot = waiting_[{client, snapshot.object}];
   if (slot.first == 0) slot.first = next_ticket_++;
   slot.second = std::move(snapshot);
@@ -72,6 +80,20 @@ bool Mesher::Idle(uint64_t client) const {
          std::none_of(waiting_.begin(), waiting_.end(), [&](const auto& entry) { return entry.first.first == client; });
 }
 
+void Mesher::Serve(const Sink& sink, const FieldSnapshot& snapshot) const {
+  try {
+    if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
+      sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
+    } else {
+      // Early in training there may be no surface yet; the next snapshot brings it.
+      spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
+                    Message(mesh.status()));
+    }
+  } catch (const std::exception& e) {  // a library, or memory: this mesh is lost, the next may come
+    spdlog::error("{}: meshing failed: {}", snapshot.object.ToString(), e.what());
+  }
+}
+
 void Mesher::Run() {
   LowerThreadPriority();
   std::unique_lock lock(mutex_);
@@ -85,17 +107,7 @@ void Mesher::Run() {
     const FieldSnapshot snapshot = std::move(oldest->second.second);
     waiting_.erase(oldest);
     lock.unlock();
-    try {
-      if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
-        sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
-      } else {
-        // Early in training there may be no surface yet; the next snapshot brings it.
-        spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
-                      Message(mesh.status()));
-      }
-    } catch (const std::exception& e) {  // a library, or memory: this mesh is lost, the next may come
-      spdlog::error("{}: meshing failed: {}", snapshot.object.ToString(), e.what());
-    }
+    Serve(sink, snapshot);
     lock.lock();
     busy_client_ = 0;
     changed_.notify_all();

@@ -13,12 +13,15 @@
 
 namespace romap {
 
-// The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits.
+// The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits. Without a
+// thread of its own it makes each mesh in Offer().
 class Mesher {
  public:
   using Sink = std::function<void(MeshUpdate, const MeshPlace&)>;
 
-  explicit Mesher(const MeshConfig& config);
+  enum class Threading { kOwnThread, kCaller };
+
+  explicit Mesher(const MeshConfig& config, Threading threading = Threading::kOwnThread);
   ~Mesher();
 
   uint64_t Register(Sink sink);
@@ -33,8 +36,10 @@ class Mesher {
   using Key = std::pair<uint64_t, ObjectId>;
 
   void Run();
+  void Serve(const Sink& sink, const FieldSnapshot& snapshot) const;
 
   const MeshConfig config_;
+  const Threading threading_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<uint64_t, Sink> sinks_;
@@ -43,7 +48,7 @@ class Mesher {
   uint64_t next_ticket_ = 1;
   uint64_t busy_client_ = 0;
   bool stopping_ = false;
-  std::thread thread_;
+  std::thread thread_;  // kOwnThread only
 };
 
 }  // namespace romap

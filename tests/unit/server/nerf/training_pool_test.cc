@@ -221,5 +221,41 @@ TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
   EXPECT_EQ(plan.AllowedSteps(40, false), full + static_cast<uint64_t>(config.max_refine_steps));
 }
 
+TEST(TrainingPoolTest, WithoutWorkersItTrainsByHandAndAlwaysAlike) {
+  const auto train = [](std::vector<uint64_t>* steps_seen) {
+    NerfConfig config = TinyConfig();
+    config.settle_time_s = 0;  // nothing may depend on time
+    config.snapshot_interval_s = 0;
+    Inbox inbox;
+    TrainingPool pool(config, 0);
+    const uint64_t client = pool.Register(inbox.Sink());
+    const uint64_t other = pool.Register([](FieldSnapshot) { FAIL() << "not this client's turn"; });
+    pool.Offer(other, Offer(1, 5));
+    pool.Offer(client, Offer(1, 5));
+    pool.Offer(client, Offer(2, 5));
+    EXPECT_EQ(pool.GetProgress(client).steps, 0u);
+    pool.TrainSlices(client, 3);
+    EXPECT_EQ(pool.GetProgress(client).steps, 15u);
+    pool.TrainSlices(client, 1000);
+    EXPECT_EQ(pool.GetProgress(client).steps, 28u) << "14 steps each while more views may come";
+    pool.Finish(client);
+    pool.TrainSlices(client, 1000);
+    EXPECT_TRUE(pool.Idle(client));
+    EXPECT_EQ(pool.GetProgress(client).steps, 80u);
+
+    const std::vector<FieldSnapshot> snapshots = inbox.Of(1);
+    for (const FieldSnapshot& snapshot : snapshots) steps_seen->push_back(snapshot.steps);
+    std::vector<Eigen::Vector3f> places;
+    for (int i = -5; i <= 5; ++i) places.emplace_back(0.02F * static_cast<float>(i), 0.01F, -0.03F);
+    std::vector<float> raw(places.size());
+    snapshots.back().field->Sample(places, raw, {});
+    return raw;
+  };
+  std::vector<uint64_t> first_steps, second_steps;
+  EXPECT_EQ(train(&first_steps), train(&second_steps));
+  EXPECT_EQ(first_steps, second_steps);
+  EXPECT_EQ(first_steps.back(), 40u);
+}
+
 }  // namespace
 }  // namespace romap
