@@ -33,12 +33,12 @@ struct Best {
 std::vector<EpipolarRay> PolarRays(const MapKeyframe& keyframe, const Eigen::Matrix3d& axes, bool only_new,
                                    const SlamConfig& config) {
   std::vector<EpipolarRay> rays;
-  for (size_t i = 0; i < keyframe.features.size(); ++i) {
+  for (size_t i = 0; i < keyframe.features().size(); ++i) {
     if (only_new && keyframe.points[i]) continue;
-    const Eigen::Vector3d ray = axes.transpose() * keyframe.bearings_world[i];
+    const Eigen::Vector3d ray = axes.transpose() * keyframe.BearingWorld(i);
     const double sine = ray.head<2>().norm();
     if (sine < kMinSineToBaseline) continue;
-    const double sigma_rad = config.pixel_sigma_px * keyframe.features[i].octave_scale / keyframe.camera.fx_px;
+    const double sigma_rad = config.pixel_sigma_px * keyframe.features()[i].octave_scale / keyframe.camera().fx_px;
     rays.push_back({static_cast<int>(i), std::atan2(ray.y(), ray.x()), std::atan2(sine, ray.z()), sigma_rad / sine});
   }
   return rays;
@@ -55,8 +55,8 @@ Eigen::Matrix3d BaselineAxes(const Eigen::Vector3d& baseline) {
 
 void Offer(const MapKeyframe& keyframe, int feature, int distance, Best& best) {
   const auto same_spot = [&](int a, int b) {
-    const Feature& fa = keyframe.features[static_cast<size_t>(a)];
-    const Feature& fb = keyframe.features[static_cast<size_t>(b)];
+    const Feature& fa = keyframe.features()[static_cast<size_t>(a)];
+    const Feature& fb = keyframe.features()[static_cast<size_t>(b)];
     const auto scale = static_cast<float>(std::max(fa.octave_scale, fb.octave_scale));
     return (fa.pixel_px - fb.pixel_px).norm() < kSameSpot_px * scale;
   };
@@ -102,12 +102,12 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
   for (const EpipolarRay& ray : second_rays) max_sigma_rad = std::max(max_sigma_rad, ray.around_sigma_rad);
 
   const double min_parallax_rad = config.min_parallax_deg * std::numbers::pi / 180;
-  std::vector<Best> best_of_first(first.features.size());
-  std::vector<Best> best_of_second(second.features.size());
+  std::vector<Best> best_of_first(first.features().size());
+  std::vector<Best> best_of_second(second.features().size());
   for (const EpipolarRay& ray : first_rays) {
-    const Feature& feature = first.features[static_cast<size_t>(ray.feature)];
+    const Feature& feature = first.features()[static_cast<size_t>(ray.feature)];
     VisitPlane(ray, second_rays, max_sigma_rad, [&](const EpipolarRay& candidate) {
-      const Feature& other = second.features[static_cast<size_t>(candidate.feature)];
+      const Feature& other = second.features()[static_cast<size_t>(candidate.feature)];
       const double parallax_rad = candidate.from_baseline_rad - ray.from_baseline_rad;
       if (parallax_rad < min_parallax_rad || parallax_rad > kMaxParallax_rad) return;
       if (std::abs(feature.octave - other.octave) > kMaxOctaveDifference) return;

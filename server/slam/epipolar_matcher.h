@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "server/slam/keyframe.h"
 #include "server/slam/slam_config.h"
+#include "server/slam/slam_map.h"
 
 namespace romap {
 

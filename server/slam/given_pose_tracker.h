@@ -2,21 +2,21 @@
 
 #include <memory>
 
+#include "common/messages.h"
 #include "server/slam/keyframe_selector.h"
 #include "server/slam/slam_config.h"
-#include "server/slam/tracker.h"
 #include "server/slam/up_estimator.h"
 
 namespace romap {
 
-// The tracker for clients that know their camera poses: takes Frame::T_world_camera as it is, however far it jumps, and
-// chooses the keyframes.
-class GivenPoseTracker : public Tracker {
+// For frames that bring their camera pose: takes Frame::T_world_camera as it is, however far it jumps, and chooses the
+// keyframes.
+class GivenPoseTracker {
  public:
   explicit GivenPoseTracker(const SlamConfig& config) : selector_(config) {}
 
-  // FAILED_PRECONDITION, naming the frame, when it brings no pose.
-  absl::StatusOr<TrackedFrame> Track(std::shared_ptr<const Frame> frame) override;
+  // `frame` must bring a pose.
+  TrackedFrame Take(std::shared_ptr<const Frame> frame);
 
  private:
   KeyframeSelector selector_;

@@ -12,6 +12,8 @@ struct SlamConfig {
   int keyframe_max_gap_frames = 30;
   int keyframe_wait_frames = 3;
   double keyframe_sharpness_ratio = 0.75;
+  double tracking_keyframe_share = 0.7;
+  double start_parallax_deg = 1.5;
 
   int scene_features = 1000;
   int object_features = 600;
@@ -21,7 +23,9 @@ struct SlamConfig {
   int mask_erosion_px = 1;
 
   int matched_keyframes = 4;
-  int kept_keyframes = 20;
+  int window_keyframes = 10;
+  int window_iterations = 8;
+  int max_keyframes = 2000;
   int max_points = 20000;
   double min_parallax_deg = 2.0;
   double pixel_sigma_px = 1.0;
@@ -31,12 +35,18 @@ struct SlamConfig {
   int trial_keyframes = 3;
   int trial_observations = 3;
   double depth_sigma_ratio = 0.02;
+  double prior_sigma_rad = 0.01;
+  double prior_sigma_mu = 0.02;
+  int seed = 1;
 
   void Fields(ConfigFields& fields) {
     KeyframeFields(fields);
     FeatureFields(fields);
     MapFields(fields);
   }
+
+  // For the random samples of one call; `call` tells calls apart.
+  uint64_t Seed(uint64_t call) const { return static_cast<uint64_t>(seed) * 1000003 + call; }
 
  private:
   void KeyframeFields(ConfigFields& fields) {
@@ -52,6 +62,10 @@ struct SlamConfig {
         {.unit = "frames", .min = 0, .max = 30, .help = "How long a due keyframe waits for a sharp, masked frame"});
     fields.Add("keyframe_sharpness_ratio", &keyframe_sharpness_ratio,
                {.min = 0, .max = 2, .help = "Sharp is what reaches this share of the recent frames' median sharpness"});
+    fields.Add("tracking_keyframe_share", &tracking_keyframe_share,
+               {.min = 0.05, .max = 5, .help = "Turn and way count so much when the camera is tracked from images"});
+    fields.Add("start_parallax_deg", &start_parallax_deg,
+               {.unit = "deg", .min = 0.1, .max = 20, .help = "Median parallax of the two views a map begins with"});
   }
 
   void FeatureFields(ConfigFields& fields) {
@@ -60,9 +74,9 @@ struct SlamConfig {
     fields.Add("object_features", &object_features,
                {.min = 0, .max = 10000, .help = "Further ORB features, spread over the instance masks only"});
     fields.Add("scene_fast_threshold", &scene_fast_threshold,
+               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner anywhere"});
     fields.Add("scene_fast_min_threshold", &scene_fast_min_threshold,
                {.unit = "grey levels", .min = 1, .max = 100, .help = "The same where nothing has as much contrast"});
-               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner anywhere"});
     fields.Add("object_fast_threshold", &object_fast_threshold,
                {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner inside an instance mask"});
     fields.Add("mask_erosion_px", &mask_erosion_px,
@@ -72,8 +86,12 @@ struct SlamConfig {
   void MapFields(ConfigFields& fields) {
     fields.Add("matched_keyframes", &matched_keyframes,
                {.min = 1, .max = 20, .help = "Earlier keyframes that a new one is matched with to find new points"});
-    fields.Add("kept_keyframes", &kept_keyframes,
-               {.min = 2, .max = 200, .help = "Keyframes whose features are kept for matching"});
+    fields.Add("window_keyframes", &window_keyframes,
+               {.min = 2, .max = 60, .help = "Keyframes whose poses local bundle adjustment refines"});
+    fields.Add("window_iterations", &window_iterations,
+               {.min = 1, .max = 50, .help = "Iterations of local bundle adjustment at most"});
+    fields.Add("max_keyframes", &max_keyframes,
+               {.min = 10, .max = 100000, .help = "Keyframes in the map; beyond, the least needed go"});
     fields.Add("max_points", &max_points, {.min = 100, .max = 1e6, .help = "Map points; beyond, the stalest go"});
     fields.Add("min_parallax_deg", &min_parallax_deg,
                {.unit = "deg", .min = 0.1, .max = 30, .help = "Angle between two rays that makes a point of them"});
@@ -91,6 +109,11 @@ struct SlamConfig {
                {.min = 2, .max = 20, .help = "Observations it needs by then"});
     fields.Add("depth_sigma_ratio", &depth_sigma_ratio,
                {.min = 0.0001, .max = 1, .help = "Standard deviation of a depth image over the depth"});
+    fields.Add("seed", &seed, {.min = 0, .max = 1e9, .help = "Of all random samples; same input, same seed, same map"});
+    fields.Add("prior_sigma_rad", &prior_sigma_rad,
+               {.unit = "rad", .min = 1e-6, .max = 3, .help = "Standard deviation of a pose that is taken as a prior"});
+    fields.Add("prior_sigma_mu", &prior_sigma_mu,
+               {.unit = "mu", .min = 1e-9, .max = 1e6, .help = "The same of its position"});
   }
 };
 

@@ -1,176 +1,418 @@
 #include "server/slam/sparse_mapper.h"
 
+#include <spdlog/spdlog.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <optional>
-#include <tuple>
-#include <unordered_set>
+#include <chrono>
+#include <set>
 #include <utility>
 
-#include "server/slam/epipolar_matcher.h"
-#include "server/slam/triangulation.h"
+#include "common/thread_priority.h"
+#include "server/slam/loop_closer.h"
+#include "server/slam/map_culling.h"
 
 namespace romap {
 namespace {
 
-constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
-constexpr double kMaxSizeRatio = 1.9;        // between the sizes that two features of one point claim to have
+constexpr int kMinSharedPoints = 15;
+constexpr size_t kMaxLocalPoints = 8000;
+constexpr size_t kPlacesTold = 60;       // keyframes whose place tracking learns, besides those around
+constexpr int kGiveUpAfter_frames = 45;  // a camera lost so long in a map so young begins anew
+constexpr size_t kYoungMap_keyframes = 6;
+constexpr int kMinObservationsWellPlaced = 3;
+
+double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 }  // namespace
 
-KeyframeView SparseMapper::AddKeyframe(const TrackedFrame& tracked) {
-  const Frame& frame = *tracked.frame;
-  MapKeyframe keyframe =
-      MakeMapKeyframe(KeyframeId{++keyframe_count_}, frame, tracked.T_world_camera, extractor_.Extract(frame));
-  FindKnownPoints(keyframe);
-  MakePointsByParallax(keyframe);
-  MakePointsByDepth(keyframe);
-
-  kept_keyframes_.push_back(std::move(keyframe));
-  if (kept_keyframes_.size() > static_cast<size_t>(config_.kept_keyframes)) kept_keyframes_.pop_front();
-  std::vector<MapPointId> removed = Cull();
-  KeyframeView view = MakeView(tracked, kept_keyframes_.back());
-  view.removed_points = std::move(removed);
-  return view;
+SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment)
+    : config_(config), slot_(local_map), inline_adjustment_(inline_adjustment), extractor_(config) {
+  BeginAnew();
 }
 
-void SparseMapper::FindKnownPoints(MapKeyframe& keyframe) {
-  using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
-  std::vector<Claim> claims;
-  for (const auto& [id, track] : tracks_) {
-    const auto found = FindInKeyframe(track, keyframe, config_);
-    if (found) claims.emplace_back(found->distance, id, found->feature);
-  }
-  std::sort(claims.begin(), claims.end());
-  for (const auto& [distance, id, feature] : claims) {
-    Tie(keyframe, feature, tracks_.at(id));
-  }
+SparseMapper::~SparseMapper() { DropWholeAdjustment(); }
+
+void SparseMapper::BeginAnew() {
+  DropWholeAdjustment();
+  const uint64_t keyframes = map_ ? map_->keyframe_count() : 0;
+  const uint64_t points = map_ ? map_->point_count() : 0;
+  map_ = std::make_unique<SlamMap>(config_, keyframes, points);
+  maker_ = std::make_unique<PointMaker>(config_, map_.get());
+  places_ = std::make_unique<PlaceRecogniser>(config_, map_.get());
+  corrections_.Forget();
+  up_ = WorldUp(keyframes);
+  next_whole_ = keyframes + 10;
+  latest_ = {};
+  frames_lost_ = 0;
 }
 
-void SparseMapper::MakePointsByParallax(MapKeyframe& keyframe) {
-  const std::vector<MapKeyframe*> others = KeyframesToMatch(keyframe);
-  for (MapKeyframe* other : others) {
-    for (const FeatureMatch& match : MatchAlongEpipolarPlanes(keyframe, *other, config_)) {
-      if (const MapPointId known = other->points[static_cast<size_t>(match.second)]) {
-        Tie(keyframe, match.first, tracks_.at(known));
-        continue;
-      }
-      PointTrack* track = MakePoint(keyframe, match.first, *other, match.second);
-      if (track == nullptr) continue;
-      for (MapKeyframe* third : others) {
-        if (third == other) continue;
-        if (const auto found = FindInKeyframe(*track, *third, config_)) Tie(*third, found->feature, *track);
-      }
+// ------------------------------------------------------------------------------------------------ a frame's life
+
+MappedFrame SparseMapper::Process(const TrackedImage& image) {
+  MappedFrame mapped{.tracked = image.tracked};
+  bool moved = TakeWholeAdjustment(/*wait=*/false);
+  const bool lost = image.tracked.state == TrackingState::kLost;
+  const bool tracked = !lost && image.tracked.state != TrackingState::kInitialising;
+  const bool fits = image.pose_given || image.generation == generation_;
+  if (image.start) {
+    mapped.begun_anew = !map_->keyframes().empty();
+    if (Begin(*image.start, *image.tracked.frame)) {
+      mapped.tracked.state = TrackingState::kTracking;
+      mapped.tracked.is_keyframe = true;
+      mapped.tracked.reference = latest_;
+      mapped.tracked.T_reference_camera = {};
+      Place(mapped.tracked);
+      mapped.view = MakeView(mapped.tracked, *map_->FindKeyframe(latest_));
     }
+    PublishLocalMap(latest_);
+  } else if (tracked && !fits) {
+    // Tracked against a map that was given up meanwhile.
+    mapped.tracked.state = TrackingState::kLost;
+    mapped.tracked.is_keyframe = false;
+  } else if (tracked) {
+    frames_lost_ = 0;
+    if (!image.pose_given) Place(mapped.tracked);
+    if (!world_is_given_) up_.Observe(*image.tracked.frame, mapped.tracked.T_world_camera);
+    if (image.tracked.is_keyframe) {
+      mapped.view = AddKeyframe(image);
+      mapped.tracked.T_world_camera = mapped.view->T_world_camera;
+      mapped.tracked.reference = image.pose_given ? KeyframeId{} : mapped.view->id;
+      mapped.tracked.T_reference_camera = {};
+      mapped.view->up_world = mapped.tracked.up_world;
+      moved = true;
+    }
+  } else if (lost && fits) {
+    ++frames_lost_;
+    if (frames_lost_ > kGiveUpAfter_frames && map_->keyframes().size() <= kYoungMap_keyframes && !world_is_given_) {
+      spdlog::info("slam: the camera is lost in a map of {} keyframes, it is begun anew", map_->keyframes().size());
+      BeginAnew();
+      ++generation_;
+      mapped.begun_anew = true;
+      PublishLocalMap({});
+      return mapped;
+    }
+    FindLostCamera(image);
   }
+  if (moved) {
+    MapCorrection correction = corrections_.Take(*map_);
+    if (!correction.keyframes.empty() || !correction.points.empty()) mapped.correction = std::move(correction);
+  }
+  if (mapped.view) corrections_.Tell(*mapped.view, map_->FindKeyframe(mapped.view->id)->scale);
+  return mapped;
 }
 
-void SparseMapper::MakePointsByDepth(MapKeyframe& keyframe) {
-  for (size_t i = 0; i < keyframe.features.size(); ++i) {
-    const double range_mu = keyframe.ranges_mu[i];
-    if (keyframe.points[i] || range_mu <= 0) continue;
-    NewTrack(keyframe, static_cast<int>(i), keyframe.center_world() + range_mu * keyframe.bearings_world[i]);
+MapCorrection SparseMapper::Finish() {
+  TakeWholeAdjustment(/*wait=*/true);
+  if (!world_is_given_ && map_->keyframes().size() > 2) {
+    StartWholeAdjustment();
+    TakeWholeAdjustment(/*wait=*/true);
+    TurnUp();
   }
+  return corrections_.Take(*map_);
 }
 
-std::vector<MapKeyframe*> SparseMapper::KeyframesToMatch(const MapKeyframe& keyframe) {
-  std::vector<double> depths_mu;
-  for (const MapPointId id : keyframe.points) {
-    if (id) depths_mu.push_back((keyframe.T_camera_world * tracks_.at(id).point.position_world).z());
-  }
-  double min_baseline_mu = 0;
-  if (!depths_mu.empty()) {
-    const auto middle = depths_mu.begin() + static_cast<std::ptrdiff_t>(depths_mu.size() / 2);
-    std::nth_element(depths_mu.begin(), middle, depths_mu.end());
-    min_baseline_mu = *middle * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
-  }
-  const Eigen::Vector3d axis = keyframe.T_world_camera.rotation() * Eigen::Vector3d::UnitZ();
-  std::vector<MapKeyframe*> others;
-  for (auto it = kept_keyframes_.rbegin(); it != kept_keyframes_.rend(); ++it) {
-    if (others.size() == static_cast<size_t>(config_.matched_keyframes)) break;
-    if ((it->center_world() - keyframe.center_world()).norm() <= min_baseline_mu) continue;
-    const Eigen::Vector3d other_axis = it->T_world_camera.rotation() * Eigen::Vector3d::UnitZ();
-    if (axis.dot(other_axis) > kMaxAxisTurnCosine) others.push_back(&*it);
-  }
-  return others;
+// The frame's pose in the world as it is now.
+void SparseMapper::Place(TrackedFrame& tracked) const {
+  const auto reference = map_->Place(tracked.reference);
+  if (!reference) return;
+  const SE3<Camera, Camera>& T = tracked.T_reference_camera;
+  tracked.T_world_camera =
+      reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
 }
 
-PointTrack* SparseMapper::MakePoint(MapKeyframe& keyframe, int feature, MapKeyframe& other, int other_feature) {
-  const Sight sight = SightOf(keyframe, feature, config_);
-  const Sight other_sight = SightOf(other, other_feature, config_);
-  const std::optional<Eigen::Vector3d> start = IntersectRays(sight, other_sight);
-  if (!start) return nullptr;
-  const Eigen::Vector3d p_world = RefinePoint({sight, other_sight}, *start);
-  if (!Agrees(sight, p_world) || !Agrees(other_sight, p_world)) return nullptr;
-  if (Parallax_rad(sight, other_sight, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
-  const double size_mu = sight.bearing_sigma_rad * (p_world - sight.center_world).norm();
-  const double other_size_mu = other_sight.bearing_sigma_rad * (p_world - other_sight.center_world).norm();
-  if (std::max(size_mu, other_size_mu) > kMaxSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
+// ------------------------------------------------------------------------------------------------ the first views
 
-  PointTrack& track = NewTrack(other, other_feature, p_world);
-  if (Tie(keyframe, feature, track)) return &track;
-  other.points[static_cast<size_t>(other_feature)] = {};
-  tracks_.erase(track.point.id);
-  return nullptr;
-}
-
-PointTrack& SparseMapper::NewTrack(MapKeyframe& keyframe, int feature, const Eigen::Vector3d& p_world) {
-  const MapPointId id{++point_count_};
-  keyframe.points[static_cast<size_t>(feature)] = id;
-  PointTrack& track = tracks_.emplace(id, StartTrack(id, keyframe, feature, p_world, config_)).first->second;
-  track.born_keyframe = keyframe_count_;
-  return track;
-}
-
-// A point is seen at most once in a keyframe, and a feature shows at most one point.
-bool SparseMapper::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
-  MapPointId& tied = keyframe.points[static_cast<size_t>(feature)];
-  if (tied || track.latest_keyframe == keyframe.id.value || !AddSight(keyframe, feature, config_, track)) return false;
-  tied = track.point.id;
+bool SparseMapper::Begin(const MapStart& start, const Frame& frame) {
+  BeginAnew();
+  ++generation_;
+  world_is_given_ = false;
+  metric_ = !start.second;
+  // Until more is known the camera's own up is up, or what its gravity says.
+  Eigen::Vector3d up_camera = -Eigen::Vector3d::UnitY();
+  if (frame.gravity_camera && metric_) up_camera = -*frame.gravity_camera;
+  const SE3<World, Camera> T_world_first(RotationFromZTo(up_camera).conjugate(), Eigen::Vector3d::Zero());
+  if (start.second) {
+    if (!BeginFromTwoViews(start, T_world_first)) {
+      BeginAnew();
+      return false;
+    }
+  } else {
+    MapKeyframe& first = map_->AddKeyframe(start.first, T_world_first);
+    maker_->MakePointsByDepth(first);
+    latest_ = first.id;
+  }
+  for (const auto& [id, keyframe] : map_->keyframes()) places_->Add(keyframe);
+  TurnUp();
+  spdlog::info("slam: a map begins at frame {} with {} points", frame.frame_id, map_->points().size());
   return true;
 }
 
-std::vector<MapPointId> SparseMapper::Cull() {
-  std::vector<MapPointId> gone;
-  std::vector<std::pair<uint64_t, MapPointId>> by_age;
-  for (const auto& [id, track] : tracks_) {
-    const bool trial_is_over = keyframe_count_ - track.born_keyframe >= static_cast<uint64_t>(config_.trial_keyframes);
-    if (trial_is_over && track.point.observations < config_.trial_observations) {
-      gone.push_back(id);
-    } else {
-      by_age.emplace_back(track.latest_keyframe, id);
-    }
+bool SparseMapper::BeginFromTwoViews(const MapStart& start, const SE3<World, Camera>& T_world_first) {
+  constexpr size_t kMinPoints = 40;
+  constexpr double kMaxRms_px = 2;
+  if (start.points.size() < kMinPoints) return false;
+  std::vector<double> depths;
+  for (const MapStart::Point& point : start.points) depths.push_back(point.p_first.z());
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
+  const double unit = 1 / depths[depths.size() / 2];  // the scene's median depth becomes one map unit
+  MapKeyframe& first = map_->AddKeyframe(start.first, T_world_first);
+  const SE3<Camera, Camera> T_first_second(start.T_first_second.rotation(), unit * start.T_first_second.translation());
+  MapKeyframe& second = map_->AddKeyframe(start.second, T_world_first * T_first_second);
+  second.parent = first.id;
+  for (const MapStart::Point& point : start.points) {
+    PointTrack& track = map_->AddPoint(T_world_first * Eigen::Vector3d(unit * point.p_first));
+    map_->AddSight(track, first, point.first_feature);
+    map_->AddSight(track, second, point.second_feature);
+    map_->Refresh(track);
   }
-  if (by_age.size() > static_cast<size_t>(config_.max_points)) {
-    std::sort(by_age.begin(), by_age.end());
-    by_age.resize(by_age.size() - static_cast<size_t>(config_.max_points));
-    for (const auto& [latest_keyframe, id] : by_age) gone.push_back(id);
-  }
-  for (const MapPointId id : gone) tracks_.erase(id);
-  const std::unordered_set<MapPointId> gone_set(gone.begin(), gone.end());
-  for (MapKeyframe& keyframe : kept_keyframes_) {
-    for (MapPointId& point : keyframe.points) {
-      if (point && gone_set.contains(point)) point = {};
-    }
-  }
-  return gone;
+  MapProblem problem = WholeProblem(*map_, config_);
+  const BundleSummary summary = AdjustBundle(problem.bundle, {.max_iterations = 20, .dense = true});
+  if (!summary.usable || summary.final_rms_px > kMaxRms_px) return false;
+  ApplyWhole(problem, *map_);
+  latest_ = second.id;
+  return map_->points().size() >= kMinPoints;
 }
 
-KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe) const {
+// ------------------------------------------------------------------------------------------------ keyframes
+
+MapKeyframe& SparseMapper::InsertKeyframe(const TrackedImage& image) {
+  std::shared_ptr<const FrameFeatures> sight = image.sight;
+  const Frame& frame = *image.tracked.frame;
+  if (!image.pose_given) {
+    // Objects are small: their corners are worth a second look.
+    const std::vector<Feature> more = extractor_.ExtractObjects(frame, sight->features);
+    if (!more.empty()) {
+      std::vector<Feature> all = sight->features;
+      all.insert(all.end(), more.begin(), more.end());
+      sight = MakeFrameFeatures(frame, std::move(all));
+    }
+  }
+  TrackedFrame tracked = image.tracked;
+  Place(tracked);
+  MapKeyframe& keyframe = map_->AddKeyframe(std::move(sight), tracked.T_world_camera);
+  keyframe.pose_given = image.pose_given;
+  if (!image.pose_given && frame.T_world_camera && world_is_given_) {
+    keyframe.prior = PosePrior{.T_world_camera = *frame.T_world_camera,
+                               .rotation_sigma_rad = config_.prior_sigma_rad,
+                               .translation_sigma_mu = config_.prior_sigma_mu};
+  }
+  for (size_t i = 0; i < image.points.size(); ++i) {
+    if (!image.points[i]) continue;
+    if (PointTrack* track = map_->FindPoint(image.points[i])) map_->AddSight(*track, keyframe, static_cast<int>(i));
+  }
+  return keyframe;
+}
+
+KeyframeView SparseMapper::AddKeyframe(const TrackedImage& image) {
+  if (map_->keyframes().empty()) {
+    ++generation_;
+    // Poses that are given or believed make the world theirs.
+    world_is_given_ = true;
+  }
+  MapKeyframe& keyframe = InsertKeyframe(image);
+  if (keyframe.pose_given) {
+    std::vector<MapPointId> all;
+    for (const auto& [id, track] : map_->points()) all.push_back(id);
+    maker_->FindKnownPoints(keyframe, all);
+  } else {
+    maker_->FindKnownPoints(keyframe, PointsOf(Neighbourhood(keyframe, 20, 5)));
+  }
+  const auto neighbours = map_->Covisible(keyframe, 1);
+  keyframe.parent = neighbours.empty() ? latest_ : neighbours.front().first;
+  latest_ = keyframe.id;
+  const std::vector<MapKeyframe*> others = maker_->KeyframesToMatch(keyframe);
+  maker_->MakePointsByParallax(keyframe, others);
+  maker_->MakePointsByDepth(keyframe);
+  if (!keyframe.pose_given) {
+    std::vector<MapKeyframe*> around;
+    for (const KeyframeId id : Neighbourhood(keyframe, 8, 0)) around.push_back(map_->FindKeyframe(id));
+    maker_->FuseDuplicates(keyframe, around);
+  }
+  for (const MapPointId id : keyframe.points) {
+    if (id) map_->Refresh(*map_->FindPoint(id));
+  }
+  CullPoints(config_, *map_);
+  if (!keyframe.pose_given) {
+    AdjustWindow(keyframe);
+    for (const KeyframeId gone : CullKeyframes(config_, keyframe, *map_)) places_->Remove(gone);
+  }
+  places_->Add(keyframe);
+  if (!keyframe.pose_given) CloseLoops(keyframe);
+  TurnUp();
+  PublishLocalMap(keyframe.id);
+  KeyframeView view = MakeView(image.tracked, keyframe);
+  return view;
+}
+
+void SparseMapper::AdjustWindow(const MapKeyframe& keyframe) {
+  const auto begin = std::chrono::steady_clock::now();
+  MapProblem problem = WindowProblem(*map_, keyframe, config_);
+  // Every second adjustment at least is carried through.
+  const std::atomic<bool>* abort = window_was_cut_short_ ? nullptr : &hurry_;
+  const BundleSummary summary =
+      AdjustBundle(problem.bundle, {.max_iterations = config_.window_iterations, .dense = true, .abort = abort});
+  window_was_cut_short_ = summary.aborted;
+  if (summary.usable) ApplyWindow(problem, *map_);
+  figures_.window_s.push_back(Seconds(std::chrono::steady_clock::now() - begin));
+}
+
+void SparseMapper::CloseLoops(const MapKeyframe& keyframe) {
+  const std::optional<LoopMatch> loop = places_->FindLoop(keyframe, metric_ || world_is_given_);
+  if (!loop) {
+    if (map_->keyframe_count() < next_whole_) return;
+    next_whole_ += next_whole_;
+    if (!whole_) StartWholeAdjustment();
+    return;
+  }
+  DropWholeAdjustment();  // it knows nothing of the loop
+  if (CloseLoop(*loop, metric_ || world_is_given_, config_, *map_)) {
+    ++figures_.loops;
+    StartWholeAdjustment();
+  } else {
+    ++figures_.sewn;
+  }
+}
+
+std::vector<KeyframeId> SparseMapper::Neighbourhood(const MapKeyframe& keyframe, size_t first, size_t second) const {
+  std::vector<KeyframeId> ids;
+  std::set<KeyframeId> known = {keyframe.id};
+  auto around = map_->Covisible(keyframe, kMinSharedPoints);
+  if (around.empty() && keyframe.parent) around.emplace_back(keyframe.parent, 0);
+  if (around.size() > first) around.resize(first);
+  for (const auto& [id, shared] : around) {
+    if (known.insert(id).second) ids.push_back(id);
+  }
+  if (second == 0) return ids;
+  for (const auto& [id, shared] : around) {
+    size_t taken = 0;
+    for (const auto& [next, count] : map_->Covisible(*map_->FindKeyframe(id), kMinSharedPoints)) {
+      if (taken++ == second) break;
+      if (known.insert(next).second) ids.push_back(next);
+    }
+  }
+  return ids;
+}
+
+std::vector<MapPointId> SparseMapper::PointsOf(const std::vector<KeyframeId>& keyframes) const {
+  std::set<MapPointId> points;
+  for (const KeyframeId id : keyframes) {
+    for (const MapPointId point : map_->FindKeyframe(id)->points) {
+      if (point) points.insert(point);
+    }
+    if (points.size() > kMaxLocalPoints) break;
+  }
+  return {points.begin(), points.end()};
+}
+
+KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe) {
   KeyframeView view;
   view.id = keyframe.id;
   view.frame = tracked.frame;
-  view.T_world_camera = tracked.T_world_camera;
+  view.T_world_camera = keyframe.T_world_camera();
   view.up_world = tracked.up_world;
-  for (size_t i = 0; i < keyframe.features.size(); ++i) {
+  for (size_t i = 0; i < keyframe.points.size(); ++i) {
     if (!keyframe.points[i]) continue;
-    const Feature& feature = keyframe.features[i];
+    const Feature& feature = keyframe.features()[i];
     view.observations.push_back({.point = keyframe.points[i], .pixel_px = feature.pixel_px, .label = feature.label});
-    view.points.push_back(tracks_.at(keyframe.points[i]).point);
+    view.points.push_back(map_->FindPoint(keyframe.points[i])->point);
   }
+  view.removed_points = map_->TakeRemovedPoints();
   return view;
+}
+
+// ------------------------------------------------------------------------------------------------ the whole map
+
+void SparseMapper::StartWholeAdjustment() {
+  DropWholeAdjustment();
+  whole_ = std::make_unique<WholeAdjustment>();
+  whole_->problem = WholeProblem(*map_, config_);
+  const auto solve = [whole = whole_.get()] {
+    whole->summary = AdjustBundle(whole->problem.bundle, {.max_iterations = 15, .abort = &whole->abort});
+    whole->done = true;
+  };
+  if (inline_adjustment_) return solve();
+  whole_->thread = std::thread([solve] {
+    LowerThreadPriority();
+    solve();
+  });
+}
+
+bool SparseMapper::TakeWholeAdjustment(bool wait) {
+  if (!whole_ || (!wait && !whole_->done)) return false;
+  if (whole_->thread.joinable()) whole_->thread.join();
+  const BundleSummary& summary = whole_->summary;
+  spdlog::debug("slam: whole bundle of {} keyframes and {} points: {:.2f} -> {:.2f} px",
+                whole_->problem.keyframes.size(), whole_->problem.points.size(), summary.initial_rms_px,
+                summary.final_rms_px);
+  const bool usable = summary.usable;
+  if (usable) ApplyWhole(whole_->problem, *map_);
+  whole_ = nullptr;
+  if (usable && latest_) PublishLocalMap(latest_);
+  return usable;
+}
+
+void SparseMapper::DropWholeAdjustment() {
+  if (!whole_) return;
+  whole_->abort = true;
+  if (whole_->thread.joinable()) whole_->thread.join();
+  whole_ = nullptr;
+}
+
+bool SparseMapper::TurnUp() {
+  if (world_is_given_) return false;
+  const std::optional<Eigen::Quaterniond> R_new_old = up_.Correct(*map_);
+  figures_.up_confidence = up_.confidence();
+  if (!R_new_old) return false;
+  const bool was_adjusting = whole_ != nullptr;
+  DropWholeAdjustment();
+  map_->Transform({1.0, *R_new_old, Eigen::Vector3d::Zero()});
+  up_.Turned(*R_new_old);
+  if (was_adjusting) StartWholeAdjustment();
+  return true;
+}
+
+// ------------------------------------------------------------------------------------------------ for tracking
+
+void SparseMapper::FindLostCamera(const TrackedImage& image) {
+  if (map_->keyframes().empty()) return;
+  const auto found = places_->FindCamera(*image.sight);
+  if (!found) return;
+  ++figures_.relocalisations;
+  PublishLocalMap(found->place, LocalMap::Relocalisation{.frame_id = image.sight->frame_id,
+                                                         .timestamp_ns = image.sight->timestamp_ns,
+                                                         .T_world_camera = found->pose.T_world_camera});
+}
+
+void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised) {
+  auto local = std::make_shared<LocalMap>();
+  local->version = ++version_;
+  local->keyframes_done = map_->keyframe_count();
+  local->generation = generation_;
+  local->reference = around;
+  local->relocalised = relocalised;
+  const MapKeyframe* center = map_->FindKeyframe(around);
+  if (center != nullptr) {
+    std::vector<KeyframeId> keyframes = Neighbourhood(*center, 20, 5);
+    keyframes.insert(keyframes.begin(), around);
+    for (const MapPointId id : PointsOf(keyframes)) {
+      const PointTrack& track = *map_->FindPoint(id);
+      local->index[id] = static_cast<int>(local->points.size());
+      local->points.push_back(LooksOf(track));
+    }
+    const int well_placed = std::min(kMinObservationsWellPlaced, static_cast<int>(map_->keyframes().size()));
+    for (const MapPointId id : center->points) {
+      local->reference_points += id && map_->FindPoint(id)->point.observations >= well_placed ? 1 : 0;
+    }
+    const uint64_t newest = map_->keyframe_count();
+    for (uint64_t id = newest > kPlacesTold ? newest - kPlacesTold : 1; id <= newest; ++id) {
+      keyframes.push_back(KeyframeId{id});
+    }
+    for (const KeyframeId id : keyframes) {
+      if (const auto place = map_->Place(id)) local->keyframes[id] = {place->T_world_camera, place->scale};
+    }
+  }
+  slot_->Put(std::move(local));
 }
 
 }  // namespace romap

@@ -1,50 +1,115 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
-#include <deque>
-#include <map>
+#include <memory>
+#include <optional>
+#include <thread>
 #include <vector>
 
 #include "common/messages.h"
+#include "server/slam/correction_log.h"
 #include "server/slam/features/feature_extractor.h"
-#include "server/slam/keyframe.h"
-#include "server/slam/point_track.h"
+#include "server/slam/local_map.h"
+#include "server/slam/map_adjustment.h"
+#include "server/slam/place_recogniser.h"
+#include "server/slam/point_maker.h"
 #include "server/slam/slam_config.h"
+#include "server/slam/slam_map.h"
+#include "server/slam/tracker.h"
+#include "server/slam/world_up.h"
 
 namespace romap {
 
-// Makes map points from keyframes with known poses. For one thread. The same keyframes give the same map.
+// What became of one frame in the map.
+struct MappedFrame {
+  TrackedFrame tracked;                          // its pose in the world as it is now
+  std::optional<MapCorrection> correction = {};  // of what was handed on before; comes before `view`
+  std::optional<KeyframeView> view = {};         // of a keyframe
+  bool begun_anew = false;                       // all that was handed on before is void
+};
+
+// The mapping side of slam: makes the sparse map out of what tracking says, keeps it consistent (local and whole bundle
+// adjustment, loops, gravity), finds lost cameras again, and hands the map around the camera to tracking. For one
+// thread; only Hurry() may be called from others.
 //
 // A point is tied to an object by the labels of its observations, one per keyframe that sees it. They are evidence, not
 // verdicts: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks.
 class SparseMapper {
  public:
-  explicit SparseMapper(SlamConfig config) : config_(config), extractor_(config) {}
+  // `local_map` outlives the mapper. `inline_adjustment`: the whole bundle is adjusted on the spot and not on a thread
+  // of its own, so that the same frames give the same map.
+  SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment = false);
+  ~SparseMapper();
 
-  // Adds the keyframe, finds known points again, makes new ones, refines and culls. The view lists the points seen in
-  // this keyframe; a point seen for the first time has at least two observations unless a depth image gave it.
-  KeyframeView AddKeyframe(const TrackedFrame& tracked);
+  MappedFrame Process(const TrackedImage& image);
+  // No more frames: waits for adjustments under way; what moved by them.
+  MapCorrection Finish();
+  // So many keyframes wait: bundle adjustment ends early.
+  void Hurry(bool keyframes_wait) { hurry_ = keyframes_wait; }
 
-  size_t points() const { return tracks_.size(); }
-  size_t keyframes() const { return static_cast<size_t>(keyframe_count_); }
+  size_t points() const { return map_->points().size(); }
+  size_t keyframes() const { return map_->keyframe_count(); }
+  const SlamMap& map() const { return *map_; }
+
+  // Counts and times for benchmarks.
+  struct Figures {
+    std::vector<double> window_s;  // per local bundle adjustment
+    int loops = 0;                 // closed with a correction
+    int sewn = 0;                  // closed without one
+    int relocalisations = 0;
+    double up_confidence = 0;
+  };
+  const Figures& figures() const { return figures_; }
 
  private:
-  void FindKnownPoints(MapKeyframe& keyframe);
-  void MakePointsByParallax(MapKeyframe& keyframe);
-  void MakePointsByDepth(MapKeyframe& keyframe);
-  std::vector<MapKeyframe*> KeyframesToMatch(const MapKeyframe& keyframe);
-  PointTrack* MakePoint(MapKeyframe& keyframe, int feature, MapKeyframe& other, int other_feature);
-  PointTrack& NewTrack(MapKeyframe& keyframe, int feature, const Eigen::Vector3d& p_world);
-  bool Tie(MapKeyframe& keyframe, int feature, PointTrack& track);
-  std::vector<MapPointId> Cull();
-  KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe) const;
+  struct WholeAdjustment {
+    MapProblem problem;
+    BundleSummary summary;
+    std::atomic<bool> abort = false;
+    std::atomic<bool> done = false;
+    std::thread thread;
+  };
+
+  void BeginAnew();
+  bool Begin(const MapStart& start, const Frame& frame);
+  bool BeginFromTwoViews(const MapStart& start, const SE3<World, Camera>& T_world_first);
+  KeyframeView AddKeyframe(const TrackedImage& image);
+  MapKeyframe& InsertKeyframe(const TrackedImage& image);
+  void FindLostCamera(const TrackedImage& image);
+  std::vector<KeyframeId> Neighbourhood(const MapKeyframe& keyframe, size_t first, size_t second) const;
+  std::vector<MapPointId> PointsOf(const std::vector<KeyframeId>& keyframes) const;
+  void AdjustWindow(const MapKeyframe& keyframe);
+  void CloseLoops(const MapKeyframe& keyframe);
+  void StartWholeAdjustment();
+  bool TakeWholeAdjustment(bool wait);
+  void DropWholeAdjustment();
+  bool TurnUp();
+  void PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised = {});
+  KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe);
+  void Place(TrackedFrame& tracked) const;
 
   const SlamConfig config_;
+  LocalMapSlot* const slot_;
+  const bool inline_adjustment_;
   FeatureExtractor extractor_;
-  std::map<MapPointId, PointTrack> tracks_;
-  std::deque<MapKeyframe> kept_keyframes_;  // newest last
-  uint64_t keyframe_count_ = 0;
-  uint64_t point_count_ = 0;  // ever made
+  std::unique_ptr<SlamMap> map_;
+  std::unique_ptr<PointMaker> maker_;
+  std::unique_ptr<PlaceRecogniser> places_;
+  CorrectionLog corrections_;
+  WorldUp up_;
+  std::unique_ptr<WholeAdjustment> whole_;
+  Figures figures_;
+
+  int generation_ = 0;
+  uint64_t version_ = 0;
+  bool world_is_given_ = false;
+  bool metric_ = false;  // depth gives the scale
+  KeyframeId latest_;
+  uint64_t next_whole_ = 10;  // keyframes at which the whole bundle is adjusted, loop or not
+  int frames_lost_ = 0;
+  bool window_was_cut_short_ = false;
+  std::atomic<bool> hurry_ = false;
 };
 
 }  // namespace romap

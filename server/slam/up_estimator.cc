@@ -37,4 +37,9 @@ void UpEstimator::Add(const Frame& frame, const SE3<World, Camera>& T_world_came
   up_world_ = sum.isZero() ? median.normalized() : sum.normalized();
 }
 
+void UpEstimator::Turn(const Eigen::Quaterniond& R_new_old) {
+  for (Eigen::Vector3d& sample : samples_) sample = R_new_old * sample;
+  up_world_ = R_new_old * up_world_;
+}
+
 }  // namespace romap

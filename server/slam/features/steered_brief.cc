@@ -1,7 +1,6 @@
 #include "server/slam/features/steered_brief.h"
 
 #include <cmath>
-#include <random>
 
 namespace romap {
 namespace {
@@ -66,29 +65,6 @@ PatchDirection IntensityCentroid(const cv::Mat& image, int x_px, int y_px) {
   const auto length = static_cast<float>(std::hypot(moment_x, moment_y));
   if (length == 0) return {};
   return {static_cast<float>(moment_x) / length, static_cast<float>(moment_y) / length};
-}
-
-const std::array<BriefTest, 256>& BriefTests() {
-  static const std::array<BriefTest, 256> tests = [] {
-    std::array<BriefTest, 256> result;
-    std::mt19937 random(1);
-    std::normal_distribution<double> normal(0, 6.2);
-    auto draw = [&](int8_t& x, int8_t& y) {
-      for (;;) {
-        const double a = std::round(normal(random)), b = std::round(normal(random));
-        if (a * a + b * b > 14.5 * 14.5) continue;
-        x = static_cast<int8_t>(a);
-        y = static_cast<int8_t>(b);
-        return;
-      }
-    };
-    for (auto& t : result) {
-      draw(t.first_x_px, t.first_y_px);
-      draw(t.second_x_px, t.second_y_px);
-    }
-    return result;
-  }();
-  return tests;
 }
 
 Descriptor SteeredBrief(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction) {
