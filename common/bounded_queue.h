@@ -26,6 +26,15 @@ class BoundedQueue {
     return true;
   }
 
+  // Never waits: false when there is no room or the queue was closed; then the item is left as it was.
+  bool TryPush(T& item) {
+    std::lock_guard lock(mutex_);
+    if (closed_ || items_.size() >= capacity_) return false;
+    items_.push_back(std::move(item));
+    ready_.notify_one();
+    return true;
+  }
+
   // Never waits: makes room by dropping the oldest item, which is returned. False in `accepted` when closed.
   std::optional<T> PushDroppingOldest(T item, bool* accepted) {
     std::lock_guard lock(mutex_);

@@ -26,6 +26,7 @@ struct SessionOptions {
   std::string name;  // for people; may be empty
   CameraModel camera;
   FrameMode mode = FrameMode::kReplay;
+  PoseUse pose_use = PoseUse::kGiven;
 };
 
 struct SessionInfo {

@@ -26,12 +26,7 @@ absl::Status RunExport(const ExportOptions& options) {
   for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", fault);
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
 
-  std::vector<StampedPose> trajectory;
-  for (size_t i = 0; i < snapshot.trajectory.size(); ++i) {
-    if (snapshot.trajectory[i].T_world_camera) {
-      trajectory.push_back({snapshot.timestamps_ns[i], *snapshot.trajectory[i].T_world_camera});
-    }
-  }
+  const std::vector<StampedPose> trajectory = TrajectoryOf(snapshot);
   ROMAP_RETURN_IF_ERROR(WriteTum((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
   fmt::print("{} objects and {} camera poses of session {} written to {}\n", objects.size(), trajectory.size(),
              snapshot.session_id, options.out);

@@ -69,6 +69,16 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
   return decoded;
 }
 
+std::vector<StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
+  std::vector<StampedPose> trajectory;
+  for (size_t i = 0; i < snapshot.trajectory.size(); ++i) {
+    if (snapshot.trajectory[i].T_world_camera) {
+      trajectory.push_back({snapshot.timestamps_ns[i], *snapshot.trajectory[i].T_world_camera});
+    }
+  }
+  return trajectory;
+}
+
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects) {
   const fs::path folder = fs::path(dir) / "objects";
   ROMAP_RETURN_IF_ERROR(MakeEmptyFolder(folder));

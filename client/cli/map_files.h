@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "client/files/tum.h"
 #include "common/mapping_service.h"
 #include "common/messages.h"
 #include "common/status.h"
@@ -21,6 +22,9 @@ struct MapObject {
 // Decodes the meshes of confirmed objects, by id. An object whose mesh cannot be decoded keeps an empty one, and
 // `faults` says why.
 std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects, std::vector<std::string>* faults);
+
+// The camera's way as a map has it now, in the order of its frames.
+std::vector<StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
 
 // Writes objects/<id>_<class>.ply and .glb (World frame, map units) and cuboids.json below `dir`, which is made. Meshes
 // of an earlier run in the same folder are removed.

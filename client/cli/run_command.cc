@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -20,10 +21,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const std::map<std::string, PoseUse> kPoseUses = {
+    {"given", PoseUse::kGiven}, {"prior", PoseUse::kPrior}, {"none", PoseUse::kIgnore}};
+
 struct RunOptions {
   std::string sequence_dir;
   std::string out;
-  std::string poses = "groundtruth";
+  PoseUse poses = PoseUse::kGiven;
   SequenceOptions sequence;
   StreamOptions stream;
   ServiceOptions service;
@@ -42,11 +46,7 @@ absl::Status PrepareOutput(const std::string& out) {
 
 SequenceOptions ToSequenceOptions(const RunOptions& options) {
   SequenceOptions sequence = options.sequence;
-  if (options.poses == "none") {
-    sequence.poses.clear();
-  } else if (options.poses != "groundtruth") {
-    sequence.poses = options.poses;
-  }
+  if (options.poses == PoseUse::kIgnore) sequence.poses.clear();
   if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
   return sequence;
 }
@@ -58,8 +58,8 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
 }
 
 // Adds the figures against ground truth, where the sequence has any, to the summary and prints them.
-void Evaluate(const RunOptions& options, nlohmann::json& summary) {
-  const RunReport report = EvaluateRun(options.out, options.sequence_dir, /*poses_given=*/true);
+void Evaluate(const RunOptions& options, bool poses_given, nlohmann::json& summary) {
+  const RunReport report = EvaluateRun(options.out, options.sequence_dir, poses_given);
   summary["evaluation"] = ToJson(report);
   if (!report.objects && !report.boxes) return;  // the sequence has no ground truth
   fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, FormatTable(report));
@@ -75,7 +75,7 @@ absl::Status RunSequence(const RunOptions& options) {
 
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
-  const std::vector<StampedPose> trajectory = collector.Trajectory();
+  const std::vector<StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
   ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
   RunSummary summary = Summarise(sequence, result, collector, objects);
@@ -85,7 +85,8 @@ absl::Status RunSequence(const RunOptions& options) {
   fmt::print("{}", FormatSummary(summary));
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
-  if (!objects.empty()) Evaluate(options, json);
+  const bool poses_given = options.poses == PoseUse::kGiven && sequence.has_poses();
+  if (!objects.empty()) Evaluate(options, poses_given, json);
   ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures/*.png\nfigures: {0}/summary.json\n",
              options.out);
@@ -112,7 +113,12 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
       ->required();
   options->service.AddTo(*command, /*offer_local=*/true);
   command
-      ->add_option("--poses", options->poses, "Camera poses to send: groundtruth, none, or a TUM file of the sequence")
+      ->add_option("--poses", options->poses,
+                   "Camera poses of the sequence: given (they are the truth), prior (they help tracking and may be "
+                   "corrected) or none (the camera is tracked from the images, as it is in a sequence without poses)")
+      ->transform(CLI::CheckedTransformer(kPoseUses))
+      ->option_text("given|prior|none [given]");
+  command->add_option("--pose-file", options->sequence.poses, "List of camera poses in the sequence (TUM format)")
       ->capture_default_str();
   command->add_option("--masks", options->sequence.masks, "List of mask images in the sequence")->capture_default_str();
   command->add_option("--detections", options->sequence.detections, "What the labels of each frame mean")
@@ -134,7 +140,10 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_option("--name", options->stream.session_name, "Name of the session, for people");
   command->add_flag("--keep-session", options->stream.keep_session, "Leave the session on the server");
   command->add_flag("--no-pictures", options->no_pictures, "Do not draw pictures");
-  command->callback([options, chosen] { *chosen = [options] { return RunSequence(*options); }; });
+  command->callback([options, chosen] {
+    options->stream.pose_use = options->poses;
+    *chosen = [options] { return RunSequence(*options); };
+  });
 }
 
 }  // namespace romap

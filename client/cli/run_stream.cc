@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "client/cli/interrupt.h"
+#include "client/cli/map_files.h"
 #include "client/cli/progress.h"
 #include "common/status.h"
 
@@ -89,6 +90,7 @@ class Run {
     SessionOptions session;
     session.name = options_.session_name;
     session.camera = sequence_.camera();
+    session.pose_use = options_.pose_use;
     session.mode = options_.realtime ? FrameMode::kLive : FrameMode::kReplay;
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
     result_.session_id = info.id;
@@ -97,6 +99,7 @@ class Run {
     if (result_.status.ok()) result_.status = Train();
     progress_.Done();
     stream_.reset();
+    if (result_.status.ok()) FetchTrajectory();
     if (result_.status.ok() && !options_.keep_session) {
       // The map is here; a failure to tidy up on the server does not spoil it.
       service_.DeleteSession(info.id).IgnoreError();
@@ -144,6 +147,16 @@ class Run {
     result_.interrupted = Interrupted();
     result_.training_complete = stream_->Done();
     return stream_->Done() ? stream_->status() : absl::OkStatus();
+  }
+
+  void FetchTrajectory() {
+    if (const auto map = service_.ExportMap(result_.session_id); map.ok()) {
+      result_.trajectory = TrajectoryOf(*map);
+    } else {
+      fmt::print(stderr,
+                 "romap: the camera poses are written as they were acknowledged, without later corrections: {}\n",
+                 Message(map.status()));
+    }
   }
 
   void TakeEvent() {

@@ -42,6 +42,7 @@ class Sequence {
   size_t size() const { return frames_.size(); }              // frames, at least 1
   int64_t timestamp_ns(size_t index) const { return frames_[index].timestamp_ns; }
   bool has_mask(size_t index) const { return !frames_[index].mask_path.empty(); }
+  bool has_poses() const { return !poses_.empty(); }
   const std::optional<ObjectsYaml>& objects() const { return objects_; }
 
   // Frame `index` (< size()) with its files' bytes as they are: image, mask (8 or 16 bit label PNG), depth (16 bit

@@ -47,6 +47,14 @@ inline constexpr std::array<EnumPair<FrameMode, v1::FrameMode>, 3> kFrameModes{{
     {FrameMode::kLive, v1::FRAME_MODE_LIVE},
 }};
 
+// POSE_USE_UNSPECIFIED may come in and means given, as before there was a choice.
+inline constexpr std::array<EnumPair<PoseUse, v1::PoseUse>, 4> kPoseUses{{
+    {PoseUse::kGiven, v1::POSE_USE_GIVEN},
+    {PoseUse::kGiven, v1::POSE_USE_UNSPECIFIED},
+    {PoseUse::kPrior, v1::POSE_USE_PRIOR},
+    {PoseUse::kIgnore, v1::POSE_USE_IGNORE},
+}};
+
 inline constexpr std::array<EnumPair<SessionState, v1::SessionState>, 4> kSessionStates{{
     {SessionState::kOpen, v1::SESSION_STATE_OPEN},
     {SessionState::kFinishing, v1::SESSION_STATE_FINISHING},

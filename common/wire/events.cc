@@ -119,6 +119,7 @@ v1::FrameAck ToProto(FrameAck ack) {
   if (ack.T_world_camera) *proto.mutable_t_world_camera() = ToProto(*ack.T_world_camera);
   proto.set_is_keyframe(ack.is_keyframe);
   proto.set_latency_s(ack.latency_s);
+  proto.set_state_reason(std::move(ack.state_reason));
   return proto;
 }
 
@@ -135,6 +136,7 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
   ack.is_keyframe = proto.is_keyframe();
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.latency_s(), where + ".latency_s"));
   ack.latency_s = proto.latency_s();
+  ack.state_reason = std::move(*proto.mutable_state_reason());
   return ack;
 }
 

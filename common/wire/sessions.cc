@@ -34,6 +34,7 @@ v1::CreateSessionRequest ToProto(const SessionOptions& options) {
   proto.set_name(options.name);
   *proto.mutable_camera() = ToProto(options.camera);
   proto.set_mode(EnumToProto(kFrameModes, options.mode));
+  proto.set_pose_use(EnumToProto(kPoseUses, options.pose_use));
   return proto;
 }
 
@@ -43,6 +44,7 @@ absl::StatusOr<SessionOptions> FromProto(const v1::CreateSessionRequest& proto) 
   options.name = proto.name();
   ROMAP_ASSIGN_OR_RETURN(options.camera, CameraFromProto(proto.camera(), "camera"));
   ROMAP_ASSIGN_OR_RETURN(options.mode, EnumFromProto(kFrameModes, proto.mode(), "mode"));
+  ROMAP_ASSIGN_OR_RETURN(options.pose_use, EnumFromProto(kPoseUses, proto.pose_use(), "pose_use"));
   return options;
 }
 

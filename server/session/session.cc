@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "common/status.h"
-#include "server/slam/given_pose_tracker.h"
 
 namespace romap {
 namespace {
@@ -38,8 +37,8 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       pool_(pool),
       mesher_(mesher),
       ingest_(options.camera),
-      tracker_(std::make_unique<GivenPoseTracker>(config.slam)),
-      sparse_mapper_(config.slam),
+      tracker_(config.slam, options.pose_use, &local_map_),
+      sparse_mapper_(config.slam, &local_map_),
       object_mapper_(config.objects),
       next_statistics_(Clock::now()),
       frames_(config.session.frame_queue),
@@ -84,26 +83,38 @@ void Session::TrackFrame(const Arrival& arrival) {
   const FrameInput& input = arrival.input;
   auto frame = ingest_.Accept(input);
   if (!frame.ok()) return Reject(input, Message(frame.status()), arrival.time);
-  auto tracked = tracker_->Track(*frame);
-  if (!tracked.ok()) return Reject(input, Message(tracked.status()), arrival.time);
+  TrackedImage image = tracker_.Track(*frame);
+  Acknowledge(arrival, image.tracked);
+  if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
+  // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
+  // objects.
+  const bool may_wait = options_.mode == FrameMode::kReplay || image.tracked.is_keyframe || image.start;
+  if (tracked_.TryPush(image)) return;
+  if (may_wait) {
+    tracked_.Push(std::move(image));
+  } else {
+    Settle();
+  }
+}
 
-  map_.Acknowledge({.frame_id = input.frame_id,
-                    .accepted = true,
-                    .error = "",
-                    .state = tracked->state,
-                    .T_world_camera = tracked->T_world_camera,
-                    .is_keyframe = tracked->is_keyframe,
-                    .latency_s = Seconds(Clock::now() - arrival.time)},
-                   input.timestamp_ns);
-  tracked_.Push(*std::move(tracked));
+void Session::Acknowledge(const Arrival& arrival, const TrackedFrame& tracked) {
+  const bool has_pose = tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalised;
+  FrameAck ack;
+  ack.frame_id = arrival.input.frame_id;
+  ack.state = tracked.state;
+  if (has_pose) ack.T_world_camera = tracked.T_world_camera;
+  ack.is_keyframe = tracked.is_keyframe;
+  ack.latency_s = Seconds(Clock::now() - arrival.time);
+  ack.state_reason = tracked.reason;
+  map_.Acknowledge(std::move(ack), arrival.input.timestamp_ns, tracked.reference, tracked.T_reference_camera);
 }
 
 void Session::RunMapping() {
   const auto period = std::chrono::milliseconds(static_cast<int64_t>(1000 * config_.session.statistics_period_s));
   try {
     while (!tracked_.Drained()) {
-      const std::optional<TrackedFrame> tracked = tracked_.PopFor(period);
-      if (tracked && !stopping_) MapFrame(*tracked);
+      const std::optional<TrackedImage> image = tracked_.PopFor(period);
+      if (image && !stopping_) MapFrame(*image);
       PublishStatistics();
     }
     SettleAll();
@@ -114,19 +125,30 @@ void Session::RunMapping() {
   }
 }
 
-void Session::MapFrame(const TrackedFrame& tracked) {
-  Publish(object_mapper_.ObserveFrame(tracked));
-  if (tracked.is_keyframe) {
-    const KeyframeView keyframe = sparse_mapper_.AddKeyframe(tracked);
-    Publish(object_mapper_.ObserveKeyframe(keyframe));
+void Session::MapFrame(const TrackedImage& image) {
+  if (image.tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
+  const MappedFrame mapped = sparse_mapper_.Process(image);
+  if (mapped.begun_anew) Publish(object_mapper_.Reset());
+  if (mapped.correction) Correct(*mapped.correction);
+  Publish(object_mapper_.ObserveFrame(mapped.tracked));
+  if (mapped.view) {
+    Publish(object_mapper_.ObserveKeyframe(*mapped.view));
     ++keyframes_;
-    map_points_ = sparse_mapper_.points();
   }
+  map_points_ = sparse_mapper_.points();
   ++frames_processed_;
   Settle();
 }
 
+void Session::Correct(const MapCorrection& correction) {
+  map_.Correct(correction);
+  Publish(object_mapper_.Correct(correction));
+}
+
 void Session::Publish(ObjectMapper::Output output) {
+  for (const ObjectViews& views : output.views) {
+    if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
+  }
   // Before the updates that tell clients of it, and before the fields make meshes in the corrected world.
   for (const ObjectViews& views : output.views) {
     if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
@@ -145,6 +167,7 @@ void Session::Publish(ObjectMapper::Output output) {
 }
 
 void Session::TrainToTheEnd() {
+  Correct(sparse_mapper_.Finish());
   Publish(object_mapper_.Finish());
   pool_->Finish(pool_client_);
   while (!stopping_ && !(pool_->Idle(pool_client_) && mesher_->Idle(mesher_client_))) {

@@ -26,8 +26,10 @@ namespace romap {
 
 // One client's map. Owns the stages and wires the data path; two threads of its own:
 //
-//   frames -> [tracking thread: Ingest, Tracker] -> tracked -> [mapping thread: ObjectMapper, SparseMapper]
+//   frames -> [tracking thread: Ingest, Tracker] -> tracked -> [mapping thread: SparseMapper, ObjectMapper]
 //          -> TrainingPool (server's) -> Mesher (server's) -> MapState -> outboxes
+//
+// The sparse map goes back to tracking as a value (LocalMapSlot); its corrections go down the same path as the frames.
 //
 // A frame that was accepted is never lost while the session lives; closing a stream closes nothing here.
 class Session {
@@ -68,7 +70,9 @@ class Session {
   void RunTracking();
   void RunMapping();
   void TrackFrame(const Arrival& arrival);
-  void MapFrame(const TrackedFrame& tracked);
+  void Acknowledge(const Arrival& arrival, const TrackedFrame& tracked);
+  void MapFrame(const TrackedImage& image);
+  void Correct(const MapCorrection& correction);
   void Publish(ObjectMapper::Output output);
   void TrainToTheEnd();
   void PublishStatistics();
@@ -90,13 +94,15 @@ class Session {
   uint64_t pool_client_ = 0;
 
   Ingest ingest_;                      // tracking thread
-  std::unique_ptr<Tracker> tracker_;   // tracking thread
+  LocalMapSlot local_map_;             // from the mapping thread to the tracking thread
+  Tracker tracker_;                    // tracking thread
   SparseMapper sparse_mapper_;         // mapping thread
   ObjectMapper object_mapper_;         // mapping thread
   Clock::time_point next_statistics_;  // mapping thread
 
   BoundedQueue<Arrival> frames_;
-  BoundedQueue<TrackedFrame> tracked_;
+  BoundedQueue<TrackedImage> tracked_;
+  std::atomic<int> keyframes_waiting_ = 0;  // in `tracked_`
 
   std::atomic<SessionState> state_ = SessionState::kOpen;
   std::atomic<bool> sender_attached_ = false;

@@ -22,8 +22,8 @@
 #include "client/files/sequence.h"
 #include "common/config.h"
 #include "server/objects/object_mapper.h"
-#include "server/slam/given_pose_tracker.h"
 #include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
 #include "tests/support/synthetic_world.h"
 
 namespace romap {
@@ -94,21 +94,21 @@ void Record(const ObjectMapper::Output& output, size_t frame, Run& run) {
 }
 
 absl::StatusOr<Run> MapSequence(const Sequence& sequence, const SlamConfig& slam, const ObjectsConfig& objects) {
-  GivenPoseTracker tracker(slam);
-  SparseMapper sparse(slam);
+  LocalMapSlot local_map;
+  Tracker tracker(slam, PoseUse::kGiven, &local_map);
+  SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
   ObjectMapper mapper(objects);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
-    ROMAP_ASSIGN_OR_RETURN(const TrackedFrame tracked, tracker.Track(DecodeFrame(input, sequence.camera())));
+    const MappedFrame mapped = sparse.Process(tracker.Track(DecodeFrame(input, sequence.camera())));
     double start = UserSeconds();
-    Record(mapper.ObserveFrame(tracked), i, run);
+    Record(mapper.ObserveFrame(mapped.tracked), i, run);
     run.frames_s += UserSeconds() - start;
     ++run.frames;
-    if (!tracked.is_keyframe) continue;
-    const KeyframeView view = sparse.AddKeyframe(tracked);
+    if (!mapped.view) continue;
     start = UserSeconds();
-    Record(mapper.ObserveKeyframe(view), i, run);
+    Record(mapper.ObserveKeyframe(*mapped.view), i, run);
     const double keyframe_s = UserSeconds() - start;
     run.keyframes_s += keyframe_s;
     run.slowest_keyframe_s = std::max(run.slowest_keyframe_s, keyframe_s);

@@ -18,8 +18,8 @@
 
 #include "client/files/sequence.h"
 #include "common/config.h"
-#include "server/slam/given_pose_tracker.h"
 #include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
 
 namespace romap {
 namespace {
@@ -130,8 +130,9 @@ void Report(const Run& run, const SparseMapper& mapper) {
 
 absl::Status Bench(const std::string& dir, SlamConfig config, bool sensor_depth) {
   ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(dir, {.use_depth = true}));
-  GivenPoseTracker tracker(config);
-  SparseMapper mapper(config);
+  LocalMapSlot local_map;
+  Tracker tracker(config, PoseUse::kGiven, &local_map);
+  SparseMapper mapper(config, &local_map, /*inline_adjustment=*/true);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(FrameInput input, sequence.Load(i));
@@ -139,16 +140,16 @@ absl::Status Bench(const std::string& dir, SlamConfig config, bool sensor_depth)
     if (!sensor_depth) input.depth.clear();
     const auto frame = DecodeFrame(input, sequence.camera());
     const double start_s = UserSeconds();
-    ROMAP_ASSIGN_OR_RETURN(const TrackedFrame tracked, tracker.Track(frame));
+    const TrackedImage image = tracker.Track(frame);
     const double tracked_s = UserSeconds();
     run.track_s += tracked_s - start_s;
     ++run.frames;
-    if (!tracked.is_keyframe) continue;
-    const KeyframeView view = mapper.AddKeyframe(tracked);
+    const MappedFrame mapped = mapper.Process(image);
+    if (!mapped.view) continue;
     const double mapped_s = UserSeconds();
     run.map_s += mapped_s - tracked_s;
     run.slowest_s = std::max(run.slowest_s, mapped_s - tracked_s);
-    Record(view, true_depth_mu, run);
+    Record(*mapped.view, true_depth_mu, run);
   }
   Report(run, mapper);
   return absl::OkStatus();

@@ -32,9 +32,19 @@ class EpipolarMatcherTest : public ::testing::Test {
     return {.pixel_px = pixel_px.cast<float>(), .descriptor = descriptor};
   }
 
+  static MapKeyframe MakeKeyframe(KeyframeId id, const Frame& frame, const SE3<World, Camera>& pose,
+                                  const std::vector<Feature>& features) {
+    MapKeyframe keyframe;
+    keyframe.id = id;
+    keyframe.sight = MakeFrameFeatures(frame, features);
+    keyframe.points.resize(features.size());
+    keyframe.SetPose(pose);
+    return keyframe;
+  }
+
   std::vector<FeatureMatch> Match() const {
-    return MatchAlongEpipolarPlanes(MakeMapKeyframe(KeyframeId{2}, frame_, kFirst, first_),
-                                    MakeMapKeyframe(KeyframeId{1}, frame_, kSecond, second_), SlamConfig{});
+    return MatchAlongEpipolarPlanes(MakeKeyframe(KeyframeId{2}, frame_, kFirst, first_),
+                                    MakeKeyframe(KeyframeId{1}, frame_, kSecond, second_), SlamConfig{});
   }
 
   inline static const SE3<World, Camera> kFirst{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 0)};
@@ -58,12 +68,11 @@ TEST_F(EpipolarMatcherTest, WorksWhenTheCameraMovesForward) {
   std::vector<Feature> seen_ahead;
   SlamConfig config;
   config.min_parallax_deg = 0.2;
-  const MapKeyframe here = MakeMapKeyframe(KeyframeId{1}, frame_, kFirst, first_);
-  for (const Eigen::Vector3d& bearing : here.bearings_world) {
-    seen_ahead.push_back(Project(3 * bearing, ahead, first_[seen_ahead.size()].descriptor));
+  const MapKeyframe here = MakeKeyframe(KeyframeId{1}, frame_, kFirst, first_);
+  for (size_t i = 0; i < first_.size(); ++i) {
+    seen_ahead.push_back(Project(3 * here.BearingWorld(i), ahead, first_[i].descriptor));
   }
-  const auto matches =
-      MatchAlongEpipolarPlanes(MakeMapKeyframe(KeyframeId{2}, frame_, ahead, seen_ahead), here, config);
+  const auto matches = MatchAlongEpipolarPlanes(MakeKeyframe(KeyframeId{2}, frame_, ahead, seen_ahead), here, config);
   EXPECT_GT(matches.size(), first_.size() / 2);
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
@@ -87,15 +96,15 @@ TEST_F(EpipolarMatcherTest, TwoLookalikesInThePlaneAreAmbiguous) {
 }
 
 TEST_F(EpipolarMatcherTest, FeaturesWithAPointAreNotMatchedAgain) {
-  MapKeyframe first = MakeMapKeyframe(KeyframeId{2}, frame_, kFirst, first_);
+  MapKeyframe first = MakeKeyframe(KeyframeId{2}, frame_, kFirst, first_);
   first.points[17] = MapPointId{5};
   const auto matches =
-      MatchAlongEpipolarPlanes(first, MakeMapKeyframe(KeyframeId{1}, frame_, kSecond, second_), SlamConfig{});
+      MatchAlongEpipolarPlanes(first, MakeKeyframe(KeyframeId{1}, frame_, kSecond, second_), SlamConfig{});
   EXPECT_EQ(matches.size(), first_.size() - 1);
 }
 
 TEST_F(EpipolarMatcherTest, NoBaselineNoMatches) {
-  const MapKeyframe keyframe = MakeMapKeyframe(KeyframeId{1}, frame_, kFirst, first_);
+  const MapKeyframe keyframe = MakeKeyframe(KeyframeId{1}, frame_, kFirst, first_);
   EXPECT_TRUE(MatchAlongEpipolarPlanes(keyframe, keyframe, SlamConfig{}).empty());
 }
 

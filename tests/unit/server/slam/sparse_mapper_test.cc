@@ -12,13 +12,30 @@
 namespace romap {
 namespace {
 
-TrackedFrame Keyframe(std::shared_ptr<const Frame> frame) {
-  TrackedFrame tracked;
-  tracked.T_world_camera = *frame->T_world_camera;
-  tracked.frame = std::move(frame);
-  tracked.is_keyframe = true;
-  return tracked;
+// A keyframe whose pose the client gave.
+TrackedImage Keyframe(std::shared_ptr<const Frame> frame) {
+  TrackedImage image;
+  image.pose_given = true;
+  image.tracked.T_world_camera = *frame->T_world_camera;
+  image.tracked.is_keyframe = true;
+  image.sight = MakeFrameFeatures(*frame, FeatureExtractor(SlamConfig{}).Extract(*frame));
+  image.points.resize(image.sight->size());
+  image.tracked.frame = std::move(frame);
+  return image;
 }
+
+// A mapper for keyframes with given poses.
+class Mapper {
+ public:
+  explicit Mapper(const SlamConfig& config = {}) : mapper_(config, &slot_, /*inline_adjustment=*/true) {}
+  KeyframeView AddKeyframe(const TrackedImage& image) { return *mapper_.Process(image).view; }
+  size_t points() const { return mapper_.points(); }
+  size_t keyframes() const { return mapper_.keyframes(); }
+
+ private:
+  LocalMapSlot slot_;
+  SparseMapper mapper_;
+};
 
 // What a reader of the views knows of the map.
 struct KnownPoints {
@@ -47,7 +64,7 @@ struct KnownPoints {
   }
 };
 
-KnownPoints MapOrbit(const TexturedWorld& world, SparseMapper& mapper, int keyframes, bool with_depth = false) {
+KnownPoints MapOrbit(const TexturedWorld& world, Mapper& mapper, int keyframes, bool with_depth = false) {
   KnownPoints known;
   for (int i = 0; i < keyframes; ++i) {
     auto frame = world.Render(static_cast<uint64_t>(i + 1), TexturedWorld::OrbitPose(6.0 * i));
@@ -59,7 +76,7 @@ KnownPoints MapOrbit(const TexturedWorld& world, SparseMapper& mapper, int keyfr
 
 TEST(SparseMapper, PointsLieOnTheTrueSurfaces) {
   const TexturedWorld world;
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   const KnownPoints known = MapOrbit(world, mapper, 10);
   EXPECT_EQ(mapper.keyframes(), 10);
   EXPECT_EQ(mapper.points(), known.points.size());
@@ -72,7 +89,7 @@ TEST(SparseMapper, PointsLieOnTheTrueSurfaces) {
 
 TEST(SparseMapper, AViewIsConsistentInItself) {
   const TexturedWorld world;
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   for (int i = 0; i < 6; ++i) {
     const auto frame = world.Render(static_cast<uint64_t>(i + 1), TexturedWorld::OrbitPose(6.0 * i));
     const KeyframeView view = mapper.AddKeyframe(Keyframe(frame));
@@ -95,7 +112,7 @@ TEST(SparseMapper, AViewIsConsistentInItself) {
 
 TEST(SparseMapper, LabelsTellThePlateFromTheFloor) {
   const TexturedWorld world;
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   const KnownPoints known = MapOrbit(world, mapper, 8);
   int plate_points = 0;
   int misplaced = 0;
@@ -111,8 +128,8 @@ TEST(SparseMapper, LabelsTellThePlateFromTheFloor) {
 
 TEST(SparseMapper, PointsGainObservationsAndAccuracy) {
   const TexturedWorld world;
-  SparseMapper short_mapper{SlamConfig{}};
-  SparseMapper long_mapper{SlamConfig{}};
+  Mapper short_mapper;
+  Mapper long_mapper;
   const KnownPoints few = MapOrbit(world, short_mapper, 3);
   const KnownPoints many = MapOrbit(world, long_mapper, 12);
   EXPECT_LT(many.Error_mu(0.5), few.Error_mu(0.5));
@@ -124,7 +141,7 @@ TEST(SparseMapper, PointsGainObservationsAndAccuracy) {
 
 TEST(SparseMapper, AnUnrelatedImageAddsNoLastingPoints) {
   const TexturedWorld world;
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   MapOrbit(world, mapper, 4);
   const size_t before = mapper.points();
   for (int i = 0; i < 6; ++i) {  // noise of its own in every frame: whatever matches is wrong
@@ -139,18 +156,18 @@ TEST(SparseMapper, AnUnrelatedImageAddsNoLastingPoints) {
 
 TEST(SparseMapper, DepthImagesGivePointsFromTheFirstKeyframeOn) {
   const TexturedWorld world;
-  SparseMapper one{SlamConfig{}};
+  Mapper one;
   const KnownPoints first = MapOrbit(world, one, 1, true);
   EXPECT_GT(first.points.size(), 200);
   EXPECT_LT(first.Error_mu(0.95), 0.01);
-  SparseMapper five{SlamConfig{}};
+  Mapper five;
   EXPECT_LT(MapOrbit(world, five, 5, true).Error_mu(0.9), 0.02);
 }
 
 TEST(SparseMapper, TheSameKeyframesGiveTheSameMap) {
   const TexturedWorld world;
-  SparseMapper once{SlamConfig{}};
-  SparseMapper again{SlamConfig{}};
+  Mapper once;
+  Mapper again;
   const KnownPoints a = MapOrbit(world, once, 6);
   const KnownPoints b = MapOrbit(world, again, 6);
   ASSERT_EQ(a.points.size(), b.points.size());
@@ -161,7 +178,7 @@ TEST(SparseMapper, TheSameKeyframesGiveTheSameMap) {
 }
 
 TEST(SparseMapper, ImagesWithoutTextureGiveAnEmptyView) {
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   for (const int side_px : {16, 64, 320}) {
     const TexturedWorld world(side_px, side_px);
     const auto frame = world.Render(1, TexturedWorld::OrbitPose(side_px));
@@ -175,7 +192,7 @@ TEST(SparseMapper, ImagesWithoutTextureGiveAnEmptyView) {
 TEST(SparseMapper, GoesOnWhenTheImageSizeChanges) {
   const TexturedWorld world(320, 240);
   const TexturedWorld larger(400, 300);
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   KnownPoints known = MapOrbit(world, mapper, 4);
   const KeyframeView view = mapper.AddKeyframe(Keyframe(larger.Render(9, TexturedWorld::OrbitPose(24))));
   known.Take(view);
@@ -190,8 +207,7 @@ TEST(SparseMapper, TheMapStaysWithinItsBounds) {
   const TexturedWorld world;
   SlamConfig config;
   config.max_points = 150;
-  config.kept_keyframes = 3;
-  SparseMapper mapper{config};
+  Mapper mapper{config};
   const KnownPoints known = MapOrbit(world, mapper, 8);
   EXPECT_LE(mapper.points(), 150);
   EXPECT_GT(mapper.points(), 100);
@@ -200,7 +216,7 @@ TEST(SparseMapper, TheMapStaysWithinItsBounds) {
 
 TEST(SparseMapper, AnAbsurdPoseDoesNoHarm) {
   const TexturedWorld world;
-  SparseMapper mapper{SlamConfig{}};
+  Mapper mapper;
   MapOrbit(world, mapper, 4);
   auto frame = world.Render(9, TexturedWorld::OrbitPose(24));
   frame->T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1e9, 1e9, -1e9));

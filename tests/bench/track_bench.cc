@@ -1,0 +1,280 @@
+// Tracks the camera through a recorded sequence from its images, with tracking and mapping as a server runs them but
+// without objects, and writes the trajectories.
+//
+//   track_bench DIR --out FOLDER [--set slam.FIELD=VALUE]... [--depth] [--poses given|prior|ignore] [--cut A:B]
+//               [--until N] [--one-thread] [--fps RATE] [--verbose]
+//
+// FOLDER/trajectory.txt holds every frame's pose as the map says at the end, FOLDER/live.txt as it was said at once
+// (TUM format). Prints what was tracked, the times per frame and per bundle adjustment, and the time of
+// cv::ORB::detectAndCompute at the same number of features in the same run. --cut leaves out the frames A..B-1.
+// --one-thread maps between two frames instead of beside them, so that the same input gives the same result.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/files/sequence.h"
+#include "common/bounded_queue.h"
+#include "common/config.h"
+#include "common/status.h"
+#include "server/session/ingest.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+
+namespace romap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+double Quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+struct Options {
+  std::string sequence;
+  std::string out;
+  SlamConfig slam;
+  bool depth = false;
+  PoseUse poses = PoseUse::kIgnore;
+  size_t cut_begin = 0, cut_end = 0;
+  size_t until = 1 << 30;
+  bool one_thread = false;
+  bool verbose = false;
+  double fps = 0;
+};
+
+Options Parse(int argc, char** argv) {
+  Options options;
+  ConfigFields fields;
+  fields.Section("slam");
+  options.slam.Fields(fields);
+  std::vector<std::string> sets;
+  for (int i = 1; i < argc; ++i) {
+    const std::string arg = argv[i];
+    const auto value = [&] { return std::string(i + 1 < argc ? argv[++i] : ""); };
+    if (arg == "--out") {
+      options.out = value();
+    } else if (arg == "--set") {
+      sets.push_back(value());
+    } else if (arg == "--depth") {
+      options.depth = true;
+    } else if (arg == "--poses") {
+      const std::string poses = value();
+      options.poses = poses == "given" ? PoseUse::kGiven : poses == "prior" ? PoseUse::kPrior : PoseUse::kIgnore;
+    } else if (arg == "--cut") {
+      std::sscanf(value().c_str(), "%zu:%zu", &options.cut_begin, &options.cut_end);
+    } else if (arg == "--until") {
+      options.until = std::stoul(value());
+    } else if (arg == "--one-thread") {
+      options.one_thread = true;
+    } else if (arg == "--verbose") {
+      options.verbose = true;
+      spdlog::set_level(spdlog::level::debug);
+    } else if (arg == "--fps") {
+      options.fps = std::stod(value());
+    } else {
+      options.sequence = arg;
+    }
+  }
+  if (const absl::Status status = fields.Set(sets); !status.ok()) {
+    std::fprintf(stderr, "track_bench: %s\n", Message(status).c_str());
+    std::exit(2);
+  }
+  return options;
+}
+
+// One line per frame that has a pose, with what it hangs on.
+struct Said {
+  double time_s = 0;
+  TrackedFrame tracked;
+};
+
+void Write(const std::filesystem::path& path, const std::vector<Said>& frames) {
+  std::ofstream file(path);
+  for (const Said& said : frames) {
+    const Eigen::Vector3d t = said.tracked.T_world_camera.translation();
+    const Eigen::Quaterniond q = said.tracked.T_world_camera.rotation();
+    file << fmt::format("{:.6f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f}\n", said.time_s, t.x(), t.y(), t.z(),
+                        q.x(), q.y(), q.z(), q.w());
+  }
+}
+
+class Run {
+ public:
+  explicit Run(Options options)
+      : options_(std::move(options)),
+        mapper_(options_.slam, &slot_, options_.one_thread),
+        tracker_(options_.slam, options_.poses, &slot_),
+        queue_(8) {}
+
+  int operator()() {
+    auto sequence = Sequence::Open(options_.sequence, {.use_depth = options_.depth});
+    if (!sequence.ok()) {
+      std::fprintf(stderr, "track_bench: %s\n", Message(sequence.status()).c_str());
+      return 2;
+    }
+    cv::setNumThreads(1);
+    Ingest ingest(sequence->camera());
+    std::thread mapping;
+    if (!options_.one_thread) {
+      mapping = std::thread([this] {
+        while (std::optional<TrackedImage> image = queue_.Pop()) Map(*image);
+      });
+    }
+    const cv::Ptr<cv::ORB> orb = cv::ORB::create(options_.slam.scene_features);
+    const size_t count = std::min(sequence->size(), options_.until);
+    const Clock::time_point begin = Clock::now();
+    for (size_t i = 0; i < count; ++i) {
+      if (i >= options_.cut_begin && i < options_.cut_end) continue;
+      const auto input = sequence->Load(i);
+      if (!input.ok()) {
+        std::fprintf(stderr, "track_bench: %s\n", Message(input.status()).c_str());
+        continue;
+      }
+      auto frame = ingest.Accept(*input);
+      if (!frame.ok()) {
+        std::fprintf(stderr, "frame %zu: %s\n", i, Message(frame.status()).c_str());
+        continue;
+      }
+      if (i % 10 == 0) TimeOrb(**frame, *orb);
+      if (options_.fps > 0) {
+        std::this_thread::sleep_until(begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                                                  static_cast<double>(i) / options_.fps)));
+      }
+      Track(*frame);
+    }
+    queue_.Close();
+    if (mapping.joinable()) mapping.join();
+    const size_t keyframes_kept = mapper_.map().keyframes().size();
+    mapper_.Finish();
+    Report(keyframes_kept);
+    return 0;
+  }
+
+ private:
+  void TimeOrb(const Frame& frame, cv::ORB& orb) {
+    cv::Mat grey, descriptors;
+    std::vector<cv::KeyPoint> keypoints;
+    cv::cvtColor(frame.image_bgr, grey, cv::COLOR_BGR2GRAY);
+    const Clock::time_point begin = Clock::now();
+    orb.detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
+    orb_s_.push_back(Seconds(Clock::now() - begin));
+  }
+
+  void Track(const std::shared_ptr<const Frame>& frame) {
+    const Clock::time_point begin = Clock::now();
+    TrackedImage image = tracker_.Track(frame);
+    const TrackingState state = image.tracked.state;
+    ++frames_;
+    if (state == TrackingState::kInitialising) {
+      ++initialising_;
+      if (!tracking_began_) reason_ = image.tracked.reason;
+      if (options_.verbose) fmt::print("frame {}: {}\n", frame->frame_id, image.tracked.reason);
+    } else {
+      if (!tracking_began_) first_tracked_ = frame->frame_id;
+      tracking_began_ = true;
+      track_s_.push_back(Seconds(Clock::now() - begin));
+    }
+    if (state == TrackingState::kLost) {
+      ++lost_;
+      lost_frames_ += fmt::format(" {}", frame->frame_id);
+    }
+    const bool has_pose = state == TrackingState::kTracking || state == TrackingState::kRelocalised;
+    if (state == TrackingState::kRelocalised) relocalised_ += fmt::format(" {}", frame->frame_id);
+    if (has_pose) {
+      live_.push_back({1e-9 * static_cast<double>(frame->timestamp_ns), image.tracked});
+      live_.back().tracked.frame = nullptr;
+    }
+    if (options_.one_thread) return Map(image);
+    const bool is_keyframe = image.tracked.is_keyframe;
+    if (is_keyframe) mapper_.Hurry(++waiting_ > 0);
+    queue_.Push(std::move(image));
+  }
+
+  void Map(const TrackedImage& image) {
+    if (image.tracked.is_keyframe) mapper_.Hurry(--waiting_ > 0);
+    const Clock::time_point begin = Clock::now();
+    const MappedFrame mapped = mapper_.Process(image);
+    if (mapped.begun_anew) ++begun_anew_;
+    if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
+    const TrackedFrame& tracked = mapped.tracked;
+    if (tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalised) {
+      final_.push_back({1e-9 * static_cast<double>(tracked.frame->timestamp_ns), tracked});
+      final_.back().tracked.frame = nullptr;
+    }
+  }
+
+  void Report(size_t keyframes_kept) {
+    for (Said& said : final_) {
+      if (!said.tracked.reference) continue;
+      const auto reference = mapper_.map().Place(said.tracked.reference);
+      if (!reference) continue;
+      const SE3<Camera, Camera>& T = said.tracked.T_reference_camera;
+      said.tracked.T_world_camera =
+          reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+    }
+    if (!options_.out.empty()) {
+      std::filesystem::create_directories(options_.out);
+      Write(std::filesystem::path(options_.out) / "trajectory.txt", final_);
+      Write(std::filesystem::path(options_.out) / "live.txt", live_);
+    }
+    const size_t after = frames_ - initialising_;
+    fmt::print("frames {}: initialising {}, tracked {} of the {} after ({:.1f} %), lost {}, first tracked {}\n",
+               frames_, initialising_, after - lost_, after,
+               100.0 * static_cast<double>(after - lost_) / static_cast<double>(std::max<size_t>(1, after)), lost_,
+               first_tracked_);
+    if (lost_ > 0) fmt::print("lost:{}\n", lost_frames_);
+    if (!relocalised_.empty()) fmt::print("relocalised:{}\n", relocalised_);
+    if (!tracking_began_) fmt::print("never initialised: {}\n", reason_);
+    const auto& figures = mapper_.figures();
+    fmt::print(
+        "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
+        mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, begun_anew_,
+        figures.up_confidence);
+    const double orb_ms = 1e3 * Quantile(orb_s_, 0.5);
+    fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
+               1e3 * Quantile(track_s_, 0.5), 1e3 * Quantile(track_s_, 0.99), 1e3 * Quantile(track_s_, 0.5) / orb_ms,
+               orb_ms);
+    fmt::print("keyframe mapping: median {:.0f} ms, p99 {:.0f} ms; local adjustment: median {:.0f} ms, p99 {:.0f} ms\n",
+               1e3 * Quantile(map_s_, 0.5), 1e3 * Quantile(map_s_, 0.99), 1e3 * Quantile(figures.window_s, 0.5),
+               1e3 * Quantile(figures.window_s, 0.99));
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    fmt::print("peak memory {} MB\n", usage.ru_maxrss / 1024);
+  }
+
+  Options options_;
+  LocalMapSlot slot_;
+  SparseMapper mapper_;
+  Tracker tracker_;
+  BoundedQueue<TrackedImage> queue_;
+  std::atomic<int> waiting_ = 0;
+  std::vector<Said> live_, final_;
+  std::vector<double> orb_s_, track_s_, map_s_;
+  size_t frames_ = 0, initialising_ = 0, lost_ = 0;
+  int begun_anew_ = 0;
+  bool tracking_began_ = false;
+  uint64_t first_tracked_ = 0;
+  std::string lost_frames_, relocalised_, reason_;
+};
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) { return romap::Run(romap::Parse(argc, argv))(); }
