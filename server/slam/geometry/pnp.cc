@@ -1,6 +1,7 @@
 #include "server/slam/geometry/pnp.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <opencv2/calib3d.hpp>
 #include <random>

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <random>
 
@@ -14,7 +15,8 @@ namespace {
 constexpr int kSampleSize = 3;
 constexpr int kRefineRounds = 5;
 constexpr int kIterationsPerRound = 8;
-// Points whose second-largest spread is below this share of the largest lie on a line: any turn about it fits.
+// Of the singular values of the points' correlation, the second over the first: below, the points lie on a line (to a
+// hundredth of its length), and any turn about it fits.
 constexpr double kLineShare = 1e-4;
 
 Similarity FromSim3(const Sim3<Camera, Camera>& S) {
