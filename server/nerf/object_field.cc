@@ -53,7 +53,9 @@ absl::Status ObjectField::AddView(ObjectView view) {
   if (view.object != id_) {
     return FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString());
   }
-  return TakeView(Moved(S_new_first_.Inverse(), std::move(view)));
+  ROMAP_RETURN_IF_ERROR(TakeView(Moved(S_new_first_.Inverse(), std::move(view))));
+  plan_.OnNewView(steps());
+  return absl::OkStatus();
 }
 
 void ObjectField::Move(const Sim3<World, World>& S_new_old) { S_new_first_ = S_new_old * S_new_first_; }
@@ -63,12 +65,17 @@ absl::Status ObjectField::CorrectView(const ViewPose& pose) {
   if (known == views_.end()) return absl::OkStatus();
   ObjectView corrected = *known;
   corrected.T_world_camera = S_new_first_.Inverse().Moved(pose.T_world_camera);
-  return TakeView(std::move(corrected));
+  const double shift_share = ShiftShare(known->T_world_camera, corrected.T_world_camera);
+  ROMAP_RETURN_IF_ERROR(TakeView(std::move(corrected)));
+  plan_.OnCorrectedView(steps(), shift_share);
+  return absl::OkStatus();
 }
 
 // The view is in the first world.
 absl::Status ObjectField::TakeView(ObjectView view) {
   ROMAP_RETURN_IF_ERROR(ValidateView(view, box_));
+  divergences_ = 0;
+  views_changed_ = true;
   auto same = std::ranges::find(views_, view.keyframe, &ObjectView::keyframe);
   if (same == views_.end() && views() >= config_.max_views) {
     same = views_.begin() + static_cast<std::ptrdiff_t>(MostRedundantView(view));
@@ -80,10 +87,20 @@ absl::Status ObjectField::TakeView(ObjectView view) {
   } else {
     views_.push_back(std::move(view));
   }
-  views_changed_ = true;
-  divergences_ = 0;
-  plan_.OnNewView(steps());
   return absl::OkStatus();
+}
+
+// How far a view moved against the box, in sides of the box: by the corner that moved most in the camera's frame.
+double ObjectField::ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const {
+  const SE3<Camera, Object> T_old_object = T_old.Inverse() * box_.T_world_object;
+  const SE3<Camera, Object> T_new_object = T_new.Inverse() * box_.T_world_object;
+  double largest_mu = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+    const Eigen::Vector3d p = sign.cwiseProduct(box_.half_extents);
+    largest_mu = std::max(largest_mu, (T_new_object * p - T_old_object * p).norm());
+  }
+  return largest_mu / box_.side_mu;
 }
 
 // The view whose direction to the object is nearest to that of `view`.

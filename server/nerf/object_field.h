@@ -37,7 +37,8 @@ class ObjectField {
   void Move(const Sim3<World, World>& S_new_old);
 
   // The corrected pose, in the new world, of a view that is there; one that is not (any more) is passed over. Training
-  // goes on from what is learned, a little longer. INVALID_ARGUMENT: see ValidateView; then the view stays as it was.
+  // goes on from what is learned, the longer the more changed. INVALID_ARGUMENT: see ValidateView; then the view stays
+  // as it was.
   absl::Status CorrectView(const ViewPose& pose);
 
   // `steps` steps of optimisation on `threads` (1..64) threads. Nothing happens without box and views.
@@ -58,6 +59,7 @@ class ObjectField {
 
  private:
   absl::Status TakeView(ObjectView view);
+  double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
   void Restart();
   void PrepareViews();
   size_t MostRedundantView(const ObjectView& view) const;

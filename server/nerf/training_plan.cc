@@ -12,6 +12,14 @@ void TrainingPlan::OnNewView(uint64_t steps_done) {
   planned_steps_ = std::min(extended, steps_done + static_cast<uint64_t>(config_.max_refine_steps));
 }
 
+void TrainingPlan::OnCorrectedView(uint64_t steps_done, double shift_share) {
+  constexpr double kShiftOfOneView = 0.004;  // weighs as much as a new view
+  const double weight = std::clamp(shift_share / kShiftOfOneView, 1.0, 100.0);
+  const uint64_t extended = planned_steps_ + static_cast<uint64_t>(weight * config_.refine_steps_per_view);
+  const uint64_t most = steps_done + static_cast<uint64_t>(config_.full_budget_steps);
+  planned_steps_ = std::max(planned_steps_, std::min(extended, most));
+}
+
 uint64_t TrainingPlan::AllowedSteps(int views, bool complete) const {
   if (views == 0) return 0;
   if (complete) return planned_steps_;

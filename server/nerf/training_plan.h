@@ -16,8 +16,12 @@ class TrainingPlan {
   explicit TrainingPlan(const NerfConfig& config) : config_(config) { Restart(); }
 
   void Restart() { planned_steps_ = static_cast<uint64_t>(config_.full_budget_steps); }
-  // A new or corrected view came when `steps_done` steps were done.
+  // A new view came when `steps_done` steps were done.
   void OnNewView(uint64_t steps_done);
+  // The pose of a view was corrected; `shift_share` is how far it moved against the box, in sides of the box. Density
+  // that a wrong pose put before or behind the surface goes only while the rate is high, so the plan is extended in
+  // proportion, up to a whole new training.
+  void OnCorrectedView(uint64_t steps_done, double shift_share);
 
   // Steps allowed so far. `complete`: no more views are expected, so train to the end of the plan.
   uint64_t AllowedSteps(int views, bool complete) const;

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "common/map_motion.h"
 #include "server/nerf/training_plan.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
@@ -187,6 +188,38 @@ TEST(TrainingPoolTest, BadViewsCostNothingButThemselves) {
   WaitUntilIdle(pool, client);
   ASSERT_FALSE(inbox.Of(1).empty());
   EXPECT_EQ(inbox.Of(1).back().views, 3);
+}
+
+TEST(TrainingPoolTest, AMovedObjectIsNotTrainedAnewNorSentAgain) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  ObjectViews offer = Offer(1, 5);
+  pool.Offer(client, offer);
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  const size_t sent = inbox.Of(1).size();
+
+  const Sim3<World, World> S(1.3, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), {1, 2, 3});
+  const ObjectViews moved{.object = ObjectId{1}, .S_new_old = S, .cuboid = Moved(S, offer.cuboid)};
+  pool.Offer(client, moved);
+  WaitUntilIdle(pool, client);
+  EXPECT_EQ(pool.GetProgress(client).steps, 40u);
+  EXPECT_EQ(inbox.Of(1).size(), sent);
+
+  // A view that moved against the object is worth some steps more, in the corrected world.
+  ObjectViews corrected{.object = ObjectId{1}, .cuboid = moved.cuboid};
+  const SE3<Camera, Camera> small(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.01, 0, 0));
+  corrected.corrected_views = {{KeyframeId{2}, S.Moved(offer.new_views[1].T_world_camera) * small}};
+  pool.Offer(client, corrected);
+  WaitUntilIdle(pool, client);
+  EXPECT_GT(pool.GetProgress(client).steps, 40u);
+  ASSERT_GT(inbox.Of(1).size(), sent);
+  const FieldSnapshot last = inbox.Of(1).back();
+  EXPECT_TRUE(last.converged);
+  EXPECT_EQ(last.views, 5);
+  EXPECT_NEAR(last.S_new_first.scale(), 1.3, 1e-9);
+  EXPECT_TRUE(last.T_world_object.translation().isApprox(S * offer.cuboid.T_world_object.translation(), 1e-9));
 }
 
 TEST(TrainingPoolTest, DivergedTrainingNeverLeaves) {

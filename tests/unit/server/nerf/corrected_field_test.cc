@@ -1,0 +1,183 @@
+// What corrections of the map do to a field: it goes along, keeps what it learned, and learns on.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/map_motion.h"
+#include "server/nerf/object_field.h"
+#include "tests/unit/server/nerf/test_scene.h"
+
+namespace romap {
+namespace {
+
+using testing::BallScene;
+using testing::BallSurfaceError;
+
+NerfConfig FastConfig() {
+  NerfConfig config;
+  config.levels = 6;
+  config.log2_table_entries = 12;
+  config.finest_resolution = 128;
+  config.rays_per_step = 512;
+  config.full_budget_steps = 100;
+  return config;
+}
+
+ObjectField MakeField(const BallScene& scene, const std::vector<ObjectView>& views,
+                      const NerfConfig& config = FastConfig()) {
+  ObjectField field(config, scene.object, 1);
+  EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+  for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
+  return field;
+}
+
+// A closed loop: turned by 20 degrees about a leaning axis, shifted, and larger.
+Sim3<World, World> LoopClosure() {
+  const Eigen::AngleAxisd turn(20 * M_PI / 180, Eigen::Vector3d(0.1, -0.1, 1).normalized());
+  return {1.3, Eigen::Quaterniond(turn), {2.0, -1.0, 0.5}};
+}
+
+std::vector<float> RawOnGrid(const FieldSnapshot& snapshot) {
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3f unit(i % 10 / 4.6f - 0.98f, i / 10 % 10 / 4.6f - 0.98f, i / 100 / 4.6f - 0.98f);
+    points.push_back(unit.cwiseProduct(snapshot.box_half_extents));
+  }
+  std::vector<float> raw(points.size());
+  snapshot.field->Sample(points, raw, {});
+  return raw;
+}
+
+TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
+  const BallScene scene;
+  ObjectField field = MakeField(scene, scene.Views());
+  field.Train(40, 1);
+  const FieldSnapshot before = field.Snapshot();
+  const Sim3<World, World> S = LoopClosure();
+  field.Move(S);
+  ASSERT_TRUE(field.SetBox(Moved(S, scene.Box())).ok());
+  EXPECT_EQ(field.steps(), 40u);
+  const FieldSnapshot after = field.Snapshot();
+  EXPECT_TRUE(after.T_world_object.Matrix().isApprox(S.Moved(before.T_world_object).Matrix(), 1e-9));
+  EXPECT_TRUE(after.box_half_extents.isApprox(1.3f * before.box_half_extents, 1e-5f));
+  EXPECT_TRUE(
+      after.S_new_first.Moved(SE3<World, Object>()).Matrix().isApprox(S.Moved(SE3<World, Object>()).Matrix(), 1e-9));
+  EXPECT_EQ(after.hull.bits, before.hull.bits);
+  ASSERT_EQ(after.view_centers_object.size(), before.view_centers_object.size());
+  for (size_t i = 0; i < after.view_centers_object.size(); ++i) {
+    EXPECT_TRUE(after.view_centers_object[i].isApprox(1.3f * before.view_centers_object[i], 1e-5f));
+  }
+  const std::vector<float> raw_before = RawOnGrid(before), raw_after = RawOnGrid(after);
+  for (size_t i = 0; i < raw_before.size(); ++i) EXPECT_NEAR(raw_before[i], raw_after[i], 0.02) << i;
+}
+
+TEST(CorrectedFieldTest, TrainingGoesOnInTheCorrectedWorld) {
+  BallScene scene;
+  scene.with_depth = true;
+  const std::vector<ObjectView> views = scene.Views();
+  const std::vector<ObjectView> first_half(views.begin(), views.begin() + 6);
+  ObjectField field = MakeField(scene, first_half, NerfConfig{});
+  field.Train(60, 1);
+  const Sim3<World, World> S = LoopClosure();
+  field.Move(S);
+  for (size_t i = 6; i < views.size(); ++i) ASSERT_TRUE(field.AddView(Moved(S, views[i])).ok());
+  ASSERT_TRUE(field.SetBox(Moved(S, scene.Box())).ok());
+  EXPECT_EQ(field.views(), scene.views);
+  field.Train(120, 1);
+  EXPECT_EQ(field.steps(), 180u);
+
+  BallScene moved = scene;
+  moved.radius_mu = S.scale() * scene.radius_mu;
+  EXPECT_LT(BallSurfaceError(moved, field.Snapshot()), 0.06);
+}
+
+TEST(CorrectedFieldTest, AFieldThatMovedLearnsWhatOneThatDidNotLearns) {
+  const BallScene scene;
+  ObjectField moved = MakeField(scene, scene.Views()), still = MakeField(scene, scene.Views());
+  moved.Train(10, 1);
+  still.Train(10, 1);
+  moved.Move(LoopClosure());
+  moved.Train(10, 1);
+  still.Train(10, 1);
+  const std::vector<float> raw_moved = RawOnGrid(moved.Snapshot()), raw_still = RawOnGrid(still.Snapshot());
+  for (size_t i = 0; i < raw_moved.size(); ++i) EXPECT_NEAR(raw_moved[i], raw_still[i], 0.02) << i;
+}
+
+TEST(CorrectedFieldTest, ABoxThatLeansALittleIsNoReasonToStartAnew) {
+  BallScene scene;
+  Cuboid box = scene.Box();
+  box.half_extents.x() *= 4;  // of a leaning bar the ends go far up and down
+  ObjectField field(FastConfig(), scene.object, 1);
+  ASSERT_TRUE(field.SetBox(box).ok());
+  for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
+  field.Train(5, 1);
+  const Sim3<World, World> S(1, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())), {0, 0, 0});
+  field.Move(S);
+  // The cuboid of the corrected map goes along but stays upright.
+  box.T_world_object = {box.T_world_object.rotation(), S * box.T_world_object.translation()};
+  ASSERT_TRUE(field.SetBox(box).ok());
+  EXPECT_EQ(field.steps(), 5u);
+  // Turned about the vertical by as much, it is another box.
+  box.T_world_object =
+      box.T_world_object * SE3<Object, Object>(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
+                                               Eigen::Vector3d::Zero());
+  ASSERT_TRUE(field.SetBox(box).ok());
+  EXPECT_EQ(field.steps(), 0u);
+}
+
+// Every third camera believes the object lower than it is, the others higher.
+std::vector<ObjectView> WithWrongPoses(const BallScene& scene, double error_rad) {
+  std::vector<ObjectView> views = scene.Views();
+  for (size_t i = 0; i < views.size(); ++i) {
+    const double turn_rad = i % 3 == 0 ? error_rad : -error_rad;
+    const SE3<Camera, Camera> error(Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitX())),
+                                    Eigen::Vector3d::Zero());
+    views[i].T_world_camera = views[i].T_world_camera * error;
+  }
+  return views;
+}
+
+TEST(CorrectedFieldTest, CorrectedPosesImproveAFieldThatWasTrainedWithWrongOnes) {
+  const BallScene scene;
+  const NerfConfig config;
+  ObjectField field = MakeField(scene, WithWrongPoses(scene, 0.008), config);
+  const uint64_t planned = field.AllowedSteps(true);
+  field.Train(static_cast<int>(planned), 1);
+  const FieldSnapshot before = field.Snapshot();
+
+  for (const ObjectView& view : scene.Views()) {
+    ASSERT_TRUE(field.CorrectView({view.keyframe, view.T_world_camera}).ok());
+  }
+  EXPECT_EQ(field.views(), scene.views);
+  EXPECT_EQ(field.steps(), planned) << "what is learned is kept";
+  const uint64_t more = field.AllowedSteps(true) - planned;
+  EXPECT_LE(more, static_cast<uint64_t>(config.full_budget_steps));
+  field.Train(static_cast<int>(more), 1);
+  const FieldSnapshot after = field.Snapshot();
+  EXPECT_LT(BallSurfaceError(scene, after), 0.7 * BallSurfaceError(scene, before));
+  EXPECT_LT(after.loss, 0.5 * before.loss);
+}
+
+TEST(CorrectedFieldTest, SmallCorrectionsCostFewSteps) {
+  const BallScene scene;
+  ObjectField field = MakeField(scene, WithWrongPoses(scene, 0.0005));
+  const uint64_t planned = field.AllowedSteps(true);
+  field.Train(static_cast<int>(planned), 1);
+  ASSERT_TRUE(field.CorrectView({KeyframeId{1}, scene.View(0).T_world_camera}).ok());
+  EXPECT_EQ(field.AllowedSteps(true), planned + static_cast<uint64_t>(FastConfig().refine_steps_per_view));
+}
+
+TEST(CorrectedFieldTest, PosesThatCannotBeOrAreOfNoViewChangeNothing) {
+  const BallScene scene;
+  ObjectField field = MakeField(scene, scene.Views());
+  const Eigen::Vector3d nan = Eigen::Vector3d::Constant(NAN);
+  EXPECT_FALSE(field.CorrectView({KeyframeId{1}, {Eigen::Quaterniond::Identity(), nan}}).ok());
+  EXPECT_TRUE(field.CorrectView({KeyframeId{999}, SE3<World, Camera>()}).ok());
+  EXPECT_EQ(field.views(), scene.views);
+  field.Train(2, 1);
+  EXPECT_EQ(field.steps(), 2u);
+}
+
+}  // namespace
+}  // namespace romap
