@@ -7,12 +7,13 @@ namespace {
 
 constexpr size_t kTests = 256;
 
-// Half the width of each row of the circle of radius kPatchRadius_px.
+// Half the width of each row of the circle of radius kPatchRadius_px, rows and columns alike: a circle that is wider
+// than high would pull all directions to one axis.
 std::array<int, kPatchRadius_px + 1> CircleRows() {
+  constexpr double kRadius_px = kPatchRadius_px + 0.5;
   std::array<int, kPatchRadius_px + 1> half_width_px{};
   for (int y = 0; y <= kPatchRadius_px; ++y) {
-    half_width_px[static_cast<size_t>(y)] =
-        static_cast<int>(std::lround(std::sqrt(kPatchRadius_px * kPatchRadius_px - y * y)));
+    half_width_px[static_cast<size_t>(y)] = static_cast<int>(std::sqrt(kRadius_px * kRadius_px - y * y));
   }
   return half_width_px;
 }

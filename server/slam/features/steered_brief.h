@@ -32,7 +32,8 @@ struct BriefTest {
   int8_t second_y_px = 0;
 };
 
-// The 256 tests; bit i of the descriptor is bit i % 64 of its word i / 64.
+// The 256 tests, learned so that each tells corners apart and no two say the same; bit i of the descriptor is bit i %
+// 64 of its word i / 64.
 const std::array<BriefTest, 256>& BriefTests();
 
 // The tests' results with the pattern turned into the patch's direction (steered BRIEF, Rublee et al., ICCV 2011).

@@ -1,0 +1,229 @@
+// Chooses the 256 binary tests of server/slam/features/brief_pattern.cc and prints them as the rows of its table. Takes
+// half a minute.
+//
+//   learn_brief_pattern
+//
+// Random tests are tried on corners of generated pictures (dead leaves: Lee, Mumford and Huang, IJCV 2001), each corner
+// seen twice, the second time with other noise and a little warped. Tests that differ much between corners and little
+// between two sights of one corner come first; from the top of that list, those are taken that are correlated with none
+// taken before (the greedy search of Rublee et al., ICCV 2011).
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <vector>
+
+#include "server/slam/features/corner_detector.h"
+#include "server/slam/features/image_pyramid.h"
+#include "server/slam/features/steered_brief.h"
+
+namespace romap {
+namespace {
+
+constexpr int kPictures = 60;
+constexpr int kLeaves = 700;
+constexpr int kCornersPerOctave = 60;
+constexpr size_t kCandidates = 20000;
+constexpr double kNoise = 4;               // grey levels
+constexpr double kWarp = 0.12;             // of the second sight's affine map, standard deviation
+constexpr double kShift_px = 0.7;          // of the second sight's corner
+constexpr double kMaxImbalance = 0.1;      // of a test's share of ones from a half
+constexpr double kFirstCorrelation = 0.1;  // allowed between two tests; raised until there are enough
+constexpr double kCorrelationStep = 0.02;
+
+// Uniform in [0, 1), the same with every standard library.
+double Uniform(std::mt19937& random) { return random() / 4294967296.0; }
+
+double Normal(std::mt19937& random) {
+  const double radius = std::sqrt(-2 * std::log(1 - Uniform(random)));
+  return radius * std::cos(2 * std::numbers::pi * Uniform(random));
+}
+
+// Random ellipses and rectangles that hide each other, many small and few large, each with a shade and a slope of grey.
+cv::Mat DeadLeaves(std::mt19937& random) {
+  cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < kLeaves; ++i) {
+    const double size_px = 6 / std::sqrt(1 - Uniform(random) * (1 - std::pow(6.0 / 200, 2)));
+    const cv::RotatedRect leaf(
+        cv::Point2f(static_cast<float>(640 * Uniform(random)), static_cast<float>(480 * Uniform(random))),
+        cv::Size2f(static_cast<float>(2 * size_px), static_cast<float>(2 * size_px * (0.3 + 0.7 * Uniform(random)))),
+        static_cast<float>(360 * Uniform(random)));
+    const cv::Scalar grey(255 * Uniform(random));
+    if (Uniform(random) < 0.4) {
+      cv::ellipse(picture, leaf, grey, cv::FILLED, cv::LINE_AA);
+    } else {
+      std::array<cv::Point2f, 4> corners;
+      leaf.points(corners.data());
+      std::array<cv::Point, 4> pixels;
+      std::copy(corners.begin(), corners.end(), pixels.begin());
+      cv::fillConvexPoly(picture, pixels, grey, cv::LINE_AA);
+    }
+  }
+  cv::GaussianBlur(picture, picture, {0, 0}, 0.8);
+  return picture;
+}
+
+cv::Mat WithNoise(const cv::Mat& picture, uint64_t seed) {
+  cv::Mat grain(picture.size(), CV_16SC1), noisy;
+  cv::RNG(seed).fill(grain, cv::RNG::NORMAL, 0, kNoise);
+  cv::add(picture, grain, noisy, cv::noArray(), CV_8U);
+  return noisy;
+}
+
+// The grey values around a corner, turned upright.
+constexpr int kSide_px = 2 * kPatchRadius_px + 1;
+using Patch = std::array<uint8_t, kSide_px * kSide_px>;
+
+Patch CutPatch(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction, const cv::Matx22d& warp) {
+  const cv::Matx22d turn(direction.cosine, -direction.sine, direction.sine, direction.cosine);
+  const cv::Matx22d to_image = warp * turn;
+  Patch patch;
+  for (int y = -kPatchRadius_px; y <= kPatchRadius_px; ++y) {
+    for (int x = -kPatchRadius_px; x <= kPatchRadius_px; ++x) {
+      const cv::Vec2d at = to_image * cv::Vec2d(x, y);
+      const int u = std::clamp(x_px + static_cast<int>(std::lround(at[0])), 0, smooth.cols - 1);
+      const int v = std::clamp(y_px + static_cast<int>(std::lround(at[1])), 0, smooth.rows - 1);
+      patch[static_cast<size_t>((y + kPatchRadius_px) * kSide_px + x + kPatchRadius_px)] = smooth.at<uint8_t>(v, u);
+    }
+  }
+  return patch;
+}
+
+struct Sights {
+  std::vector<Patch> first;
+  std::vector<Patch> second;
+};
+
+void AddSights(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Sights& sights) {
+  constexpr int kMargin_px = kPatchBorder_px + 4;  // for the second sight's shift
+  ImagePyramid one, other;
+  const cv::Mat one_grey = WithNoise(picture, 2 * seed), other_grey = WithNoise(picture, 2 * seed + 1);
+  one.Build(one_grey, 64);
+  other.Build(other_grey, 64);
+  for (int octave = 0; octave < one.octaves(); ++octave) {
+    const cv::Mat& image = one.sharp(octave);
+    const cv::Rect part(kMargin_px, kMargin_px, image.cols - 2 * kMargin_px, image.rows - 2 * kMargin_px);
+    for (const cv::KeyPoint& corner : SpreadEvenly(DetectCorners(image, part, 15), image.size(), kCornersPerOctave)) {
+      const auto x_px = static_cast<int>(corner.pt.x), y_px = static_cast<int>(corner.pt.y);
+      const auto shift = [&] { return std::clamp(static_cast<int>(std::lround(kShift_px * Normal(random))), -3, 3); };
+      const int other_x_px = x_px + shift(), other_y_px = y_px + shift();
+      const cv::Matx22d warp(1 + kWarp * Normal(random), kWarp * Normal(random), kWarp * Normal(random),
+                             1 + kWarp * Normal(random));
+      sights.first.push_back(
+          CutPatch(one.smooth(octave), x_px, y_px, IntensityCentroid(image, x_px, y_px), cv::Matx22d::eye()));
+      sights.second.push_back(CutPatch(other.smooth(octave), other_x_px, other_y_px,
+                                       IntensityCentroid(other.sharp(octave), other_x_px, other_y_px), warp));
+    }
+  }
+}
+
+// Two different points of the circle.
+BriefTest DrawTest(std::mt19937& random) {
+  const auto draw = [&](int8_t& x_px, int8_t& y_px) {
+    do {
+      x_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * kPatchRadius_px));
+      y_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * kPatchRadius_px));
+    } while (x_px * x_px + y_px * y_px > (kPatchRadius_px - 0.5) * (kPatchRadius_px - 0.5));
+  };
+  BriefTest test;
+  do {
+    draw(test.first_x_px, test.first_y_px);
+    draw(test.second_x_px, test.second_y_px);
+  } while (test.first_x_px == test.second_x_px && test.first_y_px == test.second_y_px);
+  return test;
+}
+
+// A test's outcomes on all corners, one bit each.
+using Bits = std::vector<uint64_t>;
+
+Bits Outcomes(const BriefTest& test, const std::vector<Patch>& patches) {
+  const auto index = [](int x_px, int y_px) {
+    return static_cast<size_t>((y_px + kPatchRadius_px) * kSide_px + x_px + kPatchRadius_px);
+  };
+  const size_t first = index(test.first_x_px, test.first_y_px), second = index(test.second_x_px, test.second_y_px);
+  Bits bits((patches.size() + 63) / 64, 0);
+  for (size_t i = 0; i < patches.size(); ++i) {
+    bits[i / 64] |= static_cast<uint64_t>(patches[i][first] < patches[i][second]) << (i % 64);
+  }
+  return bits;
+}
+
+double ShareDiffering(const Bits& a, const Bits& b, size_t count) {
+  size_t differing = 0;
+  for (size_t i = 0; i < a.size(); ++i) differing += static_cast<size_t>(std::popcount(a[i] ^ b[i]));
+  return static_cast<double>(differing) / static_cast<double>(count);
+}
+
+struct Candidate {
+  BriefTest test;
+  Bits bits;
+  double merit = 0;
+};
+
+// Sorted by how well the test alone tells same from different corners: distance of the means of the two outcomes, in
+// standard deviations.
+std::vector<Candidate> RankCandidates(const Sights& sights, std::mt19937& random) {
+  const size_t count = sights.first.size();
+  const Bits zeros((count + 63) / 64, 0);
+  std::vector<Candidate> candidates;
+  while (candidates.size() < kCandidates) {
+    Candidate candidate{.test = DrawTest(random), .bits = {}};
+    candidate.bits = Outcomes(candidate.test, sights.first);
+    const double ones = ShareDiffering(candidate.bits, zeros, count);
+    if (std::abs(ones - 0.5) > kMaxImbalance) continue;
+    const double flips = ShareDiffering(candidate.bits, Outcomes(candidate.test, sights.second), count);
+    const double differs = 2 * ones * (1 - ones);
+    candidate.merit = (differs - flips) / std::sqrt(differs * (1 - differs) + flips * (1 - flips));
+    candidates.push_back(std::move(candidate));
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+  return candidates;
+}
+
+std::vector<BriefTest> TakeUncorrelated(const std::vector<Candidate>& candidates, size_t corners) {
+  std::vector<const Candidate*> taken;
+  for (double limit = kFirstCorrelation; taken.size() < BriefTests().size(); limit += kCorrelationStep) {
+    taken.clear();
+    for (const Candidate& candidate : candidates) {
+      const bool is_new = std::none_of(taken.begin(), taken.end(), [&](const Candidate* other) {
+        return std::abs(1 - 2 * ShareDiffering(candidate.bits, other->bits, corners)) > limit;
+      });
+      if (is_new) taken.push_back(&candidate);
+      if (taken.size() == BriefTests().size()) break;
+    }
+    std::fprintf(stderr, "correlation up to %.2f: %zu tests\n", limit, taken.size());
+  }
+  std::vector<BriefTest> tests;
+  for (const Candidate* candidate : taken) tests.push_back(candidate->test);
+  return tests;
+}
+
+void PrintTable(const std::vector<BriefTest>& tests) {
+  for (size_t i = 0; i < tests.size(); ++i) {
+    const BriefTest& t = tests[i];
+    std::printf("%s{%d, %d, %d, %d},%s", i % 6 == 0 ? "    " : "", t.first_x_px, t.first_y_px, t.second_x_px,
+                t.second_y_px, i % 6 == 5 || i + 1 == tests.size() ? "\n" : " ");
+  }
+}
+
+int Main() {
+  std::mt19937 random(1);
+  Sights sights;
+  for (uint64_t i = 0; i < kPictures; ++i) AddSights(DeadLeaves(random), i, random, sights);
+  std::fprintf(stderr, "%zu corners\n", sights.first.size());
+  PrintTable(TakeUncorrelated(RankCandidates(sights, random), sights.first.size()));
+  return 0;
+}
+
+}  // namespace
+}  // namespace romap
+
+int main() { return romap::Main(); }
