@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+namespace romap {
+
+// normal . p = offset for the points p on it; normal has unit length.
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double offset_mu = 0;
+
+  double Height(const Eigen::Vector3d& p) const { return normal.dot(p) - offset_mu; }
+};
+
+struct PlaneFit {
+  Plane plane;
+  double sigma_rad = 0;  // standard deviation of the normal's direction (root mean square angle)
+};
+
+// The plane through all three; nullopt when they are as good as on one line.
+std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+
+// The plane with the least weighted sum of squared distances. Its normal is on the side of `up`. weights[i] >= 0, in
+// any unit, is of points[i]. The deviation comes from the distances themselves, not from the weights (White's
+// covariance estimate, 1980), so weights may say what matters as well as what is accurate. nullopt: fewer than four
+// points with a weight, or all of them about on one line.
+std::optional<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, std::span<const double> weights,
+                                 const Eigen::Vector3d& up);
+
+}  // namespace romap

@@ -1,0 +1,299 @@
+#include "server/slam/places/support_plane.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "server/slam/places/plane_fit.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kMaxTilt_rad = 75 * kDegree;
+constexpr int kMinInliers = 12;
+constexpr size_t kMinObjectPoints = 3;
+constexpr int kTriples = 800;
+constexpr double kPromisingShare = 0.7;  // of the best score so far
+constexpr size_t kMaxCandidates = 30;
+constexpr double kSame_rad = 0.5 * kDegree;
+constexpr int kRefinements = 10;
+// Lengths without a unit are shares of the typical distance from a camera to the objects.
+constexpr double kLeastSigma = 0.002;  // points of a real surface scatter at least so much
+constexpr double kMostSigma = 0.03;    // points worse than this tell nothing
+constexpr double kInlierSigmas = 2.5;
+// What a point counts for that is far from the objects' masks, relative to one that is near.
+constexpr double kFarWeight = 0.3;
+constexpr double kReach = 0.15;  // how far around an object its support is looked for
+constexpr double kMinCamerasAbove = 0.9;
+// The estimate of the deviation knows of scatter only. A map also bends, and tables are not flat.
+constexpr double kSigmaFloor_rad = 0.15 * kDegree;
+constexpr double kMinConfidence = 0.05;
+constexpr size_t kMaxObjectPoints = 300;
+
+double Ramp(double value, double zero_at, double one_at) {
+  return std::clamp((value - zero_at) / (one_at - zero_at), 0.0, 1.0);
+}
+
+double Angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+
+double Quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+// The query made clean: finite values only, typical lengths, and a weight for every point.
+struct Scene {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> cameras;
+  std::vector<Eigen::Vector3d> object_points;
+  double distance_mu = 0;       // from the cameras to the objects
+  double object_spread_mu = 0;  // of the object points around their middle
+
+  std::vector<Eigen::Vector3d> points;
+  std::vector<double> sigmas_mu;
+  std::vector<double> weights;  // by closeness to the objects and by precision
+};
+
+// Middle and typical lengths. False: the cameras or objects do not allow for a scene.
+bool MeasureScene(const SupportPlaneQuery& query, Scene& scene) {
+  for (const auto& up : query.camera_ups_world) {
+    if (up.allFinite()) scene.up += up.stableNormalized();
+  }
+  for (const auto& center : query.camera_centers_world) {
+    if (center.allFinite()) scene.cameras.push_back(center);
+  }
+  const size_t stride = query.object_points_world.size() / kMaxObjectPoints + 1;
+  for (size_t i = 0; i < query.object_points_world.size(); i += stride) {
+    if (query.object_points_world[i].allFinite()) scene.object_points.push_back(query.object_points_world[i]);
+  }
+  if (!(scene.up.norm() > 1e-3) || scene.cameras.empty() || scene.object_points.size() < kMinObjectPoints) return false;
+  scene.up.normalize();
+
+  Eigen::Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const auto& p : scene.object_points) values.push_back(p[axis]);
+    middle[axis] = Quantile(std::move(values), 0.5);
+  }
+  const auto median_distance = [&](const std::vector<Eigen::Vector3d>& points) {
+    std::vector<double> distances;
+    for (const auto& p : points) distances.push_back((p - middle).norm());
+    return Quantile(std::move(distances), 0.5);
+  };
+  scene.distance_mu = median_distance(scene.cameras);
+  scene.object_spread_mu = median_distance(scene.object_points);
+  return scene.distance_mu > 0;
+}
+
+double DistanceToObjects(const Scene& scene, const Eigen::Vector3d& p) {
+  double nearest_squared = (p - scene.object_points[0]).squaredNorm();
+  for (const auto& object_point : scene.object_points) {
+    nearest_squared = std::min(nearest_squared, (p - object_point).squaredNorm());
+  }
+  return std::sqrt(nearest_squared);
+}
+
+void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
+  const double least_sigma_mu = kLeastSigma * scene.distance_mu;
+  // Masks tell what is near in the picture; in space it may be the floor behind the table.
+  const double reach_mu = std::max(3 * scene.object_spread_mu, kReach * scene.distance_mu);
+  for (const SupportPoint& point : query.points) {
+    if (!point.position_world.allFinite() || !(point.sigma_mu <= kMostSigma * scene.distance_mu)) continue;
+    const double sigma_mu = std::hypot(point.sigma_mu, least_sigma_mu);
+    const double distance = DistanceToObjects(scene, point.position_world) / reach_mu;
+    const double closeness = (point.near_object ? 1 : kFarWeight) / std::pow(1 + distance * distance, 2);
+    scene.points.push_back(point.position_world);
+    scene.sigmas_mu.push_back(sigma_mu);
+    scene.weights.push_back(closeness * std::pow(least_sigma_mu / sigma_mu, 2));
+  }
+}
+
+// Share, 0..1, of what speaks for the objects standing on this plane, whatever the points say.
+double ObjectsStandOn(const Scene& scene, const Plane& plane) {
+  const auto above = [&](const Eigen::Vector3d& p) { return plane.Height(p) > 0; };
+  const auto cameras_above = static_cast<double>(std::ranges::count_if(scene.cameras, above));
+  if (cameras_above < kMinCamerasAbove * static_cast<double>(scene.cameras.size())) return 0;
+
+  std::vector<double> heights;
+  for (const auto& p : scene.object_points) heights.push_back(plane.Height(p));
+  const double low = Quantile(heights, 0.1);
+  const double extent = Quantile(heights, 0.9) - low;
+  // Masks are not exact and take in some of what lies behind and below.
+  const double tolerance = 0.1 * extent + 3 * kLeastSigma * scene.distance_mu;
+  const auto below = static_cast<double>(std::ranges::count_if(heights, [&](double h) { return h < -tolerance; }));
+  const double rest_above = 1 - Ramp(below / static_cast<double>(heights.size()), 0.1, 0.3);
+  // The lowest points that were seen of an object may be some way up it, but not objects' heights above the plane.
+  const double gap = std::max(0.0, low) / (0.5 * extent + 0.02 * scene.distance_mu);
+  return rest_above / (1 + gap * gap);
+}
+
+// What one point says for the plane: its weight when on it, nothing when away from it.
+double SupportOf(const Scene& scene, const Plane& plane, size_t point) {
+  const double residual = plane.Height(scene.points[point]) / (kInlierSigmas * scene.sigmas_mu[point]);
+  return scene.weights[point] * std::max(0.0, 1 - residual * residual);
+}
+
+double Support(const Scene& scene, const Plane& plane) {
+  double support = 0;
+  for (size_t i = 0; i < scene.points.size(); ++i) support += SupportOf(scene, plane, i);
+  return support;
+}
+
+// Refits while the points that the plane is made of are found anew: Tukey's biweight with the scale of the residuals
+// themselves, for stated uncertainties are often off by a factor. nullopt: they do not make a plane.
+std::optional<PlaneFit> Refine(const Scene& scene, const Plane& start) {
+  PlaneFit fit{.plane = start, .sigma_rad = 0};
+  double scale = 1;  // of a residual, in the points' own sigmas
+  for (int round = 0; round < kRefinements; ++round) {
+    std::vector<double> near;
+    std::vector<double> weights(scene.points.size(), 0.0);
+    for (size_t i = 0; i < scene.points.size(); ++i) {
+      const double residual = std::abs(fit.plane.Height(scene.points[i])) / scene.sigmas_mu[i];
+      if (residual <= kInlierSigmas) near.push_back(residual);
+      const double relative = residual / (4.685 * scale);
+      if (relative < 1) weights[i] = scene.weights[i] * std::pow(1 - relative * relative, 2);
+    }
+    if (std::ssize(near) < kMinInliers) return std::nullopt;
+    scale = std::clamp(1.4826 * Quantile(near, 0.5), 0.2, 1.0);
+    const auto refit = FitPlane(scene.points, weights, scene.up);
+    if (!refit) return std::nullopt;
+    fit = *refit;
+  }
+  return fit;
+}
+
+bool IsLevel(const Scene& scene, const Plane& plane) { return plane.normal.dot(scene.up) > std::cos(kMaxTilt_rad); }
+
+bool IsInlier(const Scene& scene, const Plane& plane, size_t point) {
+  return std::abs(plane.Height(scene.points[point])) <= kInlierSigmas * scene.sigmas_mu[point];
+}
+
+struct Candidate {
+  Plane plane;
+  double score = 0;
+};
+
+double Score(const Scene& scene, const Plane& plane) {
+  return IsLevel(scene, plane) ? Support(scene, plane) * ObjectsStandOn(scene, plane) : 0;
+}
+
+// Promising planes through three points that are drawn by their weights, best first (RANSAC with the score of MSAC:
+// Torr and Zisserman, 2000).
+std::vector<Candidate> SearchPlanes(const Scene& scene, uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::discrete_distribution<size_t> draw(scene.weights.begin(), scene.weights.end());
+  std::vector<Candidate> candidates;
+  double best_score = 0;
+  for (int i = 0; i < kTriples; ++i) {
+    auto plane = PlaneThrough(scene.points[draw(random)], scene.points[draw(random)], scene.points[draw(random)]);
+    if (!plane) continue;
+    if (plane->normal.dot(scene.up) < 0) *plane = {-plane->normal, -plane->offset_mu};
+    const double score = Score(scene, *plane);
+    best_score = std::max(best_score, score);
+    if (score > kPromisingShare * best_score) candidates.push_back({*plane, score});
+  }
+  std::ranges::stable_sort(candidates, std::ranges::greater(), &Candidate::score);
+  candidates.resize(std::min(candidates.size(), kMaxCandidates));
+  return candidates;
+}
+
+struct FoundPlane {
+  PlaneFit fit;
+  double score = 0;
+};
+
+// How likely `other` would have been as good as `best`, had other points of the same surfaces been found: 1 if it is as
+// good, less the more points say that it is worse. Points that agree with both do not tell.
+double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlane& other) {
+  const double best_stands = ObjectsStandOn(scene, best.fit.plane);
+  const double other_stands = ObjectsStandOn(scene, other.fit.plane);
+  double variance = 0;
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    variance += std::pow(
+        best_stands * SupportOf(scene, best.fit.plane, i) - other_stands * SupportOf(scene, other.fit.plane, i), 2);
+  }
+  const double worse_by = best.score - other.score;
+  return worse_by > 0 ? std::exp(-worse_by * worse_by / (2 * variance)) : 1;
+}
+
+// The best of the candidates after refinement. Other planes may explain the points about as well, as with few points
+// and clutter next to the support; the deviation tells of them too. nullopt: none holds.
+std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidate> candidates) {
+  std::vector<FoundPlane> refined;
+  for (const Candidate& candidate : candidates) {
+    const auto fit = Refine(scene, candidate.plane);
+    const double score = fit ? Score(scene, fit->plane) : 0;
+    if (score > 0) refined.push_back({*fit, score});
+  }
+  if (refined.empty()) return std::nullopt;
+  std::ranges::stable_sort(refined, std::ranges::greater(), &FoundPlane::score);
+  const FoundPlane& best = refined[0];
+
+  double likelihoods = 0;
+  double variance = 0;
+  std::vector<Eigen::Vector3d> normals;
+  for (const FoundPlane& other : refined) {
+    const auto is_same = [&](const Eigen::Vector3d& normal) {
+      return Angle_rad(normal, other.fit.plane.normal) < kSame_rad;
+    };
+    if (std::ranges::any_of(normals, is_same)) continue;
+    normals.push_back(other.fit.plane.normal);
+    const double likelihood = ChanceOfOther(scene, best, other);
+    likelihoods += likelihood;
+    variance += likelihood * std::pow(Angle_rad(best.fit.plane.normal, other.fit.plane.normal), 2);
+  }
+  PlaneFit chosen = best.fit;
+  chosen.sigma_rad = std::hypot(chosen.sigma_rad, std::sqrt(variance / likelihoods), kSigmaFloor_rad);
+  return chosen;
+}
+
+double Confidence(const Scene& scene, const PlaneFit& fit) {
+  double inlier_weight = 0;
+  double all_weight = 0;
+  std::vector<Eigen::Vector3d> inliers;
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    all_weight += scene.weights[i];
+    if (!IsInlier(scene, fit.plane, i)) continue;
+    inlier_weight += scene.weights[i];
+    inliers.push_back(scene.points[i]);
+  }
+  // A support is seen around what stands on it.
+  const double reach_mu = kReach * scene.distance_mu;
+  int supported = 0;
+  for (const auto& p : scene.object_points) {
+    const Eigen::Vector3d foot = p - fit.plane.Height(p) * fit.plane.normal;
+    supported += std::ranges::any_of(inliers, [&](const auto& q) { return (q - foot).norm() < reach_mu; });
+  }
+  const double supported_share = static_cast<double>(supported) / static_cast<double>(scene.object_points.size());
+  const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kDegree), 2));
+  return Ramp(inlier_weight / all_weight, 0.1, 0.4) * supported_share * sharpness * ObjectsStandOn(scene, fit.plane);
+}
+
+}  // namespace
+
+std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query) {
+  Scene scene;
+  if (!MeasureScene(query, scene)) return std::nullopt;
+  WeighPoints(query, scene);
+  if (std::ssize(scene.points) < kMinInliers) return std::nullopt;
+  const auto fit = ChoosePlane(scene, SearchPlanes(scene, query.seed));
+  if (!fit) return std::nullopt;
+
+  SupportPlane support{.normal_world = fit->plane.normal,
+                       .offset_mu = fit->plane.offset_mu,
+                       .sigma_rad = fit->sigma_rad,
+                       .confidence = Confidence(scene, *fit)};
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    support.inliers += IsInlier(scene, fit->plane, i);
+  }
+  if (support.inliers < kMinInliers || support.confidence < kMinConfidence) return std::nullopt;
+  return support;
+}
+
+}  // namespace romap
