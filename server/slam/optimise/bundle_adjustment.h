@@ -56,7 +56,8 @@ struct BundleOptions {
 
 struct BundleSummary {
   int iterations = 0;
-  double initial_rms_px = 0;  // over the observations used, weighted by 1 / sigma
+  // Root mean square reprojection error over the observations used (at last only the inliers), weighted by 1 / sigma^2.
+  double initial_rms_px = 0;
   double final_rms_px = 0;
   int outliers = 0;
   bool aborted = false;
@@ -67,6 +68,10 @@ struct BundleSummary {
 // measured), Huber loss at the 95 % bound, analytic Jacobians, right-multiplied SE3 increments, points eliminated by
 // the Schur complement. Deterministic with one thread. The caller fixes the gauge through `fixed` cameras (two for a
 // monocular map, or the far end of the window).
+//
+// Left out, and left as they are: points that no free camera sees, points that one camera sees without depth, and
+// observations that make no sense (index out of range, numbers not finite, sigma not positive, point behind the
+// camera). At the end all observations are judged, also those left out, unless the result is not usable.
 BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace romap
