@@ -7,7 +7,8 @@
 namespace romap {
 namespace {
 
-constexpr int kCell_px = 48;
+// Parts of the image this large must not stay without corners.
+constexpr int kCell_px = 80;
 // How many corners, over those wanted, there are to choose from. More choice spreads them better, but weak corners are
 // found again less often.
 constexpr double kChoice = 1.5;
