@@ -58,6 +58,100 @@ TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
   EXPECT_EQ(update.T_world_mesh->translation().x(), 5);
 }
 
+Sim3<World, World> Correction(double scale, double yaw_rad, double x) {
+  return {scale, Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(x, 0, 0)};
+}
+
+// Where a vertex of the newest mesh is in the world.
+Eigen::Vector3d Placed(const ObjectUpdate& object, const Eigen::Vector3d& vertex) {
+  return *object.T_world_mesh * (object.mesh_scale * vertex);
+}
+
+TEST(MapStateTest, ACorrectionMovesTheMeshAndDoesNotSendItAgain) {
+  const Eigen::Vector3d vertex(0.1, -0.2, 0.3);
+  MapState map;
+  map.Apply(Update(1));
+  map.PublishMesh(MeshOf(1), PlaceAt(5));
+  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100, false);
+  const Eigen::Vector3d before = Placed(map.Snapshot().objects[0].object, vertex);
+  const Sim3<World, World> first = Correction(1.3, 0.35, 2), second = Correction(0.9, -0.1, -1);
+  for (const Sim3<World, World>& S : {first, second}) {
+    map.MoveObject(ObjectId{1}, S);
+    map.Apply(Update(1));
+  }
+  std::optional<ObjectUpdate> last;
+  while (const auto event = outbox->Next(kNoWait)) {
+    ASSERT_TRUE(std::holds_alternative<ObjectUpdate>(*event));
+    last = std::get<ObjectUpdate>(*event);
+  }
+  ASSERT_TRUE(last.has_value());
+  EXPECT_NEAR(last->mesh_scale, 1.3 * 0.9, 1e-12);
+  EXPECT_TRUE(Placed(*last, vertex).isApprox(second * (first * before), 1e-12));
+}
+
+// A mesh is made while the map is corrected: its snapshot knows the first correction but not the second.
+TEST(MapStateTest, AMeshOfAnOlderSnapshotIsPutWhereItsObjectIsNow) {
+  const Eigen::Vector3d vertex(0.1, -0.2, 0.3);
+  const Sim3<World, World> first = Correction(1.3, 0.35, 2), second = Correction(0.9, -0.1, -1);
+  MapState map;
+  map.Apply(Update(1));
+  map.MoveObject(ObjectId{1}, first);
+  MeshPlace place = PlaceAt(5);
+  place.S_new_first = first;
+  map.MoveObject(ObjectId{1}, second);
+  map.PublishMesh(MeshOf(1), place);
+  const ObjectUpdate late = map.Snapshot().objects[0].object;
+  EXPECT_TRUE(Placed(late, vertex).isApprox(second * (place.T_world_mesh * vertex), 1e-12));
+  EXPECT_NEAR(late.mesh_scale, 0.9, 1e-12);
+
+  // The next one knows all and needs no scale of its own.
+  place.S_new_first = second * first;
+  map.PublishMesh(MeshOf(1), place);
+  const ObjectUpdate current = map.Snapshot().objects[0].object;
+  EXPECT_TRUE(Placed(current, vertex).isApprox(place.T_world_mesh * vertex, 1e-12));
+  EXPECT_NEAR(current.mesh_scale, 1, 1e-12);
+  map.MoveObject(ObjectId{99}, first);  // an object that is not there
+}
+
+SE3<World, Camera> CameraAt(double x, double yaw_rad = 0) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(x, 0, 0)};
+}
+
+TEST(MapStateTest, FramesFollowTheirKeyframes) {
+  MapState map;
+  const SE3<Camera, Camera> T_reference_camera(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
+                                               Eigen::Vector3d(0.5, 0, 0));
+  FrameAck keyframe, follower, given;
+  keyframe.frame_id = 1;
+  keyframe.is_keyframe = true;
+  keyframe.T_world_camera = CameraAt(10);
+  follower.frame_id = 2;
+  follower.T_world_camera = CameraAt(10) * T_reference_camera;
+  given.frame_id = 3;
+  given.T_world_camera = CameraAt(12);
+  map.Acknowledge(keyframe, 10, KeyframeId{1});
+  map.Acknowledge(follower, 20, KeyframeId{1}, T_reference_camera);
+  map.Acknowledge(given, 30);
+  EXPECT_TRUE(map.Snapshot().trajectory[1].T_world_camera->Matrix().isApprox(follower.T_world_camera->Matrix()));
+
+  const Sim3<World, World> S = Correction(1.5, 0.2, 3);
+  MapCorrection correction;
+  correction.keyframes = {{KeyframeId{1}, S.Moved(CameraAt(10)), S}};
+  map.Correct(correction);
+  const std::vector<FrameAck> moved = map.Snapshot().trajectory;
+  for (size_t i = 0; i < 2; ++i) {
+    const SE3<World, Camera>& before = i == 0 ? *keyframe.T_world_camera : *follower.T_world_camera;
+    EXPECT_TRUE(moved[i].T_world_camera->Matrix().isApprox(S.Moved(before).Matrix(), 1e-12)) << i;
+  }
+  EXPECT_EQ(moved[2].T_world_camera->translation(), given.T_world_camera->translation()) << "hangs on nothing";
+
+  // A frame that was tracked before the correction is acknowledged after it.
+  follower.frame_id = 4;
+  map.Acknowledge(follower, 40, KeyframeId{1}, T_reference_camera);
+  EXPECT_TRUE(map.Snapshot().trajectory[3].T_world_camera->Matrix().isApprox(S.Moved(*follower.T_world_camera).Matrix(),
+                                                                             1e-12));
+}
+
 TEST(MapStateTest, ANewcomerGetsTheMapFirst) {
   MapState map;
   map.Apply(Update(1));
