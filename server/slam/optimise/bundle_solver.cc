@@ -191,6 +191,8 @@ ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options,
   solver.num_threads = std::max(1, options.threads);
   solver.linear_solver_type = options.dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.logging_type = ceres::SILENT;
+  // In the solver's own unit the columns are of like size already, and the damping follows their norms.
+  solver.jacobi_scaling = false;
   // The points are eliminated first; found by hand, this costs Ceres a search for independent sets.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (size_t i = 0; i < points_.size(); ++i) {
