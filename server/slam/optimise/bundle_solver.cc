@@ -136,9 +136,10 @@ void BundleSolver::SelectPoints() {
     if (!problem_.cameras[observation.camera].fixed) point.from_free_camera = true;
   }
   for (size_t i = 0; i < use_.size(); ++i) {
+    if (!use_[i]) continue;  // its indices may be wrong
     const Sights& point = sights[problem_.observations[i].point];
     const bool fixed = problem_.points[problem_.observations[i].point].fixed;
-    use_[i] = use_[i] && point.from_free_camera && (fixed || point.constraints >= 2);
+    use_[i] = point.from_free_camera && (fixed || point.constraints >= 2);
   }
 }
 
