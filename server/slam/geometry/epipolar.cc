@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -44,6 +45,17 @@ Eigen::Matrix<double, 3, 2> AxesAcross(const Eigen::Vector3d& direction) {
   axes.col(0) = direction.unitOrthogonal();
   axes.col(1) = direction.cross(axes.col(0));
   return axes;
+}
+
+// Derivatives of the essential matrix by the parameters of Moved.
+std::array<Eigen::Matrix3d, 5> EssentialDerivatives(const Motion& motion) {
+  std::array<Eigen::Matrix3d, 5> derivatives;
+  for (int k = 0; k < 3; ++k) {
+    derivatives[k] = Skew(motion.direction) * Skew(Eigen::Vector3d::Unit(k)) * motion.rotation;
+  }
+  const Eigen::Matrix<double, 3, 2> axes = AxesAcross(motion.direction);
+  for (int k = 0; k < 2; ++k) derivatives[3 + k] = Skew(axes.col(k)) * motion.rotation;
+  return derivatives;
 }
 
 double AngleSigma_rad(const Eigen::MatrixXd& covariance) {
@@ -116,31 +128,26 @@ double Support(const CameraModel& camera, const Motion& motion, std::span<const 
   return support;
 }
 
-void AddEpipolarError(const CameraModel& camera, const Motion& motion, const RayMatch& match,
-                      MotionEquations& equations) {
-  const EpipolarLines lines = LinesOf(camera, motion.Essential(), match);
-  if (!(lines.slope2 > 0)) return;  // both points at the epipoles: any motion along this direction explains them
-
-  // Derivatives of E * first and E^T * second.
-  const Eigen::Vector3d first_turned = motion.rotation * match.first;
-  const Eigen::Vector3d across = match.second.cross(motion.direction);
-  const Eigen::Matrix<double, 3, 2> axes = AxesAcross(motion.direction);
-  Eigen::Matrix<double, 3, 5> d_second_line;
-  d_second_line.leftCols<3>() = -Skew(motion.direction) * Skew(first_turned);
-  Eigen::Matrix<double, 3, 5> d_first_line;
-  d_first_line.leftCols<3>() = motion.rotation.transpose() * Skew(across);
-  for (int k = 0; k < 2; ++k) {
-    d_second_line.col(3 + k) = axes.col(k).cross(first_turned);
-    d_first_line.col(3 + k) = motion.rotation.transpose() * match.second.cross(axes.col(k));
+MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d essential = motion.Essential();
+  const std::array<Eigen::Matrix3d, 5> derivatives = EssentialDerivatives(motion);
+  MotionEquations equations;
+  for (const RayMatch& match : matches) {
+    const EpipolarLines lines = LinesOf(camera, essential, match);
+    if (!(lines.slope2 > 0)) continue;  // both points at the epipoles: any motion along this direction explains them
+    const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
+    const double error = lines.algebraic * scale;
+    MotionEquations::Vector derivative;
+    for (int k = 0; k < 5; ++k) {
+      const Eigen::Vector3d second_line = derivatives[k] * match.first;
+      const Eigen::Vector3d first_line = derivatives[k].transpose() * match.second;
+      const double half_slope2 = second_line.dot(lines.second_slope) + first_line.dot(lines.first_slope);
+      derivative[k] = scale * (match.second.dot(second_line) - lines.algebraic / lines.slope2 * half_slope2);
+    }
+    equations.Add(derivative, error, HuberWeight(error * error, kEpipolarChi2Bound));
+    equations.cost += HuberCost(error * error, kEpipolarChi2Bound);
   }
-  const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
-  const double error = lines.algebraic * scale;
-  const MotionEquations::Vector d_half_slope2 =
-      d_second_line.transpose() * lines.second_slope + d_first_line.transpose() * lines.first_slope;
-  const MotionEquations::Vector derivative =
-      scale * (d_second_line.transpose() * match.second - (lines.algebraic / lines.slope2) * d_half_slope2);
-  equations.Add(derivative, error, HuberWeight(error * error, kEpipolarChi2Bound));
-  equations.cost += HuberCost(error * error, kEpipolarChi2Bound);
+  return equations;
 }
 
 Motion Moved(const Motion& motion, const MotionEquations::Vector& step) {
@@ -160,11 +167,7 @@ RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::
     for (const RayMatch& match : matches) {
       if (SampsonChi2(camera, essential, match) < reach * kEpipolarChi2Bound) inliers.push_back(match);
     }
-    const auto linearise = [&](const Motion& at) {
-      MotionEquations sums;
-      for (const RayMatch& match : inliers) AddEpipolarError(camera, at, match, sums);
-      return sums;
-    };
+    const auto linearise = [&](const Motion& at) { return EpipolarEquations(camera, at, inliers); };
     const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
     equations = Minimise<5>(kIterationsPerRound, linearise, move, refined.motion);
   }

@@ -56,9 +56,8 @@ double Support(const CameraModel& camera, const Motion& motion, std::span<const 
 
 using MotionEquations = NormalEquations<5>;
 
-// Adds the Sampson error of one match, with Huber's weight. Parameters as in Moved.
-void AddEpipolarError(const CameraModel& camera, const Motion& motion, const RayMatch& match,
-                      MotionEquations& equations);
+// The Sampson errors of the matches, with Huber's weight. Parameters as in Moved.
+MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches);
 
 // step = (turn of the second camera's frame, shift of the direction along two axes across it).
 Motion Moved(const Motion& motion, const MotionEquations::Vector& step);
