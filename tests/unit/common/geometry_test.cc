@@ -39,6 +39,14 @@ TEST(GeometryTest, RotationFromZToUp) {
   }
 }
 
+TEST(GeometryTest, ShortestRotationTurnsNothingElse) {
+  const Eigen::Vector3d from(0.3, -1, 2), to(-5, 0.1, 0.4);
+  const Eigen::Quaterniond rotation = ShortestRotation(from, to);
+  EXPECT_TRUE((rotation * from.normalized()).isApprox(to.normalized(), 1e-12));
+  const Eigen::Vector3d axis = from.cross(to);
+  EXPECT_TRUE((rotation * axis).isApprox(axis, 1e-12));
+}
+
 TEST(CameraModelTest, ProjectUndoesUnproject) {
   const CameraModel camera{640, 480, 500, 510, 319.5, 239.5, {}};
   const Eigen::Vector3d ray = camera.Unproject(17, 400);
