@@ -3,10 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <thread>
 #include <utility>
 
 #include "common/status.h"
+#include "common/wire/recording.h"
 
 namespace romap {
 namespace {
@@ -14,6 +16,7 @@ namespace {
 constexpr size_t kMaxNameLength = 200;
 
 int TrainingThreads(const ServerConfig& config) {
+  if (config.session.single_thread) return 0;
   if (config.training_threads > 0) return config.training_threads;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
@@ -61,7 +64,9 @@ class LocalEventStream : public MapStream {
 }  // namespace
 
 LocalMappingService::LocalMappingService(const ServerConfig& config)
-    : config_(config), pool_(config.nerf, TrainingThreads(config)), mesher_(config.mesh) {}
+    : config_(config),
+      pool_(config.nerf, TrainingThreads(config)),
+      mesher_(config.mesh, config.session.single_thread ? Mesher::Threading::kCaller : Mesher::Threading::kOwnThread) {}
 
 LocalMappingService::~LocalMappingService() {
   // Sessions use the pool and the mesher, so they end first.
@@ -89,7 +94,12 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
         fmt::format("the server keeps {} sessions and takes no more; delete one first", sessions_.size()));
   }
   const std::string id = NewId();
-  auto session = std::make_shared<Session>(id, options, config_, &pool_, &mesher_);
+  std::unique_ptr<wire::RecordingWriter> recorder;
+  if (!config_.session.record_dir.empty()) {
+    const std::filesystem::path path = std::filesystem::path(config_.session.record_dir) / (id + ".romaprec");
+    ROMAP_ASSIGN_OR_RETURN(recorder, wire::RecordingWriter::Create(path.string(), options));
+  }
+  auto session = std::make_shared<Session>(id, options, config_, &pool_, &mesher_, std::move(recorder));
   sessions_[id] = session;
   spdlog::info("session {}: created, {}x{} px", id, options.camera.width_px, options.camera.height_px);
   return session->Info();

@@ -24,21 +24,25 @@ int64_t UnixNow_ns() {
       .count();
 }
 
+// Of training after each keyframe when one thread does all; about what two cores do between keyframes.
+constexpr int kSlicesPerKeyframe = 4;
+
 double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 }  // namespace
 
 Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
-                 Mesher* mesher)
+                 Mesher* mesher, std::unique_ptr<wire::RecordingWriter> recorder)
     : id_(std::move(id)),
       options_(options),
       config_(config),
       created_unix_ns_(UnixNow_ns()),
       pool_(pool),
       mesher_(mesher),
+      recorder_(std::move(recorder)),
       ingest_(options.camera),
       tracker_(config.slam, options.pose_use, &local_map_),
-      sparse_mapper_(config.slam, &local_map_),
+      sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
       object_mapper_(config.objects),
       next_statistics_(Clock::now()),
       frames_(config.session.frame_queue),
@@ -47,6 +51,10 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       mesher_->Register([this](MeshUpdate mesh, const MeshPlace& place) { map_.PublishMesh(std::move(mesh), place); });
   pool_client_ =
       pool_->Register([this](FieldSnapshot snapshot) { mesher_->Offer(mesher_client_, std::move(snapshot)); });
+  if (config_.session.single_thread) {
+    tracking_thread_ = std::thread([this] { RunAll(); });
+    return;
+  }
   tracking_thread_ = std::thread([this] { RunTracking(); });
   mapping_thread_ = std::thread([this] { RunMapping(); });
 }
@@ -79,12 +87,32 @@ void Session::RunTracking() {
   tracked_.Close();
 }
 
+// Tracking, mapping and training in turns.
+void Session::RunAll() {
+  try {
+    while (std::optional<Arrival> arrival = frames_.Pop()) {
+      if (!stopping_) TrackFrame(*arrival);
+      PublishStatistics();
+    }
+    EndMapping();
+  } catch (const std::exception& e) {
+    Fail("mapping", e.what());
+    SettleAll();
+  }
+}
+
 void Session::TrackFrame(const Arrival& arrival) {
   const FrameInput& input = arrival.input;
   auto frame = ingest_.Accept(input);
   if (!frame.ok()) return Reject(input, Message(frame.status()), arrival.time);
+  Record(input);
   TrackedImage image = tracker_.Track(*frame);
   Acknowledge(arrival, image.tracked);
+  if (config_.session.single_thread) {
+    MapFrame(image);
+    if (image.tracked.is_keyframe) pool_->TrainSlices(pool_client_, kSlicesPerKeyframe);
+    return;
+  }
   if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
   // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
   // objects.
@@ -114,19 +142,23 @@ void Session::RunMapping() {
   try {
     while (!tracked_.Drained()) {
       const std::optional<TrackedImage> image = tracked_.PopFor(period);
+      if (image && image->tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
       if (image && !stopping_) MapFrame(*image);
       PublishStatistics();
     }
-    SettleAll();
-    if (state_ != SessionState::kFailed && !stopping_) TrainToTheEnd();
+    EndMapping();
   } catch (const std::exception& e) {
     Fail("mapping", e.what());
     SettleAll();
   }
 }
 
+void Session::EndMapping() {
+  SettleAll();
+  if (state_ != SessionState::kFailed && !stopping_) TrainToTheEnd();
+}
+
 void Session::MapFrame(const TrackedImage& image) {
-  if (image.tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
   const MappedFrame mapped = sparse_mapper_.Process(image);
   if (mapped.begun_anew) Publish(object_mapper_.Reset());
   if (mapped.correction) Correct(*mapped.correction);
@@ -171,7 +203,11 @@ void Session::TrainToTheEnd() {
   Publish(object_mapper_.Finish());
   pool_->Finish(pool_client_);
   while (!stopping_ && !(pool_->Idle(pool_client_) && mesher_->Idle(mesher_client_))) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if (config_.session.single_thread) {
+      pool_->TrainSlices(pool_client_, 1);
+    } else {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
     PublishStatistics();
   }
   if (stopping_) return;
@@ -194,6 +230,15 @@ void Session::Reject(const FrameInput& input, const std::string& why, Clock::tim
                     .latency_s = Seconds(Clock::now() - arrival)},
                    input.timestamp_ns);
   Settle();
+}
+
+// A disk that fails costs the recording, not the session.
+void Session::Record(const FrameInput& input) {
+  if (!recorder_) return;
+  const absl::Status status = recorder_->Append(input);
+  if (status.ok()) return;
+  spdlog::error("session {}: its recording ends: {}", id_, Message(status));
+  recorder_ = nullptr;
 }
 
 void Session::Fail(const char* stage, const std::string& what) {

@@ -13,6 +13,7 @@
 
 #include "common/bounded_queue.h"
 #include "common/mapping_service.h"
+#include "common/wire/recording.h"
 #include "server/nerf/training_pool.h"
 #include "server/objects/object_mapper.h"
 #include "server/session/ingest.h"
@@ -30,13 +31,15 @@ namespace romap {
 //          -> TrainingPool (server's) -> Mesher (server's) -> MapState -> outboxes
 //
 // The sparse map goes back to tracking as a value (LocalMapSlot); its corrections go down the same path as the frames.
+// With session.single_thread the tracking thread does all of it, frame by frame and in a fixed order, so that the same
+// frames give the same map to the last bit; the pool and the mesher then have no threads either.
 //
 // A frame that was accepted is never lost while the session lives; closing a stream closes nothing here.
 class Session {
  public:
-  // `pool` and `mesher` outlive the session.
-  Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
-          Mesher* mesher);
+  // `pool` and `mesher` outlive the session. `recorder` is told every accepted frame; none = not recorded.
+  Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool, Mesher* mesher,
+          std::unique_ptr<wire::RecordingWriter> recorder = nullptr);
   ~Session();
 
   SessionInfo Info() const;
@@ -69,6 +72,9 @@ class Session {
 
   void RunTracking();
   void RunMapping();
+  void RunAll();
+  void EndMapping();
+  void Record(const FrameInput& input);
   void TrackFrame(const Arrival& arrival);
   void Acknowledge(const Arrival& arrival, const TrackedFrame& tracked);
   void MapFrame(const TrackedImage& image);
@@ -92,6 +98,8 @@ class Session {
   MapState map_;
   uint64_t mesher_client_ = 0;
   uint64_t pool_client_ = 0;
+
+  std::unique_ptr<wire::RecordingWriter> recorder_;  // tracking thread
 
   Ingest ingest_;                      // tracking thread
   LocalMapSlot local_map_;             // from the mapping thread to the tracking thread

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "common/config.h"
 
 namespace romap {
@@ -10,6 +12,8 @@ struct SessionConfig {
   int mapping_queue = 8;
   int subscriber_queue = 65536;
   double statistics_period_s = 0.5;
+  std::string record_dir;
+  bool single_thread = false;
 
   void Fields(ConfigFields& fields) {
     fields.Add("max_sessions", &max_sessions,
@@ -25,6 +29,11 @@ struct SessionConfig {
                 .help = "Acknowledgements kept for a client that does not read; the oldest are dropped beyond it"});
     fields.Add("statistics_period_s", &statistics_period_s,
                {.unit = "s", .min = 0.05, .max = 60, .help = "Time between two statistics messages"});
+    fields.Add("record_dir", &record_dir,
+               {.help = "Folder for <session id>.romaprec, what each session was fed, for romap replay; empty = none"});
+    fields.Add(
+        "single_thread", &single_thread,
+        {.help = "One thread per session does all in a fixed order: slower, but the same frames give the same map"});
   }
 };
 
