@@ -41,6 +41,7 @@ int RunCli(int argc, const char* const* argv) {
       ->capture_default_str();
   Command chosen;
   AddRunCommand(app, &chosen);
+  AddReplayCommand(app, &chosen);
   AddEvalCommand(app, &chosen);
   AddSynthCommand(app, &chosen);
   AddExportCommand(app, &chosen);

@@ -15,6 +15,7 @@ using Command = std::function<absl::Status()>;
 
 void AddRunCommand(CLI::App& app, Command* chosen);
 void AddEvalCommand(CLI::App& app, Command* chosen);
+void AddReplayCommand(CLI::App& app, Command* chosen);
 void AddSynthCommand(CLI::App& app, Command* chosen);
 void AddExportCommand(CLI::App& app, Command* chosen);
 void AddSessionsCommand(CLI::App& app, Command* chosen);

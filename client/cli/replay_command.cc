@@ -1,0 +1,132 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/cli/command.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/map_files.h"
+#include "client/cli/progress.h"
+#include "client/cli/service_options.h"
+#include "client/files/text_file.h"
+#include "client/files/tum.h"
+#include "common/status.h"
+#include "common/wire/recording.h"
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReplayOptions {
+  std::string file;
+  std::string out;
+  bool threads = false;
+  ServiceOptions service;
+};
+
+// Share of the progress bar that the frames take; training has the rest.
+constexpr double kFrameShare = 0.6;
+
+// Sends every frame and waits until the map is finished. The events say nothing that the export does not say later.
+absl::Status Feed(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(const auto stream, service.OpenMap(session_id));
+  Progress progress("replaying");
+  for (size_t i = 0; i < recording.size() && !Interrupted(); ++i) {
+    ROMAP_ASSIGN_OR_RETURN(FrameInput frame, recording.Load(i));
+    ROMAP_RETURN_IF_ERROR(stream->Send(std::move(frame)));
+    while (stream->Next(std::chrono::milliseconds(0))) {
+    }
+    progress.Show(kFrameShare * static_cast<double>(i) / static_cast<double>(recording.size()),
+                  fmt::format("frame {}/{}", i + 1, recording.size()));
+  }
+  if (Interrupted())
+    return absl::CancelledError("interrupted, nothing is written: half a replay compares with nothing");
+  ROMAP_RETURN_IF_ERROR(service.FinishSession(session_id).status());
+  while (!stream->Done() && !Interrupted()) {
+    const std::optional<MapEvent> event = stream->Next(std::chrono::milliseconds(50));
+    if (const auto* statistics = event ? std::get_if<Statistics>(&*event) : nullptr) {
+      progress.Show(kFrameShare + (1 - kFrameShare) * statistics->training_progress,
+                    fmt::format("{} objects still training", statistics->objects_training));
+    }
+  }
+  progress.Done();
+  if (Interrupted())
+    return absl::CancelledError("interrupted, nothing is written: half a replay compares with nothing");
+  return stream->status();
+}
+
+// No times and no memory: two replays of one file agree in all of it.
+nlohmann::json ToJson(const wire::Recording& recording, const Statistics& statistics,
+                      const std::vector<MapObject>& objects, const std::vector<std::string>& faults) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const MapObject& entry : objects) {
+    list.push_back({{"name", entry.file_stem},
+                    {"class", entry.object.class_name},
+                    {"observations", entry.object.observations},
+                    {"training_steps", entry.steps},
+                    {"vertices", entry.mesh_world.vertices.size()},
+                    {"triangles", entry.mesh_world.triangles.size()}});
+  }
+  return {{"recording", recording.path()},
+          {"lost_bytes", recording.lost_bytes()},
+          {"frames",
+           {{"sent", statistics.frames_received},
+            {"accepted", statistics.frames_processed},
+            {"rejected", statistics.frames_rejected},
+            {"keyframes", statistics.keyframes}}},
+          {"map_points", statistics.map_points},
+          {"objects", list},
+          {"faults", faults}};
+}
+
+absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& recording, const MapSnapshot& snapshot) {
+  std::vector<std::string> faults;
+  const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+  ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
+  const nlohmann::json summary = ToJson(recording, snapshot.statistics, objects, faults);
+  ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), summary.dump(1) + "\n"));
+  fmt::print("{} frames replayed ({} keyframes): {} objects and {} camera poses written to {}\n", recording.size(),
+             snapshot.statistics.keyframes, objects.size(), snapshot.trajectory.size(), options.out);
+  return absl::OkStatus();
+}
+
+absl::Status RunReplay(ReplayOptions options) {
+  ROMAP_ASSIGN_OR_RETURN(const wire::Recording recording, wire::Recording::Open(options.file));
+  if (recording.lost_bytes() > 0) {
+    fmt::print(stderr, "romap: {}: the last record is cut off, its {} bytes are left out; {} frames are replayed\n",
+               options.file, recording.lost_bytes(), recording.size());
+  }
+  options.service.local = true;
+  // In front, so that what the user sets has the last word.
+  if (!options.threads) options.service.settings.insert(options.service.settings.begin(), "session.single_thread=true");
+  ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
+  SessionOptions session = recording.options();
+  session.mode = FrameMode::kReplay;  // what a live session dropped is not in the file
+  ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service->CreateSession(session));
+  ROMAP_RETURN_IF_ERROR(Feed(recording, *service, info.id));
+  ROMAP_ASSIGN_OR_RETURN(const MapSnapshot snapshot, service->ExportMap(info.id));
+  return WriteResult(options, recording, snapshot);
+}
+
+}  // namespace
+
+void AddReplayCommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App* command = app.add_subcommand(
+      "replay", "Map what a session was fed (session.record_dir) once more, the same way every time");
+  command->add_option("file", options->file, "The recording, <session id>.romaprec")->required();
+  command->add_option("--out", options->out, "Folder for meshes, cuboids, trajectory and figures")->required();
+  command->add_flag("--threads", options->threads,
+                    "Map on several threads as a server does: faster, and not quite the same every time");
+  command->add_option("--config", options->service.config_file, "YAML configuration of the mapping");
+  command->add_option("--set", options->service.settings, "section.field=value of the configuration, repeatable");
+  command->callback([options, chosen] { *chosen = [options] { return RunReplay(*options); }; });
+}
+
+}  // namespace romap

@@ -1,0 +1,108 @@
+// A session that was recorded, replayed by the built program.
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "client/synth/synth.h"
+#include "tests/support/subprocess.h"
+
+namespace romap {
+namespace {
+
+using ::testing::HasSubstr;
+using testing_support::ProcessResult;
+using testing_support::RunProcess;
+using testing_support::TemporaryFolder;
+
+namespace fs = std::filesystem;
+
+ProcessResult Romap(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), ROMAP_CLIENT);
+  return RunProcess(arguments);
+}
+
+std::string Bytes(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::map<std::string, std::string> AllFiles(const std::string& dir) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(dir)) {
+    if (entry.is_regular_file()) files[fs::relative(entry.path(), dir).string()] = Bytes(entry.path());
+  }
+  return files;
+}
+
+class ReplayTest : public ::testing::Test {
+ protected:
+  // Maps a small sequence with recording on; the recording's path.
+  std::string Record() const {
+    synth::SynthOptions options{.seed = 3, .objects = 2, .frames = 40, .width_px = 240, .height_px = 180};
+    EXPECT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
+    fs::create_directory(folder_ / "recordings");
+    const ProcessResult run =
+        Romap({"run", folder_ / "sequence", "--local", "--set", "session.record_dir=" + (folder_ / "recordings"),
+               "--out", folder_ / "map", "--no-pictures"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const auto files = AllFiles(folder_ / "recordings");
+    EXPECT_EQ(files.size(), 1U);
+    return files.empty() ? "" : (folder_ / "recordings/") + files.begin()->first;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(ReplayTest, TwoReplaysWriteTheSameBytes) {
+  const std::string recording = Record();
+  for (const char* out : {"first", "second"}) {
+    const ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
+    ASSERT_EQ(replay.exit_code, 0) << replay.err;
+    EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
+  }
+  const auto first = AllFiles(folder_ / "first");
+  const auto second = AllFiles(folder_ / "second");
+  EXPECT_GE(first.size(), 7U) << "trajectory, cuboids, summary, and a .ply and a .glb of each object";
+  ASSERT_EQ(first.size(), second.size());
+  for (const auto& [name, bytes] : first) EXPECT_TRUE(second.at(name) == bytes) << name << " differs";
+}
+
+TEST_F(ReplayTest, ACutOffRecordingIsReplayedAsFarAsItGoes) {
+  const std::string recording = Record();
+  fs::resize_file(recording, fs::file_size(recording) - 1000);
+  const ProcessResult replay = Romap({"replay", recording, "--threads", "--out", folder_ / "out"});
+  ASSERT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_THAT(replay.err, HasSubstr("the last record is cut off"));
+  EXPECT_THAT(replay.out, HasSubstr("39 frames replayed"));
+}
+
+TEST_F(ReplayTest, WhatIsNoRecordingIsRefusedInOneLine) {
+  const std::string text = folder_ / "notes.txt";
+  std::ofstream(text) << "not a recording at all";
+  std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\2\0\0\0", 4);
+  for (const auto& [file, fault] : {std::pair{text, "should begin with ROMAPREC"},
+                                    std::pair{folder_ / "old.romaprec", "of version 2, this program reads version 1"},
+                                    std::pair{folder_ / "missing.romaprec", "no such file"}}) {
+    const ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
+    EXPECT_EQ(replay.exit_code, 2);
+    EXPECT_THAT(replay.err, HasSubstr(fault));
+    EXPECT_EQ(std::count(replay.err.begin(), replay.err.end(), '\n'), 1) << replay.err;
+  }
+}
+
+TEST_F(ReplayTest, AFolderThatIsNotThereIsSaidBeforeAnyFrameIsSent) {
+  synth::SynthOptions options{.seed = 3, .objects = 1, .frames = 2, .width_px = 64, .height_px = 48};
+  ASSERT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
+  const ProcessResult run = Romap({"run", folder_ / "sequence", "--local", "--set",
+                                   "session.record_dir=" + (folder_ / "nowhere"), "--out", folder_ / "map"});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.err, HasSubstr("nowhere"));
+}
+
+}  // namespace
+}  // namespace romap
