@@ -61,14 +61,15 @@ void MeasureAll(int repeats) {
   local.max_iterations = 8;
   BundleOptions local_sparse = local;
   local_sparse.dense = false;
-  for (const int points : {1500, 3000}) {
+  // Eight sights of each point: seven cameras before the free ones still see some of their points.
+  for (const int points : {1000, 1500, 2500}) {
     for (const int free : {10, 20}) {
-      const BundleWorldOptions window = Window(free + 20, 20, points, 6);
+      const BundleWorldOptions window = Window(free + 7, 7, points, 8);
       Measure(fmt::format("window {} free, dense", free), window, local, repeats);
       Measure(fmt::format("window {} free, sparse", free), window, local_sparse, repeats);
     }
   }
-  BundleWorldOptions depth = Window(30, 20, 1500, 6);
+  BundleWorldOptions depth = Window(17, 7, 1500, 8);
   depth.with_depth = true;
   Measure("window with depth, dense", depth, local, repeats);
 
