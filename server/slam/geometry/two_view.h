@@ -14,13 +14,15 @@ namespace romap {
 struct TwoViewMatch {
   Eigen::Vector2d first_px = Eigen::Vector2d::Zero();  // undistorted
   Eigen::Vector2d second_px = Eigen::Vector2d::Zero();
-  double sigma_px = 1;  // standard deviation per axis of the worse of the two
+  // Standard deviation per axis of the worse of the two. May be generous, because the matches' own scatter counts where
+  // it is smaller; may not be too small, or good matches are taken for wrong.
+  double sigma_px = 1;
 };
 
 enum class TwoViewOutcome {
   kOk,
   kTooFewMatches,      // fewer than min_matches, or fewer inliers than min_points under the best model
-  kTooLittleParallax,  // the best motion is a turn, or its rays are too close to parallel
+  kTooLittleParallax,  // a mere turn explains it, rays are too close to parallel, or the motion too uncertain
   kAmbiguous,          // two motions explain the matches about equally well
 };
 
@@ -45,7 +47,7 @@ struct TwoViewResult {
   SE3<Camera, Camera> T_first_second;  // second camera to first camera; |translation| = 1
   std::vector<std::optional<Eigen::Vector3d>> points_first;  // per match: in the first camera's frame, if usable
   int points = 0;
-  double parallax_rad = 0;  // median over the points
+  double parallax_rad = 0;  // median over the agreeing matches
 };
 
 // Structure and motion from two views of one calibrated camera, without any prior. RANSAC fits a homography and an
