@@ -78,8 +78,9 @@ uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int ero
 
 void FeatureExtractor::LookAt(const Frame& frame) {
   const cv::Mat& picture = frame.source_grey.empty() ? frame.image_bgr : frame.source_grey;
-  if (picture_.data == picture.data && picture_.size() == picture.size()) return;
+  if (picture_.data == picture.data && picture_.size() == picture.size() && picture_frame_id_ == frame.frame_id) return;
   picture_ = picture;
+  picture_frame_id_ = frame.frame_id;
   if (picture.channels() == 3) cv::cvtColor(picture, grey_, cv::COLOR_BGR2GRAY);
   pyramid_.Build(picture.channels() == 3 ? grey_ : picture, kMinImageSide_px);
 }
@@ -92,6 +93,15 @@ std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame,
   return frame.source_grey.empty() ? pixels_px : UndistortPixels(frame.source_camera, pixels_px);
 }
 
+Corners FeatureExtractor::KeepSeen(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const {
+  const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
+  Corners seen;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    if (IsInside(frame.camera, pixels_px[i]) && (free.empty() || IsSet(free, pixels_px[i]))) seen.push_back(corners[i]);
+  }
+  return seen;
+}
+
 // From the coarsest octave on, so that what an octave cannot fill goes to the finer ones, which have more to choose
 // from.
 std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const Frame& frame, int count,
@@ -100,9 +110,7 @@ std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const F
   for (int octave = pyramid_.octaves() - 1; octave >= 0; --octave) {
     const Corners corners = find(octave, Share(static_cast<size_t>(count) - candidates.size(), octave));
     const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
-    for (size_t i = 0; i < corners.size(); ++i) {
-      if (IsInside(frame.camera, pixels_px[i])) candidates.push_back({corners[i].pt, octave, pixels_px[i]});
-    }
+    for (size_t i = 0; i < corners.size(); ++i) candidates.push_back({corners[i].pt, octave, pixels_px[i]});
   }
   return candidates;
 }
@@ -111,9 +119,10 @@ std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
   LookAt(frame);
   const auto find = [&](int octave, size_t count) {
     const cv::Mat& image = pyramid_.sharp(octave);
-    return SpreadEvenly(DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
-                                                config_.scene_fast_min_threshold),
-                        image.size(), count);
+    Corners corners = DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
+                                              config_.scene_fast_min_threshold);
+    if (!frame.source_grey.empty()) corners = KeepSeen(frame, octave, corners, {});
+    return SpreadEvenly(std::move(corners), image.size(), count);
   };
   return Describe(frame, FindInOctaves(frame, config_.scene_features, find));
 }
@@ -135,12 +144,7 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
     const cv::Mat& image = pyramid_.sharp(octave);
     const cv::Rect part = Describable(image) & pyramid_.Part(octave, box_px);
     const Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
-    const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
-    Corners fitting;
-    for (size_t i = 0; i < corners.size(); ++i) {
-      if (IsInside(frame.camera, pixels_px[i]) && IsSet(free, pixels_px[i])) fitting.push_back(corners[i]);
-    }
-    return SpreadEvenly(std::move(fitting), image.size(), count);
+    return SpreadEvenly(KeepSeen(frame, octave, corners, free), image.size(), count);
   };
   return Describe(frame, FindInOctaves(frame, config_.object_features, find));
 }

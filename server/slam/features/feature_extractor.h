@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -16,7 +17,7 @@ namespace romap {
 
 // Finds oriented FAST corners with steered BRIEF descriptors (ORB: Rublee et al., ICCV 2011). The same frame gives the
 // same features in the same order; an image that is too small or has no texture gives none. For one thread: keeps its
-// buffers, and the pyramid of the last frame, from call to call.
+// buffers, and the pyramid of the last frame, from call to call (its picture must not be written to meanwhile).
 //
 // Where the frame has the picture as the lens gave it (Frame::source_grey), corners are found and described there and
 // only their positions are undistorted: a resampled picture is less sharp.
@@ -46,6 +47,8 @@ class FeatureExtractor {
   using FindCorners = std::function<Corners(int octave, size_t count)>;
 
   void LookAt(const Frame& frame);
+  // The corners that the pinhole image shows, where `free` (CV_8UC1, of its size; empty = anywhere) is set.
+  Corners KeepSeen(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const;
   // NaN or outside the image where the pinhole camera does not see the corner.
   std::vector<Eigen::Vector2f> PinholePixels(const Frame& frame, int octave, const Corners& corners) const;
   std::vector<Candidate> FindInOctaves(const Frame& frame, int count, const FindCorners& find) const;
@@ -54,6 +57,7 @@ class FeatureExtractor {
   const SlamConfig config_;
   cv::Mat grey_;
   cv::Mat picture_;  // what the pyramid shows; holding it keeps its memory from becoming another picture's
+  uint64_t picture_frame_id_ = 0;
   ImagePyramid pyramid_;
 };
 

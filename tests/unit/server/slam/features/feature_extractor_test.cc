@@ -164,7 +164,7 @@ TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
   frame.source_camera.fx_px = frame.source_camera.fy_px = 100;  // sees twice as far to all sides
   frame.camera = frame.source_camera.Pinhole();
   const std::vector<Feature> features = FeatureExtractor(SlamConfig{}).ExtractScene(frame);
-  EXPECT_GT(features.size(), 100);
+  EXPECT_GT(features.size(), 500);  // the places of those dropped are filled
   for (const Feature& feature : features) {
     EXPECT_TRUE(cv::Rect2f(0, 0, 319, 239).contains({feature.pixel_px.x(), feature.pixel_px.y()}));
   }
