@@ -108,6 +108,7 @@ Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int 
 
 Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count) {
   if (corners.size() <= count) return corners;
+  if (count == 0) return {};
   KeepChoice(corners, image_size, static_cast<size_t>(kChoice * static_cast<double>(count)));
   // At twice the distance of a square lattice of `count` corners not as many fit; at one pixel all do.
   float near_px = 1;

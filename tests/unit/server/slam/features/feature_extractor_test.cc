@@ -61,6 +61,18 @@ TEST(FeatureExtractor, AFeatureOnTheMasksBorderHasNoLabel) {
   }
 }
 
+TEST(FeatureExtractor, GivesAsManyAsAskedForWhereThereAreEnough) {
+  const TexturedWorld world;
+  const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
+  SlamConfig config;
+  config.scene_features = 50;
+  config.object_features = 3;  // fewer than octaves
+  FeatureExtractor extractor(config);
+  const std::vector<Feature> scene = extractor.ExtractScene(*frame);
+  EXPECT_EQ(scene.size(), 50U);
+  EXPECT_EQ(extractor.ExtractObjects(*frame, scene).size(), 3U);
+}
+
 TEST(FeatureExtractor, TheSameFrameGivesTheSameFeatures) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
