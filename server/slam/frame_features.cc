@@ -1,0 +1,103 @@
+#include "server/slam/frame_features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace romap {
+namespace {
+
+constexpr int kCell_px = 16;
+constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighbourhood
+constexpr int kNearShrink = 8;          // masks are shrunk so many times to tell what is close to one
+constexpr double kNearShare = 0.08;     // of the image's width
+
+// Distance along the feature's ray by the depth image, 0 where there is none or where the surface jumps.
+double RangeAt(const cv::Mat& depth_mu, const CameraModel& camera, const Feature& feature) {
+  const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
+  const int v = static_cast<int>(std::lround(feature.pixel_px.y()));
+  if (u < 1 || v < 1 || u + 1 >= depth_mu.cols || v + 1 >= depth_mu.rows) return 0;
+  const float center_mu = depth_mu.at<float>(v, u);
+  for (int dv = -1; dv <= 1; ++dv) {
+    for (int du = -1; du <= 1; ++du) {
+      const float z_mu = depth_mu.at<float>(v + dv, u + du);
+      if (!(z_mu > 0) || std::abs(z_mu - center_mu) > kMaxDepthJump * center_mu) return 0;
+    }
+  }
+  return center_mu * camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y()).norm();
+}
+
+// Small image that is not 0 in and around masks.
+cv::Mat Surroundings(const cv::Mat& labels) {
+  cv::Mat small;
+  cv::resize(labels, small, {labels.cols / kNearShrink, labels.rows / kNearShrink}, 0, 0, cv::INTER_NEAREST);
+  const int reach = std::max(1, static_cast<int>(kNearShare * small.cols));
+  cv::Mat around;
+  cv::dilate(small > 0, around, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+  return around;
+}
+
+}  // namespace
+
+FeatureGrid::FeatureGrid(int width_px, int height_px, const std::vector<Feature>& features)
+    : columns_(width_px / kCell_px + 1),
+      rows_(height_px / kCell_px + 1),
+      cell_begin_(static_cast<size_t>(columns_) * static_cast<size_t>(rows_) + 1, 0),
+      members_(features.size()) {
+  std::vector<size_t> cell_of(features.size());
+  for (size_t i = 0; i < features.size(); ++i) {
+    const int column = std::clamp(static_cast<int>(features[i].pixel_px.x()) / kCell_px, 0, columns_ - 1);
+    const int row = std::clamp(static_cast<int>(features[i].pixel_px.y()) / kCell_px, 0, rows_ - 1);
+    cell_of[i] = static_cast<size_t>(row * columns_ + column);
+    ++cell_begin_[cell_of[i] + 1];
+  }
+  for (size_t cell = 1; cell < cell_begin_.size(); ++cell) cell_begin_[cell] += cell_begin_[cell - 1];
+  std::vector<int> next(cell_begin_.begin(), cell_begin_.end() - 1);
+  for (size_t i = 0; i < features.size(); ++i) members_[static_cast<size_t>(next[cell_of[i]]++)] = static_cast<int>(i);
+}
+
+void FeatureGrid::Near(const Eigen::Vector2d& pixel_px, double radius_px, std::vector<int>& indices) const {
+  indices.clear();
+  const auto cell = [](double px, int count) {
+    return static_cast<int>(std::clamp(px / kCell_px, 0.0, static_cast<double>(count - 1)));
+  };
+  const int first_column = cell(pixel_px.x() - radius_px, columns_);
+  const int last_column = cell(pixel_px.x() + radius_px, columns_);
+  for (int row = cell(pixel_px.y() - radius_px, rows_); row <= cell(pixel_px.y() + radius_px, rows_); ++row) {
+    // The cells of a row lie one after the other.
+    const int begin = cell_begin_[static_cast<size_t>(row * columns_ + first_column)];
+    const int end = cell_begin_[static_cast<size_t>(row * columns_ + last_column + 1)];
+    indices.insert(indices.end(), members_.begin() + begin, members_.begin() + end);
+  }
+}
+
+bool FrameFeatures::HasDepth() const {
+  return std::any_of(ranges_mu.begin(), ranges_mu.end(), [](double range_mu) { return range_mu > 0; });
+}
+
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features) {
+  auto sight = std::make_shared<FrameFeatures>();
+  sight->frame_id = frame.frame_id;
+  sight->timestamp_ns = frame.timestamp_ns;
+  sight->camera = frame.camera;
+  sight->features = std::move(features);
+  const size_t count = sight->features.size();
+  sight->bearings_camera.reserve(count);
+  sight->ranges_mu.assign(count, 0);
+  sight->near_object.assign(count, 0);
+  const cv::Mat around = frame.labels.empty() ? cv::Mat() : Surroundings(frame.labels);
+  for (size_t i = 0; i < count; ++i) {
+    const Feature& feature = sight->features[i];
+    sight->bearings_camera.push_back(frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y()).normalized());
+    if (!frame.depth_mu.empty()) sight->ranges_mu[i] = RangeAt(frame.depth_mu, frame.camera, feature);
+    if (around.empty() || feature.label != 0) continue;
+    const int u = std::clamp(static_cast<int>(feature.pixel_px.x()) / kNearShrink, 0, around.cols - 1);
+    const int v = std::clamp(static_cast<int>(feature.pixel_px.y()) / kNearShrink, 0, around.rows - 1);
+    sight->near_object[i] = around.at<uint8_t>(v, u) != 0 ? 1 : 0;
+  }
+  sight->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, sight->features);
+  return sight;
+}
+
+}  // namespace romap

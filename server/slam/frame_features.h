@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/messages.h"
+#include "server/slam/features/feature.h"
+
+namespace romap {
+
+// Finds features near a pixel.
+class FeatureGrid {
+ public:
+  FeatureGrid() = default;
+  FeatureGrid(int width_px, int height_px, const std::vector<Feature>& features);
+  // Replaces `indices` by those of the features whose cells touch the square of half side `radius_px` around
+  // `pixel_px`, in ascending order within a cell; callers check the distance.
+  void Near(const Eigen::Vector2d& pixel_px, double radius_px, std::vector<int>& indices) const;
+
+ private:
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<int> cell_begin_;  // of `members_`, one more than there are cells
+  std::vector<int> members_;
+};
+
+// A frame as slam keeps it: without its image. Immutable once made, so that threads may share it.
+struct FrameFeatures {
+  uint64_t frame_id = 0;
+  int64_t timestamp_ns = 0;
+  CameraModel camera = {};  // pinhole
+  std::vector<Feature> features = {};
+  std::vector<Eigen::Vector3d> bearings_camera = {};  // unit length; one per feature, as all below
+  std::vector<double> ranges_mu = {};                 // by the depth image along the bearing, 0 = unknown
+  std::vector<uint8_t> near_object = {};              // 1: outside every mask, but close to one
+  FeatureGrid grid = {};
+
+  size_t size() const { return features.size(); }
+  bool HasDepth() const;
+};
+
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features);
+
+}  // namespace romap

@@ -1,0 +1,119 @@
+#include "server/slam/loop_closer.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "server/slam/optimise/pose_graph.h"
+#include "server/slam/point_maker.h"
+
+namespace romap {
+namespace {
+
+constexpr double kNoDrift_px = 4;
+constexpr int kMinSharedPoints = 15;
+constexpr int kStrongSharedPoints = 80;  // an edge of the pose graph besides parents and loops
+constexpr double kLoopWeight = 3;        // over that of an edge between neighbours
+constexpr size_t kFusedNeighbours = 12;
+
+using Similarities = std::map<KeyframeId, Sim3<World, Camera>>;
+
+Sim3<Camera, Camera> Between(const Similarities& poses, KeyframeId a, KeyframeId b) {
+  return poses.at(a).Inverse() * poses.at(b);
+}
+
+// Edges with what the map said before the correction, and the loops with what was measured.
+std::vector<PoseGraphEdge> Edges(const SlamMap& map, const Similarities& before, const LoopMatch& loop,
+                                 const std::map<KeyframeId, int>& node_of) {
+  std::vector<PoseGraphEdge> edges;
+  std::set<std::pair<KeyframeId, KeyframeId>> known;
+  const auto add = [&](KeyframeId a, KeyframeId b, const Sim3<Camera, Camera>& S_a_b, double weight) {
+    if (a == b || !known.insert(std::minmax(a, b)).second) return;
+    edges.push_back({.a = node_of.at(a), .b = node_of.at(b), .S_a_b = S_a_b, .weight = weight});
+  };
+  add(loop.place, loop.keyframe, loop.S_place_keyframe, kLoopWeight);
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    for (const auto& [other, S_this_other] : keyframe.loops) add(id, other, Between(before, id, other), kLoopWeight);
+    if (keyframe.parent) add(keyframe.parent, id, Between(before, keyframe.parent, id), 1);
+    for (const auto& [other, shared] : map.Covisible(keyframe, kStrongSharedPoints)) {
+      add(id, other, Between(before, id, other), 1);
+    }
+  }
+  return edges;
+}
+
+// Writes new similarities of the keyframes into the map; points go along with the keyframe that saw them first.
+void Write(const Similarities& before, const Similarities& after, SlamMap& map) {
+  std::map<KeyframeId, Sim3<World, World>> moved;
+  for (auto& [id, keyframe] : map.keyframes()) {
+    const Sim3<World, World> S_new_old = after.at(id) * before.at(id).Inverse();
+    moved.emplace(id, S_new_old);
+    keyframe.SetPose(after.at(id).Rigid());
+    keyframe.scale *= S_new_old.scale();
+  }
+  for (auto& [id, track] : map.points()) {
+    const Sim3<World, World>& S_new_old = moved.at(track.sights.front().keyframe);
+    track.point.position_world = S_new_old * track.point.position_world;
+    map.Refresh(track);
+  }
+}
+
+}  // namespace
+
+bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, SlamMap& map) {
+  MapKeyframe& newest = *map.FindKeyframe(loop.keyframe);
+  MapKeyframe& place = *map.FindKeyframe(loop.place);
+  std::vector<MapKeyframe*> new_side = {&newest};
+  for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) new_side.push_back(map.FindKeyframe(id));
+  std::vector<MapKeyframe*> old_side = {&place};
+  for (const auto& [id, shared] : map.Covisible(place, kMinSharedPoints)) old_side.push_back(map.FindKeyframe(id));
+  const bool drifted = loop.disagreement_px > kNoDrift_px;
+
+  if (drifted) {
+    Similarities before;
+    std::map<KeyframeId, int> node_of;
+    std::vector<PoseGraphNode> nodes;
+    for (const auto& [id, keyframe] : map.keyframes()) {
+      before.emplace(id, Sim3<World, Camera>(keyframe.T_world_camera()));
+      node_of[id] = static_cast<int>(nodes.size());
+      // What the client said of its poses holds; the old side is where the map began to be drawn.
+      nodes.push_back({.S_world_camera = before.at(id), .fixed = keyframe.pose_given || id == loop.place});
+    }
+    const std::vector<PoseGraphEdge> edges = Edges(map, before, loop, node_of);
+    // A good start: the new side where the loop puts it.
+    const Sim3<World, Camera> S_world_newest = before.at(loop.place) * loop.S_place_keyframe;
+    const Sim3<World, World> S_new_old = S_world_newest * before.at(loop.keyframe).Inverse();
+    for (const MapKeyframe* keyframe : new_side) {
+      PoseGraphNode& node = nodes[static_cast<size_t>(node_of.at(keyframe->id))];
+      if (!node.fixed) node.S_world_camera = S_new_old * before.at(keyframe->id);
+    }
+    const PoseGraphSummary summary = OptimisePoseGraph(nodes, edges, {.fix_scale = fix_scale});
+    spdlog::info(
+        "slam: loop from {} to {}: off by {:.0f} px, scale by {:.3f}; pose graph of {} keyframes and {} edges, "
+        "cost {:.3g} -> {:.3g}",
+        loop.keyframe.ToString(), loop.place.ToString(), loop.disagreement_px, S_new_old.scale(), nodes.size(),
+        edges.size(), summary.initial_cost, summary.final_cost);
+    if (!summary.usable) return false;
+    Similarities after;
+    for (const auto& [id, node] : node_of) after.emplace(id, nodes[static_cast<size_t>(node)].S_world_camera);
+    Write(before, after, map);
+    newest.loops.emplace_back(loop.place, loop.S_place_keyframe.Inverse());
+    place.loops.emplace_back(loop.keyframe, loop.S_place_keyframe);
+  } else {
+    spdlog::debug("slam: loop from {} to {} fits already: {:.1f} px", loop.keyframe.ToString(), loop.place.ToString(),
+                  loop.disagreement_px);
+  }
+
+  for (const auto& [seen, known] : loop.same_points) map.MergePoints(seen, known);
+  PointMaker maker(config, &map);
+  if (old_side.size() > kFusedNeighbours) old_side.resize(kFusedNeighbours);
+  if (new_side.size() > kFusedNeighbours) new_side.resize(kFusedNeighbours);
+  for (MapKeyframe* keyframe : new_side) maker.FuseDuplicates(*keyframe, old_side);
+  return drifted;
+}
+
+}  // namespace romap

@@ -1,0 +1,168 @@
+#include "server/slam/map_adjustment.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <unordered_map>
+#include <utility>
+
+namespace romap {
+namespace {
+
+constexpr int kMinSharedPoints = 15;
+constexpr size_t kMaxHoldingKeyframes = 20;
+
+class ProblemBuilder {
+ public:
+  ProblemBuilder(const SlamMap& map, const SlamConfig& config, const CameraModel& camera) : map_(map), config_(config) {
+    problem_.bundle.camera = camera;
+  }
+
+  void AddKeyframe(const MapKeyframe& keyframe, bool fixed) {
+    camera_of_[keyframe.id] = static_cast<int>(problem_.keyframes.size());
+    problem_.keyframes.push_back(keyframe.id);
+    problem_.before.push_back(keyframe.T_world_camera());
+    problem_.bundle.cameras.push_back(
+        {.T_world_camera = keyframe.T_world_camera(), .fixed = fixed || keyframe.pose_given, .prior = keyframe.prior});
+  }
+
+  // The point and its sights from keyframes that were added.
+  void AddPoint(const PointTrack& track) {
+    const auto point = static_cast<int>(problem_.points.size());
+    bool seen = false;
+    for (const PointSight& sight : track.sights) {
+      const auto camera = camera_of_.find(sight.keyframe);
+      if (camera == camera_of_.end()) continue;
+      problem_.bundle.observations.push_back(Observe(camera->second, point, sight));
+      seen = true;
+    }
+    if (!seen) return;
+    problem_.points.push_back(track.point.id);
+    problem_.bundle.points.push_back({.position_world = track.point.position_world});
+  }
+
+  bool Has(KeyframeId keyframe) const { return camera_of_.contains(keyframe); }
+  MapProblem Take() { return std::move(problem_); }
+
+ private:
+  BundleObservation Observe(int camera, int point, const PointSight& sight) const {
+    const FrameFeatures& seen = *map_.FindKeyframe(sight.keyframe)->sight;
+    const auto i = static_cast<size_t>(sight.feature);
+    BundleObservation observation{.camera = camera,
+                                  .point = point,
+                                  .pixel_px = seen.features[i].pixel_px.cast<double>(),
+                                  .sigma_px = config_.pixel_sigma_px * seen.features[i].octave_scale};
+    if (seen.ranges_mu[i] > 0) {
+      observation.depth_mu = seen.ranges_mu[i] * seen.bearings_camera[i].z();
+      observation.depth_sigma_mu = config_.depth_sigma_ratio * observation.depth_mu;
+    }
+    return observation;
+  }
+
+  const SlamMap& map_;
+  const SlamConfig& config_;
+  MapProblem problem_;
+  std::unordered_map<KeyframeId, int> camera_of_;
+};
+
+}  // namespace
+
+MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config) {
+  std::vector<const MapKeyframe*> window = {&newest};
+  for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) {
+    if (window.size() == static_cast<size_t>(config.window_keyframes)) break;
+    window.push_back(map.FindKeyframe(id));
+  }
+  std::set<MapPointId> points;
+  for (const MapKeyframe* keyframe : window) {
+    for (const MapPointId point : keyframe->points) {
+      if (point) points.insert(point);
+    }
+  }
+  std::map<KeyframeId, int> around;
+  for (const MapPointId point : points) {
+    for (const PointSight& sight : map.FindPoint(point)->sights) ++around[sight.keyframe];
+  }
+  for (const MapKeyframe* keyframe : window) around.erase(keyframe->id);
+  std::vector<std::pair<int, KeyframeId>> holding;
+  for (const auto& [id, count] : around) holding.emplace_back(count, id);
+  std::sort(holding.rbegin(), holding.rend());
+  if (holding.size() > kMaxHoldingKeyframes) holding.resize(kMaxHoldingKeyframes);
+
+  // Nothing holds a young map: its oldest keyframe does. Its scale stays free, and damping keeps it where it is.
+  KeyframeId held;
+  if (holding.empty()) {
+    held = (*std::min_element(window.begin(), window.end(), [](auto* a, auto* b) { return a->id < b->id; }))->id;
+  }
+
+  ProblemBuilder builder(map, config, newest.camera());
+  for (const MapKeyframe* keyframe : window) {
+    builder.AddKeyframe(*keyframe, keyframe->id == held);
+  }
+  for (const auto& [count, id] : holding) builder.AddKeyframe(*map.FindKeyframe(id), true);
+  for (const MapPointId point : points) builder.AddPoint(*map.FindPoint(point));
+  return builder.Take();
+}
+
+MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config) {
+  const MapKeyframe& first = map.keyframes().begin()->second;
+  ProblemBuilder builder(map, config, first.camera());
+  for (const auto& [id, keyframe] : map.keyframes()) builder.AddKeyframe(keyframe, id == first.id);
+  for (const auto& [id, track] : map.points()) builder.AddPoint(track);
+  return builder.Take();
+}
+
+void ApplyWindow(const MapProblem& problem, SlamMap& map) {
+  for (size_t i = 0; i < problem.keyframes.size(); ++i) {
+    if (!problem.bundle.cameras[i].fixed) {
+      map.FindKeyframe(problem.keyframes[i])->SetPose(problem.bundle.cameras[i].T_world_camera);
+    }
+  }
+  for (size_t i = 0; i < problem.points.size(); ++i) {
+    map.FindPoint(problem.points[i])->point.position_world = problem.bundle.points[i].position_world;
+  }
+  for (const BundleObservation& observation : problem.bundle.observations) {
+    if (!observation.outlier) continue;
+    map.RemoveSight(problem.points[static_cast<size_t>(observation.point)],
+                    problem.keyframes[static_cast<size_t>(observation.camera)]);
+  }
+}
+
+void ApplyWhole(const MapProblem& problem, SlamMap& map) {
+  // What happened to the space around each keyframe.
+  std::map<KeyframeId, Sim3<World, World>> moved;
+  for (size_t i = 0; i < problem.keyframes.size(); ++i) {
+    const SE3<World, Camera>& after = problem.bundle.cameras[i].T_world_camera;
+    moved[problem.keyframes[i]] = Sim3<World, World>(after * problem.before[i].Inverse());
+  }
+  for (auto& [id, keyframe] : map.keyframes()) {
+    auto it = moved.find(id);
+    if (it == moved.end()) {
+      // Parents are older, so theirs is known.
+      const auto parent = moved.find(keyframe.parent);
+      it = moved.emplace(id, parent == moved.end() ? Sim3<World, World>() : parent->second).first;
+    }
+    if (!keyframe.pose_given) keyframe.SetPose(it->second.Moved(keyframe.T_world_camera()));
+  }
+  std::set<MapPointId> solved;
+  for (size_t i = 0; i < problem.points.size(); ++i) {
+    PointTrack* track = map.FindPoint(problem.points[i]);
+    if (track == nullptr) continue;
+    track->point.position_world = problem.bundle.points[i].position_world;
+    solved.insert(track->point.id);
+  }
+  for (auto& [id, track] : map.points()) {
+    if (solved.contains(id) || track.sights.empty()) continue;
+    const auto it = moved.find(track.sights.front().keyframe);
+    if (it != moved.end()) track.point.position_world = it->second * track.point.position_world;
+  }
+  for (const BundleObservation& observation : problem.bundle.observations) {
+    if (!observation.outlier) continue;
+    const KeyframeId keyframe = problem.keyframes[static_cast<size_t>(observation.camera)];
+    if (map.FindKeyframe(keyframe) == nullptr) continue;
+    map.RemoveSight(problem.points[static_cast<size_t>(observation.point)], keyframe);
+  }
+  for (auto& [id, track] : map.points()) map.Refresh(track);
+}
+
+}  // namespace romap

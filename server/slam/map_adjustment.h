@@ -1,0 +1,35 @@
+#pragma once
+
+#include <atomic>
+#include <vector>
+
+#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/slam_config.h"
+#include "server/slam/slam_map.h"
+
+namespace romap {
+
+// A part of the map as a bundle problem, and which keyframe and point each entry is. A value: it can be solved on
+// another thread while the map goes on.
+struct MapProblem {
+  BundleProblem bundle;
+  std::vector<KeyframeId> keyframes;       // of bundle.cameras
+  std::vector<MapPointId> points;          // of bundle.points
+  std::vector<SE3<World, Camera>> before;  // poses of bundle.cameras when the problem was made
+};
+
+// The newest keyframe, those that share most points with it, and all their points; keyframes farther away that see
+// these points hold the window in place.
+MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config);
+
+// Everything. The first keyframe stays; without depth the scale is free, and damping keeps it where it is.
+MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config);
+
+// Writes the solution of a window back and drops the sights that it calls outliers.
+void ApplyWindow(const MapProblem& problem, SlamMap& map);
+
+// Writes back a solution that was found while the map went on: keyframes and points that came meanwhile go along with
+// the keyframe they hang on.
+void ApplyWhole(const MapProblem& problem, SlamMap& map);
+
+}  // namespace romap

@@ -1,0 +1,88 @@
+#include "server/slam/map_culling.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace romap {
+namespace {
+
+constexpr double kRedundantShare = 0.9;
+constexpr int kOtherKeyframes = 3;
+constexpr size_t kMaxGone = 2;  // at once, so that adjustment can settle
+
+bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
+  int points = 0;
+  int redundant = 0;
+  for (size_t i = 0; i < keyframe.points.size(); ++i) {
+    if (!keyframe.points[i]) continue;
+    ++points;
+    int as_good = 0;
+    for (const PointSight& sight : map.FindPoint(keyframe.points[i])->sights) {
+      if (sight.keyframe == keyframe.id) continue;
+      const auto& features = map.FindKeyframe(sight.keyframe)->features();
+      as_good += features[static_cast<size_t>(sight.feature)].octave <= keyframe.features()[i].octave + 1 ? 1 : 0;
+      if (as_good == kOtherKeyframes) break;
+    }
+    redundant += as_good == kOtherKeyframes ? 1 : 0;
+  }
+  return points > 0 && redundant > kRedundantShare * points;
+}
+
+}  // namespace
+
+void CullPoints(const SlamConfig& config, SlamMap& map) {
+  std::vector<MapPointId> gone;
+  std::vector<std::pair<uint64_t, MapPointId>> by_age;
+  for (const auto& [id, track] : map.points()) {
+    const bool trial_is_over =
+        map.keyframe_count() - track.born_keyframe >= static_cast<uint64_t>(config.trial_keyframes);
+    if (trial_is_over && track.point.observations < config.trial_observations) {
+      gone.push_back(id);
+    } else {
+      by_age.emplace_back(track.latest_keyframe, id);
+    }
+  }
+  if (by_age.size() > static_cast<size_t>(config.max_points)) {
+    std::sort(by_age.begin(), by_age.end());
+    by_age.resize(by_age.size() - static_cast<size_t>(config.max_points));
+    for (const auto& [latest_keyframe, id] : by_age) gone.push_back(id);
+  }
+  for (const MapPointId id : gone) map.RemovePoint(id);
+}
+
+std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map) {
+  std::vector<KeyframeId> gone;
+  const auto may_go = [&](const MapKeyframe& keyframe) {
+    // The newest ones are what tracking hangs on, and the first one holds the world.
+    return !keyframe.pose_given && keyframe.parent && keyframe.loops.empty() && keyframe.id.value + 5 < newest.id.value;
+  };
+  for (const auto& [id, shared] : map.Covisible(newest, 15)) {
+    if (gone.size() == kMaxGone) break;
+    const MapKeyframe& keyframe = *map.FindKeyframe(id);
+    if (may_go(keyframe) && IsRedundant(keyframe, map)) {
+      map.RemoveKeyframe(id);
+      gone.push_back(id);
+    }
+  }
+  if (map.keyframes().size() > static_cast<size_t>(config.max_keyframes)) {
+    // The one that shares most with its parent tells least of its own.
+    KeyframeId least;
+    double highest = 0;
+    for (const auto& [id, keyframe] : map.keyframes()) {
+      if (!may_go(keyframe)) continue;
+      const double way_mu = (keyframe.center_world() - map.FindKeyframe(keyframe.parent)->center_world()).norm();
+      const double closeness = 1 / (1e-9 + way_mu);
+      if (closeness > highest) {
+        highest = closeness;
+        least = id;
+      }
+    }
+    if (least) {
+      map.RemoveKeyframe(least);
+      gone.push_back(least);
+    }
+  }
+  return gone;
+}
+
+}  // namespace romap

@@ -1,0 +1,200 @@
+#include "server/slam/point_maker.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "server/slam/epipolar_matcher.h"
+#include "server/slam/projection_search.h"
+#include "server/slam/triangulation.h"
+
+namespace romap {
+namespace {
+
+constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
+constexpr double kMaxSizeRatio = 1.9;        // between the sizes that two features of one point claim to have
+constexpr double kFuseRadius_px = 2.5;
+constexpr int kFuseDistance = 50;  // Hamming, bits
+
+std::vector<uint8_t> TiedFeatures(const MapKeyframe& keyframe) {
+  std::vector<uint8_t> tied(keyframe.points.size());
+  std::transform(keyframe.points.begin(), keyframe.points.end(), tied.begin(),
+                 [](MapPointId point) { return static_cast<uint8_t>(point ? 1 : 0); });
+  return tied;
+}
+
+}  // namespace
+
+LocalPoint LooksOf(const PointTrack& track) {
+  return {.id = track.point.id,
+          .position_world = track.point.position_world,
+          .direction_world = track.direction_world,
+          .size_mu = track.size_mu,
+          .descriptor = track.descriptor};
+}
+
+bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
+  if (keyframe.points[static_cast<size_t>(feature)]) return false;
+  const Sight sight = map_->SightOf(keyframe, feature);
+  if (!keyframe.pose_given) {
+    if (!Agrees(sight, track.point.position_world)) return false;
+    return map_->AddSight(track, keyframe, feature);
+  }
+  std::vector<Sight> sights = map_->SightsOf(track);
+  sights.push_back(sight);
+  const Eigen::Vector3d p_world = RefinePoint(sights, track.point.position_world);
+  if (!std::all_of(sights.begin(), sights.end(), [&](const Sight& s) { return Agrees(s, p_world); })) return false;
+  if (!map_->AddSight(track, keyframe, feature)) return false;
+  track.point.position_world = p_world;
+  return true;
+}
+
+void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPointId>& candidates) {
+  using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
+  std::vector<Claim> claims;
+  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  const ProjectionSearch search{.radius_px = config_.search_radius_px, .max_distance = config_.max_descriptor_distance};
+  const std::vector<uint8_t> tied = TiedFeatures(keyframe);
+  for (const MapPointId id : candidates) {
+    const PointTrack* track = map_->FindPoint(id);
+    if (track == nullptr) continue;
+    if (const auto found = matcher.Find(LooksOf(*track), search, tied)) {
+      claims.emplace_back(found->distance, track->point.id, found->feature);
+    }
+  }
+  std::sort(claims.begin(), claims.end());
+  for (const auto& [distance, id, feature] : claims) Tie(keyframe, feature, *map_->FindPoint(id));
+}
+
+std::optional<int> PointMaker::FindFreeFeature(const PointTrack& track, const MapKeyframe& keyframe) const {
+  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  const ProjectionSearch search{.radius_px = config_.search_radius_px, .max_distance = config_.max_descriptor_distance};
+  const auto found = matcher.Find(LooksOf(track), search, {});
+  if (!found || keyframe.points[static_cast<size_t>(found->feature)]) return std::nullopt;
+  return found->feature;
+}
+
+void PointMaker::MakePointsByParallax(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& others) {
+  for (MapKeyframe* other : others) {
+    for (const FeatureMatch& match : MatchAlongEpipolarPlanes(keyframe, *other, config_)) {
+      if (const MapPointId known = other->points[static_cast<size_t>(match.second)]) {
+        Tie(keyframe, match.first, *map_->FindPoint(known));
+        continue;
+      }
+      PointTrack* track = MakePoint(keyframe, match.first, *other, match.second);
+      if (track == nullptr) continue;
+      for (MapKeyframe* third : others) {
+        if (third == other) continue;
+        if (const auto feature = FindFreeFeature(*track, *third)) Tie(*third, *feature, *track);
+      }
+    }
+  }
+}
+
+PointTrack* PointMaker::MakePoint(MapKeyframe& keyframe, int feature, MapKeyframe& other, int other_feature) {
+  if (keyframe.points[static_cast<size_t>(feature)]) return nullptr;
+  const Sight sight = map_->SightOf(keyframe, feature);
+  const Sight other_sight = map_->SightOf(other, other_feature);
+  const std::optional<Eigen::Vector3d> start = IntersectRays(sight, other_sight);
+  if (!start) return nullptr;
+  const Eigen::Vector3d p_world = RefinePoint({sight, other_sight}, *start);
+  if (!Agrees(sight, p_world) || !Agrees(other_sight, p_world)) return nullptr;
+  if (Parallax_rad(sight, other_sight, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
+  const double size_mu = sight.bearing_sigma_rad * (p_world - sight.center_world).norm();
+  const double other_size_mu = other_sight.bearing_sigma_rad * (p_world - other_sight.center_world).norm();
+  if (std::max(size_mu, other_size_mu) > kMaxSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
+
+  PointTrack& track = map_->AddPoint(p_world);
+  map_->AddSight(track, other, other_feature);
+  map_->AddSight(track, keyframe, feature);
+  map_->Refresh(track);
+  return &track;
+}
+
+void PointMaker::MakePointsByDepth(MapKeyframe& keyframe) {
+  for (size_t i = 0; i < keyframe.points.size(); ++i) {
+    const double range_mu = keyframe.sight->ranges_mu[i];
+    if (keyframe.points[i] || range_mu <= 0) continue;
+    PointTrack& track = map_->AddPoint(keyframe.center_world() + range_mu * keyframe.BearingWorld(i));
+    map_->AddSight(track, keyframe, static_cast<int>(i));
+    map_->Refresh(track);
+  }
+}
+
+std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyframe) const {
+  std::vector<double> depths_mu;
+  for (const MapPointId id : keyframe.points) {
+    if (id) depths_mu.push_back((keyframe.T_camera_world() * map_->FindPoint(id)->point.position_world).z());
+  }
+  double min_baseline_mu = 0;
+  if (!depths_mu.empty()) {
+    const auto middle = depths_mu.begin() + static_cast<std::ptrdiff_t>(depths_mu.size() / 2);
+    std::nth_element(depths_mu.begin(), middle, depths_mu.end());
+    min_baseline_mu = *middle * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
+  }
+  const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
+  // Those that share points, and the newest, which may not share any yet.
+  std::vector<KeyframeId> candidates;
+  for (const auto& [id, shared] : map_->Covisible(keyframe, 15)) candidates.push_back(id);
+  for (auto it = map_->keyframes().rbegin(); it != map_->keyframes().rend() && candidates.size() < 60; ++it) {
+    if (it->first != keyframe.id && std::find(candidates.begin(), candidates.end(), it->first) == candidates.end()) {
+      if (keyframe.pose_given || candidates.empty()) candidates.push_back(it->first);
+    }
+  }
+  // With given poses the newest are as good as any, and the ones nearest in time look most alike.
+  if (keyframe.pose_given) std::sort(candidates.rbegin(), candidates.rend());
+  std::vector<MapKeyframe*> others;
+  for (const KeyframeId id : candidates) {
+    if (others.size() == static_cast<size_t>(config_.matched_keyframes)) break;
+    MapKeyframe* other = map_->FindKeyframe(id);
+    if ((other->center_world() - keyframe.center_world()).norm() <= min_baseline_mu) continue;
+    const Eigen::Vector3d other_axis = other->T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
+    if (axis.dot(other_axis) > kMaxAxisTurnCosine) others.push_back(other);
+  }
+  return others;
+}
+
+int PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& points) {
+  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  const ProjectionSearch search{.radius_px = kFuseRadius_px, .max_distance = kFuseDistance};
+  int fused = 0;
+  for (const MapPointId id : points) {
+    PointTrack* track = map_->FindPoint(id);
+    if (track == nullptr) continue;
+    const bool seen_here = std::any_of(track->sights.begin(), track->sights.end(),
+                                       [&](const PointSight& sight) { return sight.keyframe == keyframe.id; });
+    if (seen_here) continue;
+    const auto found = matcher.Find(LooksOf(*track), search, {});
+    if (!found) continue;
+    const MapPointId there = keyframe.points[static_cast<size_t>(found->feature)];
+    if (!there) {
+      fused += Tie(keyframe, found->feature, *track) ? 1 : 0;
+      continue;
+    }
+    // The one that more keyframes saw stays.
+    const PointTrack* other = map_->FindPoint(there);
+    const bool keep_other = other->sights.size() >= track->sights.size();
+    map_->MergePoints(keep_other ? track->point.id : there, keep_other ? there : track->point.id);
+    ++fused;
+  }
+  return fused;
+}
+
+void PointMaker::FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbours) {
+  const auto points_of = [](const MapKeyframe& of) {
+    std::vector<MapPointId> points;
+    std::copy_if(of.points.begin(), of.points.end(), std::back_inserter(points),
+                 [](MapPointId id) { return bool(id); });
+    return points;
+  };
+  for (MapKeyframe* neighbour : neighbours) {
+    FuseInto(*neighbour, points_of(keyframe));
+    FuseInto(keyframe, points_of(*neighbour));
+  }
+}
+
+}  // namespace romap

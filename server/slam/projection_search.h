@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/slam/frame_features.h"
+#include "server/slam/local_map.h"
+#include "server/slam/slam_config.h"
+
+namespace romap {
+
+// How far and how strictly known points are looked for around their projection.
+struct ProjectionSearch {
+  double radius_px = 4;          // times the octave scale expected, up to three
+  int max_distance = 60;         // Hamming, bits
+  double ratio = 0.9;            // best over second best distance; rivals at the same spot do not count
+  double min_view_cosine = 0.7;  // between the ray and the mean of the rays that saw it; ORB does not survive more
+};
+
+// Where a point was found.
+struct Sighting {
+  int feature = 0;
+  int distance = 0;  // Hamming, bits
+};
+
+struct PointMatch {
+  int point = 0;    // index
+  int feature = 0;  // index
+  int distance = 0;
+};
+
+// Finds points in one frame seen from one pose. Keeps its buffers; for one thread.
+class ProjectionMatcher {
+ public:
+  ProjectionMatcher(const FrameFeatures& frame, const SE3<World, Camera>& T_world_camera);
+
+  // Pixel and expected octave scale of a point; nullopt: behind the camera, outside the image, or seen from too
+  // different a direction.
+  struct Expected {
+    Eigen::Vector2d pixel_px;
+    double octave_scale = 1;
+  };
+  std::optional<Expected> Expect(const LocalPoint& point, double min_view_cosine) const;
+
+  // The feature that shows the point. Features with a non-zero entry in `taken` (empty: none) are passed over.
+  std::optional<Sighting> Find(const LocalPoint& point, const ProjectionSearch& search, std::span<const uint8_t> taken);
+
+  // One-to-one matches: where two points claim a feature, the one that looks more like it gets it.
+  std::vector<PointMatch> MatchAll(std::span<const LocalPoint> points, const ProjectionSearch& search,
+                                   std::span<const uint8_t> taken);
+
+ private:
+  const FrameFeatures& frame_;
+  const SE3<Camera, World> T_camera_world_;
+  const Eigen::Vector3d center_world_;
+  std::vector<int> near_;
+};
+
+// Points and features alike by their looks alone: mutual best, and clearly better than the second best.
+std::vector<PointMatch> MatchByLooks(std::span<const LocalPoint> points, const FrameFeatures& frame, int max_distance,
+                                     double ratio);
+
+}  // namespace romap

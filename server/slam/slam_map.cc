@@ -1,0 +1,220 @@
+#include "server/slam/slam_map.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+namespace romap {
+namespace {
+
+size_t FeatureOf(const PointTrack& track, KeyframeId keyframe) {
+  const auto it = std::find_if(track.sights.begin(), track.sights.end(),
+                               [&](const PointSight& sight) { return sight.keyframe == keyframe; });
+  return static_cast<size_t>(it - track.sights.begin());
+}
+
+}  // namespace
+
+MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> sight,
+                                  const SE3<World, Camera>& T_world_camera) {
+  const KeyframeId id{++keyframe_count_};
+  MapKeyframe& keyframe = keyframes_[id];
+  keyframe.id = id;
+  keyframe.points.resize(sight->size());
+  keyframe.sight = std::move(sight);
+  keyframe.SetPose(T_world_camera);
+  return keyframe;
+}
+
+PointTrack& SlamMap::AddPoint(const Eigen::Vector3d& position_world) {
+  const MapPointId id{++point_count_};
+  PointTrack& track = points_[id];
+  track.point.id = id;
+  track.point.position_world = position_world;
+  track.born_keyframe = keyframe_count_;
+  return track;
+}
+
+bool SlamMap::AddSight(PointTrack& track, MapKeyframe& keyframe, int feature) {
+  MapPointId& tied = keyframe.points[static_cast<size_t>(feature)];
+  if (tied || FeatureOf(track, keyframe.id) < track.sights.size()) return false;
+  tied = track.point.id;
+  const auto after = std::find_if(track.sights.begin(), track.sights.end(),
+                                  [&](const PointSight& sight) { return sight.keyframe > keyframe.id; });
+  track.sights.insert(after, {keyframe.id, feature});
+  track.point.observations = static_cast<int>(track.sights.size());
+  track.latest_keyframe = std::max(track.latest_keyframe, keyframe.id.value);
+  return true;
+}
+
+void SlamMap::RemoveSight(MapPointId point, KeyframeId keyframe_id) {
+  PointTrack* track = FindPoint(point);
+  if (track == nullptr) return;
+  const size_t index = FeatureOf(*track, keyframe_id);
+  if (index == track->sights.size()) return;
+  MapKeyframe& keyframe = keyframes_.at(keyframe_id);
+  const auto feature = static_cast<size_t>(track->sights[index].feature);
+  keyframe.points[feature] = {};
+  track->sights.erase(track->sights.begin() + static_cast<std::ptrdiff_t>(index));
+  track->point.observations = static_cast<int>(track->sights.size());
+  const auto has_depth = [&](const PointSight& sight) {
+    return keyframes_.at(sight.keyframe).sight->ranges_mu[static_cast<size_t>(sight.feature)] > 0;
+  };
+  const bool placed = track->sights.size() >= 2 || (track->sights.size() == 1 && has_depth(track->sights[0]));
+  if (!placed) RemovePoint(track->point.id);
+}
+
+void SlamMap::RemovePoint(MapPointId point) {
+  const auto it = points_.find(point);
+  if (it == points_.end()) return;
+  for (const PointSight& sight : it->second.sights) {
+    keyframes_.at(sight.keyframe).points[static_cast<size_t>(sight.feature)] = {};
+  }
+  points_.erase(it);
+  removed_points_.push_back(point);
+}
+
+void SlamMap::MergePoints(MapPointId from, MapPointId into) {
+  const auto source = points_.find(from);
+  PointTrack* target = FindPoint(into);
+  if (source == points_.end() || target == nullptr || target->point.id == from) return;
+  const std::vector<PointSight> sights = source->second.sights;
+  RemovePoint(from);
+  merged_into_[from] = target->point.id;
+  for (const PointSight& sight : sights) AddSight(*target, keyframes_.at(sight.keyframe), sight.feature);
+  Refresh(*target);
+}
+
+void SlamMap::RemoveKeyframe(KeyframeId id) {
+  MapKeyframe& keyframe = keyframes_.at(id);
+  const std::vector<MapPointId> points = keyframe.points;
+  for (const MapPointId point : points) {
+    if (point) RemoveSight(point, id);
+  }
+  const MapKeyframe& parent = keyframes_.at(keyframe.parent);
+  const SE3<Camera, Camera> T_parent_this = parent.T_camera_world() * keyframe.T_world_camera();
+  removed_keyframes_[id] = {.parent = parent.id,
+                            .T_parent_this = {T_parent_this.rotation(), T_parent_this.translation() / parent.scale},
+                            .relative_scale = keyframe.scale / parent.scale};
+  for (auto& [other_id, other] : keyframes_) {
+    if (other.parent == id) other.parent = parent.id;
+    std::erase_if(other.loops, [&](const auto& loop) { return loop.first == id; });
+  }
+  keyframes_.erase(id);
+}
+
+PointTrack* SlamMap::FindPoint(MapPointId point) {
+  for (auto it = merged_into_.find(point); it != merged_into_.end(); it = merged_into_.find(point)) point = it->second;
+  const auto it = points_.find(point);
+  return it == points_.end() ? nullptr : &it->second;
+}
+
+MapKeyframe* SlamMap::FindKeyframe(KeyframeId keyframe) {
+  const auto it = keyframes_.find(keyframe);
+  return it == keyframes_.end() ? nullptr : &it->second;
+}
+
+std::optional<SlamMap::Pose> SlamMap::Place(KeyframeId id) const {
+  if (const MapKeyframe* keyframe = FindKeyframe(id)) return Pose{keyframe->T_world_camera(), keyframe->scale};
+  const auto removed = removed_keyframes_.find(id);
+  if (removed == removed_keyframes_.end()) return std::nullopt;
+  const std::optional<Pose> parent = Place(removed->second.parent);
+  if (!parent) return std::nullopt;
+  const SE3<Camera, Camera>& T_parent_this = removed->second.T_parent_this;
+  return Pose{parent->T_world_camera *
+                  SE3<Camera, Camera>(T_parent_this.rotation(), parent->scale * T_parent_this.translation()),
+              parent->scale * removed->second.relative_scale};
+}
+
+std::vector<std::pair<KeyframeId, int>> SlamMap::Covisible(const MapKeyframe& keyframe, int min_shared) const {
+  std::unordered_map<KeyframeId, int> shared;
+  for (const MapPointId point : keyframe.points) {
+    if (!point) continue;
+    for (const PointSight& sight : points_.at(point).sights) ++shared[sight.keyframe];
+  }
+  shared.erase(keyframe.id);
+  std::vector<std::pair<KeyframeId, int>> neighbours;
+  for (const auto& [id, count] : shared) {
+    if (count >= min_shared) neighbours.emplace_back(id, count);
+  }
+  std::sort(neighbours.begin(), neighbours.end(),
+            [](const auto& a, const auto& b) { return std::pair(a.second, a.first) > std::pair(b.second, b.first); });
+  return neighbours;
+}
+
+Sight SlamMap::SightOf(const MapKeyframe& keyframe, int feature) const {
+  const auto i = static_cast<size_t>(feature);
+  const double range_mu = keyframe.sight->ranges_mu[i];
+  return {.center_world = keyframe.center_world(),
+          .bearing_world = keyframe.BearingWorld(i),
+          .bearing_sigma_rad = config_.pixel_sigma_px * keyframe.features()[i].octave_scale / keyframe.camera().fx_px,
+          .range_mu = range_mu,
+          .range_sigma_mu = config_.depth_sigma_ratio * range_mu};
+}
+
+std::vector<Sight> SlamMap::SightsOf(const PointTrack& track, size_t max_sights) const {
+  std::vector<Sight> sights;
+  const size_t count = track.sights.size();
+  const size_t taken = std::min(count, max_sights);
+  sights.reserve(taken);
+  for (size_t i = 0; i < taken; ++i) {
+    // Spread over time, the first and the newest among them.
+    const PointSight& sight = track.sights[taken < 2 ? 0 : i * (count - 1) / (taken - 1)];
+    sights.push_back(SightOf(keyframes_.at(sight.keyframe), sight.feature));
+  }
+  return sights;
+}
+
+void SlamMap::Refresh(PointTrack& track) const {
+  if (track.sights.empty()) return;
+  constexpr size_t kMaxLooks = 12;
+  const size_t count = track.sights.size();
+  const size_t looks = std::min(count, kMaxLooks);
+  std::vector<Descriptor> descriptors;
+  Eigen::Vector3d directions = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> rays;
+  for (size_t i = 0; i < looks; ++i) {
+    const PointSight& sight = track.sights[looks < 2 ? 0 : i * (count - 1) / (looks - 1)];
+    const MapKeyframe& keyframe = keyframes_.at(sight.keyframe);
+    descriptors.push_back(keyframe.features()[static_cast<size_t>(sight.feature)].descriptor);
+    rays.push_back((track.point.position_world - keyframe.center_world()).normalized());
+    directions += rays.back();
+  }
+  track.direction_world = directions.normalized();
+  double least_cosine = 1;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    for (size_t k = 0; k < i; ++k) least_cosine = std::min(least_cosine, rays[i].dot(rays[k]));
+  }
+  track.point.max_parallax_rad = std::acos(std::clamp(least_cosine, -1.0, 1.0));
+
+  const PointSight& newest = track.sights.back();
+  const MapKeyframe& keyframe = keyframes_.at(newest.keyframe);
+  const Feature& feature = keyframe.features()[static_cast<size_t>(newest.feature)];
+  track.size_mu =
+      feature.octave_scale * (track.point.position_world - keyframe.center_world()).norm() / keyframe.camera().fx_px;
+
+  int least_sum = std::numeric_limits<int>::max();
+  for (size_t i = 0; i < looks; ++i) {
+    int sum = 0;
+    for (const Descriptor& other : descriptors) sum += HammingDistance(descriptors[i], other);
+    if (sum >= least_sum) continue;
+    least_sum = sum;
+    track.descriptor = descriptors[i];
+  }
+}
+
+void SlamMap::Transform(const Sim3<World, World>& S_new_old) {
+  for (auto& [id, keyframe] : keyframes_) {
+    keyframe.SetPose(S_new_old.Moved(keyframe.T_world_camera()));
+    keyframe.scale *= S_new_old.scale();
+  }
+  for (auto& [id, track] : points_) {
+    track.point.position_world = S_new_old * track.point.position_world;
+    track.direction_world = S_new_old.rotation() * track.direction_world;
+    track.size_mu *= S_new_old.scale();
+  }
+}
+
+}  // namespace romap

@@ -1,0 +1,98 @@
+#include "server/slam/world_up.h"
+
+#include <spdlog/spdlog.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "server/slam/places/support_plane.h"
+
+namespace romap {
+namespace {
+
+constexpr double kWorthTurning_rad = 0.3 * std::numbers::pi / 180;
+constexpr double kMinConfidence = 0.3;
+constexpr uint64_t kPeriod_keyframes = 5;
+constexpr uint64_t kLongPeriod_keyframes = 20;  // once it is sure
+constexpr double kSure = 0.8;
+constexpr size_t kMaxCameras = 200;
+
+struct Evidence {
+  std::vector<SupportPoint> points;
+  std::vector<Eigen::Vector3d> object_points;
+  std::vector<Eigen::Vector3d> centers;
+  std::vector<Eigen::Vector3d> ups;
+};
+
+Evidence Gather(const SlamMap& map) {
+  Evidence evidence;
+  for (const auto& [id, track] : map.points()) {
+    int on_object = 0;
+    int near_object = 0;
+    for (const PointSight& sight : track.sights) {
+      const FrameFeatures& seen = *map.FindKeyframe(sight.keyframe)->sight;
+      on_object += seen.features[static_cast<size_t>(sight.feature)].label != 0 ? 1 : 0;
+      near_object += seen.near_object[static_cast<size_t>(sight.feature)];
+    }
+    const auto sights = static_cast<int>(track.sights.size());
+    if (2 * on_object > sights) {
+      evidence.object_points.push_back(track.point.position_world);
+    } else if (on_object == 0 && sights >= 2) {
+      // One pixel across the ray, magnified along it by what parallax leaves.
+      const double parallax_rad = std::max(track.point.max_parallax_rad, 0.02);
+      evidence.points.push_back({.position_world = track.point.position_world,
+                                 .sigma_mu = track.size_mu / parallax_rad,
+                                 .near_object = 2 * near_object > sights});
+    }
+  }
+  const size_t step = 1 + map.keyframes().size() / kMaxCameras;
+  size_t i = 0;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    if (i++ % step != 0) continue;
+    evidence.centers.push_back(keyframe.center_world());
+    evidence.ups.push_back(keyframe.T_world_camera().rotation() * -Eigen::Vector3d::UnitY());
+  }
+  return evidence;
+}
+
+}  // namespace
+
+void WorldUp::Observe(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
+  if (!frame.gravity_camera) return;
+  gravity_.Add(frame, T_world_camera);
+  has_gravity_ = true;
+}
+
+std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map) {
+  Eigen::Vector3d up_world;
+  if (has_gravity_) {
+    up_world = gravity_.up_world();
+    confidence_ = 1;
+  } else {
+    if (map.keyframe_count() < next_try_) return std::nullopt;
+    next_try_ = map.keyframe_count() + (confidence_ >= kSure ? kLongPeriod_keyframes : kPeriod_keyframes);
+    const Evidence evidence = Gather(map);
+    const auto plane = FindSupportPlane({.points = evidence.points,
+                                         .object_points_world = evidence.object_points,
+                                         .camera_centers_world = evidence.centers,
+                                         .camera_ups_world = evidence.ups,
+                                         .seed = map.keyframe_count()});
+    if (!plane || plane->confidence < kMinConfidence) return std::nullopt;
+    // A surer plane than this one was seen before: what is seen now is a part of the scene.
+    if (plane->confidence < 0.7 * confidence_) return std::nullopt;
+    confidence_ = plane->confidence;
+    up_world = plane->normal_world;
+    spdlog::debug("slam: support plane of {} points, confidence {:.2f}, sigma {:.2f} deg", plane->inliers,
+                  plane->confidence, plane->sigma_rad * 180 / std::numbers::pi);
+  }
+  const double angle_rad = std::acos(std::clamp(up_world.z(), -1.0, 1.0));
+  if (angle_rad < kWorthTurning_rad) return std::nullopt;
+  return RotationFromZTo(up_world).conjugate();
+}
+
+void WorldUp::Turned(const Eigen::Quaterniond& R_new_old) { gravity_.Turn(R_new_old); }
+
+}  // namespace romap
