@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -28,10 +29,10 @@ constexpr double kMostSigma = 0.03;    // points worse than this tell nothing
 constexpr double kInlierSigmas = 2.5;
 // What a point counts for that is far from the objects' masks, relative to one that is near.
 constexpr double kFarWeight = 0.3;
-constexpr double kReach = 0.15;  // how far around an object its support is looked for
+constexpr double kReach = 0.25;  // how far around an object its support is looked for
 constexpr double kMinCamerasAbove = 0.9;
 // The estimate of the deviation knows of scatter only. A map also bends, and tables are not flat.
-constexpr double kSigmaFloor_rad = 0.15 * kDegree;
+constexpr double kSigmaFloor_rad = 0.3 * kDegree;
 constexpr double kMinConfidence = 0.05;
 constexpr size_t kMaxObjectPoints = 300;
 
@@ -57,7 +58,8 @@ struct Scene {
 
   std::vector<Eigen::Vector3d> points;
   std::vector<double> sigmas_mu;
-  std::vector<double> weights;  // by closeness to the objects and by precision
+  std::vector<double> closeness;  // to the objects, 0..1
+  std::vector<double> weights;    // by closeness and precision
 };
 
 // Middle and typical lengths. False: the cameras or objects do not allow for a scene.
@@ -81,13 +83,13 @@ bool MeasureScene(const SupportPlaneQuery& query, Scene& scene) {
     for (const auto& p : scene.object_points) values.push_back(p[axis]);
     middle[axis] = Quantile(std::move(values), 0.5);
   }
-  const auto median_distance = [&](const std::vector<Eigen::Vector3d>& points) {
+  const auto distance = [&](const std::vector<Eigen::Vector3d>& points, double share) {
     std::vector<double> distances;
     for (const auto& p : points) distances.push_back((p - middle).norm());
-    return Quantile(std::move(distances), 0.5);
+    return Quantile(std::move(distances), share);
   };
-  scene.distance_mu = median_distance(scene.cameras);
-  scene.object_spread_mu = median_distance(scene.object_points);
+  scene.distance_mu = distance(scene.cameras, 0.5);
+  scene.object_spread_mu = distance(scene.object_points, 0.8);  // masks take in some of the background
   return scene.distance_mu > 0;
 }
 
@@ -102,7 +104,7 @@ double DistanceToObjects(const Scene& scene, const Eigen::Vector3d& p) {
 void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
   const double least_sigma_mu = kLeastSigma * scene.distance_mu;
   // Masks tell what is near in the picture; in space it may be the floor behind the table.
-  const double reach_mu = std::max(3 * scene.object_spread_mu, kReach * scene.distance_mu);
+  const double reach_mu = std::max(2 * scene.object_spread_mu, kReach * scene.distance_mu);
   for (const SupportPoint& point : query.points) {
     if (!point.position_world.allFinite() || !(point.sigma_mu <= kMostSigma * scene.distance_mu)) continue;
     const double sigma_mu = std::hypot(point.sigma_mu, least_sigma_mu);
@@ -110,6 +112,7 @@ void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
     const double closeness = (point.near_object ? 1 : kFarWeight) / std::pow(1 + distance * distance, 2);
     scene.points.push_back(point.position_world);
     scene.sigmas_mu.push_back(sigma_mu);
+    scene.closeness.push_back(closeness);
     scene.weights.push_back(closeness * std::pow(least_sigma_mu / sigma_mu, 2));
   }
 }
@@ -129,8 +132,8 @@ double ObjectsStandOn(const Scene& scene, const Plane& plane) {
   const auto below = static_cast<double>(std::ranges::count_if(heights, [&](double h) { return h < -tolerance; }));
   const double rest_above = 1 - Ramp(below / static_cast<double>(heights.size()), 0.1, 0.3);
   // The lowest points that were seen of an object may be some way up it, but not objects' heights above the plane.
-  const double gap = std::max(0.0, low) / (0.5 * extent + 0.02 * scene.distance_mu);
-  return rest_above / (1 + gap * gap);
+  const double gap = std::max(0.0, low) / (extent + 0.02 * scene.distance_mu);
+  return rest_above / (1 + std::pow(gap, 4));
 }
 
 // What one point says for the plane: its weight when on it, nothing when away from it.
@@ -253,26 +256,29 @@ std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidat
   return chosen;
 }
 
-double Confidence(const Scene& scene, const PlaneFit& fit) {
-  double inlier_weight = 0;
-  double all_weight = 0;
-  std::vector<Eigen::Vector3d> inliers;
-  for (size_t i = 0; i < scene.points.size(); ++i) {
-    all_weight += scene.weights[i];
-    if (!IsInlier(scene, fit.plane, i)) continue;
-    inlier_weight += scene.weights[i];
-    inliers.push_back(scene.points[i]);
-  }
-  // A support is seen around what stands on it.
+// Share of the object points that have inliers around the place on the plane below them.
+double SupportedShare(const Scene& scene, const Plane& plane, std::span<const size_t> inliers) {
   const double reach_mu = kReach * scene.distance_mu;
-  int supported = 0;
-  for (const auto& p : scene.object_points) {
-    const Eigen::Vector3d foot = p - fit.plane.Height(p) * fit.plane.normal;
-    supported += std::ranges::any_of(inliers, [&](const auto& q) { return (q - foot).norm() < reach_mu; });
+  const auto is_supported = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d foot = p - plane.Height(p) * plane.normal;
+    return std::ranges::any_of(inliers, [&](size_t i) { return (scene.points[i] - foot).norm() < reach_mu; });
+  };
+  return static_cast<double>(std::ranges::count_if(scene.object_points, is_supported)) /
+         static_cast<double>(scene.object_points.size());
+}
+
+double Confidence(const Scene& scene, const PlaneFit& fit, std::span<const size_t> inliers) {
+  double inlier_weight = 0;
+  double close_inliers = 0;
+  for (const size_t i : inliers) {
+    inlier_weight += scene.weights[i];
+    close_inliers += scene.closeness[i];
   }
-  const double supported_share = static_cast<double>(supported) / static_cast<double>(scene.object_points.size());
+  const double all_weight = std::accumulate(scene.weights.begin(), scene.weights.end(), 0.0);
   const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kDegree), 2));
-  return Ramp(inlier_weight / all_weight, 0.1, 0.4) * supported_share * sharpness * ObjectsStandOn(scene, fit.plane);
+  // A few points among the objects and many far away make a sharp plane of something else.
+  return Ramp(inlier_weight / all_weight, 0.1, 0.4) * Ramp(close_inliers, 3, 15) * sharpness *
+         SupportedShare(scene, fit.plane, inliers) * ObjectsStandOn(scene, fit.plane);
 }
 
 }  // namespace
@@ -285,15 +291,17 @@ std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query) {
   const auto fit = ChoosePlane(scene, SearchPlanes(scene, query.seed));
   if (!fit) return std::nullopt;
 
-  SupportPlane support{.normal_world = fit->plane.normal,
-                       .offset_mu = fit->plane.offset_mu,
-                       .sigma_rad = fit->sigma_rad,
-                       .confidence = Confidence(scene, *fit)};
+  std::vector<size_t> inliers;
   for (size_t i = 0; i < scene.points.size(); ++i) {
-    support.inliers += IsInlier(scene, fit->plane, i);
+    if (IsInlier(scene, fit->plane, i)) inliers.push_back(i);
   }
-  if (support.inliers < kMinInliers || support.confidence < kMinConfidence) return std::nullopt;
-  return support;
+  const double confidence = Confidence(scene, *fit, inliers);
+  if (std::ssize(inliers) < kMinInliers || confidence < kMinConfidence) return std::nullopt;
+  return SupportPlane{.normal_world = fit->plane.normal,
+                      .offset_mu = fit->plane.offset_mu,
+                      .sigma_rad = fit->sigma_rad,
+                      .confidence = confidence,
+                      .inliers = static_cast<int>(inliers.size())};
 }
 
 }  // namespace romap

@@ -72,7 +72,7 @@ TEST(SupportPlane, SigmaGrowsWithTheNoiseAndTellsTheError) {
       squared_sigma += std::pow(plane->sigma_rad, 2);
     }
     EXPECT_LT(std::sqrt(squared_error), 2 * std::sqrt(squared_sigma));
-    EXPECT_GT(std::sqrt(squared_sigma), 1.1 * sigma_before_rad);
+    EXPECT_GT(std::sqrt(squared_sigma), 1.03 * sigma_before_rad);
     sigma_before_rad = std::sqrt(squared_sigma);
   }
 }
