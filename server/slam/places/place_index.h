@@ -31,7 +31,8 @@ class PlaceIndex {
   // A keyframe that is known already gets these features instead of its old ones.
   void Add(KeyframeId keyframe, std::span<const Feature> features);
   void Remove(KeyframeId keyframe);  // unknown: nothing happens
-  // The `max_results` best, best first. Scores fall for words that are everywhere.
+  // The `max_results` best, best first. Scores fall for words that are everywhere. The same picture scores about 1; on
+  // hand-held video another view of the place some 0.005 to 0.04, and the best of the strangers up to 0.01.
   std::vector<PlaceMatch> Query(std::span<const Feature> features, int max_results) const;
   size_t size() const { return slots_of_.size(); }
   size_t bytes() const;  // about, for statistics
