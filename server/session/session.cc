@@ -27,6 +27,11 @@ int64_t UnixNow_ns() {
 // Of training after each keyframe when one thread does all; about what two cores do between keyframes.
 constexpr int kSlicesPerKeyframe = 4;
 
+// Does the local map that tracking works with change by this frame?
+bool ChangesMap(const TrackedImage& image) {
+  return !image.pose_given && (image.tracked.is_keyframe || image.start || image.tracked.state == TrackingState::kLost);
+}
+
 double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
 }  // namespace
@@ -113,16 +118,37 @@ void Session::TrackFrame(const Arrival& arrival) {
     if (image.tracked.is_keyframe) pool_->TrainSlices(pool_client_, kSlicesPerKeyframe);
     return;
   }
+  options_.mode == FrameMode::kLive ? QueueLive(std::move(image)) : QueueReplay(std::move(image));
+}
+
+// A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
+// objects.
+void Session::QueueLive(TrackedImage image) {
   if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
-  // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
-  // objects.
-  const bool may_wait = options_.mode == FrameMode::kReplay || image.tracked.is_keyframe || image.start;
   if (tracked_.TryPush(image)) return;
-  if (may_wait) {
+  if (image.tracked.is_keyframe || image.start) {
     tracked_.Push(std::move(image));
   } else {
     Settle();
   }
+}
+
+// A recording can wait: tracking from images runs at most one keyframe ahead of the map, and a lost camera is looked
+// for before the next frame.
+void Session::QueueReplay(TrackedImage image) {
+  const bool is_urgent = image.start || image.tracked.state == TrackingState::kLost;
+  const bool changes_map = ChangesMap(image);
+  if (changes_map) CountMapChange(1);
+  if (!tracked_.Push(std::move(image)) || !changes_map) return;
+  const int ahead = is_urgent ? 0 : 1;
+  std::unique_lock lock(drain_mutex_);
+  map_changed_.wait(lock, [&] { return map_changes_waiting_ <= ahead || all_settled_; });
+}
+
+void Session::CountMapChange(int change) {
+  std::lock_guard lock(drain_mutex_);
+  map_changes_waiting_ += change;
+  map_changed_.notify_all();
 }
 
 void Session::Acknowledge(const Arrival& arrival, const TrackedFrame& tracked) {
@@ -142,8 +168,11 @@ void Session::RunMapping() {
   try {
     while (!tracked_.Drained()) {
       const std::optional<TrackedImage> image = tracked_.PopFor(period);
-      if (image && image->tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
+      if (image && options_.mode == FrameMode::kLive && image->tracked.is_keyframe) {
+        sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
+      }
       if (image && !stopping_) MapFrame(*image);
+      if (image && ChangesMap(*image)) CountMapChange(-1);
       PublishStatistics();
     }
     EndMapping();
@@ -178,9 +207,6 @@ void Session::Correct(const MapCorrection& correction) {
 }
 
 void Session::Publish(ObjectMapper::Output output) {
-  for (const ObjectViews& views : output.views) {
-    if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
-  }
   // Before the updates that tell clients of it, and before the fields make meshes in the corrected world.
   for (const ObjectViews& views : output.views) {
     if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
@@ -314,6 +340,7 @@ void Session::SettleAll() {
   {
     std::lock_guard lock(drain_mutex_);
     all_settled_ = true;
+    map_changed_.notify_all();
     due.swap(drain_waiters_);
   }
   for (const auto& [target, done] : due) done();

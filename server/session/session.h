@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
@@ -76,6 +77,9 @@ class Session {
   void EndMapping();
   void Record(const FrameInput& input);
   void TrackFrame(const Arrival& arrival);
+  void QueueLive(TrackedImage image);
+  void QueueReplay(TrackedImage image);
+  void CountMapChange(int change);
   void Acknowledge(const Arrival& arrival, const TrackedFrame& tracked);
   void MapFrame(const TrackedImage& image);
   void Correct(const MapCorrection& correction);
@@ -110,7 +114,7 @@ class Session {
 
   BoundedQueue<Arrival> frames_;
   BoundedQueue<TrackedImage> tracked_;
-  std::atomic<int> keyframes_waiting_ = 0;  // in `tracked_`
+  std::atomic<int> keyframes_waiting_ = 0;  // live: in `tracked_`
 
   std::atomic<SessionState> state_ = SessionState::kOpen;
   std::atomic<bool> sender_attached_ = false;
@@ -119,7 +123,9 @@ class Session {
   std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
 
   std::mutex drain_mutex_;
-  uint64_t frames_settled_ = 0;                                   // mapped, rejected or dropped
+  uint64_t frames_settled_ = 0;  // mapped, rejected or dropped
+  int map_changes_waiting_ = 0;  // replay: frames under way that will change the local map
+  std::condition_variable map_changed_;
   bool all_settled_ = false;                                      // no frame will come any more
   std::multimap<uint64_t, std::function<void()>> drain_waiters_;  // by the number of frames that must be settled
 

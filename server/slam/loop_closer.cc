@@ -14,7 +14,6 @@
 namespace romap {
 namespace {
 
-constexpr double kNoDrift_px = 4;
 constexpr int kMinSharedPoints = 15;
 constexpr int kStrongSharedPoints = 80;  // an edge of the pose graph besides parents and loops
 constexpr double kLoopWeight = 3;        // over that of an edge between neighbours

@@ -6,7 +6,7 @@
 namespace romap {
 namespace {
 
-constexpr double kRedundantShare = 0.9;
+constexpr double kRedundantShare = 0.97;
 constexpr int kOtherKeyframes = 3;
 constexpr size_t kMaxGone = 2;  // at once, so that adjustment can settle
 

@@ -18,6 +18,8 @@ constexpr double kRatio = 0.85;
 constexpr double kMinMotionShare = 0.012;  // of the image's width: median motion of the features worth a try
 constexpr int kMaxWait_frames = 90;        // a first view that led to nothing for so long is given up
 constexpr double kMinKeptShare = 0.15;     // of the first view's features must still be followed
+constexpr double kSpacingShare = 0.03;     // of the image's width: motion after which one more view is followed
+constexpr size_t kMaxFollowed = 4;
 
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -28,21 +30,20 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 void MonocularStart::Begin(std::shared_ptr<const FrameFeatures> sight) {
-  first_ = std::move(sight);
-  frames_since_first_ = 0;
-  latest_px_.clear();
-  for (const Feature& feature : first_->features) latest_px_.push_back(feature.pixel_px.cast<double>());
+  FollowedView view{.sight = std::move(sight)};
+  for (const Feature& feature : view.sight->features) view.latest_px.push_back(feature.pixel_px.cast<double>());
+  followed_.push_back(std::move(view));
 }
 
-std::vector<MonocularStart::Match> MonocularStart::Follow(const FrameFeatures& sight) {
+void MonocularStart::Follow(const FrameFeatures& sight, FollowedView& view) const {
   const double radius_px = kSearchShare * sight.camera.width_px;
   std::vector<int> first_of(sight.size(), -1);
   std::vector<int> distance_of(sight.size(), 256);
   std::vector<int> near;
-  for (size_t i = 0; i < first_->size(); ++i) {
-    const Feature& feature = first_->features[i];
+  for (size_t i = 0; i < view.sight->size(); ++i) {
+    const Feature& feature = view.sight->features[i];
     if (feature.octave > kMaxOctave) continue;
-    sight.grid.Near(latest_px_[i], radius_px, near);
+    sight.grid.Near(view.latest_px[i], radius_px, near);
     int best = -1;
     int best_distance = 256;
     int second_distance = 256;
@@ -64,66 +65,73 @@ std::vector<MonocularStart::Match> MonocularStart::Follow(const FrameFeatures& s
     distance_of[k] = best_distance;
     first_of[k] = static_cast<int>(i);
   }
-  std::vector<Match> matches;
+  view.matches.clear();
+  std::vector<double> motions_px;
   for (size_t k = 0; k < first_of.size(); ++k) {
     if (first_of[k] < 0) continue;
-    matches.push_back({first_of[k], static_cast<int>(k)});
-    latest_px_[static_cast<size_t>(first_of[k])] = sight.features[k].pixel_px.cast<double>();
+    const auto first = static_cast<size_t>(first_of[k]);
+    view.matches.push_back({first_of[k], static_cast<int>(k)});
+    view.latest_px[first] = sight.features[k].pixel_px.cast<double>();
+    motions_px.push_back((sight.features[k].pixel_px - view.sight->features[first].pixel_px).norm());
   }
-  return matches;
+  view.motion_px = motions_px.empty() ? 0 : Median(std::move(motions_px));
+  ++view.frames;
 }
 
 std::optional<MapStart> MonocularStart::Offer(std::shared_ptr<const FrameFeatures> sight, std::string* reason) {
   if (sight->size() < kMinFeatures) {
     *reason = fmt::format("too little texture: {} features, {} needed", sight->size(), kMinFeatures);
-    first_ = nullptr;
+    followed_.clear();
     return std::nullopt;
   }
-  if (!first_) {
-    Begin(std::move(sight));
-    *reason = "waiting for a second view";
+  *reason = "waiting for a second view";
+  for (FollowedView& view : followed_) Follow(*sight, view);
+  const int min_matches = TwoViewOptions{}.min_matches;
+  const size_t gone = std::erase_if(followed_, [&](const FollowedView& view) {
+    const auto matches = static_cast<double>(view.matches.size());
+    return matches < kMinKeptShare * static_cast<double>(view.sight->size()) || matches < min_matches ||
+           view.frames > kMaxWait_frames;
+  });
+  if (gone > 0) *reason = "the first view is no longer in sight";
+  for (auto view = followed_.rbegin(); view != followed_.rend(); ++view) {
+    if (auto start = Try(*view, sight, reason)) {
+      followed_.clear();
+      return start;
+    }
+  }
+  const bool has_moved_on = followed_.empty() || followed_.back().motion_px > kSpacingShare * sight->camera.width_px;
+  if (has_moved_on && followed_.size() < kMaxFollowed) Begin(std::move(sight));
+  return std::nullopt;
+}
+
+std::optional<MapStart> MonocularStart::Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& sight,
+                                            std::string* reason) const {
+  if (view.motion_px < kMinMotionShare * sight->camera.width_px) {
+    *reason = fmt::format("too little parallax: the image moved by {:.1f} px", view.motion_px);
     return std::nullopt;
   }
-  ++frames_since_first_;
-  const std::vector<Match> matches = Follow(*sight);
-  TwoViewOptions options;
-  options.min_parallax_deg = config_.start_parallax_deg;
-  const bool faded = static_cast<double>(matches.size()) < kMinKeptShare * static_cast<double>(first_->size()) ||
-                     matches.size() < static_cast<size_t>(options.min_matches);
-  if (faded || frames_since_first_ > kMaxWait_frames) {
-    *reason = faded ? fmt::format("too few matches with the first view: {}", matches.size())
-                    : "too little parallax: the first view was given up";
-    Begin(std::move(sight));
-    return std::nullopt;
-  }
-  std::vector<double> motions_px;
   std::vector<TwoViewMatch> pairs;
-  for (const Match& match : matches) {
-    const Feature& a = first_->features[static_cast<size_t>(match.first)];
+  for (const Match& match : view.matches) {
+    const Feature& a = view.sight->features[static_cast<size_t>(match.first)];
     const Feature& b = sight->features[static_cast<size_t>(match.second)];
-    motions_px.push_back((a.pixel_px - b.pixel_px).norm());
     pairs.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
                      config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
   }
-  const double motion_px = Median(motions_px);
-  if (motion_px < kMinMotionShare * sight->camera.width_px) {
-    *reason = fmt::format("too little parallax: the image moved by {:.1f} px", motion_px);
-    return std::nullopt;
-  }
+  TwoViewOptions options;
+  options.min_parallax_deg = config_.start_parallax_deg;
   options.seed = config_.Seed(sight->frame_id);
   const TwoViewResult result = SolveTwoView(sight->camera, pairs, options);
   if (result.outcome != TwoViewOutcome::kOk) {
-    *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome), matches.size(),
+    *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome), pairs.size(),
                           result.points, result.parallax_rad * 180 / std::numbers::pi);
     return std::nullopt;
   }
-  MapStart start{.first = first_, .second = sight, .T_first_second = result.T_first_second};
-  for (size_t i = 0; i < matches.size(); ++i) {
+  MapStart start{.first = view.sight, .second = sight, .T_first_second = result.T_first_second};
+  for (size_t i = 0; i < view.matches.size(); ++i) {
     if (!result.points_first[i]) continue;
-    start.points.push_back({matches[i].first, matches[i].second, *result.points_first[i]});
+    start.points.push_back({view.matches[i].first, view.matches[i].second, *result.points_first[i]});
   }
   *reason = "two views found, the map begins";
-  first_ = nullptr;
   return start;
 }
 

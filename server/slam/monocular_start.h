@@ -25,28 +25,36 @@ struct MapStart {
   std::vector<Point> points = {};
 };
 
-// Waits for two views that a map can begin with. A view is kept and followed from frame to frame until structure and
-// motion come out of it and the newest frame (SolveTwoView), or too little of it is left.
+// Waits for two views that a map can begin with. A few views are kept and followed from frame to frame until structure
+// and motion come out of one of them and the newest frame (SolveTwoView), or too little of it is left.
 class MonocularStart {
  public:
   explicit MonocularStart(const SlamConfig& config) : config_(config) {}
 
   // The next frame. Without a result, `reason` says why for people.
   std::optional<MapStart> Offer(std::shared_ptr<const FrameFeatures> sight, std::string* reason);
-  void Reset() { first_ = nullptr; }
+  void Reset() { followed_.clear(); }
 
  private:
   struct Match {
     int first = 0;
     int second = 0;
   };
+  struct FollowedView {
+    std::shared_ptr<const FrameFeatures> sight;
+    std::vector<Eigen::Vector2d> latest_px = {};  // where each feature was seen last
+    std::vector<Match> matches = {};              // with the newest frame
+    double motion_px = 0;                         // median over the matches
+    int frames = 0;                               // since it was taken
+  };
+
   void Begin(std::shared_ptr<const FrameFeatures> sight);
-  std::vector<Match> Follow(const FrameFeatures& sight);
+  void Follow(const FrameFeatures& sight, FollowedView& view) const;
+  std::optional<MapStart> Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& sight,
+                              std::string* reason) const;
 
   const SlamConfig config_;
-  std::shared_ptr<const FrameFeatures> first_;
-  std::vector<Eigen::Vector2d> latest_px_;  // where each feature of `first_` was seen last
-  int frames_since_first_ = 0;
+  std::vector<FollowedView> followed_;  // oldest first
 };
 
 }  // namespace romap

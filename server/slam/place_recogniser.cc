@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <unordered_map>
 #include <utility>
 
 #include "server/slam/geometry/similarity.h"
@@ -16,17 +15,18 @@ namespace romap {
 namespace {
 
 constexpr int kCandidates = 5;
+constexpr int kLoopCandidates = 3;
 constexpr int kMaxDistance = 60;  // Hamming, bits
 constexpr double kRatio = 0.85;
-constexpr int kMinCameraInliers = 15;  // of matches by looks
-constexpr int kMinCameraPoints = 40;   // after a search by projection
-constexpr double kCameraRadius_px = 8;
+constexpr int kMinLooksInliers = 12;  // of matches by looks
+constexpr int kMinPoints = 40;        // after a search by projection
+constexpr double kMinInlierShare = 0.5;
+constexpr double kWideRadius_px = 10;
+constexpr double kNarrowRadius_px = 4;
+constexpr size_t kFewNeighbours = 3;
 constexpr size_t kNeighbours = 8;
-
 constexpr int kMinSharedPoints = 15;
-constexpr int kMinLoopMatches = 20;
-constexpr int kMinLoopPoints = 45;
-constexpr double kLoopRadius_px = 6;
+constexpr int kMinCommonPoints = 15;
 constexpr uint64_t kMinLoopKeyframes = 10;  // between both ends
 
 std::vector<LocalPoint> LooksOfAll(const SlamMap& map, const std::vector<MapPointId>& ids) {
@@ -59,131 +59,111 @@ std::vector<MapPointId> PlaceRecogniser::PointsAround(const MapKeyframe& keyfram
   return {points.begin(), points.end()};
 }
 
+std::optional<PlaceRecogniser::Located> PlaceRecogniser::Locate(const FrameFeatures& sight, const MapKeyframe& place,
+                                                                uint64_t call) const {
+  const std::vector<LocalPoint> points = LooksOfAll(*map_, PointsAround(place, kFewNeighbours));
+  std::vector<PoseObservation> observations;
+  for (const PointMatch& match : MatchByLooks(points, sight, kMaxDistance, kRatio)) {
+    observations.push_back(
+        Observe(sight, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
+  }
+  const auto pose = SolvePnp(sight.camera, observations, {.min_inliers = kMinLooksInliers, .seed = config_.Seed(call)});
+  if (!pose) return std::nullopt;
+
+  const std::vector<LocalPoint> around = LooksOfAll(*map_, PointsAround(place, kNeighbours));
+  Located located;
+  located.T_world_camera = pose->T_world_camera;
+  PoseEstimate refined;
+  for (const double radius_px : {kWideRadius_px, kNarrowRadius_px}) {
+    ProjectionMatcher matcher(sight, located.T_world_camera);
+    const auto matches = matcher.MatchAll(around, {.radius_px = radius_px, .max_distance = kMaxDistance}, {});
+    observations.clear();
+    for (const PointMatch& match : matches) {
+      observations.push_back(
+          Observe(sight, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
+    }
+    refined = RefinePose(sight.camera, located.T_world_camera, observations);
+    located.T_world_camera = refined.T_world_camera;
+    located.points.clear();
+    for (size_t i = 0; i < matches.size(); ++i) {
+      if (refined.inlier[i] == 0) continue;
+      located.points.emplace_back(around[static_cast<size_t>(matches[i].point)].id, matches[i].feature);
+    }
+  }
+  spdlog::debug("slam: frame {} looks like {}: {} of {} points", sight.frame_id, place.id.ToString(), refined.inliers,
+                observations.size());
+  if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
+    return std::nullopt;
+  }
+  return located;
+}
+
 std::optional<PlaceRecogniser::Found> PlaceRecogniser::FindCamera(const FrameFeatures& sight) const {
   for (const PlaceMatch& candidate : index_.Query(sight.features, kCandidates)) {
     const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
     if (place == nullptr) continue;
-    const std::vector<LocalPoint> points = LooksOfAll(*map_, PointsAround(*place, 2));
-    std::vector<PoseObservation> observations;
-    for (const PointMatch& match : MatchByLooks(points, sight, kMaxDistance, kRatio)) {
-      observations.push_back(
-          Observe(sight, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
-    }
-    const auto pose =
-        SolvePnp(sight.camera, observations, {.min_inliers = kMinCameraInliers, .seed = config_.Seed(sight.frame_id)});
-    if (!pose) continue;
-
-    const std::vector<LocalPoint> around = LooksOfAll(*map_, PointsAround(*place, kNeighbours));
-    ProjectionMatcher matcher(sight, pose->T_world_camera);
-    const ProjectionSearch search{.radius_px = kCameraRadius_px, .max_distance = kMaxDistance};
-    observations.clear();
-    for (const PointMatch& match : matcher.MatchAll(around, search, {})) {
-      observations.push_back(
-          Observe(sight, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
-    }
-    PoseEstimate refined = RefinePose(sight.camera, pose->T_world_camera, observations);
-    spdlog::debug("slam: frame {} looks like {}: {} of {} points", sight.frame_id, place->id.ToString(),
-                  refined.inliers, observations.size());
-    if (refined.inliers >= kMinCameraPoints) return Found{std::move(refined), place->id};
+    if (const auto located = Locate(sight, *place, sight.frame_id)) return Found{located->T_world_camera, place->id};
   }
   return std::nullopt;
 }
 
 std::optional<LoopMatch> PlaceRecogniser::FindLoop(const MapKeyframe& keyframe, bool fix_scale) const {
   std::set<KeyframeId> connected = {keyframe.id};
-  for (const auto& [id, shared] : map_->Covisible(keyframe, 1)) connected.insert(id);
-  const std::vector<PlaceMatch> candidates =
-      index_.Query(keyframe.features(), kCandidates + static_cast<int>(connected.size()));
+  for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) connected.insert(id);
   int tried = 0;
-  for (const PlaceMatch& candidate : candidates) {
+  for (const PlaceMatch& candidate :
+       index_.Query(keyframe.features(), kCandidates + static_cast<int>(connected.size()))) {
     if (connected.contains(candidate.keyframe) || candidate.keyframe.value + kMinLoopKeyframes > keyframe.id.value) {
       continue;
     }
-    if (++tried > kCandidates) break;
+    if (++tried > kLoopCandidates) break;
     const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
     if (place == nullptr) continue;
-    if (auto loop = Verify(keyframe, *place, fix_scale)) return loop;
+    const auto located = Locate(*keyframe.sight, *place, keyframe.id.value);
+    if (!located) continue;
+    if (auto loop = MakeLoop(keyframe, *place, *located, fix_scale)) return loop;
   }
   return std::nullopt;
 }
 
-std::optional<LoopMatch> PlaceRecogniser::Verify(const MapKeyframe& keyframe, const MapKeyframe& place,
-                                                 bool fix_scale) const {
-  // Matches between what both see, by looks alone.
-  const auto own_points = [&](const MapKeyframe& of, std::vector<MapPointId>& ids, std::vector<int>& features) {
-    for (size_t i = 0; i < of.points.size(); ++i) {
-      if (!of.points[i]) continue;
-      ids.push_back(of.points[i]);
-      features.push_back(static_cast<int>(i));
-    }
-  };
-  std::vector<MapPointId> new_ids, old_ids;
-  std::vector<int> new_features, old_features;
-  own_points(keyframe, new_ids, new_features);
-  own_points(place, old_ids, old_features);
-  const std::vector<LocalPoint> old_points = LooksOfAll(*map_, old_ids);
-  std::vector<SimilarityMatch> matches;
-  std::unordered_map<int, size_t> point_of_feature;
-  for (size_t i = 0; i < new_features.size(); ++i) point_of_feature[new_features[i]] = i;
-  for (const PointMatch& match : MatchByLooks(old_points, *keyframe.sight, kMaxDistance, kRatio)) {
-    const auto seen = point_of_feature.find(match.feature);
-    if (seen == point_of_feature.end()) continue;
-    const auto old = static_cast<size_t>(match.point);
-    const Feature& new_feature = keyframe.features()[static_cast<size_t>(match.feature)];
-    const Feature& old_feature = place.features()[static_cast<size_t>(old_features[old])];
-    matches.push_back(
-        {.p_first = place.T_camera_world() * old_points[old].position_world,
-         .p_second = keyframe.T_camera_world() * map_->FindPoint(new_ids[seen->second])->point.position_world,
-         .first_px = old_feature.pixel_px.cast<double>(),
-         .second_px = new_feature.pixel_px.cast<double>(),
-         .first_sigma_px = config_.pixel_sigma_px * old_feature.octave_scale,
-         .second_sigma_px = config_.pixel_sigma_px * new_feature.octave_scale});
-  }
-  const SimilarityOptions options{
-      .fix_scale = fix_scale, .min_inliers = kMinLoopMatches, .seed = config_.Seed(keyframe.id.value)};
-  if (matches.size() < static_cast<size_t>(kMinLoopMatches)) return std::nullopt;
-  const auto similarity = SolveSimilarity(keyframe.camera(), matches, options);
-  if (!similarity) return std::nullopt;
-
-  // More points of the old place, where that similarity says they are.
-  LoopMatch loop{.keyframe = keyframe.id, .place = place.id, .S_place_keyframe = similarity->S_first_second};
-  const Sim3<World, Camera> S_world_keyframe = Sim3<World, Camera>(place.T_world_camera()) * loop.S_place_keyframe;
-  std::vector<LocalPoint> around = LooksOfAll(*map_, PointsAround(place, kNeighbours));
-  // In the keyframe's own unit of length.
-  const Sim3<World, World> S_new_old =
-      Sim3<World, World>(Sim3<World, Camera>(keyframe.T_world_camera()) * S_world_keyframe.Inverse());
-  std::vector<LocalPoint> moved = around;
-  for (LocalPoint& point : moved) {
-    point.position_world = S_new_old * point.position_world;
-    point.direction_world = S_new_old.rotation() * point.direction_world;
-    point.size_mu *= S_new_old.scale();
-  }
-  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
-  const ProjectionSearch search{.radius_px = kLoopRadius_px, .max_distance = kMaxDistance};
+std::optional<LoopMatch> PlaceRecogniser::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place,
+                                                   const Located& located, bool fix_scale) const {
+  LoopMatch loop{.keyframe = keyframe.id, .place = place.id};
+  const SE3<Camera, World>& T_place_world = place.T_camera_world();
+  std::vector<SimilarityMatch> both;
   std::vector<double> disagreements_px;
-  int found = 0;
-  for (const PointMatch& match : matcher.MatchAll(moved, search, {})) {
-    const auto i = static_cast<size_t>(match.point);
-    const Feature& feature = keyframe.features()[static_cast<size_t>(match.feature)];
-    const Eigen::Vector2d there_px = keyframe.camera().Project(keyframe.T_camera_world() * moved[i].position_world);
-    const double error_px = (there_px - feature.pixel_px.cast<double>()).norm();
-    if (error_px > 3 * config_.pixel_sigma_px * feature.octave_scale) continue;
-    ++found;
-    const Eigen::Vector3d as_it_is = keyframe.T_camera_world() * around[i].position_world;
-    if (as_it_is.z() > 0) {
-      disagreements_px.push_back((keyframe.camera().Project(as_it_is) - feature.pixel_px.cast<double>()).norm());
-    } else {
-      disagreements_px.push_back(keyframe.camera().width_px);
-    }
-    const MapPointId seen = keyframe.points[static_cast<size_t>(match.feature)];
-    if (seen && seen != around[i].id) loop.same_points.emplace_back(seen, around[i].id);
+  for (const auto& [id, feature_index] : located.points) {
+    const Eigen::Vector3d& old_world = map_->FindPoint(id)->point.position_world;
+    const Feature& feature = keyframe.features()[static_cast<size_t>(feature_index)];
+    const Eigen::Vector3d as_it_is = keyframe.T_camera_world() * old_world;
+    disagreements_px.push_back(as_it_is.z() > 0
+                                   ? (keyframe.camera().Project(as_it_is) - feature.pixel_px.cast<double>()).norm()
+                                   : keyframe.camera().width_px);
+    const MapPointId seen = keyframe.points[static_cast<size_t>(feature_index)];
+    if (!seen) continue;
+    if (seen != id) loop.same_points.emplace_back(seen, id);
+    const Eigen::Vector3d p_place = T_place_world * old_world;
+    const double sigma_px = config_.pixel_sigma_px * feature.octave_scale;
+    both.push_back({.p_first = p_place,
+                    .p_second = keyframe.T_camera_world() * map_->FindPoint(seen)->point.position_world,
+                    .first_px = keyframe.camera().Project(p_place),
+                    .second_px = feature.pixel_px.cast<double>(),
+                    .first_sigma_px = sigma_px,
+                    .second_sigma_px = sigma_px});
   }
-  spdlog::debug("slam: {} against {}: {} of {} matches, then {} points", keyframe.id.ToString(), place.id.ToString(),
-                similarity->inliers, matches.size(), found);
-  if (found < kMinLoopPoints) return std::nullopt;
   const auto middle = disagreements_px.begin() + static_cast<std::ptrdiff_t>(disagreements_px.size() / 2);
   std::nth_element(disagreements_px.begin(), middle, disagreements_px.end());
   loop.disagreement_px = *middle;
+
+  loop.S_place_keyframe = Sim3<Camera, Camera>(T_place_world * located.T_world_camera);
+  if (fix_scale || loop.disagreement_px < kNoDrift_px) return loop;
+  // How both sides' lengths compare, only points that both know can tell.
+  const auto similarity = SolveSimilarity(keyframe.camera(), both,
+                                          {.min_inliers = kMinCommonPoints, .seed = config_.Seed(keyframe.id.value)});
+  spdlog::debug("slam: {} again at {}: off by {:.1f} px, {} of {} common points agree", keyframe.id.ToString(),
+                place.id.ToString(), loop.disagreement_px, similarity ? similarity->inliers : 0, both.size());
+  if (!similarity) return std::nullopt;
+  loop.S_place_keyframe = similarity->S_first_second;
   return loop;
 }
 

@@ -10,11 +10,14 @@
 
 namespace romap {
 
+// A loop whose ends lie closer together than this, in the newest keyframe's image, has not drifted.
+inline constexpr double kNoDrift_px = 4;
+
 // A known place that a keyframe shows again.
 struct LoopMatch {
   KeyframeId keyframe;  // the newest one
   KeyframeId place;     // the old one
-  Sim3<Camera, Camera> S_place_keyframe;
+  Sim3<Camera, Camera> S_place_keyframe = {};
   std::vector<std::pair<MapPointId, MapPointId>> same_points = {};  // (seen from the new side, known on the old side)
   double disagreement_px = 0;  // median distance of the old points from where the map as it is puts them
 };
@@ -29,17 +32,25 @@ class PlaceRecogniser {
 
   // Where a frame was taken, and the keyframe that looked like it.
   struct Found {
-    PoseEstimate pose;
+    SE3<World, Camera> T_world_camera;
     KeyframeId place;
   };
   std::optional<Found> FindCamera(const FrameFeatures& sight) const;
 
-  // An old place in what the keyframe sees, far from it in the covisibility graph.
+  // An old place in what the keyframe sees, that shares hardly any points with it so far.
   std::optional<LoopMatch> FindLoop(const MapKeyframe& keyframe, bool fix_scale) const;
 
  private:
+  // A frame in the part of the map around a place.
+  struct Located {
+    SE3<World, Camera> T_world_camera;
+    std::vector<std::pair<MapPointId, int>> points;  // with the feature that shows each
+  };
+
   std::vector<MapPointId> PointsAround(const MapKeyframe& keyframe, size_t neighbours) const;
-  std::optional<LoopMatch> Verify(const MapKeyframe& keyframe, const MapKeyframe& place, bool fix_scale) const;
+  std::optional<Located> Locate(const FrameFeatures& sight, const MapKeyframe& place, uint64_t call) const;
+  std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place, const Located& located,
+                                    bool fix_scale) const;
 
   const SlamConfig config_;
   const SlamMap* const map_;

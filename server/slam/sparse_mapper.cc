@@ -381,7 +381,7 @@ void SparseMapper::FindLostCamera(const TrackedImage& image) {
   ++figures_.relocalisations;
   PublishLocalMap(found->place, LocalMap::Relocalisation{.frame_id = image.sight->frame_id,
                                                          .timestamp_ns = image.sight->timestamp_ns,
-                                                         .T_world_camera = found->pose.T_world_camera});
+                                                         .T_world_camera = found->T_world_camera});
 }
 
 void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised) {

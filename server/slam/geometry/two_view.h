@@ -35,7 +35,7 @@ struct TwoViewOptions {
   // Another motion that explains this share of what the best one explains makes the matter ambiguous.
   double max_rival_share = 0.88;
   // By the covariance of the refined motion, in its least certain direction.
-  double max_rotation_sigma_deg = 0.6;
+  double max_rotation_sigma_deg = 0.8;
   double max_direction_sigma_deg = 3;
   int max_iterations = 200;  // RANSAC
   uint64_t seed = 1;
