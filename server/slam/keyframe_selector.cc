@@ -13,9 +13,10 @@ constexpr size_t kSharpnessWindowFrames = 15;
 constexpr int kMaskMemoryFrames = 30;    // masks that last came longer ago are not waited for
 constexpr double kStandingStill = 0.15;  // progress below which passing time makes no keyframe
 constexpr double kVeryFast = 2.5;        // progress beyond which the minimum gap does not count
-constexpr double kRunsOut = 0.7;         // share of the newest keyframe's points below which it is time for another
-constexpr double kUrgent = 0.45;         // below which tracking is in danger
-constexpr int kBusy = 2;                 // keyframes that wait to be mapped
+constexpr double kTooFarToWait = 1.5;
+constexpr double kRunsOut = 0.7;  // share of the newest keyframe's points below which it is time for another
+constexpr double kUrgent = 0.45;  // below which tracking is in danger
+constexpr int kBusy = 2;          // keyframes that wait to be mapped
 constexpr int kOverwhelmed = 4;
 constexpr double kWorthMeasuring = 0.5;  // progress before which the baseline is too short to measure depth
 
@@ -42,16 +43,16 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
   }
   scene_depth_mu_ = quality.scene_depth_mu;
   const double progress = Progress(T_world_camera) * config_.tracking_keyframe_share;
-  const bool moved = progress >= 1 && frames_since_keyframe_ >= config_.keyframe_min_gap_frames;
   const bool timed_out = progress > kStandingStill && frames_since_keyframe_ >= config_.keyframe_max_gap_frames;
   const bool runs_out = (quality.tracked_share < kRunsOut && progress > kStandingStill) || quality.has_unseen_depth;
   const bool is_urgent = quality.tracked_share < kUrgent || progress > kVeryFast;
-  bool is_due = moved || timed_out || runs_out || is_urgent;
+  bool is_due = progress >= 1 || timed_out || runs_out || is_urgent;
   if (quality.keyframes_waiting >= kBusy) is_due = is_urgent;
   if (quality.keyframes_waiting >= kOverwhelmed) is_due = false;
   frames_due_ = is_due ? frames_due_ + 1 : 0;
   if (!is_due) return false;
-  const bool may_wait = !is_urgent && frames_due_ <= config_.keyframe_wait_frames;
+  // A fast camera would be too far off by the time of the next sharp frame.
+  const bool may_wait = !is_urgent && progress < kTooFarToWait && frames_due_ <= config_.keyframe_wait_frames;
   if (!is_good && may_wait) return false;
   Take(std::move(view));
   return true;
@@ -73,6 +74,7 @@ bool KeyframeSelector::IsDue(const DepthView& view) {
       progress = Progress(view.T_world_camera);
     }
   }
+
   const bool moved = progress >= 1 && frames_since_keyframe_ >= config_.keyframe_min_gap_frames;
   const bool timed_out = progress > kStandingStill && frames_since_keyframe_ >= config_.keyframe_max_gap_frames;
   const bool is_due = moved || timed_out || progress > kVeryFast;

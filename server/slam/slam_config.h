@@ -12,13 +12,13 @@ struct SlamConfig {
   int keyframe_max_gap_frames = 30;
   int keyframe_wait_frames = 3;
   double keyframe_sharpness_ratio = 0.75;
-  double tracking_keyframe_share = 0.7;
+  double tracking_keyframe_share = 1.0;
   double start_parallax_deg = 1.5;
 
   int scene_features = 1000;
   int object_features = 600;
   int scene_fast_threshold = 12;
-  int scene_fast_min_threshold = 6;
+  int scene_fast_min_threshold = 4;
   int object_fast_threshold = 5;
   int mask_erosion_px = 1;
 
@@ -80,7 +80,10 @@ struct SlamConfig {
     fields.Add("object_fast_threshold", &object_fast_threshold,
                {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner inside an instance mask"});
     fields.Add("mask_erosion_px", &mask_erosion_px,
-               {.unit = "px", .min = 0, .max = 10, .help = "A feature this close to its mask's border gets no label"});
+               {.unit = "px",
+                .min = 0,
+                .max = 10,
+                .help = "A feature so close to its mask's border, times its octave's scale, gets no label"});
   }
 
   void MapFields(ConfigFields& fields) {

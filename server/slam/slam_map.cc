@@ -23,6 +23,7 @@ MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> sight,
   MapKeyframe& keyframe = keyframes_[id];
   keyframe.id = id;
   keyframe.points.resize(sight->size());
+  keyframe.scene_features = sight->size();
   keyframe.sight = std::move(sight);
   keyframe.SetPose(T_world_camera);
   return keyframe;

@@ -22,6 +22,7 @@ struct MapKeyframe {
   std::shared_ptr<const FrameFeatures> sight;
   bool pose_given = false;              // by the client: nothing may move it
   std::optional<PosePrior> prior = {};  // what the client believes of its pose
+  size_t scene_features = 0;            // the first ones: those that an ordinary frame has too
   std::vector<MapPointId> points = {};  // one per feature, 0 = none
   KeyframeId parent = {};               // the keyframe it shared most points with when it came; 0 for the first
   std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, found by their looks

@@ -191,6 +191,7 @@ MapKeyframe& SparseMapper::InsertKeyframe(const TrackedImage& image) {
   TrackedFrame tracked = image.tracked;
   Place(tracked);
   MapKeyframe& keyframe = map_->AddKeyframe(std::move(sight), tracked.T_world_camera);
+  keyframe.scene_features = image.sight->size();
   keyframe.pose_given = image.pose_given;
   if (!image.pose_given && frame.T_world_camera && world_is_given_) {
     keyframe.prior = PosePrior{.T_world_camera = *frame.T_world_camera,
@@ -401,7 +402,8 @@ void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Re
       local->points.push_back(LooksOf(track));
     }
     const int well_placed = std::min(kMinObservationsWellPlaced, static_cast<int>(map_->keyframes().size()));
-    for (const MapPointId id : center->points) {
+    for (size_t i = 0; i < center->scene_features; ++i) {
+      const MapPointId id = center->points[i];
       local->reference_points += id && map_->FindPoint(id)->point.observations >= well_placed ? 1 : 0;
     }
     const uint64_t newest = map_->keyframe_count();

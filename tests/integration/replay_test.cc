@@ -21,9 +21,10 @@ using testing_support::TemporaryFolder;
 
 namespace fs = std::filesystem;
 
-ProcessResult Romap(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), ROMAP_CLIENT);
-  return RunProcess(arguments);
+ProcessResult Romap(const std::vector<std::string>& arguments) {
+  std::vector<std::string> command(1, ROMAP_CLIENT);
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return RunProcess(command);
 }
 
 std::string Bytes(const fs::path& path) {

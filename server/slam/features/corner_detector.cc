@@ -7,11 +7,13 @@
 namespace romap {
 namespace {
 
-// Parts of the image this large must not stay without corners.
+// Parts of the image this large should not have fewer corners ...
 constexpr int kCell_px = 80;
+// ... than so many: where structure is weak only all of the image together holds the camera.
+constexpr int kMinInCell = 8;
 // How many corners, over those wanted, there are to choose from. More choice spreads them better, but weak corners are
 // found again less often.
-constexpr double kChoice = 1.5;
+constexpr double kChoice = 3;
 constexpr int kCircleRadius_px = 3;  // of FAST's test
 
 bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; }
@@ -44,16 +46,16 @@ class CellGrid {
   int rows_;
 };
 
-// Moves the corners that may be taken to the front: the strongest, and of each cell the best one, however weak.
+// Keeps the corners that may be taken: the strongest, and of each cell the best few, however weak.
 void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
   std::stable_sort(corners.begin(), corners.end(), Stronger);
   const CellGrid grid(cv::Rect(cv::Point(), image_size));
-  std::vector<bool> has_corner(grid.size(), false);
+  std::vector<int> in_cell(grid.size(), 0);
   size_t kept = 0;
   for (size_t i = 0; i < corners.size(); ++i) {
     const size_t cell = grid.IndexOf(corners[i].pt);
-    if (i < count || !has_corner[cell]) corners[kept++] = corners[i];
-    has_corner[cell] = true;
+    if (i < count || in_cell[cell] < kMinInCell) corners[kept++] = corners[i];
+    ++in_cell[cell];
   }
   corners.resize(kept);
 }
@@ -96,10 +98,10 @@ Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int 
   Corners corners = DetectCorners(image, part, threshold);
   if (min_threshold >= threshold) return corners;
   const CellGrid grid(part);
-  std::vector<bool> has_corner(grid.size(), false);
-  for (const cv::KeyPoint& corner : corners) has_corner[grid.IndexOf(corner.pt)] = true;
+  std::vector<int> in_cell(grid.size(), 0);
+  for (const cv::KeyPoint& corner : corners) ++in_cell[grid.IndexOf(corner.pt)];
   for (size_t cell = 0; cell < grid.size(); ++cell) {
-    if (has_corner[cell]) continue;
+    if (in_cell[cell] >= kMinInCell) continue;
     const Corners weak = DetectCorners(image, grid.Cell(cell), min_threshold);
     corners.insert(corners.end(), weak.begin(), weak.end());
   }

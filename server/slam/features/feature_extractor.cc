@@ -160,14 +160,16 @@ std::vector<Feature> FeatureExtractor::Describe(const Frame& frame, const std::v
   std::vector<Feature> features;
   features.reserve(candidates.size());
   for (const Candidate& candidate : candidates) {
+    const double scale = kOctaveScales[static_cast<size_t>(candidate.octave)];
     const auto x_px = static_cast<int>(candidate.corner_px.x);
     const auto y_px = static_cast<int>(candidate.corner_px.y);
     const PatchDirection direction = IntensityCentroid(pyramid_.sharp(candidate.octave), x_px, y_px);
     features.push_back({.pixel_px = candidate.pixel_px,
                         .octave = candidate.octave,
-                        .octave_scale = kOctaveScales[static_cast<size_t>(candidate.octave)],
+                        .octave_scale = scale,
                         .angle_rad = std::atan2(direction.sine, direction.cosine),
-                        .label = LabelAt(frame.labels, candidate.pixel_px, config_.mask_erosion_px),
+                        .label = LabelAt(frame.labels, candidate.pixel_px,
+                                         static_cast<int>(std::lround(config_.mask_erosion_px * scale))),
                         .descriptor = SteeredBrief(pyramid_.smooth(candidate.octave), x_px, y_px, direction)});
   }
   return features;

@@ -51,10 +51,11 @@ TEST(FeatureExtractor, AFeatureOnTheMasksBorderHasNoLabel) {
   SlamConfig config;
   config.mask_erosion_px = 3;
   const std::vector<Feature> features = FeatureExtractor(config).Extract(*frame);
-  cv::Mat inner;
-  cv::erode(frame->labels, inner, cv::Mat::ones(7, 7, CV_8UC1));
   EXPECT_GT(CountLabelled(features), 20);
   for (const Feature& feature : features) {
+    const int reach = static_cast<int>(std::lround(3 * feature.octave_scale));
+    cv::Mat inner;
+    cv::erode(frame->labels, inner, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8UC1));
     const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
     const int v = static_cast<int>(std::lround(feature.pixel_px.y()));
     EXPECT_EQ(feature.label, inner.at<uint16_t>(v, u)) << u << " " << v;
