@@ -97,7 +97,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
 
   ProblemBuilder builder(map, config, newest.camera());
   for (const MapKeyframe* keyframe : window) {
-    builder.AddKeyframe(*keyframe, keyframe->id == held);
+    builder.AddKeyframe(*keyframe, keyframe->id == held && !keyframe->prior);
   }
   for (const auto& [count, id] : holding) builder.AddKeyframe(*map.FindKeyframe(id), true);
   for (const MapPointId point : points) builder.AddPoint(*map.FindPoint(point));
@@ -107,7 +107,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
 MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config) {
   const MapKeyframe& first = map.keyframes().begin()->second;
   ProblemBuilder builder(map, config, first.camera());
-  for (const auto& [id, keyframe] : map.keyframes()) builder.AddKeyframe(keyframe, id == first.id);
+  for (const auto& [id, keyframe] : map.keyframes()) builder.AddKeyframe(keyframe, id == first.id && !first.prior);
   for (const auto& [id, track] : map.points()) builder.AddPoint(track);
   return builder.Take();
 }

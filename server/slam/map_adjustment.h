@@ -22,7 +22,8 @@ struct MapProblem {
 // these points hold the window in place.
 MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config);
 
-// Everything. The first keyframe stays; without depth the scale is free, and damping keeps it where it is.
+// Everything. The first keyframe stays, unless priors hold the map; without depth the scale is free, and damping keeps
+// it where it is.
 MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config);
 
 // Writes the solution of a window back and drops the sights that it calls outliers.

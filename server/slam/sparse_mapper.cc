@@ -20,6 +20,7 @@ constexpr size_t kMaxLocalPoints = 8000;
 constexpr size_t kPlacesTold = 60;       // keyframes whose place tracking learns, besides those around
 constexpr int kGiveUpAfter_frames = 45;  // a camera lost so long in a map so young begins anew
 constexpr size_t kYoungMap_keyframes = 6;
+constexpr uint64_t kWholePeriodWithPriors_keyframes = 5;
 constexpr int kMinObservationsWellPlaced = 3;
 
 double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
@@ -262,7 +263,8 @@ void SparseMapper::CloseLoops(const MapKeyframe& keyframe) {
   const std::optional<LoopMatch> loop = places_->FindLoop(keyframe, metric_ || world_is_given_);
   if (!loop) {
     if (map_->keyframe_count() < next_whole_) return;
-    next_whole_ += next_whole_;
+    // Priors tell of the whole map's scale, which windows alone learn too late.
+    next_whole_ += world_is_given_ ? kWholePeriodWithPriors_keyframes : next_whole_;
     if (!whole_) StartWholeAdjustment();
     return;
   }

@@ -27,7 +27,9 @@ constexpr double kLooksRatio = 0.8;
 constexpr double kLongestPrediction_s = 0.25;
 constexpr double kLongestDepartureShare = 0.5;  // of the scene's depth: no camera jumps so far between two frames
 constexpr int kStartDepthPoints = 150;
+// Where priors begin a map their errors become the map's until there are enough of them to average out.
 constexpr int kMapPointsToLeavePriors = 150;
+constexpr uint64_t kKeyframesToLeavePriors = 12;
 
 double DepthOf(const SE3<Camera, World>& T_camera_world, const LocalPoint& point) {
   return (T_camera_world * point.position_world).z();
@@ -63,9 +65,10 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   const bool has_pose = frame->T_world_camera && pose_use_ != PoseUse::kIgnore;
   const bool is_clients_world = world_is_given_ || !has_map;
   if (has_pose && is_clients_world && !waiting_for_map_) {
-    const bool priors_suffice =
-        pose_use_ == PoseUse::kPrior && has_map && map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
-    if (!priors_suffice) return TakeGivenPose(std::move(frame));
+    const bool map_suffices = pose_use_ == PoseUse::kPrior && has_map &&
+                              map_->keyframes_done >= kKeyframesToLeavePriors &&
+                              map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
+    if (!map_suffices) return TakeGivenPose(std::move(frame));
   }
   auto sight = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame));
   if (!has_map || waiting_for_map_) return Initialise(std::move(frame), std::move(sight));

@@ -123,7 +123,7 @@ TEST(SparseMapper, LabelsTellThePlateFromTheFloor) {
     misplaced += std::abs(known.points.at(id).position_world.z() - TexturedWorld::kPlateHeight_mu) > 0.1;
   }
   EXPECT_GT(plate_points, 50);
-  EXPECT_LT(misplaced, 0.05 * plate_points);
+  EXPECT_LT(misplaced, 0.07 * plate_points);
 }
 
 TEST(SparseMapper, PointsGainObservationsAndAccuracy) {

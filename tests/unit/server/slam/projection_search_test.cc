@@ -1,0 +1,109 @@
+#include "server/slam/projection_search.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/slam/descriptor_matching.h"
+#include "tests/unit/server/slam/textured_world.h"
+
+namespace romap {
+namespace {
+
+Descriptor RandomDescriptor(std::mt19937_64& random) {
+  Descriptor descriptor;
+  for (uint64_t& word : descriptor) word = random();
+  return descriptor;
+}
+
+Descriptor Flip(Descriptor descriptor, int bits) {
+  for (int i = 0; i < bits; ++i) descriptor[static_cast<size_t>(i) % 4] ^= uint64_t{1} << (i / 4);
+  return descriptor;
+}
+
+TEST(MatchDescriptors, FindsMutualBestsWithinTheBoundsOnly) {
+  std::mt19937_64 random(3);
+  std::vector<Descriptor> first, second;
+  for (int i = 0; i < 40; ++i) first.push_back(RandomDescriptor(random));
+  for (int i = 39; i >= 0; --i) second.push_back(Flip(first[static_cast<size_t>(i)], i < 20 ? 10 : 70));
+  const auto matches = MatchDescriptors(first, second, 50, 0.8);
+  ASSERT_EQ(matches.size(), 20U);
+  for (const DescriptorMatch& match : matches) {
+    EXPECT_EQ(match.second, 39 - match.first);
+    EXPECT_EQ(match.distance,
+              HammingDistance(first[static_cast<size_t>(match.first)], second[static_cast<size_t>(match.second)]));
+  }
+  second.push_back(Flip(first[0], 11));  // a rival
+  EXPECT_EQ(MatchDescriptors(first, second, 50, 0.8).size(), 19U);
+  EXPECT_TRUE(MatchDescriptors({}, second, 50, 0.8).empty());
+  EXPECT_TRUE(MatchDescriptors(first, {}, 50, 0.8).empty());
+}
+
+class ProjectionSearchTest : public ::testing::Test {
+ protected:
+  ProjectionSearchTest() {
+    Frame frame;
+    frame.camera = TexturedWorld().camera();
+    std::uniform_real_distribution<double> side(-1, 1);
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d p_world(side(random_), 0.7 * side(random_), 4);
+      const Descriptor descriptor = RandomDescriptor(random_);
+      Feature feature;
+      feature.pixel_px = frame.camera.Project(p_world).cast<float>();
+      feature.descriptor = Flip(descriptor, 12);
+      features_.push_back(feature);
+      points_.push_back({.id = MapPointId{static_cast<uint64_t>(i + 1)},
+                         .position_world = p_world,
+                         .direction_world = p_world.normalized(),
+                         .size_mu = p_world.norm() / frame.camera.fx_px,
+                         .descriptor = descriptor});
+    }
+    sight_ = MakeFrameFeatures(frame, features_);
+  }
+
+  std::mt19937_64 random_{5};
+  std::vector<Feature> features_;
+  std::vector<LocalPoint> points_;
+  std::shared_ptr<const FrameFeatures> sight_;
+};
+
+TEST_F(ProjectionSearchTest, FindsPointsNearTheirProjection) {
+  const SE3<World, Camera> close(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.02, 0, 0));
+  const auto matches = ProjectionMatcher(*sight_, close).MatchAll(points_, {.radius_px = 8}, {});
+  EXPECT_GE(matches.size(), 58U);
+  for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);
+  const SE3<World, Camera> far(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0));
+  EXPECT_LE(ProjectionMatcher(*sight_, far).MatchAll(points_, {.radius_px = 8}, {}).size(), 1U);
+}
+
+TEST_F(ProjectionSearchTest, PassesOverWhatCannotBe) {
+  const SE3<World, Camera> here;
+  ProjectionMatcher matcher(*sight_, here);
+  LocalPoint point = points_[0];
+  ASSERT_TRUE(matcher.Find(point, {}, {}));
+  std::vector<uint8_t> taken(features_.size(), 0);
+  taken[0] = 1;
+  EXPECT_FALSE(matcher.Find(point, {}, taken));
+  LocalPoint from_behind = point;
+  from_behind.direction_world = -point.direction_world;
+  EXPECT_FALSE(matcher.Find(from_behind, {}, {}));
+  LocalPoint much_larger = point;
+  much_larger.size_mu *= 3;
+  EXPECT_FALSE(matcher.Find(much_larger, {}, {}));
+  LocalPoint behind_the_camera = point;
+  behind_the_camera.position_world = -point.position_world;
+  behind_the_camera.direction_world = -point.direction_world;
+  EXPECT_FALSE(matcher.Find(behind_the_camera, {}, {}));
+  LocalPoint of_other_looks = point;
+  of_other_looks.descriptor = Flip(point.descriptor, 120);
+  EXPECT_FALSE(matcher.Find(of_other_looks, {}, {}));
+}
+
+TEST_F(ProjectionSearchTest, LooksAloneFindThePointsToo) {
+  const auto matches = MatchByLooks(points_, *sight_, 60, 0.8);
+  EXPECT_EQ(matches.size(), points_.size());
+  for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,154 @@
+#include "server/slam/slam_map.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/slam/correction_log.h"
+#include "tests/unit/server/slam/textured_world.h"
+
+namespace romap {
+namespace {
+
+// Keyframes on a line along x that see the same points ahead of them.
+class SlamMapTest : public ::testing::Test {
+ protected:
+  static constexpr size_t kFeatures = 30;
+
+  MapKeyframe& AddKeyframe(double x) {
+    Frame frame;
+    frame.camera = TexturedWorld().camera();
+    std::vector<Feature> features(kFeatures);
+    for (size_t i = 0; i < kFeatures; ++i) {
+      features[i].pixel_px = Eigen::Vector2f(10 + 8.0F * static_cast<float>(i), 100);
+      features[i].descriptor = {i, i, i, i};
+    }
+    return map_.AddKeyframe(MakeFrameFeatures(frame, features),
+                            {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)});
+  }
+
+  PointTrack& AddPoint(int feature, std::initializer_list<MapKeyframe*> keyframes) {
+    PointTrack& track = map_.AddPoint({0.1 * feature, 0, 5});
+    for (MapKeyframe* keyframe : keyframes) EXPECT_TRUE(map_.AddSight(track, *keyframe, feature));
+    map_.Refresh(track);
+    return track;
+  }
+
+  // Every keyframe's list of points and every point's list of sights say the same.
+  void ExpectConsistent() const {
+    size_t from_keyframes = 0, from_points = 0;
+    for (const auto& [id, keyframe] : map_.keyframes()) {
+      for (size_t i = 0; i < keyframe.points.size(); ++i) {
+        if (!keyframe.points[i]) continue;
+        ++from_keyframes;
+        const auto it = map_.points().find(keyframe.points[i]);
+        ASSERT_NE(it, map_.points().end());
+        EXPECT_TRUE(std::any_of(it->second.sights.begin(), it->second.sights.end(), [&](const PointSight& sight) {
+          return sight.keyframe == id && sight.feature == static_cast<int>(i);
+        }));
+      }
+    }
+    for (const auto& [id, track] : map_.points()) {
+      from_points += track.sights.size();
+      EXPECT_EQ(track.point.observations, static_cast<int>(track.sights.size()));
+    }
+    EXPECT_EQ(from_keyframes, from_points);
+  }
+
+  SlamMap map_{SlamConfig{}};
+};
+
+TEST_F(SlamMapTest, AFeatureShowsOnePointAndAPointIsSeenOnceInAKeyframe) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  PointTrack& first = AddPoint(3, {&a, &b});
+  PointTrack& second = AddPoint(4, {&a, &b});
+  EXPECT_FALSE(map_.AddSight(second, a, 3));
+  EXPECT_FALSE(map_.AddSight(first, a, 7));
+  ExpectConsistent();
+}
+
+TEST_F(SlamMapTest, APointThatIsLeftWithOneSightGoes) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  const MapPointId id = AddPoint(3, {&a, &b}).point.id;
+  map_.RemoveSight(id, b.id);
+  EXPECT_EQ(map_.FindPoint(id), nullptr);
+  EXPECT_EQ(map_.TakeRemovedPoints(), std::vector<MapPointId>{id});
+  EXPECT_FALSE(a.points[3]);
+  ExpectConsistent();
+}
+
+TEST_F(SlamMapTest, AMergedPointAnswersForBoth) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  MapKeyframe& c = AddKeyframe(2);
+  const MapPointId from = AddPoint(3, {&a, &b}).point.id;
+  const MapPointId into = AddPoint(4, {&b, &c}).point.id;
+  map_.MergePoints(from, into);
+  ASSERT_NE(map_.FindPoint(from), nullptr);
+  EXPECT_EQ(map_.FindPoint(from)->point.id, into);
+  EXPECT_EQ(map_.FindPoint(into)->sights.size(), 3U);  // b saw both: once is enough
+  ExpectConsistent();
+}
+
+TEST_F(SlamMapTest, CovisibilityCountsSharedPoints) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  MapKeyframe& c = AddKeyframe(2);
+  for (int i = 0; i < 10; ++i) AddPoint(i, {&a, &b});
+  for (int i = 10; i < 14; ++i) AddPoint(i, {&a, &c});
+  const std::vector<std::pair<KeyframeId, int>> expected = {{b.id, 10}, {c.id, 4}};
+  EXPECT_EQ(map_.Covisible(a, 1), expected);
+  EXPECT_EQ(map_.Covisible(a, 5).size(), 1U);
+  EXPECT_TRUE(map_.Covisible(b, 11).empty());
+}
+
+TEST_F(SlamMapTest, ARemovedKeyframeGoesAlongWithItsParent) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  b.parent = a.id;
+  const KeyframeId gone = b.id;
+  map_.RemoveKeyframe(gone);
+  EXPECT_EQ(map_.FindKeyframe(gone), nullptr);
+  // The map grows to twice its size and turns by a quarter around z.
+  map_.Transform({2, Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
+                  Eigen::Vector3d(0, 0, 1)});
+  const auto place = map_.Place(gone);
+  ASSERT_TRUE(place);
+  EXPECT_LT((place->T_world_camera.translation() - Eigen::Vector3d(0, 2, 1)).norm(), 1e-9);
+  EXPECT_DOUBLE_EQ(place->scale, 2);
+  EXPECT_FALSE(map_.Place(KeyframeId{77}));
+}
+
+TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
+  MapKeyframe& a = AddKeyframe(0);
+  MapKeyframe& b = AddKeyframe(1);
+  KeyframeView view;
+  for (int i = 0; i < 5; ++i) view.points.push_back(AddPoint(i, {&a, &b}).point);
+  view.id = b.id;
+  view.T_world_camera = b.T_world_camera();
+  CorrectionLog log;
+  log.Tell(view, b.scale);
+  EXPECT_TRUE(log.Take(map_).keyframes.empty());
+
+  int told = 0;
+  for (int i = 0; i < 20; ++i) {  // each step below what is noticeable
+    map_.Transform({1, Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0005, 0, 0)});
+    told += static_cast<int>(log.Take(map_).keyframes.size());
+  }
+  EXPECT_GE(told, 2);
+  EXPECT_LE(told, 10);
+
+  map_.Transform({1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY())), {1, 2, 3}});
+  const SE3<World, Camera> before = b.T_world_camera();
+  const MapCorrection correction = log.Take(map_);
+  ASSERT_EQ(correction.keyframes.size(), 1U);
+  EXPECT_EQ(correction.points.size(), 5U);
+  EXPECT_NEAR(correction.keyframes[0].S_new_old.scale(), 1.5, 1e-9);
+  EXPECT_LT((correction.keyframes[0].T_world_camera.translation() - before.translation()).norm(), 1e-9);
+  EXPECT_TRUE(log.Take(map_).keyframes.empty());
+}
+
+}  // namespace
+}  // namespace romap

@@ -1,0 +1,263 @@
+// Tracker and SparseMapper together, frame by frame on one thread, over a world with exact geometry.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "server/slam/geometry/similarity.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+#include "tests/unit/server/slam/textured_world.h"
+
+namespace romap {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TrackingTest : public ::testing::Test {
+ protected:
+  explicit TrackingTest(PoseUse pose_use = PoseUse::kIgnore) { Begin(pose_use); }
+
+  void Begin(PoseUse pose_use) {
+    slot_ = std::make_unique<LocalMapSlot>();
+    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), /*inline_adjustment=*/true);
+    tracker_ = std::make_unique<Tracker>(SlamConfig{}, pose_use, slot_.get());
+  }
+
+  // A way with parallax: an arc above the plate.
+  static SE3<World, Camera> Pose(int i) {
+    const double angle_rad = 0.02 * i;
+    return TexturedWorld::LookAt({1.5 * std::cos(angle_rad), 1.5 * std::sin(angle_rad), 1.3 + 0.1 * std::sin(0.1 * i)},
+                                 {0, 0, 0.1});
+  }
+
+  std::shared_ptr<Frame> Render(int i) const { return world_.Render(static_cast<uint64_t>(i + 1), Pose(i)); }
+
+  TrackingState Feed(std::shared_ptr<Frame> frame) {
+    const TrackedImage image = tracker_->Track(frame);
+    reason_ = image.tracked.reason;
+    mapped_ = mapper_->Process(image);
+    const TrackingState state = image.tracked.state;
+    if (mapped_.begun_anew) ++begun_anew_;
+    if (state == TrackingState::kTracking || state == TrackingState::kRelocalised) {
+      frames_.push_back({mapped_.tracked, *frame->T_world_camera});
+      frames_.back().tracked.frame = nullptr;
+    }
+    return state;
+  }
+
+  // Feeds the frames 0..end-1. Once the camera is followed it must not be lost; returns how many frames that took.
+  int Follow(int end) {
+    int initialising = 0;
+    for (int i = 0; i < end; ++i) {
+      const TrackingState state = Feed(Render(i));
+      if (state == TrackingState::kInitialising && initialising == i) {
+        ++initialising;
+      } else {
+        EXPECT_EQ(state, TrackingState::kTracking) << i << ": " << reason_;
+      }
+    }
+    return initialising;
+  }
+
+  struct Followed {
+    TrackedFrame tracked;
+    SE3<World, Camera> truth;
+  };
+
+  // Largest distance of a followed camera from the truth after the best similarity, map units of the truth; and the
+  // scale of the truth over the map's.
+  std::pair<double, double> Error() const {
+    std::vector<Eigen::Vector3d> estimated, truth;
+    for (const Followed& frame : frames_) {
+      SE3<World, Camera> pose = frame.tracked.T_world_camera;
+      if (const auto reference = mapper_->map().Place(frame.tracked.reference)) {
+        const SE3<Camera, Camera>& T = frame.tracked.T_reference_camera;
+        pose = reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+      }
+      estimated.push_back(pose.translation());
+      truth.push_back(frame.truth.translation());
+    }
+    const auto S = AlignPoints<World, World>(estimated, truth, false);
+    if (!S) return {1e9, 0};
+    double worst = 0;
+    for (size_t i = 0; i < estimated.size(); ++i) worst = std::max(worst, (*S * estimated[i] - truth[i]).norm());
+    return {worst, S->scale()};
+  }
+
+  const TexturedWorld world_{480, 360};
+  std::unique_ptr<LocalMapSlot> slot_;
+  std::unique_ptr<SparseMapper> mapper_;
+  std::unique_ptr<Tracker> tracker_;
+  std::vector<Followed> frames_;
+  MappedFrame mapped_;
+  std::string reason_;
+  int begun_anew_ = 0;
+};
+
+TEST_F(TrackingTest, FollowsTheCameraFromImagesAlone) {
+  EXPECT_LT(Follow(90), 25);
+  const auto [worst, scale] = Error();
+  EXPECT_LT(worst, 0.02);  // of a way of two units
+  EXPECT_GT(mapper_->keyframes(), 5U);
+}
+
+TEST_F(TrackingTest, AStandingCameraWaitsAndSaysWhy) {
+  for (int i = 0; i < 8; ++i) {
+    auto frame = Render(0);
+    frame->frame_id = static_cast<uint64_t>(i + 1);
+    frame->timestamp_ns = i * 33'000'000;
+    EXPECT_EQ(Feed(frame), TrackingState::kInitialising);
+  }
+  EXPECT_THAT(reason_, HasSubstr("too little parallax"));
+  EXPECT_EQ(mapper_->keyframes(), 0U);
+}
+
+TEST_F(TrackingTest, ATurningCameraWaitsAndSaysWhy) {
+  for (int i = 0; i < 12; ++i) {
+    const SE3<World, Camera> pose = TexturedWorld::LookAt({1.2, 0, 1.2}, {0.02 * i, 0.04 * i, 0});
+    EXPECT_EQ(Feed(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitialising) << i;
+  }
+  EXPECT_THAT(reason_, HasSubstr("parallax"));
+}
+
+TEST_F(TrackingTest, ACoveredLensIsSurvived) {
+  Follow(60);
+  const size_t keyframes = mapper_->keyframes();
+  for (int i = 60; i < 66; ++i) {
+    auto frame = Render(i);
+    frame->image_bgr.setTo(0);
+    EXPECT_EQ(Feed(frame), TrackingState::kLost);
+    EXPECT_THAT(reason_, HasSubstr("texture"));
+  }
+  EXPECT_EQ(mapper_->keyframes(), keyframes);
+  EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalised) << reason_;
+  EXPECT_EQ(Feed(Render(67)), TrackingState::kTracking) << reason_;
+  EXPECT_EQ(begun_anew_, 0);
+  EXPECT_LT(Error().first, 0.02);
+}
+
+TEST_F(TrackingTest, ACameraThatWasCarriedOffIsFoundAgainInTheSameMap) {
+  Follow(110);
+  // Looking away for a while, then back where it was long ago: nothing of the last frames helps.
+  for (int i = 110; i < 113; ++i) {
+    auto frame = world_.Render(static_cast<uint64_t>(i + 1), Pose(i));
+    cv::Mat noise(frame->image_bgr.size(), CV_8UC3);
+    cv::RNG random(static_cast<uint64_t>(i));
+    random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(noise, frame->image_bgr, {7, 7}, 0);
+    EXPECT_EQ(Feed(frame), TrackingState::kLost);
+  }
+  int found_after = -1;
+  for (int i = 0; i < 10 && found_after < 0; ++i) {
+    const int place = 20 + i;
+    auto frame = world_.Render(static_cast<uint64_t>(120 + i), Pose(place));
+    if (Feed(frame) == TrackingState::kRelocalised) found_after = i;
+  }
+  EXPECT_GE(found_after, 0) << "not found again: " << reason_;
+  EXPECT_LE(found_after, 3);
+  EXPECT_EQ(begun_anew_, 0);
+  EXPECT_LT(Error().first, 0.03);
+}
+
+TEST_F(TrackingTest, AYoungMapThatIsLostForLongIsBegunAnew) {
+  for (int i = 0; Feed(Render(i)) != TrackingState::kTracking; ++i) ASSERT_LT(i, 30) << reason_;
+  for (int i = 0; i < 60; ++i) {
+    auto frame = world_.Render(static_cast<uint64_t>(100 + i), Pose(0));
+    frame->image_bgr.setTo(0);
+    Feed(frame);
+  }
+  EXPECT_EQ(begun_anew_, 1);
+  int tracked = 0;
+  for (int i = 0; i < 40; ++i) {
+    tracked += Feed(world_.Render(static_cast<uint64_t>(200 + i), Pose(i))) == TrackingState::kTracking ? 1 : 0;
+  }
+  EXPECT_GT(tracked, 15);
+}
+
+TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrameOn) {
+  for (int i = 0; i < 40; ++i) {
+    auto frame = Render(i);
+    frame->depth_mu = world_.RenderDepth(*frame);
+    const TrackingState state = Feed(frame);
+    EXPECT_EQ(state, i == 0 ? TrackingState::kInitialising : TrackingState::kTracking) << i << ": " << reason_;
+  }
+  const auto [worst, scale] = Error();
+  EXPECT_NEAR(scale, 1, 0.01);
+  EXPECT_LT(worst, 0.02);
+}
+
+TEST_F(TrackingTest, TheSameFramesGiveTheSamePoses) {
+  std::vector<Eigen::Matrix4d> first;
+  for (int round = 0; round < 2; ++round) {
+    Begin(PoseUse::kIgnore);
+    frames_.clear();
+    for (int i = 0; i < 45; ++i) Feed(Render(i));
+    if (round == 0) {
+      for (const Followed& frame : frames_) first.push_back(frame.tracked.T_world_camera.Matrix());
+    }
+  }
+  ASSERT_EQ(first.size(), frames_.size());
+  for (size_t i = 0; i < first.size(); ++i) EXPECT_EQ(first[i], frames_[i].tracked.T_world_camera.Matrix()) << i;
+}
+
+TEST_F(TrackingTest, GravityFromTheClientMakesZUp) {
+  const Eigen::Vector3d down_world = -Eigen::Vector3d::UnitZ();
+  for (int i = 0; i < 45; ++i) {
+    auto frame = Render(i);
+    frame->gravity_camera = frame->T_world_camera->rotation().conjugate() * down_world;
+    Feed(frame);
+  }
+  ASSERT_FALSE(frames_.empty());
+  const Followed& last = frames_.back();
+  const Eigen::Vector3d up_in_map =
+      last.tracked.T_world_camera.rotation() * (last.truth.rotation().conjugate() * Eigen::Vector3d::UnitZ());
+  EXPECT_GT(up_in_map.z(), std::cos(0.5 * std::numbers::pi / 180));
+}
+
+TEST_F(TrackingTest, PosesMayStopComing) {
+  Begin(PoseUse::kGiven);
+  for (int i = 0; i < 40; ++i) {
+    auto frame = Render(i);
+    EXPECT_EQ(Feed(frame), TrackingState::kTracking);
+    EXPECT_EQ(mapped_.tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
+  }
+  for (int i = 40; i < 60; ++i) {
+    auto frame = Render(i);
+    const SE3<World, Camera> truth = *frame->T_world_camera;
+    frame->T_world_camera.reset();
+    const TrackedImage image = tracker_->Track(frame);
+    mapped_ = mapper_->Process(image);
+    ASSERT_EQ(image.tracked.state, TrackingState::kTracking) << i << ": " << image.tracked.reason;
+    // In the client's own world and unit, without any alignment.
+    EXPECT_LT((mapped_.tracked.T_world_camera.translation() - truth.translation()).norm(), 0.02) << i;
+  }
+  auto frame = Render(60);
+  EXPECT_EQ(Feed(frame), TrackingState::kTracking);
+  EXPECT_EQ(mapped_.tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
+}
+
+TEST_F(TrackingTest, PriorsAreCorrectedByTheImages) {
+  Begin(PoseUse::kPrior);
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> noise(0, 0.01);
+  double of_priors = 0, of_tracking = 0;
+  for (int i = 0; i < 70; ++i) {
+    auto frame = Render(i);
+    const SE3<World, Camera> truth = *frame->T_world_camera;
+    const Eigen::Vector3d off(noise(random), noise(random), noise(random));
+    frame->T_world_camera = SE3<World, Camera>(truth.rotation(), truth.translation() + off);
+    const TrackedImage image = tracker_->Track(frame);
+    mapped_ = mapper_->Process(image);
+    EXPECT_EQ(image.tracked.state, TrackingState::kTracking) << i;
+    if (i < 30) continue;
+    of_priors += off.norm();
+    of_tracking += (mapped_.tracked.T_world_camera.translation() - truth.translation()).norm();
+  }
+  EXPECT_LT(of_tracking, 0.7 * of_priors);
+}
+
+}  // namespace
+}  // namespace romap
