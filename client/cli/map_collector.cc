@@ -36,6 +36,11 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
     return;
   }
   if (ack.is_keyframe) ++keyframes_;
+  tracking_.initialising += ack.state == TrackingState::kInitialising ? 1 : 0;
+  tracking_.lost += ack.state == TrackingState::kLost ? 1 : 0;
+  tracking_.relocalised += ack.state == TrackingState::kRelocalised ? 1 : 0;
+  tracking_.tracked += ack.T_world_camera ? 1 : 0;
+  if (!ack.T_world_camera) tracking_.last_reason = ack.state_reason;
   const auto sent = sent_.find(ack.frame_id);
   if (ack.T_world_camera && sent != sent_.end()) {
     trajectory_.push_back({sent->second.timestamp_ns, *ack.T_world_camera});

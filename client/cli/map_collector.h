@@ -38,6 +38,12 @@ class MapCollector {
   size_t acknowledged() const { return acknowledged_; }
   size_t rejected() const { return rejected_; }
   size_t keyframes() const { return keyframes_; }
+  // How the camera was followed, over the accepted frames.
+  struct Tracking {
+    size_t initialising = 0, tracked = 0, lost = 0, relocalised = 0;  // the relocalised ones count as tracked too
+    std::string last_reason;  // why the last frame that was not tracked was not; empty: all were
+  };
+  const Tracking& tracking() const { return tracking_; }
   const std::vector<std::string>& faults() const { return faults_; }  // the first few, for people
   // The most that a server's statistics reported; 0 = none came.
   uint64_t server_peak_bytes() const { return server_peak_bytes_; }
@@ -61,6 +67,7 @@ class MapCollector {
   std::vector<double> latencies_s_;
   std::vector<std::string> faults_;
   std::optional<Statistics> statistics_;
+  Tracking tracking_;
   size_t acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
   uint64_t server_peak_bytes_ = 0;
   double last_ack_s_ = 0, first_sent_s_ = 0;

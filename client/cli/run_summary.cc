@@ -35,6 +35,7 @@ RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const
   summary.sequence = sequence.dir();
   summary.frames_sent = collector.sent();
   summary.frames_rejected = collector.rejected();
+  summary.tracking = collector.tracking();
   summary.frames_accepted = collector.acknowledged() - collector.rejected();
   summary.keyframes = collector.keyframes();
   summary.mapping_s = stream.mapping_s;
@@ -96,6 +97,11 @@ nlohmann::json ToJson(const RunSummary& summary) {
             {"rejected", summary.frames_rejected},
             {"dropped", summary.frames_dropped},
             {"keyframes", summary.keyframes}}},
+          {"tracking",
+           {{"initialising", summary.tracking.initialising},
+            {"tracked", summary.tracking.tracked},
+            {"lost", summary.tracking.lost},
+            {"relocalised", summary.tracking.relocalised}}},
           {"map_points", summary.map_points},
           {"mapping_s", summary.mapping_s},
           {"training_after_last_frame_s", summary.training_s},
@@ -118,6 +124,12 @@ std::string FormatSummary(const RunSummary& summary) {
       summary.interrupted         ? " (interrupted: the map of what was sent)"
       : summary.training_complete ? ""
                                   : " (not finished)");
+  const MapCollector::Tracking& tracking = summary.tracking;
+  if (tracking.initialising + tracking.lost > 0) {
+    text += fmt::format("camera: {} frames to begin, {} tracked, {} lost, found again {} times", tracking.initialising,
+                        tracking.tracked, tracking.lost, tracking.relocalised);
+    text += tracking.tracked == 0 ? fmt::format("; never tracked: {}\n", tracking.last_reason) : "\n";
+  }
   text += fmt::format("memory: mapping {} MB, client {} MB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
   text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", "object", "centre [map units]",

@@ -4,7 +4,7 @@
 #
 #   tests/bench/map_quality.sh BUILD_DIR OUT_DIR [SEQUENCE...]
 #
-# Without SEQUENCE it makes three synthetic ones (150 frames, five objects, seeds 1 to 3) in OUT_DIR. Figures are means
+# POSES=none in the environment tracks the camera from the images. Without SEQUENCE it makes three synthetic ones (150 frames, five objects, seeds 1 to 3) in OUT_DIR. Figures are means
 # over the objects, of the surface that the cameras saw; distances in cm.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
@@ -35,7 +35,8 @@ echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
 for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
-  "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 --out "$out/$name.map" --no-pictures >"$out/$name.txt"
+  "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 \
+    --poses "${POSES:-given}" --out "$out/$name.map" --no-pictures >"$out/$name.txt"
   awk -v name="$name" '
     / rejected, .* dropped\)/ { dropped = $7; for (i = 1; i < NF; ++i) if ($i == "for") training = $(i + 1) }
     /^memory:/ { memory = $3 " MB, " $6 " MB" }

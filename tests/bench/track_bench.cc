@@ -18,6 +18,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -25,7 +26,9 @@
 #include <thread>
 #include <vector>
 
+#include "client/eval/trajectory_eval.h"
 #include "client/files/sequence.h"
+#include "client/files/tum.h"
 #include "common/bounded_queue.h"
 #include "common/config.h"
 #include "common/status.h"
@@ -242,6 +245,7 @@ class Run {
     if (lost_ > 0) fmt::print("lost:{}\n", lost_frames_);
     if (!relocalised_.empty()) fmt::print("relocalised:{}\n", relocalised_);
     if (!tracking_began_) fmt::print("never initialised: {}\n", reason_);
+    ReportError(keyframes_kept);
     const auto& figures = mapper_.figures();
     fmt::print(
         "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
@@ -257,6 +261,38 @@ class Run {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     fmt::print("peak memory {} MB\n", usage.ru_maxrss / 1024);
+  }
+
+  // Against groundtruth.txt of the sequence, where there is one.
+  void ReportError(size_t keyframes_kept) const {
+    if (options_.out.empty() || final_.empty()) return;
+    const std::string truth = options_.sequence + "/groundtruth.txt";
+    const auto report = EvaluateTrajectory({.estimated = options_.out + "/trajectory.txt",
+                                            .ground_truth = truth,
+                                            .alignment = options_.depth ? Alignment::kSe3 : Alignment::kSim3});
+    if (!report.ok()) return;
+    fmt::print("ATE rmse {:.3f} cm, {:.3f} % of the way of {:.2f} m, aligned by {}; scale {:.4f}; {} keyframes\n",
+               100 * report->ate_rmse_m, 100 * report->ate_rmse_m / report->path_length_m, report->path_length_m,
+               options_.depth ? "SE3" : "Sim3", report->scale, keyframes_kept);
+    ReportUp(truth);
+  }
+
+  // Angle between the map's z and the true one, by the orientations of all cameras.
+  void ReportUp(const std::string& truth_path) const {
+    const auto truth = ReadTum(truth_path);
+    if (!truth.ok()) return;
+    Eigen::Vector3d up_sum = Eigen::Vector3d::Zero();
+    for (const Said& said : final_) {
+      for (const StampedPose& pose : *truth) {
+        if (std::abs(1e-9 * static_cast<double>(pose.timestamp_ns) - said.time_s) > 0.005) continue;
+        const Eigen::Quaterniond R_map_truth =
+            said.tracked.T_world_camera.rotation() * pose.T_world_camera.rotation().conjugate();
+        up_sum += R_map_truth * Eigen::Vector3d::UnitZ();
+      }
+    }
+    if (up_sum.isZero()) return;
+    fmt::print("up is off by {:.2f} deg\n",
+               std::acos(std::clamp(up_sum.normalized().z(), -1.0, 1.0)) * 180 / std::numbers::pi);
   }
 
   Options options_;

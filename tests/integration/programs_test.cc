@@ -9,6 +9,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "client/eval/trajectory_eval.h"
 #include "client/synth/synth.h"
 #include "tests/support/subprocess.h"
 
@@ -42,9 +43,7 @@ synth::SynthOptions SmallScene() {
   return options;
 }
 
-void MakeSmallSequence(const std::string& dir) {
-  ASSERT_TRUE(synth::MakeSequence(SmallScene(), dir).ok());
-}
+void MakeSmallSequence(const std::string& dir) { ASSERT_TRUE(synth::MakeSequence(SmallScene(), dir).ok()); }
 
 size_t CountFiles(const std::string& folder, const std::string& extension) {
   return std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
@@ -86,6 +85,29 @@ TEST(ProgramsTest, AServerAndAClientMapASequence) {
 
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);
+}
+
+TEST(ProgramsTest, TracksTheCameraFromTheImagesAndFollowsItsOwnCorrections) {
+  const TemporaryFolder folder;
+  synth::SynthOptions options = SmallScene();
+  options.frames = 80;
+  options.rounds = 0.4;
+  ASSERT_TRUE(synth::MakeSequence(options, folder / "sequence").ok());
+  const ProcessResult run =
+      Romap({"run", folder / "sequence", "--local", "--poses", "none", "--out", folder / "map", "--no-pictures"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json summary = ReadJson(folder / "map/summary.json");
+  const int initialising = summary["tracking"]["initialising"];
+  EXPECT_GT(initialising, 0);  // no pose was sent
+  EXPECT_LT(initialising, 40);
+  EXPECT_EQ(summary["tracking"]["lost"], 0);
+  EXPECT_EQ(summary["tracking"]["tracked"], 80 - initialising);
+  // The written trajectory is that of the map at its end, up to a similarity.
+  const auto report = EvaluateTrajectory({.estimated = folder / "map/trajectory.txt",
+                                          .ground_truth = folder / "sequence/groundtruth.txt",
+                                          .alignment = Alignment::kSim3});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_LT(report->ate_rmse_m, 0.01 * report->path_length_m);
 }
 
 TEST(ProgramsTest, LocalMappingNeedsNoServer) {

@@ -56,6 +56,26 @@ TEST(MapCollectorTest, ProvisionalObjectsAreNotCounted) {
   EXPECT_GE(collector.objects().at(ObjectId{1}).first_cuboid_s, 0);
 }
 
+TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
+  MapCollector collector;
+  const auto apply = [&](TrackingState state, bool has_pose, const std::string& reason) {
+    FrameAck ack;
+    ack.state = state;
+    ack.state_reason = reason;
+    if (has_pose) ack.T_world_camera.emplace();
+    collector.Apply(ack);
+  };
+  apply(TrackingState::kInitialising, false, "too little parallax");
+  apply(TrackingState::kTracking, true, "");
+  apply(TrackingState::kLost, false, "dark");
+  apply(TrackingState::kRelocalised, true, "");
+  EXPECT_EQ(collector.tracking().initialising, 1U);
+  EXPECT_EQ(collector.tracking().tracked, 2U);
+  EXPECT_EQ(collector.tracking().lost, 1U);
+  EXPECT_EQ(collector.tracking().relocalised, 1U);
+  EXPECT_EQ(collector.tracking().last_reason, "dark");
+}
+
 TEST(MapCollectorTest, AcknowledgementsMakeTheTrajectory) {
   MapCollector collector;
   collector.NoteSent(1, 1000);

@@ -118,7 +118,7 @@ Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
 
 struct Agreement {
   int matches = 0;
-  int near = 0;  // within a pixel of where they should be
+  int near = 0;  // within a pixel of their octave of where they should be
 };
 
 // Of the fine features, whose positions are good to a pixel: how many look like one of `others`, and are where it is.
@@ -131,7 +131,7 @@ Agreement Compare(const std::vector<Feature>& features, const std::vector<Featur
     });
     if (alike == others.end() || HammingDistance(alike->descriptor, feature.descriptor) > 40) continue;
     ++agreement.matches;
-    if ((alike->pixel_px - feature.pixel_px).norm() < 1) ++agreement.near;
+    if ((alike->pixel_px - feature.pixel_px).norm() < feature.octave_scale) ++agreement.near;
   }
   return agreement;
 }
