@@ -133,16 +133,13 @@ void Session::QueueLive(TrackedImage image) {
   }
 }
 
-// A recording can wait: tracking from images runs at most one keyframe ahead of the map, and a lost camera is looked
-// for before the next frame.
+// A recording can wait: what changes the map is mapped before the next frame is tracked.
 void Session::QueueReplay(TrackedImage image) {
-  const bool is_urgent = image.start || image.tracked.state == TrackingState::kLost;
   const bool changes_map = ChangesMap(image);
   if (changes_map) CountMapChange(1);
   if (!tracked_.Push(std::move(image)) || !changes_map) return;
-  const int ahead = is_urgent ? 0 : 1;
   std::unique_lock lock(drain_mutex_);
-  map_changed_.wait(lock, [&] { return map_changes_waiting_ <= ahead || all_settled_; });
+  map_changed_.wait(lock, [&] { return map_changes_waiting_ == 0 || all_settled_; });
 }
 
 void Session::CountMapChange(int change) {
