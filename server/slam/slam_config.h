@@ -20,7 +20,7 @@ struct SlamConfig {
   int scene_fast_threshold = 12;
   int scene_fast_min_threshold = 4;
   int object_fast_threshold = 5;
-  int mask_erosion_px = 1;
+  int mask_erosion_px = 2;
 
   int matched_keyframes = 4;
   int window_keyframes = 10;
