@@ -37,6 +37,12 @@ LocalPoint LooksOf(const PointTrack& track) {
           .descriptor = track.descriptor};
 }
 
+SlamConfig PointMaker::Generous(SlamConfig config) {
+  config.matched_keyframes *= 2;
+  config.min_parallax_deg *= 0.6;
+  return config;
+}
+
 bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
   if (keyframe.points[static_cast<size_t>(feature)]) return false;
   const Sight sight = map_->SightOf(keyframe, feature);

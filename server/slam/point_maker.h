@@ -16,6 +16,10 @@ class PointMaker {
  public:
   PointMaker(const SlamConfig& config, SlamMap* map) : config_(config), map_(map) {}
 
+  // The same for a keyframe that knows few points: looks at more keyframes and takes less parallax, because a map with
+  // uncertain points is better than a lost camera.
+  static SlamConfig Generous(SlamConfig config);
+
   // Ties the features of `keyframe` to those of `candidates` that it shows.
   void FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPointId>& candidates);
   // New points from features of `keyframe` and of `others`, seen from directions that differ enough.

@@ -21,6 +21,7 @@ constexpr size_t kPlacesTold = 60;       // keyframes whose place tracking learn
 constexpr int kGiveUpAfter_frames = 45;  // a camera lost so long in a map so young begins anew
 constexpr size_t kYoungMap_keyframes = 6;
 constexpr uint64_t kWholePeriodWithPriors_keyframes = 5;
+constexpr int kScarcePoints = 100;  // known points of a keyframe below which tracking is in danger
 constexpr int kMinObservationsWellPlaced = 3;
 
 double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
@@ -223,8 +224,11 @@ KeyframeView SparseMapper::AddKeyframe(const TrackedImage& image) {
   const auto neighbours = map_->Covisible(keyframe, 1);
   keyframe.parent = neighbours.empty() ? latest_ : neighbours.front().first;
   latest_ = keyframe.id;
-  const std::vector<MapKeyframe*> others = maker_->KeyframesToMatch(keyframe);
-  maker_->MakePointsByParallax(keyframe, others);
+  const auto known =
+      std::count_if(keyframe.points.begin(), keyframe.points.end(), [](MapPointId id) { return bool(id); });
+  const bool is_scarce = !keyframe.pose_given && known < kScarcePoints;
+  PointMaker finder(is_scarce ? PointMaker::Generous(config_) : config_, map_.get());
+  finder.MakePointsByParallax(keyframe, finder.KeyframesToMatch(keyframe));
   maker_->MakePointsByDepth(keyframe);
   if (!keyframe.pose_given) {
     std::vector<MapKeyframe*> around;
@@ -260,7 +264,8 @@ void SparseMapper::AdjustWindow(const MapKeyframe& keyframe) {
 }
 
 void SparseMapper::CloseLoops(const MapKeyframe& keyframe) {
-  const std::optional<LoopMatch> loop = places_->FindLoop(keyframe, metric_ || world_is_given_);
+  std::optional<LoopMatch> loop;
+  if (config_.close_loops) loop = places_->FindLoop(keyframe, metric_ || world_is_given_);
   if (!loop) {
     if (map_->keyframe_count() < next_whole_) return;
     // Priors tell of the whole map's scale, which windows alone learn too late.
