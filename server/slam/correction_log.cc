@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/median.h"
+
 namespace romap {
 namespace {
 
@@ -15,9 +17,7 @@ double MedianDepth_mu(const KeyframeView& view) {
   std::vector<double> depths_mu;
   for (const MapPoint& point : view.points) depths_mu.push_back((T_camera_world * point.position_world).z());
   if (depths_mu.empty()) return 0;
-  const auto middle = depths_mu.begin() + static_cast<std::ptrdiff_t>(depths_mu.size() / 2);
-  std::nth_element(depths_mu.begin(), middle, depths_mu.end());
-  return *middle;
+  return Median(std::move(depths_mu));
 }
 
 }  // namespace

@@ -33,7 +33,6 @@ struct KeyframePlace {
 // The part of the sparse map around the camera, as of one moment: what the mapping thread hands to the tracking thread.
 // Immutable, so that neither ever waits for the other.
 struct LocalMap {
-  uint64_t version = 0;                           // grows
   uint64_t keyframes_done = 0;                    // keyframes that are in the map
   int generation = 0;                             // grows when the map is begun anew
   KeyframeId reference;                           // the newest keyframe
@@ -45,7 +44,6 @@ struct LocalMap {
   // The newest frame that was found again while the camera was lost.
   struct Relocalisation {
     uint64_t frame_id = 0;
-    int64_t timestamp_ns = 0;
     SE3<World, Camera> T_world_camera;
   };
   std::optional<Relocalisation> relocalised;

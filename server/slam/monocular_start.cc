@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "common/median.h"
+
 namespace romap {
 namespace {
 
@@ -20,12 +22,6 @@ constexpr int kMaxWait_frames = 90;        // a first view that led to nothing f
 constexpr double kMinKeptShare = 0.15;     // of the first view's features must still be followed
 constexpr double kSpacingShare = 0.03;     // of the image's width: motion after which one more view is followed
 constexpr size_t kMaxFollowed = 4;
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

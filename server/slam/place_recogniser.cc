@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "common/median.h"
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/projection_search.h"
@@ -151,9 +152,7 @@ std::optional<LoopMatch> PlaceRecogniser::MakeLoop(const MapKeyframe& keyframe, 
                     .first_sigma_px = sigma_px,
                     .second_sigma_px = sigma_px});
   }
-  const auto middle = disagreements_px.begin() + static_cast<std::ptrdiff_t>(disagreements_px.size() / 2);
-  std::nth_element(disagreements_px.begin(), middle, disagreements_px.end());
-  loop.disagreement_px = *middle;
+  loop.disagreement_px = Median(std::move(disagreements_px));
 
   loop.S_place_keyframe = Sim3<Camera, Camera>(T_place_world * located.T_world_camera);
   if (fix_scale || loop.disagreement_px < kNoDrift_px) return loop;

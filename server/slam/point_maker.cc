@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/median.h"
 #include "server/slam/epipolar_matcher.h"
 #include "server/slam/projection_search.h"
 #include "server/slam/triangulation.h"
@@ -138,9 +139,7 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
   }
   double min_baseline_mu = 0;
   if (!depths_mu.empty()) {
-    const auto middle = depths_mu.begin() + static_cast<std::ptrdiff_t>(depths_mu.size() / 2);
-    std::nth_element(depths_mu.begin(), middle, depths_mu.end());
-    min_baseline_mu = *middle * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
+    min_baseline_mu = Median(std::move(depths_mu)) * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
   }
   const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
   // Those that share points, and the newest, which may not share any yet.

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "common/median.h"
+
 namespace romap {
 namespace {
 
@@ -65,9 +67,7 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
     }
   }
   if (depths.empty()) return std::nullopt;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return Median(std::move(depths));
 }
 
 // At half the image's size: motion blur that matters is still seen, noise is not.
@@ -134,9 +134,7 @@ std::optional<double> SceneDepth(const DepthView& first, const DepthView& second
     }
   }
   if (votes.size() < kMinVotes) return std::nullopt;
-  const auto middle = votes.begin() + static_cast<std::ptrdiff_t>(votes.size() / 2);
-  std::nth_element(votes.begin(), middle, votes.end());
-  return *middle;
+  return Median(std::move(votes));
 }
 
 }  // namespace romap

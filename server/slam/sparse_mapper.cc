@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "common/median.h"
 #include "common/thread_priority.h"
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"
@@ -156,8 +157,7 @@ bool SparseMapper::BeginFromTwoViews(const MapStart& start, const SE3<World, Cam
   if (start.points.size() < kMinPoints) return false;
   std::vector<double> depths;
   for (const MapStart::Point& point : start.points) depths.push_back(point.p_first.z());
-  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
-  const double unit = 1 / depths[depths.size() / 2];  // the scene's median depth becomes one map unit
+  const double unit = 1 / Median(std::move(depths));  // the scene's median depth becomes one map unit
   MapKeyframe& first = map_->AddKeyframe(start.first, T_world_first);
   const SE3<Camera, Camera> T_first_second(start.T_first_second.rotation(), unit * start.T_first_second.translation());
   MapKeyframe& second = map_->AddKeyframe(start.second, T_world_first * T_first_second);
@@ -388,13 +388,12 @@ void SparseMapper::FindLostCamera(const TrackedImage& image) {
   if (!found) return;
   ++figures_.relocalisations;
   PublishLocalMap(found->place, LocalMap::Relocalisation{.frame_id = image.sight->frame_id,
-                                                         .timestamp_ns = image.sight->timestamp_ns,
+
                                                          .T_world_camera = found->T_world_camera});
 }
 
 void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised) {
   auto local = std::make_shared<LocalMap>();
-  local->version = ++version_;
   local->keyframes_done = map_->keyframe_count();
   local->generation = generation_;
   local->reference = around;

@@ -102,7 +102,6 @@ class SparseMapper {
   Figures figures_;
 
   int generation_ = 0;
-  uint64_t version_ = 0;
   bool world_is_given_ = false;
   bool metric_ = false;  // depth gives the scale
   KeyframeId latest_;

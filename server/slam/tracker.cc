@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/median.h"
 #include "server/slam/geometry/pnp.h"
 #include "server/slam/projection_search.h"
 
@@ -43,9 +44,7 @@ double MedianDepth_mu(const LocalMap& map, const SE3<World, Camera>& T_world_cam
     if (point >= 0) depths_mu.push_back(DepthOf(T_camera_world, map.points[static_cast<size_t>(point)]));
   }
   if (depths_mu.empty()) return 0;
-  const auto middle = depths_mu.begin() + static_cast<std::ptrdiff_t>(depths_mu.size() / 2);
-  std::nth_element(depths_mu.begin(), middle, depths_mu.end());
-  return *middle;
+  return Median(std::move(depths_mu));
 }
 
 }  // namespace

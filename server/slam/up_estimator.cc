@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "common/median.h"
+
 namespace romap {
 namespace {
 
@@ -14,9 +16,7 @@ Eigen::Vector3d ComponentwiseMedian(const std::deque<Eigen::Vector3d>& samples) 
   std::vector<double> values(samples.size());
   for (int axis = 0; axis < 3; ++axis) {
     std::transform(samples.begin(), samples.end(), values.begin(), [axis](const auto& v) { return v[axis]; });
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
+    median[axis] = Median(values);
   }
   return median;
 }

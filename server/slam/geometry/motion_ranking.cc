@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/median.h"
 #include "server/slam/geometry/homography.h"
 
 namespace romap {
@@ -44,9 +45,7 @@ double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span
     if (chi2 < kEpipolarChi2Bound) chi2s.push_back(chi2);
   }
   if (chi2s.empty()) return 1;
-  const auto middle = chi2s.begin() + static_cast<std::ptrdiff_t>(chi2s.size() / 2);
-  std::nth_element(chi2s.begin(), middle, chi2s.end());
-  return std::clamp(std::sqrt(*middle / kMedianChi2), kLeastNoise, 1.0);
+  return std::clamp(std::sqrt(Median(std::move(chi2s)) / kMedianChi2), kLeastNoise, 1.0);
 }
 
 // Along the axes and halfway between them; a direction and its opposite are one start.

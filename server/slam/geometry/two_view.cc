@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "common/median.h"
 #include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/homography.h"
 #include "server/slam/geometry/motion_ranking.h"
@@ -32,9 +33,7 @@ int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const
     ++result.points;
   }
   if (parallaxes_rad.empty()) return 0;
-  const auto middle = parallaxes_rad.begin() + static_cast<std::ptrdiff_t>(parallaxes_rad.size() / 2);
-  std::nth_element(parallaxes_rad.begin(), middle, parallaxes_rad.end());
-  result.parallax_rad = *middle;
+  result.parallax_rad = Median(parallaxes_rad);
   return static_cast<int>(parallaxes_rad.size());
 }
 

@@ -8,6 +8,7 @@
 #include <deque>
 #include <memory>
 
+#include "common/median.h"
 #include "server/slam/optimise/bundle_state.h"
 #include "server/slam/optimise/reprojection_cost.h"
 
@@ -115,9 +116,8 @@ void BundleSolver::MeasureUnit() {
                                .norm());
   }
   if (distances_mu.empty()) return;
-  const auto middle = distances_mu.begin() + static_cast<std::ptrdiff_t>(distances_mu.size() / 2);
-  std::nth_element(distances_mu.begin(), middle, distances_mu.end());
-  if (*middle > 0) unit_mu_ = *middle;
+  const double typical_mu = Median(std::move(distances_mu));
+  if (typical_mu > 0) unit_mu_ = typical_mu;
 }
 
 // Leaves out what would only cost time or make the equations singular: points that no free camera sees do not touch the

@@ -7,6 +7,7 @@
 #include <deque>
 #include <numeric>
 
+#include "common/median.h"
 #include "server/slam/optimise/pose_graph_cost.h"
 
 namespace romap {
@@ -51,9 +52,8 @@ bool HangsTogether(const std::vector<PoseGraphNode>& nodes, const std::vector<Po
 double TypicalLengthMu(const std::vector<PoseGraphEdge>& edges) {
   std::vector<double> lengths_mu;
   for (const PoseGraphEdge& edge : edges) lengths_mu.push_back(edge.S_a_b.translation().norm());
-  const auto middle = lengths_mu.begin() + static_cast<std::ptrdiff_t>(lengths_mu.size() / 2);
-  std::nth_element(lengths_mu.begin(), middle, lengths_mu.end());
-  return *middle > 0 ? *middle : 1;
+  const double typical_mu = Median(std::move(lengths_mu));
+  return typical_mu > 0 ? typical_mu : 1;
 }
 
 template <class To, class From>

@@ -13,6 +13,7 @@ namespace {
 
 using testing::BallScene;
 using testing::BallSurfaceError;
+using testing::RawOnGrid;
 
 NerfConfig FastConfig() {
   NerfConfig config;
@@ -38,17 +39,6 @@ Sim3<World, World> LoopClosure() {
   return {1.3, Eigen::Quaterniond(turn), {2.0, -1.0, 0.5}};
 }
 
-std::vector<float> RawOnGrid(const FieldSnapshot& snapshot) {
-  std::vector<Eigen::Vector3f> points;
-  for (int i = 0; i < 1000; ++i) {
-    const Eigen::Vector3f unit(i % 10 / 4.6f - 0.98f, i / 10 % 10 / 4.6f - 0.98f, i / 100 / 4.6f - 0.98f);
-    points.push_back(unit.cwiseProduct(snapshot.box_half_extents));
-  }
-  std::vector<float> raw(points.size());
-  snapshot.field->Sample(points, raw, {});
-  return raw;
-}
-
 TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
   const BallScene scene;
   ObjectField field = MakeField(scene, scene.Views());
@@ -68,7 +58,7 @@ TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
   for (size_t i = 0; i < after.view_centers_object.size(); ++i) {
     EXPECT_TRUE(after.view_centers_object[i].isApprox(1.3f * before.view_centers_object[i], 1e-5f));
   }
-  const std::vector<float> raw_before = RawOnGrid(before), raw_after = RawOnGrid(after);
+  const std::vector<float> raw_before = RawOnGrid(before, 0.98F), raw_after = RawOnGrid(after, 0.98F);
   for (size_t i = 0; i < raw_before.size(); ++i) EXPECT_NEAR(raw_before[i], raw_after[i], 0.02) << i;
 }
 
@@ -100,7 +90,8 @@ TEST(CorrectedFieldTest, AFieldThatMovedLearnsWhatOneThatDidNotLearns) {
   moved.Move(LoopClosure());
   moved.Train(10, 1);
   still.Train(10, 1);
-  const std::vector<float> raw_moved = RawOnGrid(moved.Snapshot()), raw_still = RawOnGrid(still.Snapshot());
+  const std::vector<float> raw_moved = RawOnGrid(moved.Snapshot(), 0.98F),
+                           raw_still = RawOnGrid(still.Snapshot(), 0.98F);
   for (size_t i = 0; i < raw_moved.size(); ++i) EXPECT_NEAR(raw_moved[i], raw_still[i], 0.02) << i;
 }
 

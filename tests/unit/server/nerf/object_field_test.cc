@@ -16,6 +16,7 @@ namespace {
 
 using testing::BallScene;
 using testing::BallSurfaceError;
+using testing::RawOnGrid;
 using ::testing::HasSubstr;
 
 NerfConfig FastConfig() {
@@ -32,17 +33,6 @@ ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   return field;
-}
-
-std::vector<float> RawOnGrid(const FieldSnapshot& snapshot) {
-  std::vector<Eigen::Vector3f> points;
-  for (int i = 0; i < 1000; ++i) {
-    const Eigen::Vector3f unit(i % 10 / 4.5f - 1, i / 10 % 10 / 4.5f - 1, i / 100 / 4.5f - 1);
-    points.push_back(unit.cwiseProduct(snapshot.box_half_extents));
-  }
-  std::vector<float> raw(points.size());
-  snapshot.field->Sample(points, raw, {});
-  return raw;
 }
 
 TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {

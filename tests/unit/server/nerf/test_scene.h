@@ -26,4 +26,7 @@ struct BallScene {
 // the centre, within the hull) from the ball, over evenly spread directions. A direction without surface counts as 1.
 double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot);
 
+// Raw values on a regular grid of 1000 points, from -reach to +reach of the box.
+std::vector<float> RawOnGrid(const FieldSnapshot& snapshot, float reach = 1);
+
 }  // namespace romap::testing

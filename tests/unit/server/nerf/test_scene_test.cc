@@ -90,6 +90,17 @@ std::vector<ObjectView> BallScene::Views() const {
   return all;
 }
 
+std::vector<float> RawOnGrid(const FieldSnapshot& snapshot, float reach) {
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3f unit(i % 10 / 4.5f - 1, i / 10 % 10 / 4.5f - 1, i / 100 / 4.5f - 1);
+    points.push_back(reach * unit.cwiseProduct(snapshot.box_half_extents));
+  }
+  std::vector<float> raw(points.size());
+  snapshot.field->Sample(points, raw, {});
+  return raw;
+}
+
 double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot) {
   constexpr int kDirections = 300, kSteps = 80;
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
