@@ -81,6 +81,13 @@ struct Frame {
   std::optional<Eigen::Vector3d> gravity_camera;  // unit length
 };
 
+// The masks of a frame that was handed on without any: detectors are slower than cameras.
+struct FrameMasks {
+  uint64_t frame_id = 0;
+  cv::Mat labels;  // CV_16UC1 of the frame's size, 0 = nothing
+  std::vector<Instance> instances;
+};
+
 // ---------------------------------------------------------------------------------------------- slam -> objects
 
 enum class TrackingState { kInitialising, kTracking, kLost, kRelocalised };

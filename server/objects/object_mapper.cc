@@ -36,10 +36,32 @@ ObjectMapper::Output ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   Output output;
   current_ = {};
   if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
-  current_.frame_id = tracked.frame->frame_id;
+  history_.Add(tracked);
   // A frame on which no detector ran says nothing about what is or is not there.
   if (!tracked.frame->has_masks) return output;
+  output = ObserveMaskedFrame(tracked);
+  if (tracked.is_keyframe) return output;
+  if (const auto stand_in = history_.StandIn(tracked, registry_)) Append(ObserveMaskedKeyframe(*stand_in), &output);
+  return output;
+}
+
+ObjectMapper::Output ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
+  current_ = {};
+  auto masked = history_.TakeLateMasks(masks);
+  if (!masked) {
+    spdlog::debug("objects: late masks of frame {} are passed over", masks.frame_id);
+    return {};
+  }
+  Output output = ObserveMaskedFrame(masked->tracked);
+  if (!masked->view) masked->view = history_.StandIn(masked->tracked, registry_);
+  if (masked->view) Append(ObserveMaskedKeyframe(*masked->view), &output);
+  return output;
+}
+
+ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
+  Output output;
   current_.usable = true;
+  current_.frame_id = tracked.frame->frame_id;
   ++frame_index_;
   current_.detections = ExtractDetections(*tracked.frame, config_);
   const Association association =
@@ -123,8 +145,14 @@ void ObjectMapper::BuryGhosts() {
 ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
   Output output;
   registry_.UpdatePositions(view);
-  if (!current_.usable || !view.frame || view.frame->frame_id != current_.frame_id) return output;
-  if (!view.T_world_camera.IsFinite()) return output;
+  if (!view.frame || !view.T_world_camera.IsFinite()) return output;
+  history_.AddKeyframe(view);
+  if (!current_.usable || view.frame->frame_id != current_.frame_id) return output;
+  return ObserveMaskedKeyframe(view);
+}
+
+ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& view) {
+  Output output;
   if (view.up_world.allFinite() && view.up_world.norm() > 0.5) up_world_ = view.up_world.normalized();
   CountPointVotes(view);
   UpdateSceneDepth(view);

@@ -9,6 +9,7 @@
 #include "server/objects/association.h"
 #include "server/objects/correction.h"
 #include "server/objects/detections.h"
+#include "server/objects/frame_history.h"
 #include "server/objects/landmark.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"
@@ -28,12 +29,15 @@ class ObjectMapper {
     std::vector<ObjectViews> views;  // of confirmed objects; the cuboid is that of the last ObjectUpdate
   };
 
-  explicit ObjectMapper(ObjectsConfig config) : config_(config) {}
+  explicit ObjectMapper(ObjectsConfig config) : config_(config), history_(config.mask_patience_s) {}
 
   // Every frame, in order.
   Output ObserveFrame(const TrackedFrame& tracked);
   // Right after ObserveFrame of the same frame, when it is a keyframe.
   Output ObserveKeyframe(const KeyframeView& view);
+  // Masks of an earlier frame that had none, in the order of their frames; passed over when they are older than
+  // ObjectsConfig::mask_patience_s or the camera's pose was not known. Not between ObserveFrame and ObserveKeyframe.
+  Output ObserveLateMasks(const FrameMasks& masks);
   // The map was corrected, as the stage before this one says of what it handed on so far. Each object goes along with
   // the keyframes that saw it (MeanMotion). What changed noticeably is told: the cuboid in an ObjectUpdate, and to the
   // field, in ObjectViews, the motion of the object's space and the views that moved against the object.
@@ -54,12 +58,14 @@ class ObjectMapper {
   using PointGroups = std::map<LandmarkKey, std::vector<PointRegistry::Member>>;
 
   // Per frame.
+  Output ObserveMaskedFrame(const TrackedFrame& tracked);
   void RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked);
   void RecordCompany();
   void UpdateLost(const Association& association, Output* output);
   void BuryGhosts();
 
   // Per keyframe.
+  Output ObserveMaskedKeyframe(const KeyframeView& view);
   void CountPointVotes(const KeyframeView& view);
   void UpdateSceneDepth(const KeyframeView& view);
   void CollectEvidence(const KeyframeView& view);
@@ -84,6 +90,7 @@ class ObjectMapper {
   ObjectsConfig config_;
   std::vector<std::unique_ptr<Landmark>> landmarks_;  // by key
   PointRegistry registry_;
+  FrameHistory history_;
   CurrentFrame current_;
   Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
   uint64_t frame_index_ = 0;

@@ -31,6 +31,7 @@ ObjectMapper::Output ObjectMapper::Correct(const MapCorrection& correction) {
   for (const KeyframeCorrection& keyframe : correction.keyframes) {
     if (IsUsable(keyframe)) keyframes[keyframe.id] = keyframe;
   }
+  history_.Correct(&keyframes);
   const auto last = keyframes.find(last_keyframe_);
   if (last != keyframes.end()) scene_depth_mu_ *= last->second.S_new_old.scale();
   for (const auto& landmark : landmarks_) CorrectLandmark(*landmark, keyframes);

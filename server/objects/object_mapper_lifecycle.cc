@@ -209,6 +209,7 @@ ObjectMapper::Output ObjectMapper::Reset() {
   }
   landmarks_.clear();
   registry_ = {};
+  history_.Clear();
   current_ = {};
   scene_depth_mu_ = 0;
   return output;

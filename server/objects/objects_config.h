@@ -10,6 +10,7 @@ struct ObjectsConfig {
   double max_mask_area_share = 0.6;
   int max_detections = 64;
   double match_min_score = 0.3;
+  double mask_patience_s = 1.5;
 
   int confirm_frames = 6;
   int confirm_keyframes = 3;
@@ -43,6 +44,8 @@ struct ObjectsConfig {
                {.unit = "masks", .min = 1, .max = 10000, .help = "Of more masks in one frame the largest are used"});
     fields.Add("match_min_score", &match_min_score,
                {.min = 0, .max = 1, .help = "Least association score between a detection and an object"});
+    fields.Add("mask_patience_s", &mask_patience_s,
+               {.unit = "s", .min = 0, .max = 10, .help = "Masks may come so long after their frame"});
     fields.Add("confirm_frames", &confirm_frames,
                {.unit = "frames", .min = 1, .max = 1000, .help = "Sightings before an object is announced"});
     fields.Add("confirm_keyframes", &confirm_keyframes,

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "common/label_image.h"
 #include "common/lens.h"
 #include "server/slam/features/steered_brief.h"
 
@@ -54,24 +55,6 @@ size_t Share(size_t left, int octave) {
   for (int i = 0; i <= octave; ++i) sum += 1 / kOctaveScales[static_cast<size_t>(i)];
   return static_cast<size_t>(
       std::lround(static_cast<double>(left) / (kOctaveScales[static_cast<size_t>(octave)] * sum)));
-}
-
-// The label under a pixel, or 0 when another one lies within `erosion_px` of it: a corner on an object's outline may
-// as well be the background's.
-uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int erosion_px) {
-  if (labels.empty()) return 0;
-  const int u = static_cast<int>(std::lround(pixel_px.x()));
-  const int v = static_cast<int>(std::lround(pixel_px.y()));
-  const cv::Rect image(0, 0, labels.cols, labels.rows);
-  if (!image.contains({u, v})) return 0;
-  const uint16_t label = labels.at<uint16_t>(v, u);
-  const cv::Rect near = cv::Rect(u - erosion_px, v - erosion_px, 2 * erosion_px + 1, 2 * erosion_px + 1) & image;
-  for (int y = near.y; y < near.br().y; ++y) {
-    for (int x = near.x; x < near.br().x; ++x) {
-      if (labels.at<uint16_t>(y, x) != label) return 0;
-    }
-  }
-  return label;
 }
 
 }  // namespace

@@ -146,6 +146,69 @@ TEST(ObjectMapper, KeepsIdenticalNeighboursApart) {
   EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
 }
 
+// The frame as a camera gives it that does not wait for its detector.
+TrackedFrame WithoutMasks(TrackedFrame tracked) {
+  auto frame = std::make_shared<Frame>(*tracked.frame);
+  frame->has_masks = false;
+  frame->labels.release();
+  frame->instances.clear();
+  tracked.frame = frame;
+  return tracked;
+}
+
+// Masks come for every `every`-th frame only, `late` frames after it.
+Told MapWithSlowDetector(const SyntheticWorld& world, int every, int late) {
+  ObjectMapper mapper({});
+  Told told;
+  for (int i = 0; i < world.frame_count() + late; ++i) {
+    if (i < world.frame_count()) {
+      TrackedFrame full = world.MakeFrame(i);
+      full.is_keyframe = world.IsKeyframe(i);
+      const bool on_time = late == 0 && i % every == 0;
+      const TrackedFrame frame = on_time ? full : WithoutMasks(full);
+      Take(mapper.ObserveFrame(frame), i, &told);
+      if (full.is_keyframe) {
+        KeyframeView view = world.MakeKeyframe(i, full);
+        view.frame = frame.frame;
+        if (!on_time) {
+          for (PointObservation& seen : view.observations) seen.label = 0;
+        }
+        Take(mapper.ObserveKeyframe(view), i, &told);
+      }
+    }
+    const int masked = i - late;
+    if (late == 0 || masked < 0 || masked % every != 0) continue;
+    const TrackedFrame then = world.MakeFrame(masked);
+    Take(mapper.ObserveLateMasks({then.frame->frame_id, then.frame->labels, then.frame->instances}), i, &told);
+  }
+  Take(mapper.Finish(), world.frame_count(), &told);
+  return told;
+}
+
+TEST(ObjectMapper, MasksOnSomeFramesThatAreNoKeyframesAreEnough) {
+  SyntheticWorldOptions options;
+  options.frames = 150;
+  options.keyframe_every = 6;
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWithSlowDetector(world, /*every=*/5, /*late=*/0)), 0.6);
+}
+
+TEST(ObjectMapper, LateMasksGiveTheSameMap) {
+  const SyntheticWorld world({});
+  const Told on_time = MapWithSlowDetector(world, 1, 0);
+  const Told late = MapWithSlowDetector(world, 1, 12);
+  const double iou = ExpectFound(world, on_time);
+  EXPECT_NEAR(ExpectFound(world, late), iou, 0.03);
+}
+
+TEST(ObjectMapper, LateMasksOnSomeFramesAreEnough) {
+  SyntheticWorldOptions options;
+  options.frames = 150;
+  options.keyframe_every = 6;
+  const SyntheticWorld world(options);
+  EXPECT_GT(ExpectFound(world, MapWithSlowDetector(world, /*every=*/5, /*late=*/12)), 0.6);
+}
+
 TEST(ObjectMapper, KnowsAnObjectAgainAfterALongAbsence) {
   SyntheticWorldOptions options;
   options.frames = 120;

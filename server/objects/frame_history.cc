@@ -1,0 +1,131 @@
+#include "server/objects/frame_history.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "common/label_image.h"
+
+namespace romap {
+namespace {
+
+// Ids of stand-ins must not meet those that the camera's map gives, which count from 1.
+constexpr uint64_t kFirstStandIn = uint64_t{1} << 62;
+constexpr int kMaskErosion_px = 2;
+
+}  // namespace
+
+void FrameHistory::Add(const TrackedFrame& tracked) {
+  const Frame& frame = *tracked.frame;
+  entries_.push_back({.tracked = tracked,
+                      .frame_id = frame.frame_id,
+                      .timestamp_ns = frame.timestamp_ns,
+                      .has_masks = frame.has_masks,
+                      .keyframe = {},
+                      .observations = {}});
+  if (frame.has_masks) entries_.back().tracked.frame = nullptr;
+  const auto patience_ns = static_cast<int64_t>(1e9 * patience_s_);
+  while (entries_.size() > 1 && frame.timestamp_ns - entries_.front().timestamp_ns > patience_ns) entries_.pop_front();
+}
+
+void FrameHistory::AddKeyframe(const KeyframeView& view) {
+  if (entries_.empty() || !view.frame || entries_.back().frame_id != view.frame->frame_id) return;
+  Entry& entry = entries_.back();
+  entry.is_keyframe = true;
+  entry.keyframe = view.id;
+  entry.tracked.T_world_camera = view.T_world_camera;
+  entry.tracked.up_world = view.up_world;
+  entry.observations = view.observations;
+}
+
+std::optional<FrameHistory::Masked> FrameHistory::TakeLateMasks(const FrameMasks& masks) {
+  const auto entry = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& known) { return known.frame_id == masks.frame_id; });
+  if (entry == entries_.end() || entry->has_masks) return std::nullopt;
+  auto frame = std::make_shared<Frame>(*entry->tracked.frame);
+  frame->has_masks = true;
+  frame->labels = masks.labels;
+  frame->instances = masks.instances;
+  entry->has_masks = true;
+  Masked masked{.tracked = entry->tracked, .view = {}};
+  entry->tracked.frame = nullptr;
+  masked.tracked.frame = frame;
+  if (!entry->is_keyframe) return masked;
+  KeyframeView& view = masked.view.emplace();
+  view.id = entry->keyframe;
+  view.frame = frame;
+  view.T_world_camera = entry->tracked.T_world_camera;
+  view.up_world = entry->tracked.up_world;
+  view.observations = entry->observations;
+  for (PointObservation& seen : view.observations) seen.label = LabelAt(masks.labels, seen.pixel_px, kMaskErosion_px);
+  return masked;
+}
+
+const FrameHistory::Entry* FrameHistory::NearestKeyframe(int64_t timestamp_ns) const {
+  const Entry* nearest = nullptr;
+  const auto gap_ns = [&](const Entry& entry) { return std::abs(entry.timestamp_ns - timestamp_ns); };
+  for (const Entry& entry : entries_) {
+    if (entry.is_keyframe && (nearest == nullptr || gap_ns(entry) < gap_ns(*nearest))) nearest = &entry;
+  }
+  return nearest;
+}
+
+// Whether a keyframe up to then has no masks; each asks for one stand-in only.
+bool FrameHistory::TakeUnmaskedKeyframes(int64_t until_ns) {
+  bool any = false;
+  for (Entry& entry : entries_) {
+    if (entry.timestamp_ns > until_ns || !entry.is_keyframe || entry.has_masks || entry.replaced) continue;
+    entry.replaced = true;
+    any = true;
+  }
+  return any;
+}
+
+std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, const PointRegistry& points) {
+  const Frame& frame = *masked.frame;
+  if (!TakeUnmaskedKeyframes(frame.timestamp_ns)) return std::nullopt;
+  KeyframeView view;
+  view.id = KeyframeId{kFirstStandIn + ++stand_ins_made_};
+  view.frame = masked.frame;
+  view.T_world_camera = masked.T_world_camera;
+  view.up_world = masked.up_world;
+  if (masked.reference) stand_ins_[view.id] = {masked.reference, masked.T_world_camera};
+  const Entry* source = NearestKeyframe(frame.timestamp_ns);
+  const SE3<Camera, World> T_camera_world = masked.T_world_camera.Inverse();
+  for (const PointObservation& seen : source->observations) {
+    const Eigen::Vector3d* p_world = points.Find(seen.point);
+    if (p_world == nullptr) continue;
+    const Eigen::Vector3d p_camera = T_camera_world * *p_world;
+    if (!(p_camera.z() > 1e-9)) continue;
+    const Eigen::Vector2f pixel_px = frame.camera.Project(p_camera).cast<float>();
+    const bool inside = pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() <= frame.camera.width_px - 1 &&
+                        pixel_px.y() <= frame.camera.height_px - 1;
+    if (!inside) continue;
+    const uint16_t label = LabelAt(frame.labels, pixel_px, kMaskErosion_px);
+    view.observations.push_back({.point = seen.point, .pixel_px = pixel_px, .label = label});
+  }
+  return view;
+}
+
+void FrameHistory::Correct(KeyframeCorrections* corrections) {
+  for (auto& [id, place] : stand_ins_) {
+    const auto moved = corrections->find(place.reference);
+    if (moved == corrections->end()) continue;
+    const Sim3<World, World> S_new_old = moved->second.S_new_old;
+    place.T_world_camera = S_new_old.Moved(place.T_world_camera);
+    (*corrections)[id] = {.id = id, .T_world_camera = place.T_world_camera, .S_new_old = S_new_old};
+  }
+  for (Entry& entry : entries_) {
+    const auto moved = corrections->find(entry.is_keyframe ? entry.keyframe : entry.tracked.reference);
+    if (moved == corrections->end()) continue;
+    entry.tracked.T_world_camera =
+        entry.is_keyframe ? moved->second.T_world_camera : moved->second.S_new_old.Moved(entry.tracked.T_world_camera);
+  }
+}
+
+void FrameHistory::Clear() {
+  entries_.clear();
+  stand_ins_.clear();
+}
+
+}  // namespace romap
