@@ -39,6 +39,7 @@ cv::Rect CarryBox(const Landmark& landmark, const TrackedFrame& tracked, double 
 
 // Where a landmark's body falls in the frame.
 struct BodySight {
+  bool known = false;
   std::vector<double> share_in_detection;  // of the points in the image
   double share_in_image = 0;
   double share_hidden = 0;  // of the points in the image: under any mask
@@ -58,12 +59,16 @@ BodySight ProjectBody(const Landmark& landmark, const TrackedFrame& tracked, con
     ++in_image;
     if (labels.empty()) continue;
     const uint16_t label = labels.at<uint16_t>(pixel->y, pixel->x);
-    hidden += label != 0 ? 1 : 0;
-    for (size_t d = 0; d < detections.size(); ++d) {
-      if (detections[d].label == label) sight.share_in_detection[d] += 1;
+    if (label == 0) continue;
+    ++hidden;
+    const auto d = std::lower_bound(detections.begin(), detections.end(), label,
+                                    [](const Detection& detection, uint16_t l) { return detection.label < l; });
+    if (d != detections.end() && d->label == label) {
+      sight.share_in_detection[static_cast<size_t>(d - detections.begin())] += 1;
     }
   }
   if (in_image == 0) return sight;
+  sight.known = true;
   for (double& share : sight.share_in_detection) share /= in_image;
   sight.share_in_image = static_cast<double>(in_image) / static_cast<double>(landmark.body_world.size());
   sight.share_hidden = static_cast<double>(hidden) / in_image;
@@ -101,24 +106,36 @@ double DepthOf(const Landmark& landmark, double scene_depth_mu) {
   return (landmark.last_T_world_camera.Inverse() * mean).z();
 }
 
-void ScoreLandmark(const Landmark& landmark, const BodySight& sight, const TrackedFrame& tracked,
-                   const std::vector<Detection>& detections, uint64_t frame_index, double scene_depth_mu,
-                   Eigen::Ref<Eigen::RowVectorXd> scores) {
-  const uint64_t gap = frame_index - landmark.last_frame;
+constexpr double kInImage = 0.3;  // of the body: enough to compare it with masks
+
+// Everything that is compared in one frame.
+struct Scene {
+  const TrackedFrame& tracked;
+  const std::vector<Detection>& detections;
+  const std::vector<std::unique_ptr<Landmark>>& landmarks;
+  uint64_t frame_index;
+  double scene_depth_mu;
+  std::vector<BodySight> sights;    // per landmark
+  std::vector<cv::Rect> projected;  // per landmark: its cuboid; empty = unknown
+};
+
+void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> scores) {
+  const Landmark& landmark = *scene.landmarks[l];
+  const BodySight& sight = scene.sights[l];
+  const uint64_t gap = scene.frame_index - landmark.last_frame;
   const bool recent = gap <= kRecentFrames;
-  const cv::Rect carried = recent ? CarryBox(landmark, tracked, DepthOf(landmark, scene_depth_mu)) : cv::Rect();
-  cv::Rect projected;
-  if (landmark.cuboid) projected = ProjectCuboid(*landmark.cuboid, 1, tracked.frame->camera, tracked.T_world_camera);
+  const cv::Rect carried =
+      recent ? CarryBox(landmark, scene.tracked, DepthOf(landmark, scene.scene_depth_mu)) : cv::Rect();
   double total_evidence = 0;
   for (const auto& [name, evidence] : landmark.class_evidence) total_evidence += evidence;
-  for (size_t d = 0; d < detections.size(); ++d) {
-    const Detection& detection = detections[d];
+  for (size_t d = 0; d < scene.detections.size(); ++d) {
+    const Detection& detection = scene.detections[d];
     Score score;
     if (recent) {
       score.AddGeometric(1.0 - static_cast<double>(gap) / (kRecentFrames + 1), BoxIou(carried, detection.box_px));
     }
-    if (sight.share_in_image > 0.3) score.AddGeometric(1.5, sight.share_in_detection[d]);
-    if (projected.area() > 0) score.AddGeometric(0.7, BoxIou(projected, detection.box_px));
+    if (sight.share_in_image > kInImage) score.AddGeometric(1.5, sight.share_in_detection[d]);
+    if (scene.projected[l].area() > 0) score.AddGeometric(0.7, BoxIou(scene.projected[l], detection.box_px));
     const auto evidence = landmark.class_evidence.find(detection.class_name);
     const bool known_class = evidence != landmark.class_evidence.end() && total_evidence > 0;
     score.Add(0.25, known_class ? evidence->second / total_evidence : 0);
@@ -126,6 +143,12 @@ void ScoreLandmark(const Landmark& landmark, const BodySight& sight, const Track
       score.Add(0.1, *landmark.last_track_id == *detection.track_id ? 1 : 0);
     }
     scores[static_cast<Eigen::Index>(d)] = score.Value();
+    if (score.Value() > 0 && spdlog::should_log(spdlog::level::debug)) {
+      spdlog::debug("objects: frame {}: label {} as landmark {}: {:.2f} (body {:.2f}, box {:.2f}, carried {:.2f})",
+                    scene.tracked.frame->frame_id, detection.label, landmark.key, score.Value(),
+                    sight.share_in_detection[d], BoxIou(scene.projected[l], detection.box_px),
+                    BoxIou(carried, detection.box_px));
+    }
   }
 }
 
@@ -142,34 +165,121 @@ bool IsAmbiguous(const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::In
   return false;
 }
 
+// Whether the mask of `d`, matched to landmark `l`, is that of `l` and of another thing in one: the other one has no
+// mask, its body lies under this one, and this one fits both together better than `l`. (A thing that stands behind `l`
+// lies under its mask as well, but does not make the mask larger.)
+bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<bool>& matched) {
+  constexpr double kUnderMask = 0.7;
+  constexpr double kBetter = 0.1;
+  const cv::Rect& box = scene.detections[d].box_px;
+  if (scene.projected[l].empty()) return false;
+  const double alone = BoxIou(box, scene.projected[l]);
+  for (size_t other = 0; other < scene.landmarks.size(); ++other) {
+    if (other == l || matched[other] || scene.projected[other].empty()) continue;
+    if (scene.landmarks[other]->state == ObjectState::kProvisional) continue;
+    const BodySight& sight = scene.sights[other];
+    if (sight.share_in_image < kInImage || sight.share_in_detection[d] < kUnderMask) continue;
+    if (BoxIou(box, scene.projected[l] | scene.projected[other]) > alone + kBetter) return true;
+  }
+  return false;
+}
+
+int CoveringLandmark(const BodySight& sight, const std::vector<Match>& matches) {
+  constexpr double kMost = 0.7;
+  constexpr double kPlainlyInImage = 0.6;
+  if (!sight.known || sight.share_in_image < kPlainlyInImage) return -1;
+  for (size_t d = 0; d < matches.size(); ++d) {
+    if (sight.share_in_detection[d] >= kMost && matches[d].doubt == nullptr) return matches[d].landmark;
+  }
+  return -1;
+}
+
+// The paper's first stage: the box of the frame before, best overlap first. What it does not find is a new landmark,
+// until its points tell that it is an old one.
+std::vector<Match> MatchGreedily(const Scene& scene) {
+  constexpr double kLeastIou = 0.3;
+  struct Pair {
+    double iou;
+    size_t landmark, detection;
+  };
+  std::vector<Pair> pairs;
+  for (size_t l = 0; l < scene.landmarks.size(); ++l) {
+    if (scene.frame_index - scene.landmarks[l]->last_frame != 1) continue;
+    for (size_t d = 0; d < scene.detections.size(); ++d) {
+      const double iou = BoxIou(scene.landmarks[l]->last_box_px, scene.detections[d].box_px);
+      if (iou >= kLeastIou) pairs.push_back({iou, l, d});
+    }
+  }
+  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.iou > b.iou; });
+  std::vector<Match> matches(scene.detections.size());
+  std::vector<bool> taken(scene.landmarks.size(), false);
+  for (const Pair& pair : pairs) {
+    if (taken[pair.landmark] || matches[pair.detection].landmark >= 0) continue;
+    taken[pair.landmark] = true;
+    matches[pair.detection].landmark = static_cast<int>(pair.landmark);
+  }
+  return matches;
+}
+
+std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
+  const auto rows = static_cast<Eigen::Index>(scene.landmarks.size());
+  const auto columns = static_cast<Eigen::Index>(scene.detections.size());
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(rows, columns);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(columns);
+  for (size_t l = 0; l < scene.landmarks.size(); ++l) {
+    ScoreLandmark(scene, l, row);
+    scores.row(static_cast<Eigen::Index>(l)) = row;
+  }
+  const std::vector<int> detection_of = AssignMaximal(scores, min_score);
+  std::vector<bool> matched(scene.landmarks.size(), false);
+  for (size_t l = 0; l < matched.size(); ++l) matched[l] = detection_of[l] >= 0;
+  std::vector<Match> matches(scene.detections.size());
+  for (size_t l = 0; l < matched.size(); ++l) {
+    if (!matched[l]) continue;
+    const auto d = static_cast<size_t>(detection_of[l]);
+    Match& match = matches[d];
+    match.landmark = static_cast<int>(l);
+    if (CoversAnother(scene, d, l, matched)) {
+      match.doubt = "it covers another thing as well";
+    } else if (IsAmbiguous(scores, static_cast<Eigen::Index>(l), detection_of[l])) {
+      match.doubt = "another match is as good";
+    }
+    spdlog::debug("objects: frame {}: label {} ({}) is landmark {} with {:.2f}{}{}", scene.tracked.frame->frame_id,
+                  scene.detections[d].label, scene.detections[d].class_name, scene.landmarks[l]->key,
+                  scores(static_cast<Eigen::Index>(l), detection_of[l]), match.doubt ? ", in doubt: " : "",
+                  match.doubt ? match.doubt : "");
+  }
+  return matches;
+}
+
 }  // namespace
 
 Association Associate(const TrackedFrame& tracked, const std::vector<Detection>& detections,
                       const std::vector<std::unique_ptr<Landmark>>& landmarks, uint64_t frame_index,
                       double scene_depth_mu, const ObjectsConfig& config) {
+  Scene scene{.tracked = tracked,
+              .detections = detections,
+              .landmarks = landmarks,
+              .frame_index = frame_index,
+              .scene_depth_mu = scene_depth_mu,
+              .sights = {},
+              .projected = {}};
   Association association;
-  association.landmark_of_detection.assign(detections.size(), -1);
-  association.ambiguous.assign(detections.size(), false);
-  Eigen::MatrixXd scores =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(landmarks.size()), static_cast<Eigen::Index>(detections.size()));
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(detections.size()));
-  for (size_t l = 0; l < landmarks.size(); ++l) {
-    const BodySight sight = ProjectBody(*landmarks[l], tracked, detections);
+  for (const auto& landmark : landmarks) {
+    const BodySight& sight = scene.sights.emplace_back(ProjectBody(*landmark, tracked, detections));
+    scene.projected.push_back(landmark->cuboid
+                                  ? ProjectCuboid(*landmark->cuboid, 1, tracked.frame->camera, tracked.T_world_camera)
+                                  : cv::Rect());
     association.visible_share.push_back(sight.share_in_image * (1 - sight.share_hidden));
-    ScoreLandmark(*landmarks[l], sight, tracked, detections, frame_index, scene_depth_mu, row);
-    scores.row(static_cast<Eigen::Index>(l)) = row;
   }
-  const std::vector<int> detection_of = AssignMaximal(scores, config.match_min_score);
+  const bool greedy = config.association == "greedy_iou";
+  association.matches = greedy ? MatchGreedily(scene) : MatchGlobally(scene, config.match_min_score);
+  std::vector<bool> matched(landmarks.size(), false);
+  for (const Match& match : association.matches) {
+    if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;
+  }
   for (size_t l = 0; l < landmarks.size(); ++l) {
-    if (detection_of[l] < 0) continue;
-    const auto d = static_cast<size_t>(detection_of[l]);
-    association.landmark_of_detection[d] = static_cast<int>(l);
-    association.ambiguous[d] = IsAmbiguous(scores, static_cast<Eigen::Index>(l), detection_of[l]);
-    if (association.ambiguous[d]) {
-      spdlog::debug("objects: frame {}: label {} is landmark {} with score {:.2f}, but ambiguous",
-                    tracked.frame->frame_id, detections[d].label, landmarks[l]->key,
-                    scores(static_cast<Eigen::Index>(l), detection_of[l]));
-    }
+    association.covered_by.push_back(matched[l] ? -1 : CoveringLandmark(scene.sights[l], association.matches));
   }
   return association;
 }

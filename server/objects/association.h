@@ -12,22 +12,35 @@
 
 namespace romap {
 
+// What one detection of a frame shows.
+struct Match {
+  int landmark = -1;  // index into the landmarks; -1: none of them
+  // The match is good enough to stay on track, but not to learn from: why. nullptr = nothing speaks against it.
+  const char* doubt = nullptr;
+};
+
 // Which landmark each detection of a frame shows.
 struct Association {
-  std::vector<int> landmark_of_detection;  // index into the landmarks, or -1
-  // The match could as well be another one: good enough to stay on track, not to learn from.
-  std::vector<bool> ambiguous;
+  std::vector<Match> matches;  // per detection
   // Per landmark: share of its body that this frame ought to show unless something is in front of it; 0 when unknown.
   std::vector<double> visible_share;
+  // Per landmark without a detection: the landmark (index) whose mask lies over most of its body; -1: none. Not where
+  // that mask plainly covers two things.
+  std::vector<int> covered_by;
 };
 
 // Scores every pair by what is known of it and assigns globally (see AssignMaximal):
 //  - share of the landmark's body (map points and hull) that projects into the mask: holds from any direction and after
 //    any gap;
 //  - overlap of the mask's box with the projected cuboid, and with the last sighting's box carried along by the
-//  camera's
-//    motion, as long as that is recent;
+//    camera's motion, as long as that is recent;
 //  - class and detector track: evidence, not a verdict.
+// A match is doubted when another one is nearly as good, and when the mask covers a second landmark as well and fits
+// both together better than one of them: neighbours that the detector took for one thing.
+//
+// With ObjectsConfig::association = "greedy_iou" the recipe of the paper's first stage instead: boxes of consecutive
+// frames, best overlap first.
+//
 // `frame_index` counts frames; `scene_depth_mu` is a typical distance for landmarks without geometry (0: unknown).
 Association Associate(const TrackedFrame& tracked, const std::vector<Detection>& detections,
                       const std::vector<std::unique_ptr<Landmark>>& landmarks, uint64_t frame_index,

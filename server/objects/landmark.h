@@ -24,17 +24,20 @@ struct Landmark {
   uint64_t revision = 0;
 
   // Sightings.
-  uint64_t first_frame = 0;  // counted by the mapper, not the client's frame ids
-  uint64_t last_frame = 0;
+  uint64_t last_frame = 0;  // counted by the mapper, not the client's frame ids
   uint64_t sightings = 0;
   int keyframe_sightings = 0;
+  uint64_t expected = 0;   // frames in which it was seen or ought to have been
   int missed_in_view = 0;  // frames without a sighting since the last one, though nothing hid it
   cv::Rect last_box_px;
   SE3<World, Camera> last_T_world_camera;
   std::optional<uint64_t> last_track_id;
   std::map<std::string, double> class_evidence;  // sum of detection scores
-  std::map<LandmarkKey, uint64_t> seen_beside;   // frames in which both had a mask: they are two things
-  std::vector<KeyframeId> keyframes;             // in which it was seen for certain
+  // What tells two things from one thing twice: frames in which both had a mask, and frames in which this one had none
+  // and that one's mask lay over its body.
+  std::map<LandmarkKey, uint64_t> seen_beside;
+  std::map<LandmarkKey, uint64_t> covered_by;
+  std::vector<KeyframeId> keyframes;  // in which it was seen for certain
 
   // Geometry, always as of the newest correction of the map.
   ObjectShape shape;
@@ -46,9 +49,13 @@ struct Landmark {
 
   ViewPicker views;
   std::optional<ObjectUpdate> published;
+  bool has_field = false;  // ObjectViews were sent
   // What corrections did to its space since clients and its field were last told; nullopt: nothing. They know no more
   // than `published` and the views sent, so what is not worth telling by itself adds up here.
   std::optional<Sim3<World, World>> S_now_told;
+
+  // Clients and its field may count on it (until it is merged into another one).
+  bool IsConfirmed() const { return published && state != ObjectState::kProvisional; }
 
   // The class with most evidence and its share; ties go to the alphabet.
   std::pair<std::string, double> BestClass() const {

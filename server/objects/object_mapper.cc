@@ -66,26 +66,26 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracke
   current_.detections = ExtractDetections(*tracked.frame, config_);
   const Association association =
       Associate(tracked, current_.detections, landmarks_, frame_index_, scene_depth_mu_, config_);
-  current_.ambiguous = association.ambiguous;
+  const size_t landmarks_before = landmarks_.size();
   UpdateLost(association, &output);
   for (size_t d = 0; d < current_.detections.size(); ++d) {
-    const int index = association.landmark_of_detection[d];
-    if (index < 0) {
+    const Match& match = association.matches[d];
+    if (match.landmark < 0) {
       landmarks_.push_back(std::make_unique<Landmark>(++last_key_, config_));
-      landmarks_.back()->first_frame = frame_index_;
       spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id,
                     current_.detections[d].label, current_.detections[d].class_name, last_key_);
     }
-    Landmark& landmark = index < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(index)];
+    Landmark& landmark = match.landmark < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(match.landmark)];
     current_.keys.push_back(landmark.key);
+    current_.certain.push_back(match.doubt == nullptr);
     RecordSighting(landmark, current_.detections[d], tracked);
     if (landmark.state == ObjectState::kLost) {
       landmark.state = ObjectState::kConfirmed;
       Publish(landmark, /*force=*/true, &output);
     }
   }
-  RecordCompany();
-  BuryGhosts();
+  RecordCompany(association, landmarks_before);
+  BuryGhosts(&output);
   return output;
 }
 
@@ -93,29 +93,36 @@ void ObjectMapper::RecordSighting(Landmark& landmark, const Detection& detection
   landmark.last_frame = frame_index_;
   landmark.missed_in_view = 0;
   ++landmark.sightings;
+  ++landmark.expected;
   landmark.last_box_px = detection.box_px;
   landmark.last_T_world_camera = tracked.T_world_camera;
   landmark.last_track_id = detection.track_id;
   landmark.class_evidence[detection.class_name] += detection.score;
 }
 
-void ObjectMapper::RecordCompany() {
+void ObjectMapper::RecordCompany(const Association& association, size_t landmarks_before) {
   for (size_t i = 0; i < current_.keys.size(); ++i) {
+    Landmark& landmark = *FindLandmark(current_.keys[i]);
     for (size_t j = 0; j < current_.keys.size(); ++j) {
-      if (i != j) ++FindLandmark(current_.keys[i])->seen_beside[current_.keys[j]];
+      if (i != j) ++landmark.seen_beside[current_.keys[j]];
     }
+  }
+  for (size_t l = 0; l < landmarks_before; ++l) {
+    const int cover = association.covered_by[l];
+    if (cover >= 0) ++landmarks_[l]->covered_by[landmarks_[static_cast<size_t>(cover)]->key];
   }
 }
 
 void ObjectMapper::UpdateLost(const Association& association, Output* output) {
   constexpr double kPlainlyVisible = 0.6;
   std::vector<bool> matched(landmarks_.size(), false);
-  for (int index : association.landmark_of_detection) {
-    if (index >= 0) matched[static_cast<size_t>(index)] = true;
+  for (const Match& match : association.matches) {
+    if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;
   }
   for (size_t l = 0; l < landmarks_.size(); ++l) {
     Landmark& landmark = *landmarks_[l];
     if (matched[l] || association.visible_share[l] < kPlainlyVisible) continue;
+    ++landmark.expected;
     ++landmark.missed_in_view;
     if (landmark.state != ObjectState::kConfirmed || landmark.missed_in_view < config_.lost_after_frames) continue;
     landmark.state = ObjectState::kLost;
@@ -125,21 +132,33 @@ void ObjectMapper::UpdateLost(const Association& association, Output* output) {
   }
 }
 
-void ObjectMapper::BuryGhosts() {
+void ObjectMapper::BuryGhosts(Output* output) {
   std::erase_if(landmarks_, [&](const auto& landmark) {
-    if (landmark->state != ObjectState::kProvisional) return false;
-    // What was seen often and then left the view may come back; what was seen twice will not.
-    const uint64_t unseen = frame_index_ - landmark->last_frame;
-    const auto patience = static_cast<uint64_t>(config_.provisional_patience_frames);
-    const bool known_place = landmark->cuboid.has_value();
-    const bool dead = landmark->missed_in_view >= config_.provisional_patience_frames ||
-                      unseen > (known_place ? 10 * patience : patience);
-    if (dead) {
-      spdlog::debug("objects: landmark {} was a ghost: {} sightings, unseen for {} frames", landmark->key,
-                    landmark->sightings, unseen);
+    const char* reason = WhyGhost(*landmark);
+    if (reason == nullptr) return false;
+    spdlog::debug("objects: landmark {} was a ghost: {} ({} sightings, {} expected)", landmark->key, reason,
+                  landmark->sightings, landmark->expected);
+    if (landmark->published) {
+      output->events.emplace_back(
+          ObjectRemoved{.id = landmark->id, .revision = ++landmark->revision, .reason = reason});
     }
-    return dead;
+    return true;
   });
+}
+
+// Why a landmark is no thing; nullptr: it may be one.
+const char* ObjectMapper::WhyGhost(const Landmark& landmark) const {
+  if (landmark.state == ObjectState::kLost) {
+    return static_cast<double>(landmark.sightings) < config_.confirm_seen_share * static_cast<double>(landmark.expected)
+               ? "it was seen too seldom where it ought to be"
+               : nullptr;
+  }
+  if (landmark.state != ObjectState::kProvisional) return nullptr;
+  // What was seen often and then left the view may come back; what was seen twice will not.
+  const uint64_t unseen = frame_index_ - landmark.last_frame;
+  const auto patience = static_cast<uint64_t>(config_.provisional_patience_frames);
+  if (landmark.missed_in_view >= config_.provisional_patience_frames) return "it is not where it was seen";
+  return unseen > (landmark.cuboid ? 10 * patience : patience) ? "it was not seen again" : nullptr;
 }
 
 ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
@@ -185,7 +204,7 @@ ObjectMapper::Output ObjectMapper::Finish() {
 void ObjectMapper::CountPointVotes(const KeyframeView& view) {
   std::map<uint16_t, LandmarkKey> key_of_label{{0, kBackgroundKey}};
   for (size_t d = 0; d < current_.detections.size(); ++d) {
-    if (!current_.ambiguous[d]) key_of_label[current_.detections[d].label] = current_.keys[d];
+    if (current_.certain[d]) key_of_label[current_.detections[d].label] = current_.keys[d];
   }
   const CameraModel& camera = view.frame->camera;
   const cv::Mat& labels = view.frame->labels;
@@ -221,7 +240,7 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
   std::vector<uint16_t> labels;
   for (const Detection& detection : current_.detections) labels.push_back(detection.label);
   for (size_t d = 0; d < current_.detections.size(); ++d) {
-    if (current_.ambiguous[d]) continue;
+    if (!current_.certain[d]) continue;
     const Detection& detection = current_.detections[d];
     Landmark& landmark = *FindLandmark(current_.keys[d]);
     ++landmark.keyframe_sightings;
@@ -265,7 +284,7 @@ void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
 std::map<LandmarkKey, Cuboid> ObjectMapper::PublishedCuboids() const {
   std::map<LandmarkKey, Cuboid> cuboids;
   for (const auto& landmark : landmarks_) {
-    if (landmark->published) cuboids[landmark->key] = landmark->published->cuboid;
+    if (landmark->IsConfirmed()) cuboids[landmark->key] = landmark->published->cuboid;
   }
   return cuboids;
 }

@@ -53,16 +53,17 @@ class ObjectMapper {
     uint64_t frame_id = 0;
     std::vector<Detection> detections;
     std::vector<LandmarkKey> keys;  // per detection; every detection has a landmark, if only a provisional one
-    std::vector<bool> ambiguous;
+    std::vector<bool> certain;      // per detection: good enough to learn from
   };
   using PointGroups = std::map<LandmarkKey, std::vector<PointRegistry::Member>>;
 
   // Per frame.
   Output ObserveMaskedFrame(const TrackedFrame& tracked);
   void RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked);
-  void RecordCompany();
+  void RecordCompany(const Association& association, size_t landmarks_before);
   void UpdateLost(const Association& association, Output* output);
-  void BuryGhosts();
+  void BuryGhosts(Output* output);
+  const char* WhyGhost(const Landmark& landmark) const;
 
   // Per keyframe.
   Output ObserveMaskedKeyframe(const KeyframeView& view);
@@ -77,6 +78,7 @@ class ObjectMapper {
   void MergeDuplicates(Output* output);
   void Merge(Landmark& from, Landmark& into, Output* output);
   bool AreTheSame(const Landmark& a, const Landmark& b) const;
+  bool IsAnnounceable(const Landmark& landmark) const;
   void Publish(Landmark& landmark, bool force, Output* output);
   std::vector<ObjectView> TakeViews(Landmark& landmark, const Cuboid& cuboid);
   void PublishAll(const std::vector<LandmarkKey>& keys, Output* output);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "common/map_motion.h"
@@ -46,6 +47,14 @@ bool MovedNoticeably(const Cuboid& told, const Cuboid& now, const Sim3<World, Wo
   return shift > kShiftShare * size || turn_rad > kTurnRad || std::abs(std::log(S_now_told.scale())) > kScaleShare;
 }
 
+// In counts of landmark `owner`: `from` is called `into` from now on.
+void RenameKey(LandmarkKey from, LandmarkKey into, LandmarkKey owner, std::map<LandmarkKey, uint64_t>* counts) {
+  const auto old = counts->find(from);
+  if (old == counts->end()) return;
+  if (owner != into) (*counts)[into] += old->second;
+  counts->erase(old);
+}
+
 }  // namespace
 
 // Evidence that a landmark is a thing: seen often, from different sides, and with a box of believable form.
@@ -57,7 +66,9 @@ bool ObjectMapper::IsProven(const Landmark& landmark) const {
   // Without points the masks alone must say where it is, which takes a wider base.
   const bool has_points = landmark.points.size() >= static_cast<size_t>(config_.min_object_points);
   const double parallax_rad = (has_points ? 1.0 : 1.5) * config_.confirm_parallax_deg * kRadPerDeg;
-  return believable && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
+  const bool steady =
+      static_cast<double>(landmark.sightings) >= config_.confirm_seen_share * static_cast<double>(landmark.expected);
+  return believable && steady && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
          landmark.keyframe_sightings >= config_.confirm_keyframes && landmark.parallax_rad >= parallax_rad;
 }
 
@@ -67,27 +78,41 @@ void ObjectMapper::ConfirmProven(const std::vector<LandmarkKey>& keys) {
     if (landmark.state != ObjectState::kProvisional || !IsProven(landmark)) continue;
     // A duplicate is merged before it is ever announced.
     const bool duplicate = std::any_of(landmarks_.begin(), landmarks_.end(), [&](const auto& other) {
-      return other->key != key && other->id && AreTheSame(landmark, *other);
+      return other->key != key && other->state != ObjectState::kProvisional && AreTheSame(landmark, *other);
     });
     if (duplicate) continue;
     landmark.state = ObjectState::kConfirmed;
-    landmark.id = ObjectId{++last_id_};
+    if (!landmark.id) landmark.id = ObjectId{++last_id_};
     spdlog::debug("objects: landmark {} is {} ({}): {} sightings, {} points, parallax {:.0f} deg", key,
                   landmark.id.ToString(), landmark.BestClass().first, landmark.sightings, landmark.points.size(),
                   landmark.parallax_rad / kRadPerDeg);
   }
 }
 
+// A provisional landmark is announced when there is something to show.
+bool ObjectMapper::IsAnnounceable(const Landmark& landmark) const {
+  constexpr uint64_t kFewestSightings = 3;
+  return landmark.cuboid && landmark.cuboid->half_extents.minCoeff() > 0 && landmark.sightings >= kFewestSightings;
+}
+
 // Two landmarks are one thing when one's body lies in the other's box and they were hardly ever seen side by side.
+// A detector that cuts things in pieces shows one thing as two at times; then mostly one mask covers both.
 bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
   if (!a.cuboid || !b.cuboid) return false;
-  const auto beside = a.seen_beside.find(b.key);
-  const double together = beside == a.seen_beside.end() ? 0 : static_cast<double>(beside->second);
-  const double fewer_sightings = static_cast<double>(std::min(a.sightings, b.sightings));
-  if (together > std::max(2.0, 0.15 * fewer_sightings)) return false;
+  const double reach = a.cuboid->half_extents.norm() + b.cuboid->half_extents.norm();
+  if ((a.cuboid->T_world_object.translation() - b.cuboid->T_world_object.translation()).norm() > reach) return false;
+  const auto count = [](const std::map<LandmarkKey, uint64_t>& counts, LandmarkKey key) {
+    const auto found = counts.find(key);
+    return found == counts.end() ? 0.0 : static_cast<double>(found->second);
+  };
+  const double together = count(a.seen_beside, b.key);
+  const double covered = count(a.covered_by, b.key) + count(b.covered_by, a.key);
+  const auto fewer_sightings = static_cast<double>(std::min(a.sightings, b.sightings));
+  const bool seen_as_two = together > std::max(2.0, 0.15 * fewer_sightings);
+  if (seen_as_two && covered <= together) return false;
   const double overlap = std::max(ShareInside(*a.cuboid, b.body_world), ShareInside(*b.cuboid, a.body_world));
   const bool same_class = a.BestClass().first == b.BestClass().first;
-  return overlap > (same_class ? 0.5 : 0.7);
+  return overlap > (same_class && !seen_as_two ? 0.5 : 0.7);
 }
 
 void ObjectMapper::MergeDuplicates(Output* output) {
@@ -98,7 +123,10 @@ void ObjectMapper::MergeDuplicates(Output* output) {
         continue;
       }
       // The one that clients know longer stays.
-      const bool swap = !landmarks_[i]->id && landmarks_[j]->id;
+      const auto rank = [](const Landmark& landmark) {
+        return std::tuple(landmark.state == ObjectState::kProvisional, !landmark.id, landmark.id);
+      };
+      const bool swap = rank(*landmarks_[j]) < rank(*landmarks_[i]);
       if (swap) std::swap(landmarks_[i], landmarks_[j]);
       Merge(*landmarks_[j], *landmarks_[i], output);
       landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(j));
@@ -109,11 +137,20 @@ void ObjectMapper::MergeDuplicates(Output* output) {
 void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   spdlog::debug("objects: landmark {} merges into landmark {}", from.key, into.key);
   registry_.Merge(from.key, into.key);
-  for (const Silhouette& silhouette : from.shape.silhouettes()) into.needs_fit |= into.shape.AddSilhouette(silhouette);
+  // Pieces of a thing do not show its outline.
+  const auto beside = from.seen_beside.find(into.key);
+  const bool is_piece = beside != from.seen_beside.end() && beside->second > 0.15 * static_cast<double>(from.sightings);
+  if (!is_piece) {
+    for (const Silhouette& silhouette : from.shape.silhouettes())
+      into.needs_fit |= into.shape.AddSilhouette(silhouette);
+  }
   for (const auto& [name, evidence] : from.class_evidence) into.class_evidence[name] += evidence;
   for (const auto& [key, count] : from.seen_beside) into.seen_beside[key] += count;
+  for (const auto& [key, count] : from.covered_by) into.covered_by[key] += count;
   into.seen_beside.erase(into.key);
+  into.covered_by.erase(into.key);
   into.sightings += from.sightings;
+  into.expected += from.sightings;
   into.keyframe_sightings += from.keyframe_sightings;
   into.keyframes.insert(into.keyframes.end(), from.keyframes.begin(), from.keyframes.end());
   if (from.last_frame > into.last_frame) {
@@ -125,15 +162,15 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   }
   for (const auto& landmark : landmarks_) {
     landmark->views.RenameNeighbour(from.key, into.key);
-    const auto beside = landmark->seen_beside.find(from.key);
-    if (beside == landmark->seen_beside.end() || landmark.get() == &from) continue;
-    if (landmark->key != into.key) landmark->seen_beside[into.key] += beside->second;
-    landmark->seen_beside.erase(from.key);
+    if (landmark.get() == &from) continue;
+    RenameKey(from.key, into.key, landmark->key, &landmark->seen_beside);
+    RenameKey(from.key, into.key, landmark->key, &landmark->covered_by);
   }
   std::replace(current_.keys.begin(), current_.keys.end(), from.key, into.key);
-  const std::vector<ObjectView> adopted =
-      into.views.Adopt(std::move(from.views), into.id, into.cuboid->T_world_object.translation());
+  std::vector<ObjectView> adopted;
+  if (!is_piece) adopted = into.views.Adopt(std::move(from.views), into.id, into.cuboid->T_world_object.translation());
   if (!from.published) return;
+  if (!into.published) Publish(into, /*force=*/true, output);  // clients must know whom they are told of
   output->events.emplace_back(ObjectMerged{.from = from.id, .into = into.id, .revision = ++into.revision});
   Publish(into, /*force=*/true, output);
   if (!adopted.empty()) {
@@ -144,7 +181,9 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
 void ObjectMapper::PublishAll(const std::vector<LandmarkKey>& keys, Output* output) {
   for (LandmarkKey key : keys) {
     Landmark* landmark = FindLandmark(key);  // may have been merged away
-    if (landmark != nullptr && landmark->id) Publish(*landmark, /*force=*/false, output);
+    if (landmark == nullptr) continue;
+    if (!landmark->id && IsAnnounceable(*landmark)) landmark->id = ObjectId{++last_id_};
+    if (landmark->id) Publish(*landmark, /*force=*/false, output);
   }
 }
 
@@ -167,13 +206,16 @@ void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
   const bool moved =
       !first && MovedNoticeably(landmark.published->cuboid, told, landmark.S_now_told.value_or(Sim3<World, World>()));
   ObjectViews views{.object = landmark.id, .cuboid = cuboid};
-  views.new_views = TakeViews(landmark, cuboid);
-  views.corrected_views = landmark.views.TakeCorrectedPoses(cuboid);
+  if (landmark.state != ObjectState::kProvisional) {
+    views.new_views = TakeViews(landmark, cuboid);
+    views.corrected_views = landmark.views.TakeCorrectedPoses(cuboid);
+  }
   const bool views_changed = !views.new_views.empty() || !views.corrected_views.empty();
   const bool tell = force || cuboid_changed || text_changed || moved;
   if (!tell && !views_changed) return;
   // Whatever is told is told in the corrected world, so the receivers must get there first.
   views.S_new_old = std::exchange(landmark.S_now_told, std::nullopt);
+  if (!landmark.has_field) views.S_new_old.reset();  // it begins in the corrected world
   if (tell || views.S_new_old) {
     landmark.published = ObjectUpdate{.id = landmark.id,
                                       .revision = ++landmark.revision,
@@ -185,13 +227,18 @@ void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
                                       .T_world_mesh = {}};
     output->events.emplace_back(*landmark.published);
   }
-  if (cuboid_changed || moved || views_changed || views.S_new_old) output->views.push_back(std::move(views));
+  if (landmark.state == ObjectState::kProvisional) return;  // nothing is trained before it is sure
+  if (!landmark.has_field || cuboid_changed || moved || views_changed || views.S_new_old) {
+    landmark.has_field = true;
+    output->views.push_back(std::move(views));
+  }
 }
 
 std::vector<ObjectView> ObjectMapper::TakeViews(Landmark& landmark, const Cuboid& cuboid) {
   std::vector<ViewContext::Neighbour> neighbours;
   for (const auto& other : landmarks_) {
-    if (other->published && other->key != landmark.key) neighbours.push_back({other->key, other->published->cuboid});
+    if (other->IsConfirmed() && other->key != landmark.key)
+      neighbours.push_back({other->key, other->published->cuboid});
   }
   return landmark.views.Take({.object = landmark.id,
                               .cuboid = cuboid,
@@ -205,7 +252,8 @@ ObjectMapper::Output ObjectMapper::Reset() {
   Output output;
   for (const auto& landmark : landmarks_) {
     if (!landmark->published) continue;
-    output.events.emplace_back(ObjectRemoved{.id = landmark->id, .reason = "the map was begun anew"});
+    output.events.emplace_back(
+        ObjectRemoved{.id = landmark->id, .revision = ++landmark->revision, .reason = "the map was begun anew"});
   }
   landmarks_.clear();
   registry_ = {};

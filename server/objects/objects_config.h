@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "common/config.h"
 
 namespace romap {
@@ -8,13 +10,15 @@ namespace romap {
 struct ObjectsConfig {
   int min_mask_area_px = 120;
   double max_mask_area_share = 0.6;
-  int max_detections = 64;
+  int max_detections = 200;
+  std::string association = "scored";
   double match_min_score = 0.3;
   double mask_patience_s = 1.5;
 
   int confirm_frames = 6;
   int confirm_keyframes = 3;
   double confirm_parallax_deg = 10;
+  double confirm_seen_share = 0.2;
   int provisional_patience_frames = 40;
   int lost_after_frames = 90;
 
@@ -41,7 +45,10 @@ struct ObjectsConfig {
     fields.Add("max_mask_area_share", &max_mask_area_share,
                {.min = 0.05, .max = 1, .help = "Masks that fill more of the image are ignored"});
     fields.Add("max_detections", &max_detections,
-               {.unit = "masks", .min = 1, .max = 10000, .help = "Of more masks in one frame the largest are used"});
+               {.unit = "masks", .min = 1, .max = 254, .help = "Of more masks in one frame the largest are used"});
+    fields.Add("association", &association,
+               {.choices = {"scored", "greedy_iou"},
+                .help = "Masks to objects: all evidence and the best assignment, or the paper's overlap of boxes"});
     fields.Add("match_min_score", &match_min_score,
                {.min = 0, .max = 1, .help = "Least association score between a detection and an object"});
     fields.Add("mask_patience_s", &mask_patience_s,
@@ -52,6 +59,11 @@ struct ObjectsConfig {
                {.unit = "keyframes", .min = 2, .max = 100, .help = "Keyframe sightings before an object is announced"});
     fields.Add("confirm_parallax_deg", &confirm_parallax_deg,
                {.unit = "deg", .min = 1, .max = 90, .help = "Change of direction before an object is announced"});
+    fields.Add("confirm_seen_share", &confirm_seen_share,
+               {.min = 0,
+                .max = 1,
+                .help = "An object is a ghost when it is seen in a smaller share of the frames that "
+                        "ought to show it"});
     fields.Add("provisional_patience_frames", &provisional_patience_frames,
                {.unit = "frames", .min = 1, .max = 10000, .help = "An unconfirmed object dies after so long unseen"});
     fields.Add("lost_after_frames", &lost_after_frames,
