@@ -1,0 +1,161 @@
+#include "server/objects/association.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "server/objects/projection.h"
+
+namespace romap {
+namespace {
+
+using ::testing::NotNull;
+
+// A camera at the world's origin that looks along z at cubes of 20 cm, 2 m away, each with its landmark.
+class AssociationTest : public ::testing::Test {
+ protected:
+  AssociationTest() {
+    frame_->frame_id = 1;
+    frame_->camera = {.width_px = 320, .height_px = 240, .fx_px = 300, .fy_px = 300, .cx_px = 160, .cy_px = 120};
+    frame_->has_masks = true;
+    frame_->labels = cv::Mat::zeros(240, 320, CV_16UC1);
+    tracked_.frame = frame_;
+  }
+
+  Landmark& AddCube(double x_mu, const std::string& class_name, double z_mu = 2) {
+    auto landmark = std::make_unique<Landmark>(static_cast<LandmarkKey>(landmarks_.size() + 1), config_);
+    landmark->state = ObjectState::kConfirmed;
+    landmark->cuboid = Cuboid{.T_world_object = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x_mu, 0, z_mu)},
+                              .half_extents = Eigen::Vector3d::Constant(0.1)};
+    for (double share : {-0.8, -0.3, 0.3, 0.8}) {
+      for (double other : {-0.8, 0.0, 0.8}) {
+        landmark->body_world.push_back(landmark->cuboid->T_world_object * Eigen::Vector3d(0.1 * share, 0.1 * other, 0));
+      }
+    }
+    landmark->class_evidence[class_name] = 10;
+    landmark->sightings = 10;
+    landmark->last_frame = 9;
+    landmark->last_box_px = BoxOf(*landmark);
+    landmarks_.push_back(std::move(landmark));
+    return *landmarks_.back();
+  }
+
+  cv::Rect BoxOf(const Landmark& landmark) const {
+    return ProjectCuboid(*landmark.cuboid, 1, frame_->camera, tracked_.T_world_camera);
+  }
+
+  void AddMask(uint16_t label, const cv::Rect& box, const std::string& class_name) {
+    cv::rectangle(frame_->labels, box, cv::Scalar(label), cv::FILLED);
+    frame_->instances.push_back({.label = label, .class_name = class_name, .track_id = {}});
+  }
+
+  Association Run() {
+    return Associate(tracked_, ExtractDetections(*frame_, config_), landmarks_, /*frame_index=*/10, 2, config_);
+  }
+
+  ObjectsConfig config_;
+  std::shared_ptr<Frame> frame_ = std::make_shared<Frame>();
+  TrackedFrame tracked_;
+  std::vector<std::unique_ptr<Landmark>> landmarks_;
+};
+
+TEST_F(AssociationTest, IdenticalNeighboursKeepTheirMasks) {
+  AddCube(-0.15, "cup");
+  AddCube(0.15, "cup");
+  AddMask(3, BoxOf(*landmarks_[1]), "cup");
+  AddMask(8, BoxOf(*landmarks_[0]), "cup");
+  const Association association = Run();
+  ASSERT_EQ(association.matches.size(), 2u);
+  EXPECT_EQ(association.matches[0].landmark, 1);
+  EXPECT_EQ(association.matches[1].landmark, 0);
+  EXPECT_EQ(association.matches[0].doubt, nullptr);
+}
+
+TEST_F(AssociationTest, AFlippedClassDoesNotDecide) {
+  AddCube(-0.15, "cup");
+  AddCube(0.15, "book");
+  AddMask(1, BoxOf(*landmarks_[0]), "book");
+  AddMask(2, BoxOf(*landmarks_[1]), "cup");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[1].landmark, 1);
+}
+
+TEST_F(AssociationTest, ClassDecidesWhereTheRestIsEqual) {
+  AddCube(0, "cup");
+  AddCube(0, "book");
+  AddMask(1, BoxOf(*landmarks_[0]), "book");
+  EXPECT_EQ(Run().matches[0].landmark, 1);
+}
+
+TEST_F(AssociationTest, AMaskOverTwoNeighboursIsDoubted) {
+  AddCube(-0.13, "cup");
+  AddCube(0.13, "cup");
+  AddMask(1, BoxOf(*landmarks_[0]) | BoxOf(*landmarks_[1]), "cup");
+  const Association association = Run();
+  EXPECT_GE(association.matches[0].landmark, 0);
+  EXPECT_THAT(association.matches[0].doubt, NotNull());
+  for (int cover : association.covered_by) EXPECT_EQ(cover, -1) << "a mask over two things covers none of them";
+  for (double visible : association.visible_share) EXPECT_LT(visible, 0.3) << "no thing is missed";
+}
+
+TEST_F(AssociationTest, AHiddenThingDoesNotSpoilTheMaskBeforeIt) {
+  AddCube(0, "box");
+  AddCube(0, "cup", 3);  // behind it, and smaller in the image
+  AddMask(1, BoxOf(*landmarks_[0]), "box");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[0].doubt, nullptr);
+  EXPECT_EQ(association.covered_by[1], 0);
+  EXPECT_LT(association.visible_share[1], 0.1);
+}
+
+TEST_F(AssociationTest, AThingWithoutMaskIsMissedInPlainView) {
+  AddCube(-0.15, "cup");
+  AddCube(0.15, "cup");
+  AddMask(1, BoxOf(*landmarks_[0]), "cup");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_DOUBLE_EQ(association.visible_share[1], 1);
+  EXPECT_EQ(association.covered_by[1], -1);
+}
+
+TEST_F(AssociationTest, FarAwayMasksAreNew) {
+  AddCube(0, "cup");
+  AddMask(1, {5, 5, 40, 40}, "cup");
+  EXPECT_EQ(Run().matches[0].landmark, -1);
+}
+
+TEST_F(AssociationTest, TheBestAssignmentIsNotTheGreediestOne) {
+  // The mask between both fits the left one best, but then the right one would go without.
+  AddCube(-0.06, "cup");
+  AddCube(0.06, "cup");
+  const cv::Rect left = BoxOf(*landmarks_[0]);
+  AddMask(1, left - cv::Point(8, 0), "cup");
+  AddMask(2, left + cv::Point(7, 0), "cup");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[1].landmark, 1);
+}
+
+TEST_F(AssociationTest, ThePapersRecipeKnowsOnlyTheFrameBefore) {
+  config_.association = "greedy_iou";
+  AddCube(-0.15, "cup");
+  AddCube(0.15, "cup").last_frame = 7;
+  AddMask(1, BoxOf(*landmarks_[0]), "cup");
+  AddMask(2, BoxOf(*landmarks_[1]), "cup");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[1].landmark, -1);
+}
+
+TEST_F(AssociationTest, WithoutMasksAllAreMissed) {
+  AddCube(0, "cup");
+  const Association association = Run();
+  EXPECT_TRUE(association.matches.empty());
+  EXPECT_DOUBLE_EQ(association.visible_share[0], 1);
+}
+
+}  // namespace
+}  // namespace romap
