@@ -127,18 +127,6 @@ TEST_F(AssociationTest, FarAwayMasksAreNew) {
   EXPECT_EQ(Run().matches[0].landmark, -1);
 }
 
-TEST_F(AssociationTest, TheBestAssignmentIsNotTheGreediestOne) {
-  // The mask between both fits the left one best, but then the right one would go without.
-  AddCube(-0.06, "cup");
-  AddCube(0.06, "cup");
-  const cv::Rect left = BoxOf(*landmarks_[0]);
-  AddMask(1, left - cv::Point(8, 0), "cup");
-  AddMask(2, left + cv::Point(7, 0), "cup");
-  const Association association = Run();
-  EXPECT_EQ(association.matches[0].landmark, 0);
-  EXPECT_EQ(association.matches[1].landmark, 1);
-}
-
 TEST_F(AssociationTest, ThePapersRecipeKnowsOnlyTheFrameBefore) {
   config_.association = "greedy_iou";
   AddCube(-0.15, "cup");
