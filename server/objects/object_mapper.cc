@@ -133,10 +133,14 @@ void ObjectMapper::UpdateLost(const Association& association, Output* output) {
 }
 
 void ObjectMapper::BuryGhosts(Output* output) {
+  Bury([&](const Landmark& landmark) { return WhyGhost(landmark); }, output);
+}
+
+void ObjectMapper::Bury(const std::function<const char*(const Landmark&)>& why, Output* output) {
   std::erase_if(landmarks_, [&](const auto& landmark) {
-    const char* reason = WhyGhost(*landmark);
+    const char* reason = why(*landmark);
     if (reason == nullptr) return false;
-    spdlog::debug("objects: landmark {} was a ghost: {} ({} sightings, {} expected)", landmark->key, reason,
+    spdlog::debug("objects: landmark {} goes: {} ({} sightings, {} expected)", landmark->key, reason,
                   landmark->sightings, landmark->expected);
     if (landmark->published) {
       output->events.emplace_back(
@@ -191,6 +195,11 @@ ObjectMapper::Output ObjectMapper::Finish() {
   FitShapes(keys);
   ConfirmProven(keys);
   MergeDuplicates(&output);
+  Bury(
+      [](const Landmark& landmark) {
+        return landmark.state == ObjectState::kProvisional ? "it never got sure" : nullptr;
+      },
+      &output);
   Output last;
   PublishAll(keys, &last);
   for (const auto& landmark : landmarks_) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -63,6 +64,8 @@ class ObjectMapper {
   void RecordCompany(const Association& association, size_t landmarks_before);
   void UpdateLost(const Association& association, Output* output);
   void BuryGhosts(Output* output);
+  // Takes out the landmarks for which `why` gives a reason.
+  void Bury(const std::function<const char*(const Landmark&)>& why, Output* output);
   const char* WhyGhost(const Landmark& landmark) const;
 
   // Per keyframe.

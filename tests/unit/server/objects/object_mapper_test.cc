@@ -24,6 +24,7 @@ struct Told {
   std::map<ObjectId, Cuboid> training_cuboid;
   std::map<ObjectId, int> first_told_at;  // frame
   std::vector<std::string> log;           // one line per event
+  std::map<ObjectId, uint64_t> gone;      // with the last revision
   int merged = 0;
   int lost = 0;
 };
@@ -32,6 +33,7 @@ void Take(const ObjectMapper::Output& output, int frame, Told* told) {
   for (const MapEvent& event : output.events) {
     if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
       EXPECT_GT(update->revision, told->objects[update->id].revision);
+      EXPECT_FALSE(told->gone.contains(update->id)) << update->id << " comes back from the dead";
       told->objects[update->id] = *update;
       told->first_told_at.try_emplace(update->id, frame);
       told->lost += update->state == ObjectState::kLost ? 1 : 0;
@@ -39,10 +41,15 @@ void Take(const ObjectMapper::Output& output, int frame, Told* told) {
       told->log.push_back(fmt::format("{} {} {} {:.9f} {:.9f} {:.9f}", update->id.ToString(), update->revision,
                                       update->class_name, p.x(), p.y(), p.z()));
     } else if (const auto* merge = std::get_if<ObjectMerged>(&event)) {
-      told->objects.erase(merge->from);
+      EXPECT_EQ(told->objects.erase(merge->from), 1u) << merge->from << " was never told";
+      EXPECT_TRUE(told->objects.contains(merge->into)) << merge->into;
+      EXPECT_GT(merge->revision, told->objects[merge->into].revision);
+      told->gone[merge->from] = merge->revision;
       ++told->merged;
     } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
-      told->objects.erase(removed->id);
+      EXPECT_GT(removed->revision, told->objects[removed->id].revision);
+      EXPECT_EQ(told->objects.erase(removed->id), 1u) << removed->id << " was never told";
+      told->gone[removed->id] = removed->revision;
     }
   }
   for (const ObjectViews& views : output.views) {
@@ -227,6 +234,37 @@ TEST(ObjectMapper, GhostsAreNeverTold) {
   const Told told = MapWorld(world);
   ExpectFound(world, told);
   for (const auto& [id, object] : told.objects) EXPECT_NE(object.class_name, "ghost");
+}
+
+// A landmark's way: provisional, then confirmed, or gone.
+TEST(ObjectMapper, WhatIsNotSureIsToldAsProvisionalAndTrainsNothing) {
+  SyntheticWorldOptions options;
+  // A mask on the table's rim that stays for a while, where nothing is.
+  for (int i = 6; i < 11; ++i) options.ghosts.push_back({i, {20 + 2 * i, 190, 30, 30}});
+  const SyntheticWorld world(options);
+  ObjectMapper mapper({});
+  Told told;
+  std::map<ObjectId, ObjectState> first_state;
+  for (int i = 0; i < world.frame_count(); ++i) {
+    const TrackedFrame frame = world.MakeFrame(i);
+    std::vector<ObjectMapper::Output> outputs = {mapper.ObserveFrame(frame)};
+    if (world.IsKeyframe(i)) outputs.push_back(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)));
+    for (const ObjectMapper::Output& output : outputs) {
+      Take(output, i, &told);
+      for (const MapEvent& event : output.events) {
+        if (const auto* update = std::get_if<ObjectUpdate>(&event)) first_state.try_emplace(update->id, update->state);
+      }
+      for (const ObjectViews& views : output.views) {
+        EXPECT_NE(told.objects.at(views.object).state, ObjectState::kProvisional);
+        EXPECT_FALSE(views.S_new_old) << "nothing was corrected";
+      }
+    }
+  }
+  for (const auto& [id, state] : first_state) EXPECT_EQ(state, ObjectState::kProvisional) << id;
+  EXPECT_GE(first_state.size(), 5u) << "the ghost, too, was told of";
+  Take(mapper.Finish(), world.frame_count(), &told);
+  for (const auto& [id, object] : told.objects) EXPECT_EQ(object.state, ObjectState::kConfirmed) << object.class_name;
+  EXPECT_EQ(told.objects.size(), 4u);
 }
 
 TEST(ObjectMapper, UpNeedNotBeZ) {
