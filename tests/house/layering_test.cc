@@ -45,6 +45,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/slam/optimise/", {"server/slam/optimise/", "common/"}},
     {"server/slam/places/", {"server/slam/places/", "server/slam/features/", "server/slam/slam_config.h", "common/"}},
     {"server/objects/", {"server/objects/", "common/"}},
+    {"server/objects/lines/", {"server/objects/lines/", "common/"}},
     {"server/nerf/", {"server/nerf/", "common/"}},
     {"server/mesh/", {"server/mesh/", "common/"}},
     {"server/session/", {"server/", "common/"}},

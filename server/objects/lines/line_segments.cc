@@ -1,0 +1,86 @@
+#include "server/objects/lines/line_segments.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/ximgproc/edge_drawing.hpp>
+
+namespace romap {
+namespace {
+
+// The detector smooths and leaves out the outermost pixels of an image.
+constexpr int kDetectorBorder_px = 4;
+
+std::vector<cv::Vec4f> DetectLines(const cv::Mat& grey, double min_length_px) {
+  // A new detector for each crop: one that is used again remembers tables of the last picture, and results would depend
+  // on what was seen before.
+  const cv::Ptr<cv::ximgproc::EdgeDrawing> detector = cv::ximgproc::createEdgeDrawing();
+  detector->params.EdgeDetectionOperator = cv::ximgproc::EdgeDrawing::SOBEL;
+  detector->params.GradientThresholdValue = 20;
+  detector->params.MinLineLength = static_cast<int>(min_length_px);
+  // The validation changes nothing for segments as long as ours, and OpenCV 4.6 leaks its tables.
+  detector->params.NFAValidation = false;
+  detector->detectEdges(grey);
+  std::vector<cv::Vec4f> lines;
+  detector->detectLines(lines);
+  return lines;
+}
+
+// Share of a segment that lies where `mask` is set, both in pixels of the crop.
+double InsideShare(const cv::Mat& mask, const LineSegment& segment) {
+  const int steps = std::max(1, static_cast<int>(std::ceil(segment.Length_px() / 2)));
+  int inside = 0;
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector2d p = segment.from_px + (segment.to_px - segment.from_px) * i / steps;
+    const int u = std::clamp(static_cast<int>(std::lround(p.x())), 0, mask.cols - 1);
+    const int v = std::clamp(static_cast<int>(std::lround(p.y())), 0, mask.rows - 1);
+    inside += mask.at<uint8_t>(v, u) != 0 ? 1 : 0;
+  }
+  return static_cast<double>(inside) / (steps + 1);
+}
+
+// Lines of a crop in its own pixels, found in a smaller picture of it when it is large.
+std::vector<LineSegment> SegmentsOf(const cv::Mat& crop_bgr, double min_length_px, double max_crop_px2) {
+  cv::Mat grey;
+  cv::cvtColor(crop_bgr, grey, cv::COLOR_BGR2GRAY);
+  const double shrink = std::sqrt(std::min(1.0, max_crop_px2 / static_cast<double>(grey.total())));
+  if (shrink < 1) cv::resize(grey, grey, {}, shrink, shrink, cv::INTER_AREA);
+  // Per axis, because the size of the small picture is rounded.
+  const Eigen::Array2d grow(static_cast<double>(crop_bgr.cols) / grey.cols,
+                            static_cast<double>(crop_bgr.rows) / grey.rows);
+  const auto to_crop = [&](float u, float v) -> Eigen::Vector2d { return (Eigen::Array2d(u, v) + 0.5) * grow - 0.5; };
+  std::vector<LineSegment> segments;
+  for (const cv::Vec4f& line : DetectLines(grey, min_length_px * shrink)) {
+    segments.push_back({to_crop(line[0], line[1]), to_crop(line[2], line[3])});
+  }
+  return segments;
+}
+
+}  // namespace
+
+std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Mat& labels, uint16_t label,
+                                          const cv::Rect& box_px, const LineSegmentOptions& options) {
+  const int margin_px = options.rim_px + kDetectorBorder_px;
+  const cv::Rect wide(box_px.x - margin_px, box_px.y - margin_px, box_px.width + 2 * margin_px,
+                      box_px.height + 2 * margin_px);
+  const cv::Rect crop = wide & cv::Rect({}, image_bgr.size());
+  const double min_length_px =
+      std::max(options.min_length_px, options.min_length_share * std::hypot(box_px.width, box_px.height));
+  if (std::min(crop.width, crop.height) <= 2 * kDetectorBorder_px) return {};
+  cv::Mat mask = labels(crop) == label;
+  const int rim_size_px = 2 * options.rim_px + 1;
+  cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {rim_size_px, rim_size_px}));
+
+  std::vector<LineSegment> segments = SegmentsOf(image_bgr(crop), min_length_px, options.max_crop_px2);
+  std::erase_if(segments, [&](const LineSegment& segment) {
+    return segment.Length_px() < min_length_px || InsideShare(mask, segment) < options.min_inside_share;
+  });
+  std::stable_sort(segments.begin(), segments.end(),
+                   [](const LineSegment& a, const LineSegment& b) { return a.Length_px() > b.Length_px(); });
+  if (segments.size() > options.max_segments) segments.resize(options.max_segments);
+  const Eigen::Vector2d corner_px(crop.x, crop.y);
+  for (LineSegment& segment : segments) segment = {segment.from_px + corner_px, segment.to_px + corner_px};
+  return segments;
+}
+
+}  // namespace romap

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace romap {
+
+// A straight edge in an image. Pixels of the whole pinhole image, pixel centres at integer coordinates.
+struct LineSegment {
+  Eigen::Vector2d from_px;
+  Eigen::Vector2d to_px;
+
+  double Length_px() const { return (to_px - from_px).norm(); }
+};
+
+struct LineSegmentOptions {
+  double min_length_px = 12;      // shorter ones have no direction to speak of
+  double min_length_share = 0.1;  // of the diagonal of the mask's box: shorter ones are texture
+  int rim_px = 3;                 // masks are not exact: an edge may lie so far outside
+  double min_inside_share = 0.9;  // of a segment's length, on the mask or its rim
+  size_t max_segments = 24;       // of more the longest are kept
+  double max_crop_px2 = 3e4;      // larger crops are shrunk to this area, so that the time stays bounded
+};
+
+// The straight edges on one mask and its rim, longest first. `image_bgr` CV_8UC3, `labels` CV_16UC1 of the same size;
+// `box_px` tight around the pixels of `label`. Only the crop around the box is looked at.
+// Source: C. Akinlar, C. Topal, "EDLines: a real-time line segment detector with a false detection control", PRL 2011.
+std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Mat& labels, uint16_t label,
+                                          const cv::Rect& box_px, const LineSegmentOptions& options = {});
+
+}  // namespace romap

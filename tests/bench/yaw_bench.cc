@@ -1,0 +1,183 @@
+// Yaw from line segments against a sequence's objects.yaml, with its own poses and masks.
+//
+//   yaw_bench DIR...
+//
+// Takes each object's silhouettes as the object mapper would (keyframes 3 degrees apart, at most 36) and prints its yaw
+// error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2 degrees about x and
+// about y, and for runs of the first, second, ... few views; and the yaw of the principal axis of its map points.
+
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "server/objects/angles.h"
+#include "server/objects/detections.h"
+#include "server/objects/lines/line_segments.h"
+#include "server/objects/lines/yaw_from_lines.h"
+#include "server/objects/pca_yaw.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+
+namespace romap {
+namespace {
+
+double UserSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
+}
+
+cv::Mat Decode(const std::string& bytes, int flags) {
+  if (bytes.empty()) return {};
+  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+  return cv::imdecode(raw, flags);
+}
+
+std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraModel& camera) {
+  auto frame = std::make_shared<Frame>();
+  frame->frame_id = input.frame_id;
+  frame->timestamp_ns = input.timestamp_ns;
+  frame->camera = camera;
+  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
+  frame->has_masks = !input.label_png.empty();
+  if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
+  frame->T_world_camera = input.T_world_camera;
+  return frame;
+}
+
+// What was seen of one object.
+struct Seen {
+  std::vector<Eigen::Matrix3d> R_world_camera;
+  std::vector<std::vector<LineSegment>> segments;
+  std::vector<Eigen::Vector3d> directions;
+  std::map<MapPointId, int> points;  // and how often each lay on the mask
+};
+
+struct Run {
+  std::map<int64_t, Seen> objects;  // by label
+  std::map<MapPointId, Eigen::Vector3d> points;
+  double find_s = 0;
+  int crops = 0;
+  double crop_area_px2 = 0;
+};
+
+void Look(const KeyframeView& view, const ObjectsConfig& config, Run& run) {
+  const Frame& frame = *view.frame;
+  for (const MapPoint& point : view.points) run.points[point.id] = point.position_world;
+  for (const PointObservation& observation : view.observations) {
+    if (observation.label != 0) ++run.objects[observation.label].points[observation.point];
+  }
+  for (const Detection& detection : ExtractDetections(frame, config)) {
+    Seen& seen = run.objects[detection.label];
+    const Eigen::Vector2d middle_px = detection.BoxCenter();
+    const Eigen::Vector3d direction =
+        view.T_world_camera.rotation() * frame.camera.Unproject(middle_px.x(), middle_px.y());
+    const bool redundant = std::any_of(seen.directions.begin(), seen.directions.end(), [&](const auto& other) {
+      return AngleBetween(other, direction) < config.silhouette_angle_deg * kRadPerDeg;
+    });
+    if (redundant || seen.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
+    const double start = UserSeconds();
+    seen.segments.push_back(FindLineSegments(frame.image_bgr, frame.labels, detection.label, detection.box_px));
+    run.find_s += UserSeconds() - start;
+    seen.directions.push_back(direction);
+    seen.R_world_camera.push_back(view.T_world_camera.RotationMatrix());
+    run.crop_area_px2 += detection.box_px.area();
+    ++run.crops;
+  }
+}
+
+absl::StatusOr<Run> LookAtSequence(const Sequence& sequence) {
+  const SlamConfig slam;
+  const ObjectsConfig objects;
+  LocalMapSlot local_map;
+  Tracker tracker(slam, PoseUse::kGiven, &local_map);
+  SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
+  Run run;
+  for (size_t i = 0; i < sequence.size(); ++i) {
+    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
+    const MappedFrame mapped = sparse.Process(tracker.Track(DecodeFrame(input, sequence.camera())));
+    if (mapped.view) Look(*mapped.view, objects, run);
+  }
+  return run;
+}
+
+void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::span<const LineView> views) {
+  const double start = UserSeconds();
+  const auto yaw = YawFromLines(R_world_reference, views);
+  const double spent_ms = 1e3 * (UserSeconds() - start);
+  if (!yaw) {
+    std::printf(" %s none", name);
+    return;
+  }
+  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / kRadPerDeg, yaw->confidence, yaw->edges,
+              spent_ms);
+}
+
+void PrintRuns(const Eigen::Matrix3d& R_world_reference, std::span<const LineView> views) {
+  for (const size_t count : {1, 3, 6, 12}) {
+    std::printf("    by %2zu:", count);
+    for (size_t first = 0; first + count <= views.size(); first += count) {
+      const auto yaw = YawFromLines(R_world_reference, views.subspan(first, count));
+      if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / kRadPerDeg, yaw->confidence);
+    }
+    std::printf("\n");
+  }
+}
+
+void PrintObject(const Sequence& sequence, const Run& run, const ObjectRecord& truth) {
+  const auto found = run.objects.find(truth.id);
+  if (found == run.objects.end()) return;
+  const Seen& seen = found->second;
+  std::vector<LineView> views;
+  for (size_t i = 0; i < seen.segments.size(); ++i) {
+    views.push_back({sequence.camera(), seen.R_world_camera[i], seen.segments[i]});
+  }
+  const Eigen::Matrix3d R_true = truth.T_world_object.RotationMatrix();
+  std::printf("%-10s %2zu views", truth.name.c_str(), views.size());
+  PrintYaw("|", R_true, views);
+  const double tilt_rad = 2 * kRadPerDeg;
+  PrintYaw("| tilted", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX()) * R_true, views);
+  PrintYaw("|", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()) * R_true, views);
+  std::vector<Eigen::Vector3d> points;
+  for (const auto& [id, count] : seen.points) {
+    const auto position = run.points.find(id);
+    if (count >= 2 && position != run.points.end()) points.push_back(truth.T_world_object.Inverse() * position->second);
+  }
+  const auto pca_rad = PcaYaw(points);
+  std::printf(" | PCA of %zu points", points.size());
+  if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / kRadPerDeg, 90));
+  std::printf("\n");
+  PrintRuns(R_true, views);
+}
+
+int Main(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const auto sequence = Sequence::Open(argv[i]);
+    if (!sequence.ok() || !sequence->objects()) {
+      std::fprintf(stderr, "%s: %s\n", argv[i], sequence.ok() ? "no objects.yaml" : Message(sequence.status()).c_str());
+      return 2;
+    }
+    const auto run = LookAtSequence(*sequence);
+    if (!run.ok()) {
+      std::fprintf(stderr, "%s\n", Message(run.status()).c_str());
+      return 1;
+    }
+    std::printf("%s: %d crops of %.0f x %.0f px on average, %.3f ms each\n", argv[i], run->crops,
+                std::sqrt(run->crop_area_px2 / run->crops), std::sqrt(run->crop_area_px2 / run->crops),
+                1e3 * run->find_s / run->crops);
+    for (const ObjectRecord& truth : sequence->objects()->objects) PrintObject(*sequence, *run, truth);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) { return romap::Main(argc, argv); }
