@@ -8,115 +8,21 @@
 // of the first cuboid; and user time per frame and keyframe.
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
 #include "client/files/ply.h"
 #include "client/files/sequence.h"
 #include "common/config.h"
-#include "server/objects/object_mapper.h"
-#include "server/slam/sparse_mapper.h"
-#include "server/slam/tracker.h"
+#include "tests/bench/object_run.h"
 #include "tests/support/synthetic_world.h"
 
 namespace romap {
 namespace {
-
-double UserSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
-
-cv::Mat Decode(const std::string& bytes, int flags) {
-  if (bytes.empty()) return {};
-  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-  return cv::imdecode(raw, flags);
-}
-
-std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraModel& camera) {
-  auto frame = std::make_shared<Frame>();
-  frame->frame_id = input.frame_id;
-  frame->timestamp_ns = input.timestamp_ns;
-  frame->camera = camera;
-  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
-  frame->has_masks = !input.label_png.empty();
-  if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
-  frame->instances = input.instances;
-  frame->T_world_camera = input.T_world_camera;
-  return frame;
-}
-
-struct Told {
-  ObjectUpdate last;
-  size_t first_frame = 0;
-  size_t views = 0;
-  size_t cuboid_changes = 0;
-};
-
-struct Run {
-  std::map<ObjectId, Told> objects;
-  std::vector<std::string> gone;
-  double frames_s = 0;
-  double keyframes_s = 0;
-  double slowest_keyframe_s = 0;
-  int frames = 0;
-  int keyframes = 0;
-};
-
-void Record(const ObjectMapper::Output& output, size_t frame, Run& run) {
-  for (const MapEvent& event : output.events) {
-    if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
-      const auto [entry, is_new] = run.objects.try_emplace(update->id);
-      if (is_new) entry->second.first_frame = frame;
-      entry->second.last = *update;
-    } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
-      run.gone.push_back(
-          fmt::format("frame {}: {} merged into {}", frame, merged->from.ToString(), merged->into.ToString()));
-      run.objects.erase(merged->from);
-    } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
-      run.gone.push_back(fmt::format("frame {}: {} removed: {}", frame, removed->id.ToString(), removed->reason));
-      run.objects.erase(removed->id);
-    }
-  }
-  for (const ObjectViews& views : output.views) {
-    Told& told = run.objects[views.object];
-    told.views += views.new_views.size();
-    ++told.cuboid_changes;
-  }
-}
-
-absl::StatusOr<Run> MapSequence(const Sequence& sequence, const SlamConfig& slam, const ObjectsConfig& objects) {
-  LocalMapSlot local_map;
-  Tracker tracker(slam, PoseUse::kGiven, &local_map);
-  SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
-  ObjectMapper mapper(objects);
-  Run run;
-  for (size_t i = 0; i < sequence.size(); ++i) {
-    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
-    const MappedFrame mapped = sparse.Process(tracker.Track(DecodeFrame(input, sequence.camera())));
-    double start = UserSeconds();
-    Record(mapper.ObserveFrame(mapped.tracked), i, run);
-    run.frames_s += UserSeconds() - start;
-    ++run.frames;
-    if (!mapped.view) continue;
-    start = UserSeconds();
-    Record(mapper.ObserveKeyframe(*mapped.view), i, run);
-    const double keyframe_s = UserSeconds() - start;
-    run.keyframes_s += keyframe_s;
-    run.slowest_keyframe_s = std::max(run.slowest_keyframe_s, keyframe_s);
-    ++run.keyframes;
-  }
-  Record(mapper.Finish(), sequence.size(), run);
-  return run;
-}
 
 const ObjectRecord* NearestTrue(const Sequence& sequence, const Cuboid& cuboid) {
   const ObjectRecord* nearest = nullptr;
@@ -155,7 +61,7 @@ std::vector<Eigen::Vector3d> TrueSurface(const Sequence& sequence, const ObjectR
   return points;
 }
 
-void Print(const Sequence& sequence, const Run& run) {
+void Print(const Sequence& sequence, const ObjectRun& run) {
   for (const std::string& line : run.gone) std::printf("%s\n", line.c_str());
   double iou_sum = 0;
   for (const auto& [id, told] : run.objects) {
@@ -189,12 +95,13 @@ void Print(const Sequence& sequence, const Run& run) {
 }
 
 int Main(int argc, char** argv) {
-  SlamConfig slam;
-  ObjectsConfig objects;
+  ObjectRunOptions run_options;
+  run_options.damage.permute_labels = true;
   ConfigFields fields;
-  slam.Fields(fields);
-  objects.Fields(fields);
-  SequenceOptions options{.permute_labels_seed = 1};
+  fields.Section("slam");
+  run_options.slam.Fields(fields);
+  run_options.objects.Fields(fields);
+  SequenceOptions options;
   std::vector<std::string> assignments;
   std::string dir;
   for (int i = 1; i < argc; ++i) {
@@ -220,7 +127,7 @@ int Main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", Message(sequence.status()).c_str());
     return 2;
   }
-  const auto run = MapSequence(*sequence, slam, objects);
+  const auto run = RunObjects(*sequence, run_options);
   if (!run.ok()) {
     std::fprintf(stderr, "%s\n", Message(run.status()).c_str());
     return 1;

@@ -1,0 +1,275 @@
+// Measures the object map: runs tracking, sparse map and objects over sequences with ground truth, several times with
+// other seeds (of labels, tracking and damage) and with masks damaged as real detectors do it, and prints Markdown
+// tables.
+//
+//   object_quality SEQUENCE... [--poses given|none|both] [--seeds N] [--damage NAME|all]... [--objects]
+//                  [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N] [--draw DIR]
+//
+// --damage says which rows there are besides "none". --masks and --detections name the results of a real detector, and
+// then what was found is listed object by object. --poses none tracks the camera from the images; trajectory and
+// cuboids are then moved to the true world by the similarity that fits the trajectories best. The same options print
+// the same tables, whatever the number of jobs.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <opencv2/core/utility.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/eval/alignment.h"
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "tests/bench/object_run.h"
+#include "tests/bench/object_score.h"
+#include "tests/bench/object_tables.h"
+
+namespace romap {
+namespace {
+
+struct DamageKind {
+  std::string name;   // for --damage
+  std::string title;  // in tables
+  MaskDamage damage;
+  bool rare = false;  // belongs into the second table
+};
+
+std::vector<DamageKind> DamageKinds() {
+  return {
+      {"none", "as they are", {}},
+      {"drop", "30 % of the masks missing", {.drop_share = 0.3}},
+      {"rate", "on 5 frames a second", {.rate_hz = 5}},
+      {"border", "borders off by up to 4 px", {.border_px = 4}},
+      {"flips", "10 % of the classes wrong", {.class_flip_share = 0.1}},
+      {"merged", "neighbours merged in 5 % of the frames", {.merge_share = 0.05}},
+      {"late", "half a second late", {.late_s = 0.5}},
+      {"together",
+       "all of these together",
+       {.rate_hz = 5, .late_s = 0.5, .drop_share = 0.3, .border_px = 4, .merge_share = 0.05, .class_flip_share = 0.1}},
+      {"flicker", "missing 30 % of the time, for 10 frames on end", {.flicker_share = 0.3}, true},
+      {"split", "10 % split in two", {.split_share = 0.1}, true},
+      {"leak", "20 % leak over their border", {.leak_share = 0.2}, true},
+      {"ghosts", "a ghost in 30 % of the frames", {.ghost_share = 0.3}, true},
+      {"empty", "nothing found in 20 % of the frames", {.empty_share = 0.2}, true},
+      {"crowd", "200 instances in every frame", {.crowd = 200}, true}};
+}
+
+struct Options {
+  std::vector<std::string> sequences;
+  std::string poses = "given";
+  int seeds = 5;
+  std::vector<std::string> damages;
+  bool objects = false;
+  std::vector<std::string> assignments;
+  SequenceOptions files;
+  int jobs = 1;
+};
+
+// One run of many that do not depend on each other.
+struct Job {
+  const Sequence* sequence = nullptr;
+  ObjectRunOptions options;
+  ScoredRun* result = nullptr;
+  absl::Status status = absl::OkStatus();
+};
+
+absl::StatusOr<Similarity> TrueFromMap(const Sequence& sequence, const ObjectRun& run) {
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(sequence.dir() + "/groundtruth.txt"));
+  ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
+                         AlignTrajectories(run.trajectory, truth, Alignment::kSim3, /*max_dt_s=*/0.02));
+  return fit.gt_from_est;
+}
+
+absl::Status Execute(const Job& job) {
+  ROMAP_ASSIGN_OR_RETURN(const ObjectRun run, RunObjects(*job.sequence, job.options));
+  job.result->tracked_share = static_cast<double>(run.trajectory.size()) / run.frames;
+  const ObjectsYaml& truth = *job.sequence->objects();
+  absl::StatusOr<Similarity> true_from_map = Similarity{};
+  if (job.options.poses == PoseUse::kIgnore) true_from_map = TrueFromMap(*job.sequence, run);
+  if (!true_from_map.ok()) {
+    // Not tracked: nothing was found.
+    job.result->score = ScoreMap(truth, {}, {});
+    return absl::OkStatus();
+  }
+  job.result->score = ScoreMap(truth, run.Confirmed(), *true_from_map);
+  return absl::OkStatus();
+}
+
+void ExecuteAll(std::vector<Job>& jobs, int threads) {
+  std::atomic<size_t> next = 0, done = 0;
+  const auto work = [&] {
+    for (size_t i = next++; i < jobs.size(); i = next++) {
+      jobs[i].status = Execute(jobs[i]);
+      fmt::print(stderr, "\rrun {} of {} ", ++done, jobs.size());
+    }
+  };
+  std::vector<std::thread> others;
+  for (int i = 1; i < threads; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+  fmt::print(stderr, "\r");
+}
+
+class Measurement {
+ public:
+  Measurement(const Options& options, ObjectRunOptions base) : options_(options), base_(std::move(base)) {
+    for (const DamageKind& kind : DamageKinds()) {
+      const auto asked = [&](const char* name) {
+        return std::find(options.damages.begin(), options.damages.end(), name) != options.damages.end();
+      };
+      if (kind.name == "none" || asked("all") || asked(kind.name.c_str())) kinds_.push_back(kind);
+    }
+  }
+
+  absl::Status Open() {
+    for (const std::string& dir : options_.sequences) {
+      ROMAP_ASSIGN_OR_RETURN(Sequence sequence, Sequence::Open(dir, options_.files));
+      if (!sequence.objects()) return NotFound("{}: there is no objects.yaml", dir);
+      sequences_.push_back(std::move(sequence));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Measure(PoseUse poses) {
+    std::vector<SequenceRuns> results;
+    for (const Sequence& sequence : sequences_) {
+      // Without the slash that a folder's name may end with.
+      SequenceRuns runs{(std::filesystem::path(sequence.dir()) / ".").parent_path().filename().string(), {}};
+      for (const DamageKind& kind : kinds_) {
+        runs.rows.push_back({kind.title, std::vector<ScoredRun>(static_cast<size_t>(options_.seeds))});
+      }
+      results.push_back(std::move(runs));
+    }
+    std::vector<Job> jobs = Jobs(poses, results);
+    ExecuteAll(jobs, options_.jobs);
+    for (const Job& job : jobs) ROMAP_RETURN_IF_ERROR(job.status);
+    Print(poses, results);
+    return absl::OkStatus();
+  }
+
+ private:
+  std::vector<Job> Jobs(PoseUse poses, std::vector<SequenceRuns>& results) const {
+    std::vector<Job> jobs;
+    for (size_t s = 0; s < sequences_.size(); ++s) {
+      for (size_t k = 0; k < kinds_.size(); ++k) {
+        for (int seed = 1; seed <= options_.seeds; ++seed) {
+          Job job{&sequences_[s], base_, &results[s].rows[k].runs[static_cast<size_t>(seed - 1)]};
+          job.result->seed = seed;
+          job.options.poses = poses;
+          job.options.slam.seed = seed;
+          job.options.damage = kinds_[k].damage;
+          job.options.damage.permute_labels = true;
+          job.options.damage.seed = static_cast<uint64_t>(seed);
+          jobs.push_back(job);
+        }
+      }
+    }
+    return jobs;
+  }
+
+  void Print(PoseUse poses, const std::vector<SequenceRuns>& results) const {
+    fmt::print("## Camera poses {}, {} seeds\n\n{}\n", poses == PoseUse::kGiven ? "given" : "from the images",
+               options_.seeds, SequencesTable(results));
+    if (options_.objects) {
+      for (const SequenceRuns& sequence : results) fmt::print("{}:\n\n{}\n", sequence.sequence, ObjectsTable(sequence));
+    }
+    if (kinds_.size() > 1) {
+      PrintDamage(results, /*rare=*/false, "Damaged masks");
+      PrintDamage(results, /*rare=*/true, "Damaged masks, continued");
+    }
+    PrintExtra(results);
+    std::fflush(stdout);
+  }
+
+  // The rows of one table, the undamaged masks first.
+  void PrintDamage(std::vector<SequenceRuns> results, bool rare, const char* title) const {
+    bool any = false;
+    for (SequenceRuns& sequence : results) {
+      std::vector<DamageRuns> rows;
+      for (size_t k = 0; k < kinds_.size(); ++k) {
+        if (k > 0 && kinds_[k].rare != rare) continue;
+        any |= k > 0;
+        rows.push_back(sequence.rows[k]);
+      }
+      sequence.rows = rows;
+    }
+    if (any) fmt::print("{}:\n\n{}\n", title, DamageTable(results));
+  }
+
+  // What stands for no true object in the undamaged runs, and what is missing there.
+  void PrintExtra(const std::vector<SequenceRuns>& results) const {
+    for (const SequenceRuns& sequence : results) {
+      for (const DamageRuns& row : sequence.rows) {
+        for (const ScoredRun& run : row.runs) {
+          std::string line;
+          for (const TrueObject& object : run.score.objects) {
+            if (!object.found) line += fmt::format(" {} is missing;", object.name);
+          }
+          for (const ExtraObject& extra : run.score.extra) {
+            line += fmt::format(" {} ({}) is extra{};", extra.object.id.ToString(), extra.object.class_name,
+                                extra.overlaps.empty() ? "" : ", in the place of " + extra.overlaps);
+          }
+          if (!line.empty()) {
+            line.back() = '\n';
+            fmt::print("- {}, {}, seed {}:{}", sequence.sequence, row.damage, run.seed, line);
+          }
+        }
+      }
+    }
+  }
+
+  Options options_;
+  ObjectRunOptions base_;
+  std::vector<DamageKind> kinds_;
+  std::vector<Sequence> sequences_;
+};
+
+absl::Status MeasureAll(const Options& options) {
+  ObjectRunOptions base;
+  ConfigFields fields;
+  fields.Section("slam");
+  base.slam.Fields(fields);
+  base.objects.Fields(fields);
+  ROMAP_RETURN_IF_ERROR(fields.Set(options.assignments));
+  Measurement measurement(options, base);
+  ROMAP_RETURN_IF_ERROR(measurement.Open());
+  if (options.poses != "none") ROMAP_RETURN_IF_ERROR(measurement.Measure(PoseUse::kGiven));
+  if (options.poses != "given") ROMAP_RETURN_IF_ERROR(measurement.Measure(PoseUse::kIgnore));
+  return absl::OkStatus();
+}
+
+int Main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Measures the object map against ground truth");
+  app.add_option("sequences", options.sequences, "Folders of sequences")->required();
+  app.add_option("--poses", options.poses, "Camera poses: given, none or both")
+      ->check(CLI::IsMember({"given", "none", "both"}));
+  app.add_option("--seeds", options.seeds, "Runs with seeds 1 to so many")->check(CLI::PositiveNumber);
+  std::vector<std::string> names = {"all"};
+  for (const DamageKind& kind : DamageKinds()) names.push_back(kind.name);
+  app.add_option("--damage", options.damages, "How masks are damaged, besides not at all")->check(CLI::IsMember(names));
+  app.add_flag("--objects", options.objects, "Print the errors of each object too");
+  app.add_option("--set", options.assignments, "SECTION.FIELD=VALUE of the configuration, slam or objects");
+  app.add_option("--masks", options.files.masks, "List of mask images in the sequences");
+  app.add_option("--detections", options.files.detections, "What the labels of each frame mean");
+  app.add_option("--jobs", options.jobs, "So many runs at the same time")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  spdlog::set_level(spdlog::level::warn);
+  cv::setNumThreads(1);
+  if (const absl::Status status = MeasureAll(options); !status.ok()) {
+    fmt::print(stderr, "object_quality: {}\n", Message(status));
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) { return romap::Main(argc, argv); }

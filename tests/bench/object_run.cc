@@ -1,0 +1,162 @@
+#include "tests/bench/object_run.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "server/objects/object_mapper.h"
+#include "server/session/ingest.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+
+namespace romap {
+namespace {
+
+double UserSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
+}
+
+std::vector<std::string> ClassNames(const Sequence& sequence) {
+  std::set<std::string> names;
+  if (sequence.objects()) {
+    for (const ObjectRecord& record : sequence.objects()->objects) names.insert(record.class_name);
+  }
+  return {names.begin(), names.end()};
+}
+
+class Runner {
+ public:
+  Runner(const Sequence& sequence, const ObjectRunOptions& options)
+      : ingest_(sequence.camera()),
+        damager_(options.damage, ClassNames(sequence)),
+        tracker_(options.slam, options.poses, &local_map_),
+        sparse_mapper_(options.slam, &local_map_, /*inline_adjustment=*/true),
+        object_mapper_(options.objects) {}
+
+  absl::Status Take(const FrameInput& input) {
+    ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest_.Accept(input));
+    const MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
+    if (mapped.begun_anew) {
+      Record(object_mapper_.Reset());
+      tracked_.clear();
+    }
+    if (mapped.correction) Record(object_mapper_.Correct(*mapped.correction));
+    const double frame_start_s = UserSeconds();
+    Record(object_mapper_.ObserveFrame(mapped.tracked));
+    run_.frames_s += UserSeconds() - frame_start_s;
+    if (mapped.view) Observe(*mapped.view);
+    TakeLateMasks(input.timestamp_ns);
+    Remember(mapped.tracked);
+    ++run_.frames;
+    return absl::OkStatus();
+  }
+
+  ObjectRun Finish() {
+    TakeLateMasks(std::numeric_limits<int64_t>::max());
+    Record(object_mapper_.Correct(sparse_mapper_.Finish()));
+    Record(object_mapper_.Finish());
+    for (const Tracked& tracked : tracked_) run_.trajectory.push_back({tracked.timestamp_ns, PoseNow(tracked)});
+    return std::move(run_);
+  }
+
+ private:
+  // A frame's pose and what it hangs on, see TrackedFrame.
+  struct Tracked {
+    int64_t timestamp_ns = 0;
+    SE3<World, Camera> T_world_camera;
+    KeyframeId reference;
+    SE3<Camera, Camera> T_reference_camera;
+  };
+
+  void Observe(const KeyframeView& view) {
+    const double start_s = UserSeconds();
+    Record(object_mapper_.ObserveKeyframe(view));
+    const double keyframe_s = UserSeconds() - start_s;
+    run_.keyframes_s += keyframe_s;
+    run_.slowest_keyframe_s = std::max(run_.slowest_keyframe_s, keyframe_s);
+    ++run_.keyframes;
+  }
+
+  void TakeLateMasks(int64_t now_ns) {
+    const double start_s = UserSeconds();
+    while (const std::optional<FrameMasks> masks = damager_.TakeLateMasks(now_ns)) {
+      Record(object_mapper_.ObserveLateMasks(*masks));
+    }
+    run_.frames_s += UserSeconds() - start_s;
+  }
+
+  void Remember(const TrackedFrame& tracked) {
+    if (tracked.state != TrackingState::kTracking && tracked.state != TrackingState::kRelocalised) return;
+    tracked_.push_back(
+        {tracked.frame->timestamp_ns, tracked.T_world_camera, tracked.reference, tracked.T_reference_camera});
+  }
+
+  SE3<World, Camera> PoseNow(const Tracked& tracked) const {
+    if (!tracked.reference) return tracked.T_world_camera;
+    const auto reference = sparse_mapper_.map().Place(tracked.reference);
+    if (!reference) return tracked.T_world_camera;
+    const SE3<Camera, Camera>& T = tracked.T_reference_camera;
+    return reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+  }
+
+  void Record(const ObjectMapper::Output& output) {
+    const auto frame = static_cast<size_t>(run_.frames);
+    for (const MapEvent& event : output.events) {
+      if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
+        const auto [entry, is_new] = run_.objects.try_emplace(update->id);
+        if (is_new) entry->second.first_frame = frame;
+        entry->second.last = *update;
+      } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
+        Forget(merged->from, fmt::format("merged into {}", merged->into.ToString()));
+      } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
+        Forget(removed->id, fmt::format("removed: {}", removed->reason));
+      }
+    }
+    for (const ObjectViews& views : output.views) {
+      ToldObject& told = run_.objects[views.object];
+      told.views += views.new_views.size();
+      ++told.cuboid_changes;
+    }
+  }
+
+  void Forget(ObjectId id, const std::string& why) {
+    run_.gone.push_back(fmt::format("frame {}: {} {}", run_.frames, id.ToString(), why));
+    run_.objects.erase(id);
+  }
+
+  Ingest ingest_;
+  MaskDamager damager_;
+  LocalMapSlot local_map_;
+  Tracker tracker_;
+  SparseMapper sparse_mapper_;
+  ObjectMapper object_mapper_;
+  std::vector<Tracked> tracked_;
+  ObjectRun run_;
+};
+
+}  // namespace
+
+std::vector<ObjectUpdate> ObjectRun::Confirmed() const {
+  std::vector<ObjectUpdate> confirmed;
+  for (const auto& [id, told] : objects) {
+    if (told.last.state == ObjectState::kConfirmed) confirmed.push_back(told.last);
+  }
+  return confirmed;
+}
+
+absl::StatusOr<ObjectRun> RunObjects(const Sequence& sequence, const ObjectRunOptions& options) {
+  Runner runner(sequence, options);
+  for (size_t i = 0; i < sequence.size(); ++i) {
+    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
+    ROMAP_RETURN_IF_ERROR(runner.Take(input));
+  }
+  return runner.Finish();
+}
+
+}  // namespace romap

@@ -1,0 +1,90 @@
+#include "tests/bench/object_score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "client/eval/boxes_eval.h"
+#include "common/assignment.h"
+
+namespace romap {
+namespace {
+
+ObjectErrors Compare(const UprightBox& box, const UprightBox& truth) {
+  const Eigen::Vector3d shift_cm = 100 * (box.center - truth.center);
+  ObjectErrors errors;
+  errors.iou = IntersectionOverUnion(box, truth);
+  errors.center_cm = shift_cm.norm();
+  errors.in_plane_cm = shift_cm.head<2>().norm();
+  errors.yaw_deg = std::abs(std::remainder((box.yaw_rad - truth.yaw_rad) * 180 / std::numbers::pi, 90.0));
+  return errors;
+}
+
+// Which true object each box is matched with, -1 = none.
+std::vector<int> Match(const std::vector<UprightBox>& boxes, const std::vector<UprightBox>& truth) {
+  constexpr double kNever = 1e6;  // more than all admissible pairs together
+  Eigen::MatrixXd cost(boxes.size(), truth.size());
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    for (size_t j = 0; j < truth.size(); ++j) {
+      const double distance = (boxes[i].center - truth[j].center).norm() / truth[j].half_extents.norm();
+      const bool admissible = distance <= 1 && IntersectionOverUnion(boxes[i], truth[j]) > 0;
+      cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = admissible ? distance : kNever;
+    }
+  }
+  std::vector<int> match = AssignRows(cost);
+  for (size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0 && cost(static_cast<Eigen::Index>(i), match[i]) >= kNever) match[i] = -1;
+  }
+  return match;
+}
+
+}  // namespace
+
+size_t MapScore::Found() const {
+  return static_cast<size_t>(
+      std::count_if(objects.begin(), objects.end(), [](const TrueObject& object) { return object.found; }));
+}
+
+MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> objects, const Similarity& true_from_map) {
+  const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
+  std::vector<UprightBox> true_boxes, boxes;
+  MapScore score;
+  for (const ObjectRecord& record : truth.objects) {
+    true_boxes.push_back(MakeUpright((z_from_up * record.T_world_object.rotation()).toRotationMatrix(),
+                                     z_from_up * record.T_world_object.translation(), record.half_extents));
+    score.objects.push_back({.name = record.name, .errors = {}});
+  }
+  for (const ObjectUpdate& object : objects) {
+    const SE3<World, Object>& T = object.cuboid.T_world_object;
+    boxes.push_back(MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()),
+                                z_from_up * (true_from_map * T.translation()),
+                                true_from_map.scale * object.cuboid.half_extents));
+  }
+  if (boxes.empty() || true_boxes.empty()) {
+    for (const ObjectUpdate& object : objects) score.extra.push_back({object, ""});
+    return score;
+  }
+  const std::vector<int> match = Match(boxes, true_boxes);
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    if (match[i] < 0) continue;
+    const auto j = static_cast<size_t>(match[i]);
+    score.objects[j].found = true;
+    score.objects[j].errors = Compare(boxes[i], true_boxes[j]);
+    score.objects[j].errors.right_class = objects[i].class_name == truth.objects[j].class_name;
+  }
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    if (match[i] >= 0) continue;
+    ExtraObject extra{objects[i], ""};
+    double most = 0;
+    for (size_t j = 0; j < true_boxes.size(); ++j) {
+      const double iou = IntersectionOverUnion(boxes[i], true_boxes[j]);
+      if (!score.objects[j].found || iou <= most) continue;
+      most = iou;
+      extra.overlaps = score.objects[j].name;
+    }
+    score.extra.push_back(extra);
+  }
+  return score;
+}
+
+}  // namespace romap

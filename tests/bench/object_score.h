@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/eval/alignment.h"
+#include "client/files/objects_yaml.h"
+#include "common/messages.h"
+
+namespace romap {
+
+// How well one true object was mapped.
+struct ObjectErrors {
+  double iou = 0;          // of the upright boxes
+  double center_cm = 0;    // distance of the centres
+  double in_plane_cm = 0;  // its horizontal part
+  double yaw_deg = 0;      // modulo 90 degrees, 0..45: a cuboid has no front
+  bool right_class = false;
+};
+
+// A true object, and what was found of it.
+struct TrueObject {
+  std::string name;
+  bool found = false;
+  ObjectErrors errors;  // when found
+};
+
+// An object of the map that stands for no true one.
+struct ExtraObject {
+  ObjectUpdate object;
+  std::string
+      overlaps;  // the true object that it shares the most of its volume with and that is found already, or none
+};
+
+struct MapScore {
+  std::vector<TrueObject> objects;  // in the order of the truth
+  std::vector<ExtraObject> extra;
+
+  size_t Found() const;
+};
+
+// Pairs the objects of a map one to one with the true ones, such that the sum of the distances of their centres is the
+// least. A pair overlaps, and its centres lie no farther apart than half the true box's diagonal; everything else is
+// missing or extra. `true_from_map` takes the map's world to the true one; lengths there are metres.
+MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> objects, const Similarity& true_from_map);
+
+}  // namespace romap
