@@ -354,7 +354,10 @@ bool SparseMapper::TakeWholeAdjustment(bool wait) {
                 whole_->problem.keyframes.size(), whole_->problem.points.size(), summary.initial_rms_px,
                 summary.final_rms_px);
   const bool usable = summary.usable;
-  if (usable) ApplyWhole(whole_->problem, *map_);
+  if (usable) {
+    ApplyWhole(whole_->problem, *map_);
+    up_.LookAgain();
+  }
   whole_ = nullptr;
   if (usable && latest_) PublishLocalMap(latest_);
   return usable;

@@ -22,6 +22,8 @@ class WorldUp {
   // Called after each keyframe: a turn of the world that makes z up, if there is one worth making. Turns around the
   // world's origin.
   std::optional<Eigen::Quaterniond> Correct(const SlamMap& map);
+  // The map changed as a whole: Correct looks again at once.
+  void LookAgain() { next_try_ = 0; }
   // The world was turned as said.
   void Turned(const Eigen::Quaterniond& R_new_old);
 
