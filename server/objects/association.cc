@@ -184,6 +184,18 @@ bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<boo
   return false;
 }
 
+// Share of the body in the mask, and overlap of the mask's box with the cuboid's. Where the image or other masks cut
+// the landmark nothing is said.
+std::optional<double> Agreement(const Scene& scene, size_t d, size_t l) {
+  constexpr double kWhole = 0.95;
+  const BodySight& sight = scene.sights[l];
+  if (!sight.known || scene.projected[l].empty() || sight.share_in_image < kWhole) return std::nullopt;
+  const double in_mask = sight.share_in_detection[d];
+  const double under_others = sight.share_hidden - in_mask;
+  if (under_others > 1 - kWhole && under_others > 0.1 * in_mask) return std::nullopt;
+  return 0.5 * (in_mask + BoxIou(scene.projected[l], scene.detections[d].box_px));
+}
+
 int CoveringLandmark(const BodySight& sight, const std::vector<Match>& matches) {
   constexpr double kMost = 0.7;
   constexpr double kPlainlyInImage = 0.6;
@@ -239,6 +251,7 @@ std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
     const auto d = static_cast<size_t>(detection_of[l]);
     Match& match = matches[d];
     match.landmark = static_cast<int>(l);
+    match.agreement = Agreement(scene, d, l);
     if (CoversAnother(scene, d, l, matched)) {
       match.doubt = "it covers another thing as well";
     } else if (IsAmbiguous(scores, static_cast<Eigen::Index>(l), detection_of[l])) {

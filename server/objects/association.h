@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/messages.h"
@@ -17,6 +18,8 @@ struct Match {
   int landmark = -1;  // index into the landmarks; -1: none of them
   // The match is good enough to stay on track, but not to learn from: why. nullptr = nothing speaks against it.
   const char* doubt = nullptr;
+  // How well the mask agrees with what is known of the landmark's shape, 0..1; nullopt while nothing is.
+  std::optional<double> agreement;
 };
 
 // Which landmark each detection of a frame shows.

@@ -27,8 +27,10 @@ struct Landmark {
   uint64_t last_frame = 0;  // counted by the mapper, not the client's frame ids
   uint64_t sightings = 0;
   int keyframe_sightings = 0;
-  uint64_t expected = 0;   // frames in which it was seen or ought to have been
-  int missed_in_view = 0;  // frames without a sighting since the last one, though nothing hid it
+  uint64_t expected = 0;     // frames in which it was seen or ought to have been
+  int missed_in_view = 0;    // frames without a sighting since the last one, though nothing hid it
+  double agreement_sum = 0;  // of the sightings' masks with its shape (Match::agreement)
+  uint64_t agreement_count = 0;
   cv::Rect last_box_px;
   SE3<World, Camera> last_T_world_camera;
   std::optional<uint64_t> last_track_id;

@@ -78,6 +78,10 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracke
     Landmark& landmark = match.landmark < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(match.landmark)];
     current_.keys.push_back(landmark.key);
     current_.certain.push_back(match.doubt == nullptr);
+    if (match.agreement) {
+      landmark.agreement_sum += *match.agreement;
+      ++landmark.agreement_count;
+    }
     RecordSighting(landmark, current_.detections[d], tracked);
     if (landmark.state == ObjectState::kLost) {
       landmark.state = ObjectState::kConfirmed;
@@ -170,13 +174,14 @@ ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
   registry_.UpdatePositions(view);
   if (!view.frame || !view.T_world_camera.IsFinite()) return output;
   history_.AddKeyframe(view);
+  // Not from late views: what they say of up may have been corrected since.
+  if (view.up_world.allFinite() && view.up_world.norm() > 0.5) up_world_ = view.up_world.normalized();
   if (!current_.usable || view.frame->frame_id != current_.frame_id) return output;
   return ObserveMaskedKeyframe(view);
 }
 
 ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& view) {
   Output output;
-  if (view.up_world.allFinite() && view.up_world.norm() > 0.5) up_world_ = view.up_world.normalized();
   CountPointVotes(view);
   UpdateSceneDepth(view);
   CollectEvidence(view);
@@ -195,6 +200,7 @@ ObjectMapper::Output ObjectMapper::Finish() {
   FitShapes(keys);
   ConfirmProven(keys);
   MergeDuplicates(&output);
+  for (const auto& l : landmarks_) fprintf(stderr, "AGR %s %d sight %lu exp %lu agr %.2f n %lu par %.0f\n", l->BestClass().first.c_str(), (int)l->state, l->sightings, l->expected, l->agreement_count ? l->agreement_sum / l->agreement_count : -1, l->agreement_count, l->parallax_rad*57.3);
   Bury(
       [](const Landmark& landmark) {
         return landmark.state == ObjectState::kProvisional ? "it never got sure" : nullptr;

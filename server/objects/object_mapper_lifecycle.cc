@@ -95,8 +95,8 @@ bool ObjectMapper::IsAnnounceable(const Landmark& landmark) const {
   return landmark.cuboid && landmark.cuboid->half_extents.minCoeff() > 0 && landmark.sightings >= kFewestSightings;
 }
 
-// Two landmarks are one thing when one's body lies in the other's box and they were hardly ever seen side by side.
-// A detector that cuts things in pieces shows one thing as two at times; then mostly one mask covers both.
+// Two landmarks are one thing when one's body lies in the other's box and they were never seen side by side. A detector
+// that cuts things in pieces shows one thing as two at times; then mostly one mask covers both.
 bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
   if (!a.cuboid || !b.cuboid) return false;
   const double reach = a.cuboid->half_extents.norm() + b.cuboid->half_extents.norm();
@@ -107,9 +107,9 @@ bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
   };
   const double together = count(a.seen_beside, b.key);
   const double covered = count(a.covered_by, b.key) + count(b.covered_by, a.key);
-  const auto fewer_sightings = static_cast<double>(std::min(a.sightings, b.sightings));
-  const bool seen_as_two = together > std::max(2.0, 0.15 * fewer_sightings);
-  if (seen_as_two && covered <= together) return false;
+  // Every frame that shows both speaks for two, every one in which one mask lies over both for one.
+  const bool seen_as_two = together > 0;
+  if (seen_as_two && covered <= 2 * together) return false;
   const double overlap = std::max(ShareInside(*a.cuboid, b.body_world), ShareInside(*b.cuboid, a.body_world));
   const bool same_class = a.BestClass().first == b.BestClass().first;
   return overlap > (same_class && !seen_as_two ? 0.5 : 0.7);

@@ -3,7 +3,7 @@
 // tables.
 //
 //   object_quality SEQUENCE... [--poses given|none|both] [--seeds N] [--damage NAME|all]... [--objects]
-//                  [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N] [--draw DIR]
+//                  [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N] [--draw DIR] [--debug]
 //
 // --damage says which rows there are besides "none". --masks and --detections name the results of a real detector, and
 // then what was found is listed object by object. --poses none tracks the camera from the images; trajectory and
@@ -177,7 +177,12 @@ class Measurement {
     fmt::print("## Camera poses {}, {} seeds\n\n{}\n", poses == PoseUse::kGiven ? "given" : "from the images",
                options_.seeds, SequencesTable(results));
     if (options_.objects) {
-      for (const SequenceRuns& sequence : results) fmt::print("{}:\n\n{}\n", sequence.sequence, ObjectsTable(sequence));
+      for (const SequenceRuns& sequence : results) {
+        for (const DamageRuns& row : sequence.rows) {
+          fmt::print("{}, masks {}:\n\n{}\n", sequence.sequence, row.damage,
+                     ObjectsTable({.sequence = sequence.sequence, .rows = {row}}));
+        }
+      }
     }
     if (kinds_.size() > 1) {
       PrintDamage(results, /*rare=*/false, "Damaged masks");
@@ -211,9 +216,14 @@ class Measurement {
           for (const TrueObject& object : run.score.objects) {
             if (!object.found) line += fmt::format(" {} is missing;", object.name);
           }
-          for (const ExtraObject& extra : run.score.extra) {
+          constexpr size_t kMostNamed = 4;
+          for (size_t i = 0; i < std::min(kMostNamed, run.score.extra.size()); ++i) {
+            const ExtraObject& extra = run.score.extra[i];
             line += fmt::format(" {} ({}) is extra{};", extra.object.id.ToString(), extra.object.class_name,
                                 extra.overlaps.empty() ? "" : ", in the place of " + extra.overlaps);
+          }
+          if (run.score.extra.size() > kMostNamed) {
+            line += fmt::format(" and {} more are extra;", run.score.extra.size() - kMostNamed);
           }
           if (!line.empty()) {
             line.back() = '\n';
@@ -254,13 +264,15 @@ int Main(int argc, char** argv) {
   std::vector<std::string> names = {"all"};
   for (const DamageKind& kind : DamageKinds()) names.push_back(kind.name);
   app.add_option("--damage", options.damages, "How masks are damaged, besides not at all")->check(CLI::IsMember(names));
+  bool debug = false;
+  app.add_flag("--debug", debug, "Log why each mask was given to which object");
   app.add_flag("--objects", options.objects, "Print the errors of each object too");
   app.add_option("--set", options.assignments, "SECTION.FIELD=VALUE of the configuration, slam or objects");
   app.add_option("--masks", options.files.masks, "List of mask images in the sequences");
   app.add_option("--detections", options.files.detections, "What the labels of each frame mean");
   app.add_option("--jobs", options.jobs, "So many runs at the same time")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  spdlog::set_level(spdlog::level::warn);
+  spdlog::set_level(debug ? spdlog::level::debug : spdlog::level::warn);
   cv::setNumThreads(1);
   if (const absl::Status status = MeasureAll(options); !status.ok()) {
     fmt::print(stderr, "object_quality: {}\n", Message(status));
