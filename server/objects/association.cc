@@ -117,6 +117,7 @@ struct Scene {
   double scene_depth_mu;
   std::vector<BodySight> sights;    // per landmark
   std::vector<cv::Rect> projected;  // per landmark: its cuboid; empty = unknown
+  std::vector<cv::Rect> carried;    // per landmark: its last sighting; empty = too long ago
 };
 
 void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> scores) {
@@ -124,8 +125,10 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
   const BodySight& sight = scene.sights[l];
   const uint64_t gap = scene.frame_index - landmark.last_frame;
   const bool recent = gap <= kRecentFrames;
-  const cv::Rect carried =
-      recent ? CarryBox(landmark, scene.tracked, DepthOf(landmark, scene.scene_depth_mu)) : cv::Rect();
+  const cv::Rect& carried = scene.carried[l];
+  // A piece that was cut off a thing must not take its mask afterwards.
+  constexpr double kUnsure = 0.8;
+  const double trust = landmark.state == ObjectState::kProvisional ? kUnsure : 1;
   double total_evidence = 0;
   for (const auto& [name, evidence] : landmark.class_evidence) total_evidence += evidence;
   for (size_t d = 0; d < scene.detections.size(); ++d) {
@@ -142,7 +145,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
     if (recent && landmark.last_track_id && detection.track_id) {
       score.Add(0.1, *landmark.last_track_id == *detection.track_id ? 1 : 0);
     }
-    scores[static_cast<Eigen::Index>(d)] = score.Value();
+    scores[static_cast<Eigen::Index>(d)] = trust * score.Value();
     if (score.Value() > 0 && spdlog::should_log(spdlog::level::debug)) {
       spdlog::debug("objects: frame {}: label {} as landmark {}: {:.2f} (body {:.2f}, box {:.2f}, carried {:.2f})",
                     scene.tracked.frame->frame_id, detection.label, landmark.key, score.Value(),
@@ -196,12 +199,20 @@ std::optional<double> Agreement(const Scene& scene, size_t d, size_t l) {
   return 0.5 * (in_mask + BoxIou(scene.projected[l], scene.detections[d].box_px));
 }
 
-int CoveringLandmark(const BodySight& sight, const std::vector<Match>& matches) {
+// The landmark whose mask lies over landmark `l`, see Association::covered_by.
+int CoveringLandmark(const Scene& scene, size_t l, const std::vector<Match>& matches) {
   constexpr double kMost = 0.7;
   constexpr double kPlainlyInImage = 0.6;
-  if (!sight.known || sight.share_in_image < kPlainlyInImage) return -1;
+  const BodySight& sight = scene.sights[l];
+  const cv::Rect& carried = scene.carried[l];
   for (size_t d = 0; d < matches.size(); ++d) {
-    if (sight.share_in_detection[d] >= kMost && matches[d].doubt == nullptr) return matches[d].landmark;
+    if (matches[d].doubt != nullptr) continue;
+    // What has no body yet is compared by its box.
+    const double covered = sight.known ? (sight.share_in_image < kPlainlyInImage ? 0 : sight.share_in_detection[d])
+                           : carried.empty()
+                               ? 0
+                               : static_cast<double>((carried & scene.detections[d].box_px).area()) / carried.area();
+    if (covered >= kMost) return matches[d].landmark;
   }
   return -1;
 }
@@ -276,13 +287,16 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
               .frame_index = frame_index,
               .scene_depth_mu = scene_depth_mu,
               .sights = {},
-              .projected = {}};
+              .projected = {},
+              .carried = {}};
   Association association;
   for (const auto& landmark : landmarks) {
     const BodySight& sight = scene.sights.emplace_back(ProjectBody(*landmark, tracked, detections));
     scene.projected.push_back(landmark->cuboid
                                   ? ProjectCuboid(*landmark->cuboid, 1, tracked.frame->camera, tracked.T_world_camera)
                                   : cv::Rect());
+    const bool recent = frame_index - landmark->last_frame <= kRecentFrames;
+    scene.carried.push_back(recent ? CarryBox(*landmark, tracked, DepthOf(*landmark, scene_depth_mu)) : cv::Rect());
     association.visible_share.push_back(sight.share_in_image * (1 - sight.share_hidden));
   }
   const bool greedy = config.association == "greedy_iou";
@@ -292,7 +306,7 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
     if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;
   }
   for (size_t l = 0; l < landmarks.size(); ++l) {
-    association.covered_by.push_back(matched[l] ? -1 : CoveringLandmark(scene.sights[l], association.matches));
+    association.covered_by.push_back(matched[l] ? -1 : CoveringLandmark(scene, l, association.matches));
   }
   return association;
 }

@@ -162,6 +162,10 @@ const char* ObjectMapper::WhyGhost(const Landmark& landmark) const {
                : nullptr;
   }
   if (landmark.state != ObjectState::kProvisional) return nullptr;
+  constexpr uint64_t kMostlyCovered = 3;
+  for (const auto& [key, count] : landmark.covered_by) {
+    if (count > kMostlyCovered * std::max<uint64_t>(landmark.sightings, 3)) return "it is a piece of another thing";
+  }
   // What was seen often and then left the view may come back; what was seen twice will not.
   const uint64_t unseen = frame_index_ - landmark.last_frame;
   const auto patience = static_cast<uint64_t>(config_.provisional_patience_frames);
@@ -200,7 +204,6 @@ ObjectMapper::Output ObjectMapper::Finish() {
   FitShapes(keys);
   ConfirmProven(keys);
   MergeDuplicates(&output);
-  for (const auto& l : landmarks_) fprintf(stderr, "AGR %s %d sight %lu exp %lu agr %.2f n %lu par %.0f\n", l->BestClass().first.c_str(), (int)l->state, l->sightings, l->expected, l->agreement_count ? l->agreement_sum / l->agreement_count : -1, l->agreement_count, l->parallax_rad*57.3);
   Bury(
       [](const Landmark& landmark) {
         return landmark.state == ObjectState::kProvisional ? "it never got sure" : nullptr;
