@@ -20,8 +20,9 @@ void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<f
   nerf::SampleChunk chunk(kBatch, model_.layout.features, model_.mlp.hidden);
   std::array<size_t, kBatch> source;
   const Eigen::Vector3f half = box_.half_extents.cast<float>();
-  const float per_mu = static_cast<float>(1.0 / box_.side_mu);
+  const float per_mu = static_cast<float>(1.0 / box_.unit_mu);
   const Eigen::Vector3f extent = box_.ExtentUnit();
+  const nerf::GridPose grid = box_.GridPose();
   size_t next = 0;
   while (next < p_object.size()) {
     chunk.size = 0;
@@ -38,6 +39,7 @@ void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<f
       chunk.z[i] = std::clamp(p.z(), 0.0f, extent.z());
       source[i] = next;
     }
+    kernels.to_grid(grid, chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data());
     kernels.encode(model_.layout, model_.table.data(), chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                    chunk.features.data());
     kernels.mlp_forward(model_.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());

@@ -17,6 +17,10 @@ namespace {
 
 constexpr int kMostDivergences = 3;
 
+// Limits of carrying a field over to another box; beyond them a new training costs no more.
+constexpr double kMostUnknownShare = 0.8;  // of the new box, that lies outside the old one
+constexpr double kMostGrowth = 2.5;        // of the longest side since the hash grid was laid out
+
 NerfConfig WithWholeWidths(NerfConfig config) {
   config.hidden_width = (config.hidden_width + 15) / 16 * 16;
   return config;
@@ -38,14 +42,30 @@ absl::Status ObjectField::SetBox(const Cuboid& cuboid_new) {
   ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid_new));
   const Cuboid cuboid = Moved(S_new_first_.Inverse(), cuboid_new);
   if (has_box_ && box_.StillFits(cuboid)) return absl::OkStatus();
-  box_ = TrainingBox::Around(cuboid, config_.box_enlargement);
+  if (!has_box_ || !CarryOverTo(box_.Refitted(cuboid, config_.box_enlargement))) {
+    box_ = TrainingBox::Around(cuboid, config_.box_enlargement);
+    if (has_box_) Restart();
+  }
+  has_box_ = true;
+  divergences_ = 0;
+  views_changed_ = !views_.empty();
   hull_.Reset(box_);
   for (const ObjectView& view : views_) hull_.Add(view);
-  views_changed_ = !views_.empty();
-  divergences_ = 0;
-  if (has_box_) Restart();
-  has_box_ = true;
+  occupancy_.SetHull(hull_.Carve());
   return absl::OkStatus();
+}
+
+// Goes on in `box` with what was learned, if that has enough in common with the present one.
+bool ObjectField::CarryOverTo(const TrainingBox& box) {
+  const double unknown_share = 1 - box_.ShareCovered(box);
+  const double growth = box.LongestSide_mu() / box.unit_mu;
+  if (unknown_share > kMostUnknownShare || growth > kMostGrowth || growth < 1 / kMostGrowth) return false;
+  occupancy_.MoveTo(box_.ShareOf(box).cast<float>());
+  // A box that was too small made the field paint what lies outside on the box's walls. That must be able to go.
+  trainer_.Soften(static_cast<float>(1 - std::min(0.5, 2 * unknown_share)));
+  plan_.OnNewBox(steps(), unknown_share);
+  box_ = box;
+  return true;
 }
 
 absl::Status ObjectField::AddView(ObjectView view) {
@@ -100,7 +120,7 @@ double ObjectField::ShiftShare(const SE3<World, Camera>& T_old, const SE3<World,
     const Eigen::Vector3d p = sign.cwiseProduct(box_.half_extents);
     largest_mu = std::max(largest_mu, (T_new_object * p - T_old_object * p).norm());
   }
-  return largest_mu / box_.side_mu;
+  return largest_mu / box_.LongestSide_mu();
 }
 
 // The view whose direction to the object is nearest to that of `view`.
@@ -143,7 +163,8 @@ TrainStats ObjectField::Train(int steps, int threads) {
   const nerf::StepSource source{
       .ray = [this](uint64_t step, int index) { return rays_.Get(step, index); },
       .learning_rate = [this](uint64_t step) { return static_cast<float>(plan_.LearningRate(step)); },
-      .extent = {extent.x(), extent.y(), extent.z()}};
+      .extent = {extent.x(), extent.y(), extent.z()},
+      .grid = box_.GridPose()};
   TrainStats stats = trainer_.Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
   train_seconds_ += stats.wall_s;
   loss_ = stats.color_loss;

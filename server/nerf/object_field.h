@@ -24,8 +24,10 @@ class ObjectField {
   // The same seed, inputs and thread counts give the same field.
   ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed);
 
-  // The object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing; another one
-  // starts a new box and a new training. INVALID_ARGUMENT: pose or size that cannot be.
+  // The object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing. For another one
+  // the box is made anew and what is learned is carried over; training goes on, the longer the more of the new box is
+  // unknown. Only a box that has little in common with the old one starts a new training. INVALID_ARGUMENT: pose or
+  // size that cannot be.
   absl::Status SetBox(const Cuboid& cuboid);
 
   // Adds a view, or replaces the one of the same keyframe. FAILED_PRECONDITION: no box yet, or the view is of another
@@ -60,6 +62,7 @@ class ObjectField {
  private:
   absl::Status TakeView(ObjectView view);
   double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
+  bool CarryOverTo(const TrainingBox& box);
   void Restart();
   void PrepareViews();
   size_t MostRedundantView(const ObjectView& view) const;

@@ -21,7 +21,7 @@ void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box) {
   object_.clear();
   background_.clear();
   sparse_.clear();
-  side_mu_ = static_cast<float>(box.side_mu);
+  unit_mu_ = static_cast<float>(box.unit_mu);
   const SE3<Object, World> T_object_world = box.T_world_object.Inverse();
   double object_pixels = 0;
   for (const ObjectView& view : views) object_pixels += cv::countNonZero(KindMask(view, RayKind::kObject));
@@ -107,7 +107,7 @@ nerf::Ray RaySet::Get(uint64_t step, int index) const {
       ray.target.background[c] = nerf::RandomUniform(seed_, step, 8 * static_cast<uint64_t>(index) + 1 + c);
     }
   }
-  ray.target.depth = pixel.z_mu > 0 ? pixel.z_mu * norm / side_mu_ : -1.0f;
+  ray.target.depth = pixel.z_mu > 0 ? pixel.z_mu * norm / unit_mu_ : -1.0f;
   ray.target.is_object = !is_background;
   return ray;
 }

@@ -43,7 +43,7 @@ class RaySet {
 
   NerfConfig config_;
   uint64_t seed_;
-  float side_mu_ = 1;
+  float unit_mu_ = 1;
   int background_rays_ = 0;  // per step
   int sparse_rays_ = 0;
   std::vector<ViewCamera> cameras_;

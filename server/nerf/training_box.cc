@@ -18,12 +18,31 @@ TrainingBox TrainingBox::Around(const Cuboid& cuboid, double enlargement) {
   box.T_world_object = cuboid.T_world_object;
   const Eigen::Vector3d& half = cuboid.half_extents;
   box.half_extents = (half * (1.0 + enlargement)).cwiseMax((half.array() + kSmallestMargin * half.maxCoeff()).matrix());
-  box.side_mu = 2.0 * box.half_extents.maxCoeff();
+  box.unit_mu = box.LongestSide_mu();
   return box;
 }
 
+TrainingBox TrainingBox::Refitted(const Cuboid& cuboid, double enlargement) const {
+  TrainingBox box = Around(cuboid, enlargement);
+  const SE3<Object, Object> T_old_new = T_world_object.Inverse() * box.T_world_object;
+  box.unit_mu = unit_mu;
+  box.R_grid_box = R_grid_box * T_old_new.RotationMatrix();
+  box.corner_grid_unit = R_grid_box * ToUnit(T_old_new * (-box.half_extents)) + corner_grid_unit;
+  return box;
+}
+
+nerf::GridPose TrainingBox::GridPose() const {
+  nerf::GridPose pose;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) pose.rotation[r][c] = static_cast<float>(R_grid_box(r, c));
+    pose.shift[r] = static_cast<float>(corner_grid_unit[r]);
+  }
+  return pose;
+}
+
 TrainingBox TrainingBox::Moved(const Sim3<World, World>& S_new_old) const {
-  return {S_new_old.Moved(T_world_object), S_new_old.scale() * half_extents, S_new_old.scale() * side_mu};
+  return {S_new_old.Moved(T_world_object), S_new_old.scale() * half_extents, S_new_old.scale() * unit_mu, R_grid_box,
+          corner_grid_unit};
 }
 
 bool TrainingBox::StillFits(const Cuboid& cuboid) const {
@@ -38,6 +57,27 @@ bool TrainingBox::StillFits(const Cuboid& cuboid) const {
     if ((p.cwiseAbs().array() > half_extents.array()).any()) return false;
   }
   return cuboid.half_extents.prod() >= kSmallestFill * half_extents.prod();
+}
+
+Eigen::Affine3d TrainingBox::ShareOf(const TrainingBox& other) const {
+  const SE3<Object, Object> T_this_other = T_world_object.Inverse() * other.T_world_object;
+  const Eigen::Vector3d per_side = (2.0 * half_extents).cwiseInverse();
+  Eigen::Affine3d share;
+  share.linear() = per_side.asDiagonal() * T_this_other.RotationMatrix() * (2.0 * other.half_extents).asDiagonal();
+  share.translation() = per_side.cwiseProduct(T_this_other * (-other.half_extents) + half_extents);
+  return share;
+}
+
+double TrainingBox::ShareCovered(const TrainingBox& other) const {
+  constexpr int kProbes = 8;  // per axis
+  const Eigen::Affine3d share = ShareOf(other);
+  int inside = 0;
+  for (int i = 0; i < kProbes * kProbes * kProbes; ++i) {
+    const Eigen::Vector3d probe(i % kProbes, i / kProbes % kProbes, i / (kProbes * kProbes));
+    const Eigen::Vector3d at = share * ((probe.array() + 0.5) / kProbes).matrix();
+    if ((at.array() >= 0).all() && (at.array() <= 1).all()) ++inside;
+  }
+  return inside / std::pow(kProbes, 3);
 }
 
 absl::Status ValidateCuboid(const Cuboid& cuboid) {

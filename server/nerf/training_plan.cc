@@ -20,6 +20,12 @@ void TrainingPlan::OnCorrectedView(uint64_t steps_done, double shift_share) {
   planned_steps_ = std::max(planned_steps_, std::min(extended, most));
 }
 
+void TrainingPlan::OnNewBox(uint64_t steps_done, double unknown_share) {
+  const double share = std::clamp(2 * unknown_share, 0.2, 1.0);  // of a whole training
+  const uint64_t wanted = steps_done + static_cast<uint64_t>(share * config_.full_budget_steps);
+  planned_steps_ = std::max(planned_steps_, wanted);
+}
+
 uint64_t TrainingPlan::AllowedSteps(int views, bool complete) const {
   if (views == 0) return 0;
   if (complete) return planned_steps_;

@@ -23,6 +23,10 @@ class TrainingPlan {
   // proportion, up to a whole new training.
   void OnCorrectedView(uint64_t steps_done, double shift_share);
 
+  // The training box was replaced; `unknown_share` of the new one, 0..1, lies outside the old one. The plan is extended
+  // in proportion, between a fifth of a new training and the whole.
+  void OnNewBox(uint64_t steps_done, double unknown_share);
+
   // Steps allowed so far. `complete`: no more views are expected, so train to the end of the plan.
   uint64_t AllowedSteps(int views, bool complete) const;
   double LearningRate(uint64_t step) const;

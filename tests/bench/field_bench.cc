@@ -1,8 +1,11 @@
 // Trains the objects of a sequence with true cuboids, poses and masks, and says what it cost:
 //   field_bench SEQUENCE [OUT] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0] [--steps 0] [--threads 2]
 //               [--loosen 0] [--seed 1] [--depth] [--masks mask.txt]
+//               [--first-steps 0] [--first-scale 1 1 1] [--first-yaw-deg 0]
 // Every `every`-th frame becomes a view. `loosen` 0.2 makes the cuboids 20 % longer. `steps` 0 = the plan's full
-// budget. With OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
+// budget. `first-steps` are done in a box that is scaled along its axes, its lowest corner staying, and turned, before
+// the right one replaces it; the rows then tell of the last step in the wrong box, the next one, and the rest. With
+// OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -33,6 +36,9 @@ struct Options {
   int threads = 2;
   int seed = 1;
   double loosen = 0;
+  int first_steps = 0;
+  std::vector<double> first_scale = {1, 1, 1};
+  double first_yaw_deg = 0;
   bool depth = false;
   NerfConfig nerf;
   MeshConfig mesh;
@@ -123,18 +129,36 @@ void PrintRow(const std::string& name, int views, const TrainStats& stats, doubl
   std::fflush(stdout);
 }
 
+// The box of the first steps.
+Cuboid FirstBox(const ObjectRecord& object, const Options& options) {
+  const Eigen::Vector3d scale(options.first_scale[0], options.first_scale[1], options.first_scale[2]);
+  const Eigen::Vector3d half = object.half_extents.cwiseProduct(scale);
+  const Eigen::AngleAxisd turn(options.first_yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+  const SE3<Object, Object> T_object_first(Eigen::Quaterniond(turn), half - object.half_extents);
+  return {object.T_world_object * T_object_first, half, 1.0};
+}
+
 absl::Status BenchObject(const std::vector<DecodedFrame>& frames, ObjectRecord object, const Options& options) {
   object.half_extents *= 1.0 + options.loosen;
   ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
-  ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
+  const Cuboid right{object.T_world_object, object.half_extents, 1.0};
+  ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : right));
   const auto start = std::chrono::steady_clock::now();
   for (const DecodedFrame& frame : frames) {
     std::optional<ObjectView> view = MakeView(frame, object);
     if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
   }
   if (field.views() == 0) return absl::OkStatus();
-  const double setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const int steps = options.steps > 0 ? options.steps : static_cast<int>(field.AllowedSteps(true));
+  double setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.first_steps > 0) {
+    if (options.first_steps > 1) field.Train(options.first_steps - 1, options.threads);
+    PrintRow("wrong box", field.views(), field.Train(1, options.threads), setup_s);
+    const auto change = std::chrono::steady_clock::now();
+    ROMAP_RETURN_IF_ERROR(field.SetBox(right));
+    setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - change).count();
+    PrintRow("right box", field.views(), field.Train(1, options.threads), setup_s);
+  }
+  const int steps = options.steps > 0 ? options.steps : static_cast<int>(field.AllowedSteps(true) - field.steps());
   PrintRow(object.name, field.views(), field.Train(steps, options.threads), setup_s);
   return options.out.empty() ? absl::OkStatus() : WriteMesh(field.Snapshot(), object, options);
 }
@@ -170,6 +194,9 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads);
   app.add_option("--seed", options.seed);
   app.add_option("--loosen", options.loosen);
+  app.add_option("--first-steps", options.first_steps);
+  app.add_option("--first-scale", options.first_scale)->expected(3);
+  app.add_option("--first-yaw-deg", options.first_yaw_deg);
   app.add_flag("--depth", options.depth);
   CLI11_PARSE(app, argc, argv);
   romap::ConfigFields fields;

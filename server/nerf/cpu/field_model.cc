@@ -1,6 +1,7 @@
 #include "server/nerf/cpu/field_model.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "server/nerf/math/random.h"
@@ -19,17 +20,19 @@ GridLayout MakeGridLayout(const NerfConfig& config) {
     const uint64_t side = static_cast<uint64_t>(std::ceil(scale)) + 2;  // corners a shifted lattice can reach
     layout.scale[l] = static_cast<float>(scale);
     layout.offset[l] = layout.entries;
-    uint64_t count = side * side * side;
-    if (count <= table_entries) {
-      layout.stride_y[l] = static_cast<uint32_t>(side);
-      layout.stride_z[l] = static_cast<uint32_t>(side * side);
-      layout.mask[l] = 0xffffffffu;
+    uint64_t count = table_entries;
+    if (side * side * side <= table_entries) {
+      // A wider window than the first box needs leaves room for boxes that grow.
+      const auto widest = static_cast<uint64_t>(std::cbrt(static_cast<double>(table_entries)));
+      const uint64_t window = std::max(side, std::min(widest, side + side / 2));
+      count = std::bit_ceil(window * window * window);
+      layout.stride_y[l] = static_cast<uint32_t>(window);
+      layout.stride_z[l] = static_cast<uint32_t>(window * window);
     } else {
-      count = table_entries;
       layout.stride_y[l] = 2654435761u;  // large odd numbers spread rows over the table
       layout.stride_z[l] = 805459861u;
-      layout.mask[l] = static_cast<uint32_t>(table_entries - 1);
     }
+    layout.mask[l] = static_cast<uint32_t>(count - 1);
     // One entry more for the pair at the end, then on to a cache line of its own.
     layout.entries += static_cast<uint32_t>((count + 1 + 7) / 8 * 8);
   }

@@ -91,6 +91,10 @@ FieldTrainer::~FieldTrainer() = default;
 FieldTrainer::FieldTrainer(FieldTrainer&&) noexcept = default;
 FieldTrainer& FieldTrainer::operator=(FieldTrainer&&) noexcept = default;
 
+void FieldTrainer::Soften(float kept_share) {
+  for (size_t i = 0; i < model_.table.size(); ++i) model_.table[i] *= kept_share;
+}
+
 void FieldTrainer::ReleaseScratch() { workers_.clear(); }
 
 TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) {
@@ -156,6 +160,7 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
                           .skip_empty = config_.sampling == "occupied"};
   chunk.size = 0;
   kernels_->place_samples(worker.rays.data(), worker.ray_count, rule, chunk, worker.spans.data());
+  kernels_->to_grid(source.grid, chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data());
   worker.Book(TrainPhase::kSampling);
   kernels_->encode(model_.layout, model_.table.data(), chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                    chunk.features.data());

@@ -18,6 +18,7 @@ struct StepSource {
   std::function<Ray(uint64_t step, int index)> ray;
   std::function<float(uint64_t step)> learning_rate;
   std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
+  GridPose grid = {};
 };
 
 // Optimises a FieldModel by stochastic gradient descent on rays: render chunks of rays, collect gradients per thread,
@@ -32,6 +33,11 @@ class FieldTrainer {
 
   // `steps` more steps on `threads` threads (the caller is one of them). Nothing is allocated within a step.
   TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads);
+
+  // Makes a trained field ready to learn something else: its features shrink to `kept_share` (0..1] of what they are.
+  // What it shows stays much the same, but details are no longer so sure of themselves that new ones cannot displace
+  // them, which is what spoils warm starts (J. Ash, R. Adams, "On Warm-Starting Neural Network Training", 2020).
+  void Soften(float kept_share);
 
   // Gives back the memory that only Run() needs; the next Run() takes it again.
   void ReleaseScratch();

@@ -99,6 +99,18 @@ void PlaceSamples(const Ray* rays, int ray_count, const SamplingRule& rule, Samp
 
 // ----------------------------------------------------------------------------------------------------------- encoding
 
+template <class Wide>
+void ToGrid(const GridPose& pose, int count, float* x, float* y, float* z) {
+  using L = Lane<Wide>;
+  for (int i = 0; i < count; i += L::kLanes) {
+    Wide px = L::Load(x + i), py = L::Load(y + i), pz = L::Load(z + i);
+    MoveToGrid(pose, px, py, pz);
+    L::Store(px, x + i);
+    L::Store(py, y + i);
+    L::Store(pz, z + i);
+  }
+}
+
 // Cells of one point on Lane<Narrow>::kLanes levels from `level` on, in memory so that single lanes can be read.
 template <class Narrow>
 struct StoredCells {
@@ -264,6 +276,7 @@ template <class Wide, class Narrow, class Four, class Q>
 KernelTable MakeKernelTable(const char* name) {
   return {.name = name,
           .place_samples = PlaceSamples<Wide>,
+          .to_grid = ToGrid<Wide>,
           .encode = Encode<Narrow, Q>,
           .encode_backward = EncodeBackward<Narrow, Q>,
           .mlp_forward = MlpForward<Wide, Four>,

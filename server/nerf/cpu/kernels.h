@@ -17,7 +17,7 @@ inline constexpr int kOccupancyResolution = 64;  // one row of cells is one mach
 inline constexpr int kRayProbes = 64;            // probes of the occupancy grid along a ray, one bit each
 inline constexpr int kMaxSamplesPerRay = 64;
 
-// A ray in Unit space: lengths in units of the box's longest side, direction of unit length.
+// A ray in Unit space (see TrainingBox), direction of unit length.
 struct Ray {
   float origin[3];
   float direction[3];
@@ -27,7 +27,7 @@ struct Ray {
 
 struct SamplingRule {
   const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
-  std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space, <= 1
+  std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
   float finest_step = 0.01f;                // samples are not set closer than this, down to min_samples
   int min_samples = 4;
   int max_samples = 16;
@@ -40,7 +40,7 @@ struct SampleChunk {
 
   int capacity;
   int size = 0;
-  AlignedBuffer<float> x, y, z;           // Unit space
+  AlignedBuffer<float> x, y, z;           // Unit space of the box, then of the grid
   AlignedBuffer<float> t, length;         // along the ray and step, units of box side
   AlignedBuffer<uint32_t> cell;           // of the occupancy grid
   AlignedBuffer<float> features;          // [capacity][features]; backward: their gradient
@@ -59,7 +59,10 @@ struct KernelTable {
   // Places samples on `rays` and appends them to `chunk` (x, y, z, t, length, cell); `spans` has one entry per ray.
   void (*place_samples)(const Ray* rays, int ray_count, const SamplingRule& rule, SampleChunk& chunk, RaySpan* spans);
 
-  // features[count][layout.features] of points in Unit space.
+  // Moves points from the Unit space of the box to that of the grid.
+  void (*to_grid)(const GridPose& pose, int count, float* x, float* y, float* z);
+
+  // features[count][layout.features] of points in the grid's Unit space.
   void (*encode)(const GridLayout& layout, const float* table, int count, const float* x, const float* y,
                  const float* z, float* features);
   // Adds to gradient[entries][2].

@@ -1,5 +1,7 @@
 #include "server/nerf/cpu/occupancy.h"
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -41,6 +43,32 @@ void Occupancy::Reset() {
   layer_weight_ = {};
   for (size_t i = 0; i < score_.size(); ++i) score_[i] = 1.0f;
   Update();
+}
+
+void Occupancy::MoveTo(const Eigen::Affine3f& share_old_new) {
+  AlignedBuffer<float> moved(score_.size());
+  // Probes must not lie further apart than old cells, else they step over thin surfaces.
+  const float spread = share_old_new.linear().cwiseAbs().rowwise().sum().maxCoeff();
+  const int probes = std::clamp(static_cast<int>(std::ceil(spread)), 1, 4);
+  const Eigen::Matrix3f step = share_old_new.linear() / static_cast<float>(probes);
+  const Eigen::Vector3f origin = share_old_new.translation() * kSide + step * Eigen::Vector3f::Constant(0.5f);
+  for (int z = 0; z < kSide * probes; ++z) {
+    for (int y = 0; y < kSide * probes; ++y) {
+      const Eigen::Vector3f row = origin + step.col(1) * static_cast<float>(y) + step.col(2) * static_cast<float>(z);
+      float* to = moved.data() + (static_cast<size_t>(z / probes) * kSide + static_cast<size_t>(y / probes)) * kSide;
+      for (int x = 0; x < kSide * probes; ++x) {
+        const Eigen::Vector3f at = row + step.col(0) * static_cast<float>(x);
+        const bool inside = (at.array() >= 0).all() && (at.array() < kSide).all();
+        const auto index = [&](const Eigen::Vector3i& cell) {
+          return (cell.z() * kSide + cell.y()) * kSide + cell.x();
+        };
+        const float score = inside ? score_[static_cast<size_t>(index(at.cast<int>()))] : 1.0f;
+        to[x / probes] = std::max(to[x / probes], score);
+      }
+    }
+  }
+  score_ = std::move(moved);
+  layer_weight_ = {};
 }
 
 std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -19,6 +20,10 @@ class Occupancy {
   void SetHull(std::vector<uint8_t> hull);
   // Forgets the scores: all of the hull is occupied again.
   void Reset();
+  // The cells cover another box from now on; SetHull() must follow. A cell's score is the largest that the old cells
+  // under it had; cells outside the old box start occupied. `share_old_new` takes places in the new box to places in
+  // the old one, both as shares of the box's sides, 0..1 inside.
+  void MoveTo(const Eigen::Affine3f& share_old_new);
   // A sample in `cell` got `weight`: the score becomes the larger of that and the decayed score.
   void Record(uint32_t cell, float weight) {
     layer_weight_[0][cell % kOccupancyResolution] += weight;

@@ -14,6 +14,8 @@ ROMAP_MATH_BEGIN
 // The index of corner (x, y, z) is (x + y stride_y + z stride_z) & mask: a dense array where a level fits, a lattice
 // hash where it does not. Either way (x, x + 1) lie side by side, so that the eight corners of a cell are four pairs of
 // entries, each one load of four floats. Every level owns one entry more than its mask spans for the pair at its end.
+// The grid has no end: a dense level repeats beyond its array, so that no two corners of any window of stride_y^3
+// corners share an entry, wherever the window lies.
 
 // The four pairs of a cell and their weights, one level (or one lane per level).
 template <class F>
@@ -24,15 +26,16 @@ struct GridCell {
 };
 
 // Finds the cell of a point of Unit space on a level of `scale` cells per unit. The half shifts the lattices of the
-// levels against each other. Coordinates must be > -0.5 / scale.
+// levels against each other.
 template <class F>
 ROMAP_HD GridCell<F> LocateCell(F x_unit, F y_unit, F z_unit, F scale, typename Lane<F>::Int stride_y,
                                 typename Lane<F>::Int stride_z, typename Lane<F>::Int mask,
                                 typename Lane<F>::Int offset) {
   const F half = Lane<F>::Set(0.5f), one = Lane<F>::Set(1.0f);
   const F px = MulAdd(x_unit, scale, half), py = MulAdd(y_unit, scale, half), pz = MulAdd(z_unit, scale, half);
-  const auto ix = Lane<F>::Truncate(px), iy = Lane<F>::Truncate(py), iz = Lane<F>::Truncate(pz);
-  const F fy = py - Lane<F>::ToFloat(iy), fz = pz - Lane<F>::ToFloat(iz);
+  const F x0 = Floor(px), y0 = Floor(py), z0 = Floor(pz);
+  const auto ix = Lane<F>::Truncate(x0), iy = Lane<F>::Truncate(y0), iz = Lane<F>::Truncate(z0);
+  const F fy = py - y0, fz = pz - z0;
   const F gy = one - fy, gz = one - fz;
   const auto base = ix + iy * stride_y + iz * stride_z;
   const auto above = base + stride_z;
@@ -45,8 +48,23 @@ ROMAP_HD GridCell<F> LocateCell(F x_unit, F y_unit, F z_unit, F scale, typename 
   cell.weight[1] = fy * gz;
   cell.weight[2] = gy * fz;
   cell.weight[3] = fy * fz;
-  cell.along_x = px - Lane<F>::ToFloat(ix);
+  cell.along_x = px - x0;
   return cell;
+}
+
+// From the training box's Unit space to the grid's, in place.
+template <class F>
+ROMAP_HD void MoveToGrid(const GridPose& pose, F& x, F& y, F& z) {
+  const auto row = [&](int r) {
+    F sum = Lane<F>::Set(pose.shift[r]);
+    sum = MulAdd(Lane<F>::Set(pose.rotation[r][0]), x, sum);
+    sum = MulAdd(Lane<F>::Set(pose.rotation[r][1]), y, sum);
+    return MulAdd(Lane<F>::Set(pose.rotation[r][2]), z, sum);
+  };
+  const F gx = row(0), gy = row(1), gz = row(2);
+  x = gx;
+  y = gy;
+  z = gz;
 }
 
 // Trilinear value of one level: feature[0..1]. `pair` and `weight` are those of one lane, `step` apart in memory.

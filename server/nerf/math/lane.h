@@ -14,7 +14,7 @@
 ROMAP_MATH_BEGIN
 
 // What a formula needs of its lane type F, besides + - * /:
-//   MulAdd(a, b, c) = a b + c, Min, Max, Sqrt, and Lane<F> for loads, stores, constants, conversions and masks.
+//   MulAdd(a, b, c) = a b + c, Min, Max, Sqrt, Floor, and Lane<F> for loads, stores, constants, conversions and masks.
 // This is the plain form, one value per lane type; cpu/vector_lane-inl.h has the same for Highway vectors.
 template <class F>
 struct Lane;
@@ -23,6 +23,7 @@ ROMAP_HD float MulAdd(float a, float b, float c) { return a * b + c; }
 ROMAP_HD float Min(float a, float b) { return a < b ? a : b; }
 ROMAP_HD float Max(float a, float b) { return a > b ? a : b; }
 ROMAP_HD float Sqrt(float a) { return std::sqrt(a); }
+ROMAP_HD float Floor(float a) { return std::floor(a); }
 
 template <>
 struct Lane<float> {
@@ -46,8 +47,8 @@ struct Lane<float> {
     d = p[3];
   }
   static ROMAP_HD float Exp(float x) { return std::exp(x); }
-  // Towards zero; x must be in 0 .. 2^31.
-  static ROMAP_HD Int Truncate(float x) { return static_cast<uint32_t>(x); }
+  // Towards zero; |x| < 2^31. What is below 0 comes out modulo 2^32.
+  static ROMAP_HD Int Truncate(float x) { return static_cast<uint32_t>(static_cast<int32_t>(x)); }
   static ROMAP_HD float ToFloat(Int x) { return static_cast<float>(x); }
   // Index of the 32-bit word that holds bit `bit` of a bit array.
   static ROMAP_HD Int WordOfBit(Int bit) { return bit >> 5; }

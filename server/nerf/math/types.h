@@ -22,6 +22,13 @@ struct GridLayout {
   alignas(64) uint32_t offset[kMaxLevels] = {};
 };
 
+// How the Unit space of the training box lies in that of the hash grid: p_grid = rotation p_unit + shift, both in the
+// same unit of length. The grid stays where the first box was.
+struct GridPose {
+  float rotation[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  float shift[3] = {0, 0, 0};
+};
+
 // Where the samples of a ray lie in the sample arrays.
 struct RaySpan {
   int first = 0;  // sample

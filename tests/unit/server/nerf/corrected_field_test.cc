@@ -109,12 +109,16 @@ TEST(CorrectedFieldTest, ABoxThatLeansALittleIsNoReasonToStartAnew) {
   box.T_world_object = {box.T_world_object.rotation(), S * box.T_world_object.translation()};
   ASSERT_TRUE(field.SetBox(box).ok());
   EXPECT_EQ(field.steps(), 5u);
-  // Turned about the vertical by as much, it is another box.
+  const SE3<World, Object> T_world_leaning = field.Snapshot().T_world_object;
+  // Turned about the vertical by as much, it is another box, and an upright one.
   box.T_world_object =
       box.T_world_object * SE3<Object, Object>(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
                                                Eigen::Vector3d::Zero());
   ASSERT_TRUE(field.SetBox(box).ok());
-  EXPECT_EQ(field.steps(), 0u);
+  EXPECT_EQ(field.steps(), 5u);
+  const auto up = [](const SE3<World, Object>& T) { return (T.rotation() * Eigen::Vector3d::UnitZ()).z(); };
+  EXPECT_LT(up(T_world_leaning), std::cos(0.09));
+  EXPECT_NEAR(up(field.Snapshot().T_world_object), 1, 1e-9);
 }
 
 // Every third camera believes the object lower than it is, the others higher.

@@ -16,8 +16,8 @@ namespace {
 
 using testing::BallScene;
 using testing::BallSurfaceError;
-using testing::RawOnGrid;
 using ::testing::HasSubstr;
+using testing::RawOnGrid;
 
 NerfConfig FastConfig() {
   NerfConfig config;
@@ -185,7 +185,7 @@ TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
   EXPECT_EQ(field.Train(5, 1).steps, 0);
 }
 
-TEST(ObjectFieldTest, SmallBoxChangeKeepsTrainingAndBigOneRestarts) {
+TEST(ObjectFieldTest, OnlyABoxWithLittleInCommonStartsAnew) {
   const BallScene scene;
   ObjectField field = MakeField(scene, FastConfig());
   field.Train(10, 1);
@@ -196,7 +196,12 @@ TEST(ObjectFieldTest, SmallBoxChangeKeepsTrainingAndBigOneRestarts) {
                                                Eigen::Vector3d(0.02, 0, 0));
   ASSERT_TRUE(field.SetBox(box).ok());
   EXPECT_EQ(field.steps(), 10u);
+  EXPECT_NEAR(field.Snapshot().box_half_extents.x(), 1.1 * scene.radius_mu, 1e-5) << "it fits as it is";
   box.half_extents *= 1.5;
+  ASSERT_TRUE(field.SetBox(box).ok());
+  EXPECT_EQ(field.steps(), 10u);
+  EXPECT_NEAR(field.Snapshot().box_half_extents.x(), 1.1 * box.half_extents.x(), 1e-5);
+  box.half_extents *= 3;
   ASSERT_TRUE(field.SetBox(box).ok());
   EXPECT_EQ(field.steps(), 0u);
   EXPECT_EQ(field.views(), scene.views);
