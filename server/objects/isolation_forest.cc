@@ -1,96 +1,184 @@
 #include "server/objects/isolation_forest.h"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <random>
+#include <limits>
+#include <numeric>
 
 namespace romap {
 namespace {
 
-// Mean path length of an unsuccessful search in a binary search tree of n nodes: the length that paths are measured by.
-double MeanPathLength(size_t n) {
-  if (n <= 1) return 0;
-  if (n == 2) return 1;
-  const auto count = static_cast<double>(n);
-  constexpr double kEulerGamma = 0.5772156649;
-  return 2 * (std::log(count - 1) + kEulerGamma) - 2 * (count - 1) / count;
-}
-
-class IsolationTree {
+// Random numbers by counter: splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+class RandomStream {
  public:
-  IsolationTree(std::vector<Eigen::Vector3d> points, int max_depth, std::mt19937_64& random) {
-    Grow(points, max_depth, random);
-  }
-
-  double PathLength(const Eigen::Vector3d& point) const {
-    size_t index = 0;
-    double length = 0;
-    while (nodes_[index].left != 0) {
-      index = nodes_[index].normal.dot(point) < nodes_[index].offset ? nodes_[index].left : nodes_[index].right;
-      length += 1;
-    }
-    return length + nodes_[index].remaining_length;
+  RandomStream(uint64_t seed, uint64_t stream) : state_(Mix(Mix(seed) + stream)) {}
+  uint64_t Bits() { return Mix(state_ += kStep); }
+  float Uniform() { return static_cast<float>(Bits() >> 40) * (1.0f / 16777216.0f); }
+  // 0..n-1. The high half of a product is as good as a remainder, and needs no division.
+  uint32_t Below(uint32_t n) { return static_cast<uint32_t>(((Bits() >> 32) * n) >> 32); }
+  Eigen::Vector3f InCube() {
+    const float x = Uniform(), y = Uniform(), z = Uniform();
+    return {x, y, z};
   }
 
  private:
-  struct Node {
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-    double offset = 0;
-    size_t left = 0;  // 0: a leaf
-    size_t right = 0;
-    double remaining_length = 0;  // expected steps to isolate what a leaf still holds together
-  };
+  static constexpr uint64_t kStep = 0x9e3779b97f4a7c15ull;
+  static uint64_t Mix(uint64_t x) {
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+    return x ^ (x >> 31);
+  }
+  uint64_t state_;
+};
 
-  size_t Grow(std::span<Eigen::Vector3d> points, int depth_left, std::mt19937_64& random) {
-    const size_t index = nodes_.size();
-    nodes_.push_back({.remaining_length = MeanPathLength(points.size())});
-    if (depth_left == 0 || points.size() <= 1) return index;
-    Eigen::Vector3d low = points[0];
-    Eigen::Vector3d high = points[0];
-    for (const Eigen::Vector3d& p : points) {
+// Uniform among the directions of space, or of a random plane or line of the axes when the level is lower.
+Eigen::Vector3f DrawSlope(RandomStream& random, int extension_level) {
+  Eigen::Vector3f slope;
+  do {
+    slope = 2.0f * random.InCube() - Eigen::Vector3f::Ones();
+    std::array<int, 3> axes = {0, 1, 2};
+    for (uint32_t left = 3; left > static_cast<uint32_t>(extension_level) + 1; --left) {
+      std::swap(axes[random.Below(left)], axes[left - 1]);
+      slope[axes[left - 1]] = 0;
+    }
+  } while (slope.squaredNorm() > 1 || slope.squaredNorm() < 1e-6f);
+  return slope;
+}
+
+// Grows one tree into nodes of its own.
+class TreeGrower {
+ public:
+  TreeGrower(std::span<IsolationForest::Node> nodes, uint32_t first, int extension_level, RandomStream random)
+      : nodes_(nodes), first_(first), extension_level_(extension_level), random_(random) {}
+
+  void Grow(std::span<Eigen::Vector3f> points, uint32_t index, int depth, int depth_limit) {
+    Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
+    for (const Eigen::Vector3f& p : points) {
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> uniform(0, 1);
-    const Eigen::Vector3d slope(normal(random), normal(random), normal(random));
-    const Eigen::Vector3d share(uniform(random), uniform(random), uniform(random));
-    const double offset = slope.dot(low + share.cwiseProduct(high - low));
-    const auto middle =
-        std::partition(points.begin(), points.end(), [&](const Eigen::Vector3d& p) { return slope.dot(p) < offset; });
-    const auto left_count = static_cast<size_t>(middle - points.begin());
-    nodes_[index].normal = slope;
-    nodes_[index].offset = offset;
-    const size_t left = Grow(points.first(left_count), depth_left - 1, random);
-    const size_t right = Grow(points.subspan(left_count), depth_left - 1, random);
-    nodes_[index].left = left;
-    nodes_[index].right = right;
-    return index;
+    IsolationForest::Node& node = nodes_[index];
+    if (depth == depth_limit || points.size() <= 1 || low == high) {
+      node = {.offset = std::numeric_limits<float>::infinity(),
+              .child = first_ + index,
+              .path_length = static_cast<float>(depth + MeanPathLength(points.size()))};
+      return;
+    }
+    node.normal = DrawSlope(random_, extension_level_);
+    node.offset = node.normal.dot(low + random_.InCube().cwiseProduct(high - low));
+    const auto middle = std::partition(points.begin(), points.end(),
+                                       [&](const Eigen::Vector3f& p) { return node.normal.dot(p) < node.offset; });
+    const uint32_t child = used_;
+    used_ += 2;
+    node.child = first_ + child;
+    const auto left = static_cast<size_t>(middle - points.begin());
+    Grow(points.first(left), child, depth + 1, depth_limit);
+    Grow(points.subspan(left), child + 1, depth + 1, depth_limit);
   }
 
-  std::vector<Node> nodes_;
+ private:
+  std::span<IsolationForest::Node> nodes_;
+  uint32_t first_;  // index of nodes_[0] in the forest
+  uint32_t used_ = 1;
+  int extension_level_;
+  RandomStream random_;
 };
+
+// Calls `body(i)` for each i < count, on several threads where there is work for more than about a millisecond; less
+// is done before other threads have woken up.
+template <class Body>
+void ForEach(size_t count, size_t point_steps, const Body& body) {
+  constexpr size_t kWorthThreads = 1'000'000;
+  if (point_steps < kWorthThreads) {
+    for (size_t i = 0; i < count; ++i) body(i);
+  } else {
+    oneapi::tbb::parallel_for(size_t{0}, count, body);
+  }
+}
 
 }  // namespace
 
-std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options) {
+double MeanPathLength(size_t n) {
+  if (n <= 1) return 0;
+  if (n == 2) return 1;  // the formula's harmonic number is approximate
+  const auto count = static_cast<double>(n);
+  constexpr double kEulerGamma = 0.57721566490153286;
+  return 2 * (std::log(count - 1) + kEulerGamma) - 2 * (count - 1) / count;
+}
+
+IsolationForest::IsolationForest(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options)
+    : sample_size_(std::min(points.size(), static_cast<size_t>(std::max(1, options.sample_size)))) {
+  if (points.empty()) return;
+  const size_t trees = static_cast<size_t>(std::max(0, options.trees));
+  depth_limit_ = static_cast<int>(std::ceil(std::log2(static_cast<double>(sample_size_))));
+  center_ =
+      std::accumulate(points.begin(), points.end(), Eigen::Vector3d(0, 0, 0)) / static_cast<double>(points.size());
+  std::vector<Eigen::Vector3f> centered(points.size());
+  for (size_t i = 0; i < points.size(); ++i) centered[i] = (points[i] - center_).cast<float>();
+
+  // An empty side of a cut is a leaf too, so a tree is bounded by its depth and not only by its points.
+  const size_t room =
+      std::min((size_t{2} << depth_limit_) - 1, 2 * sample_size_ * static_cast<size_t>(depth_limit_) + 1);
+  nodes_.resize(trees * room);
+  roots_.resize(trees);
+  const int level = std::clamp(options.extension_level, 0, 2);
+  ForEach(trees, trees * sample_size_ * static_cast<size_t>(depth_limit_ + 1), [&](size_t tree) {
+    roots_[tree] = static_cast<uint32_t>(tree * room);
+    RandomStream random(options.seed, tree);
+    std::vector<Eigen::Vector3f> sample = centered;
+    for (size_t i = 0; i < sample_size_; ++i) {
+      std::swap(sample[i], sample[i + random.Below(static_cast<uint32_t>(sample.size() - i))]);
+    }
+    const std::span<Node> tree_nodes = std::span<Node>(nodes_).subspan(tree * room, room);
+    TreeGrower grower(tree_nodes, roots_[tree], level, random);
+    grower.Grow(std::span<Eigen::Vector3f>(sample).first(sample_size_), 0, 0, depth_limit_);
+  });
+}
+
+IsolationForest::IsolationForest(std::vector<Node> nodes, std::vector<uint32_t> roots, int depth_limit,
+                                 size_t sample_size)
+    : nodes_(std::move(nodes)), roots_(std::move(roots)), depth_limit_(depth_limit), sample_size_(sample_size) {}
+
+void IsolationForest::AddPaths(std::span<const Eigen::Vector3f> points, std::span<float> path_sums) const {
+  constexpr size_t kBlock = 32;
+  std::array<uint32_t, kBlock> at;
+  for (const uint32_t root : roots_) {
+    at.fill(root);
+    for (int step = 0; step < depth_limit_; ++step) {
+      for (size_t i = 0; i < points.size(); ++i) {
+        const Node& node = nodes_[at[i]];
+        at[i] = node.child + (node.normal.dot(points[i]) >= node.offset ? 1 : 0);
+      }
+    }
+    for (size_t i = 0; i < points.size(); ++i) path_sums[i] += nodes_[at[i]].path_length;
+  }
+}
+
+std::vector<double> IsolationForest::Scores(std::span<const Eigen::Vector3d> points) const {
+  const double mean_path = MeanPathLength(sample_size_);
   std::vector<double> scores(points.size(), 0.5);
-  if (points.size() < 4) return scores;
-  std::mt19937_64 random(options.seed);
-  const size_t sample_size = std::min(points.size(), static_cast<size_t>(options.sample_size));
-  const int max_depth = static_cast<int>(std::ceil(std::log2(static_cast<double>(sample_size))));
-  std::vector<double> path_sums(points.size(), 0);
-  std::vector<Eigen::Vector3d> pool(points.begin(), points.end());
-  for (int tree_index = 0; tree_index < options.trees; ++tree_index) {
-    for (size_t i = 0; i < sample_size; ++i) std::swap(pool[i], pool[i + random() % (pool.size() - i)]);
-    const IsolationTree tree({pool.begin(), pool.begin() + static_cast<std::ptrdiff_t>(sample_size)}, max_depth,
-                             random);
-    for (size_t i = 0; i < points.size(); ++i) path_sums[i] += tree.PathLength(points[i]);
-  }
-  for (size_t i = 0; i < points.size(); ++i) {
-    scores[i] = std::exp2(-path_sums[i] / options.trees / MeanPathLength(sample_size));
-  }
+  if (roots_.empty() || !(mean_path > 0)) return scores;
+  constexpr size_t kBlock = 32;
+  const size_t steps = points.size() * roots_.size() * static_cast<size_t>(depth_limit_);
+  ForEach((points.size() + kBlock - 1) / kBlock, steps, [&](size_t block) {
+    const size_t first = block * kBlock, count = std::min(kBlock, points.size() - first);
+    std::array<Eigen::Vector3f, kBlock> centered;
+    std::array<float, kBlock> path_sums = {};
+    for (size_t i = 0; i < count; ++i) centered[i] = (points[first + i] - center_).cast<float>();
+    AddPaths(std::span<const Eigen::Vector3f>(centered).first(count), std::span<float>(path_sums).first(count));
+    for (size_t i = 0; i < count; ++i) {
+      scores[first + i] = std::exp2(-path_sums[i] / static_cast<double>(roots_.size()) / mean_path);
+    }
+  });
   return scores;
+}
+
+std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options) {
+  if (points.size() < 4) return std::vector<double>(points.size(), 0.5);
+  return IsolationForest(points, options).Scores(points);
 }
 
 }  // namespace romap
