@@ -13,8 +13,8 @@ constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighbourhood
 constexpr int kNearShrink = 8;          // masks are shrunk so many times to tell what is close to one
 constexpr double kNearShare = 0.08;     // of the image's width
 
-// Distance along the feature's ray by the depth image, 0 where there is none or where the surface jumps.
-double RangeAt(const cv::Mat& depth_mu, const CameraModel& camera, const Feature& feature) {
+// z by the depth image, 0 where there is none or where the surface jumps.
+double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
   const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
   const int v = static_cast<int>(std::lround(feature.pixel_px.y()));
   if (u < 1 || v < 1 || u + 1 >= depth_mu.cols || v + 1 >= depth_mu.rows) return 0;
@@ -25,7 +25,7 @@ double RangeAt(const cv::Mat& depth_mu, const CameraModel& camera, const Feature
       if (!(z_mu > 0) || std::abs(z_mu - center_mu) > kMaxDepthJump * center_mu) return 0;
     }
   }
-  return center_mu * camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y()).norm();
+  return center_mu;
 }
 
 // Small image that is not 0 in and around masks.
@@ -76,28 +76,54 @@ bool FrameFeatures::HasDepth() const {
   return std::any_of(ranges_mu.begin(), ranges_mu.end(), [](double range_mu) { return range_mu > 0; });
 }
 
-std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features) {
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
+                                                       const RadialCorrection& lens) {
   auto sight = std::make_shared<FrameFeatures>();
   sight->frame_id = frame.frame_id;
   sight->timestamp_ns = frame.timestamp_ns;
   sight->camera = frame.camera;
   sight->features = std::move(features);
   const size_t count = sight->features.size();
-  sight->bearings_camera.reserve(count);
   sight->ranges_mu.assign(count, 0);
   sight->near_object.assign(count, 0);
   const cv::Mat around = frame.labels.empty() ? cv::Mat() : Surroundings(frame.labels);
   for (size_t i = 0; i < count; ++i) {
     const Feature& feature = sight->features[i];
-    sight->bearings_camera.push_back(frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y()).normalized());
-    if (!frame.depth_mu.empty()) sight->ranges_mu[i] = RangeAt(frame.depth_mu, frame.camera, feature);
+    sight->seen_px.push_back(feature.pixel_px);
+    const Eigen::Vector3d ray = frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y());
+    sight->bearings_camera.push_back(ray.normalized());
+    if (!frame.depth_mu.empty()) sight->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
     if (around.empty() || feature.label != 0) continue;
     const int u = std::clamp(static_cast<int>(feature.pixel_px.x()) / kNearShrink, 0, around.cols - 1);
     const int v = std::clamp(static_cast<int>(feature.pixel_px.y()) / kNearShrink, 0, around.rows - 1);
     sight->near_object[i] = around.at<uint8_t>(v, u) != 0 ? 1 : 0;
   }
   sight->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, sight->features);
-  return sight;
+  return WithLens(std::move(sight), lens);
+}
+
+std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> sight,
+                                              const RadialCorrection& lens) {
+  if (sight->lens == lens) return sight;
+  auto corrected = std::make_shared<FrameFeatures>(*sight);
+  corrected->lens = lens;
+  const CameraModel& camera = sight->camera;
+  for (size_t i = 0; i < sight->size(); ++i) {
+    const Eigen::Vector2d pixel_px = lens.Undistort(camera, sight->seen_px[i].cast<double>());
+    const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
+    corrected->features[i].pixel_px = pixel_px.cast<float>();
+    corrected->bearings_camera[i] = ray.normalized();
+    const double depth_mu = sight->ranges_mu[i] * sight->bearings_camera[i].z();
+    corrected->ranges_mu[i] = depth_mu * ray.norm();
+  }
+  corrected->grid = FeatureGrid(camera.width_px, camera.height_px, corrected->features);
+  return corrected;
+}
+
+std::vector<Feature> SeenFeatures(const FrameFeatures& sight) {
+  std::vector<Feature> features = sight.features;
+  for (size_t i = 0; i < features.size(); ++i) features[i].pixel_px = sight.seen_px[i];
+  return features;
 }
 
 }  // namespace romap

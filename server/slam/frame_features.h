@@ -7,6 +7,7 @@
 
 #include "common/messages.h"
 #include "server/slam/features/feature.h"
+#include "server/slam/optimise/radial_correction.h"
 
 namespace romap {
 
@@ -30,8 +31,10 @@ class FeatureGrid {
 struct FrameFeatures {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
-  CameraModel camera = {};  // pinhole
+  CameraModel camera = {};     // pinhole
+  RadialCorrection lens = {};  // by which features and bearings were corrected
   std::vector<Feature> features = {};
+  std::vector<Eigen::Vector2f> seen_px = {};          // where the picture shows them, before that
   std::vector<Eigen::Vector3d> bearings_camera = {};  // unit length; one per feature, as all below
   std::vector<double> ranges_mu = {};                 // by the depth image along the bearing, 0 = unknown
   std::vector<uint8_t> near_object = {};              // 1: outside every mask, but close to one
@@ -41,6 +44,12 @@ struct FrameFeatures {
   bool HasDepth() const;
 };
 
-std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features);
+// `features` are where the picture shows them.
+std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
+                                                       const RadialCorrection& lens = {});
+// The same frame, its features corrected by another lens. The same object, if it is no other.
+std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> sight, const RadialCorrection& lens);
+// The features where the picture shows them.
+std::vector<Feature> SeenFeatures(const FrameFeatures& sight);
 
 }  // namespace romap

@@ -12,6 +12,7 @@
 
 #include "common/messages.h"
 #include "server/slam/features/feature.h"
+#include "server/slam/optimise/radial_correction.h"
 
 namespace romap {
 
@@ -35,6 +36,7 @@ struct KeyframePlace {
 struct LocalMap {
   uint64_t keyframes_done = 0;                    // keyframes that are in the map
   int generation = 0;                             // grows when the map is begun anew
+  RadialCorrection lens;                          // for the features of frames that are tracked against it
   KeyframeId reference;                           // the newest keyframe
   int reference_points = 0;                       // well-placed points that it sees
   std::map<KeyframeId, KeyframePlace> keyframes;  // the newest ones and those around

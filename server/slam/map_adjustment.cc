@@ -18,6 +18,9 @@ class ProblemBuilder {
     problem_.bundle.camera = camera;
   }
 
+  // The bundle's pixels become those that the pictures show. Comes before the points.
+  void FindLens() { problem_.bundle.lens = BundleLens{.correction = map_.lens()}; }
+
   void AddKeyframe(const MapKeyframe& keyframe, bool fixed) {
     camera_of_[keyframe.id] = static_cast<int>(problem_.keyframes.size());
     problem_.keyframes.push_back(keyframe.id);
@@ -48,9 +51,10 @@ class ProblemBuilder {
   BundleObservation Observe(int camera, int point, const PointSight& sight) const {
     const FrameFeatures& seen = *map_.FindKeyframe(sight.keyframe)->sight;
     const auto i = static_cast<size_t>(sight.feature);
+    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? seen.seen_px[i] : seen.features[i].pixel_px;
     BundleObservation observation{.camera = camera,
                                   .point = point,
-                                  .pixel_px = seen.features[i].pixel_px.cast<double>(),
+                                  .pixel_px = pixel_px.cast<double>(),
                                   .sigma_px = config_.pixel_sigma_px * seen.features[i].octave_scale};
     if (seen.ranges_mu[i] > 0) {
       observation.depth_mu = seen.ranges_mu[i] * seen.bearings_camera[i].z();
@@ -104,9 +108,10 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   return builder.Take();
 }
 
-MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config) {
+MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config, bool find_lens) {
   const MapKeyframe& first = map.keyframes().begin()->second;
   ProblemBuilder builder(map, config, first.camera());
+  if (find_lens) builder.FindLens();
   for (const auto& [id, keyframe] : map.keyframes()) builder.AddKeyframe(keyframe, id == first.id && !first.prior);
   for (const auto& [id, track] : map.points()) builder.AddPoint(track);
   return builder.Take();
@@ -129,6 +134,7 @@ void ApplyWindow(const MapProblem& problem, SlamMap& map) {
 }
 
 void ApplyWhole(const MapProblem& problem, SlamMap& map) {
+  if (problem.bundle.lens) map.CorrectLens(problem.bundle.lens->correction);
   // What happened to the space around each keyframe.
   std::map<KeyframeId, Sim3<World, World>> moved;
   for (size_t i = 0; i < problem.keyframes.size(); ++i) {

@@ -23,8 +23,8 @@ struct MapProblem {
 MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config);
 
 // Everything. The first keyframe stays, unless priors hold the map; without depth the scale is free, and damping keeps
-// it where it is.
-MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config);
+// it where it is. `find_lens`: what is left of the lens is found along with it.
+MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
 
 // Writes the solution of a window back and drops the sights that it calls outliers.
 void ApplyWindow(const MapProblem& problem, SlamMap& map);

@@ -27,6 +27,7 @@ struct SlamConfig {
   int window_iterations = 8;
   int max_keyframes = 2000;
   bool close_loops = true;
+  bool refine_lens = true;
   int max_points = 20000;
   double min_parallax_deg = 2.0;
   double pixel_sigma_px = 1.0;
@@ -97,6 +98,8 @@ struct SlamConfig {
     fields.Add("max_keyframes", &max_keyframes,
                {.min = 10, .max = 100000, .help = "Keyframes in the map; beyond, the least needed go"});
     fields.Add("close_loops", &close_loops, {.help = "Correct the map when a known place is seen again"});
+    fields.Add("refine_lens", &refine_lens,
+               {.help = "Find what the client's calibration leaves of the lens; for poses that come from images"});
     fields.Add("max_points", &max_points, {.min = 100, .max = 1e6, .help = "Map points; beyond, the stalest go"});
     fields.Add("min_parallax_deg", &min_parallax_deg,
                {.unit = "deg", .min = 0.1, .max = 30, .help = "Angle between two rays that makes a point of them"});

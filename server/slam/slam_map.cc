@@ -24,7 +24,7 @@ MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> sight,
   keyframe.id = id;
   keyframe.points.resize(sight->size());
   keyframe.scene_features = sight->size();
-  keyframe.sight = std::move(sight);
+  keyframe.sight = WithLens(std::move(sight), lens_);
   keyframe.SetPose(T_world_camera);
   return keyframe;
 }
@@ -204,6 +204,11 @@ void SlamMap::Refresh(PointTrack& track) const {
     least_sum = sum;
     track.descriptor = descriptors[i];
   }
+}
+
+void SlamMap::CorrectLens(const RadialCorrection& lens) {
+  lens_ = lens;
+  for (auto& [id, keyframe] : keyframes_) keyframe.sight = WithLens(keyframe.sight, lens);
 }
 
 void SlamMap::Transform(const Sim3<World, World>& S_new_old) {

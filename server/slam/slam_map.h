@@ -107,6 +107,11 @@ class SlamMap {
   // Looks, direction, size and parallax anew, after its sights or the map around it changed.
   void Refresh(PointTrack& track) const;
 
+  // What is left of the lens, by which all keyframes are corrected.
+  const RadialCorrection& lens() const { return lens_; }
+  // The points stay where they are: for an adjustment that found places for them, too.
+  void CorrectLens(const RadialCorrection& lens);
+
   // Applies a similarity to everything.
   void Transform(const Sim3<World, World>& S_new_old);
 
@@ -127,6 +132,7 @@ class SlamMap {
   };
 
   const SlamConfig config_;
+  RadialCorrection lens_;
   std::map<KeyframeId, MapKeyframe> keyframes_;
   std::map<MapPointId, PointTrack> points_;
   std::unordered_map<MapPointId, MapPointId> merged_into_;

@@ -22,6 +22,7 @@ constexpr size_t kPlacesTold = 60;       // keyframes whose place tracking learn
 constexpr int kGiveUpAfter_frames = 45;  // a camera lost so long in a map so young begins anew
 constexpr size_t kYoungMap_keyframes = 6;
 constexpr uint64_t kWholePeriodWithPriors_keyframes = 5;
+constexpr size_t kKeyframesToFindLens = 20;
 constexpr int kScarcePoints = 100;  // known points of a keyframe below which tracking is in danger
 constexpr int kMinObservationsWellPlaced = 3;
 
@@ -168,7 +169,7 @@ bool SparseMapper::BeginFromTwoViews(const MapStart& start, const SE3<World, Cam
     map_->AddSight(track, second, point.second_feature);
     map_->Refresh(track);
   }
-  MapProblem problem = WholeProblem(*map_, config_);
+  MapProblem problem = WholeProblem(*map_, config_, /*find_lens=*/false);
   const BundleSummary summary = AdjustBundle(problem.bundle, {.max_iterations = 20, .dense = true});
   if (!summary.usable || summary.final_rms_px > kMaxRms_px) return false;
   ApplyWhole(problem, *map_);
@@ -183,9 +184,9 @@ MapKeyframe& SparseMapper::InsertKeyframe(const TrackedImage& image) {
   const Frame& frame = *image.tracked.frame;
   if (!image.pose_given) {
     // Objects are small: their corners are worth a second look.
-    const std::vector<Feature> more = extractor_.ExtractObjects(frame, sight->features);
+    const std::vector<Feature> more = extractor_.ExtractObjects(frame, SeenFeatures(*sight));
     if (!more.empty()) {
-      std::vector<Feature> all = sight->features;
+      std::vector<Feature> all = SeenFeatures(*sight);
       all.insert(all.end(), more.begin(), more.end());
       sight = MakeFrameFeatures(frame, std::move(all));
     }
@@ -322,7 +323,8 @@ KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyfra
   for (size_t i = 0; i < keyframe.points.size(); ++i) {
     if (!keyframe.points[i]) continue;
     const Feature& feature = keyframe.features()[i];
-    view.observations.push_back({.point = keyframe.points[i], .pixel_px = feature.pixel_px, .label = feature.label});
+    view.observations.push_back(
+        {.point = keyframe.points[i], .pixel_px = keyframe.sight->seen_px[i], .label = feature.label});
     view.points.push_back(map_->FindPoint(keyframe.points[i])->point);
   }
   view.removed_points = map_->TakeRemovedPoints();
@@ -334,9 +336,10 @@ KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyfra
 void SparseMapper::StartWholeAdjustment() {
   DropWholeAdjustment();
   whole_ = std::make_unique<WholeAdjustment>();
-  whole_->problem = WholeProblem(*map_, config_);
+  whole_->problem = WholeProblem(*map_, config_, MayFindLens());
   const auto solve = [whole = whole_.get()] {
-    whole->summary = AdjustBundle(whole->problem.bundle, {.max_iterations = 15, .abort = &whole->abort});
+    whole->summary =
+        AdjustBundle(whole->problem.bundle, {.max_iterations = 20, .function_tolerance = 1e-6, .abort = &whole->abort});
     whole->done = true;
   };
   if (inline_adjustment_) return solve();
@@ -346,6 +349,12 @@ void SparseMapper::StartWholeAdjustment() {
   });
 }
 
+// A few views of little do not tell a lens from a bent scene, and poses that are given or believed were made with the
+// client's idea of the lens.
+bool SparseMapper::MayFindLens() const {
+  return config_.refine_lens && !world_is_given_ && map_->keyframes().size() >= kKeyframesToFindLens;
+}
+
 bool SparseMapper::TakeWholeAdjustment(bool wait) {
   if (!whole_ || (!wait && !whole_->done)) return false;
   if (whole_->thread.joinable()) whole_->thread.join();
@@ -353,6 +362,7 @@ bool SparseMapper::TakeWholeAdjustment(bool wait) {
   spdlog::debug("slam: whole bundle of {} keyframes and {} points: {:.2f} -> {:.2f} px",
                 whole_->problem.keyframes.size(), whole_->problem.points.size(), summary.initial_rms_px,
                 summary.final_rms_px);
+  if (whole_->problem.bundle.lens) spdlog::debug("slam: lens k1 {:.4f}", whole_->problem.bundle.lens->correction.k1);
   const bool usable = summary.usable;
   if (usable) {
     ApplyWhole(whole_->problem, *map_);
@@ -399,6 +409,7 @@ void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Re
   auto local = std::make_shared<LocalMap>();
   local->keyframes_done = map_->keyframe_count();
   local->generation = generation_;
+  local->lens = map_->lens();
   local->reference = around;
   local->relocalised = relocalised;
   const MapKeyframe* center = map_->FindKeyframe(around);

@@ -82,6 +82,7 @@ class SparseMapper {
   void AdjustWindow(const MapKeyframe& keyframe);
   void CloseLoops(const MapKeyframe& keyframe);
   void StartWholeAdjustment();
+  bool MayFindLens() const;
   bool TakeWholeAdjustment(bool wait);
   void DropWholeAdjustment();
   bool TurnUp();

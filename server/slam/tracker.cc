@@ -69,7 +69,7 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
                               map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
     if (!map_suffices) return TakeGivenPose(std::move(frame));
   }
-  auto sight = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame));
+  auto sight = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
   if (!has_map || waiting_for_map_) return Initialise(std::move(frame), std::move(sight));
   return TrackByImage(std::move(frame), std::move(sight));
 }

@@ -38,7 +38,9 @@ ObservationError Measure(const BundleProblem& problem, const BundleObservation& 
   const Eigen::Vector3d p_camera = T_world_camera.rotation().conjugate() *
                                    (problem.points[observation.point].position_world - T_world_camera.translation());
   if (!(p_camera.z() > 0)) return error;
-  error.reprojection_px2 = (problem.camera.Project(p_camera) - observation.pixel_px).squaredNorm();
+  Eigen::Vector2d pixel_px = problem.camera.Project(p_camera);
+  if (problem.lens) pixel_px = problem.lens->correction.Distort(problem.camera, pixel_px);
+  error.reprojection_px2 = (pixel_px - observation.pixel_px).squaredNorm();
   error.chi2 = error.reprojection_px2 / (observation.sigma_px * observation.sigma_px);
   double bound = kChi2Bound2;
   if (HasDepth(observation)) {

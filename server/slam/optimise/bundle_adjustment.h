@@ -8,6 +8,7 @@
 
 #include "common/camera_model.h"
 #include "common/geometry.h"
+#include "server/slam/optimise/radial_correction.h"
 
 namespace romap {
 
@@ -39,8 +40,16 @@ struct BundleObservation {
   bool outlier = false;  // in: left out of the problem. out: its error is beyond the 95 % bound
 };
 
+// A lens to be found along with the rest.
+struct BundleLens {
+  RadialCorrection correction = {};  // in: the start. out: what fits
+  double sigma = 0.03;               // standard deviation of its k1 around 0 before anything is seen
+};
+
 struct BundleProblem {
   CameraModel camera;  // of all cameras; pinhole
+  std::optional<BundleLens>
+      lens;  // of all cameras; then pixels are as the picture shows them, else as the pinhole does
   std::vector<BundleCamera> cameras;
   std::vector<BundlePoint> points;
   std::vector<BundleObservation> observations;
@@ -48,6 +57,9 @@ struct BundleProblem {
 
 struct BundleOptions {
   int max_iterations = 10;
+  // A relative fall of the cost per iteration below which the map no longer changes visibly. Where all of a map bends
+  // together, or with the lens, many small falls add up.
+  double function_tolerance = 1e-4;
   bool reject_outliers = true;  // after half of the iterations, beyond the bound; they may come back at the end
   bool dense = false;           // few cameras: DENSE_SCHUR instead of SPARSE_SCHUR
   int threads = 1;
@@ -66,8 +78,9 @@ struct BundleSummary {
 
 // Bundle adjustment (Triggs et al. 2000) with Ceres: reprojection errors (and inverse-depth errors where depth was
 // measured), Huber loss at the 95 % bound, analytic Jacobians, right-multiplied SE3 increments, points eliminated by
-// the Schur complement. Deterministic with one thread. The caller fixes the gauge through `fixed` cameras (two for a
-// monocular map, or the far end of the window).
+// the Schur complement. With `lens` the cameras' common rest of a lens is found too (self-calibration: Triggs et al.,
+// section 6.3); orbits and hands turn and tilt enough to tell it from the scene. Deterministic with one thread. The
+// caller fixes the gauge through `fixed` cameras (two for a monocular map, or the far end of the window).
 //
 // Left out, and left as they are: points that no free camera sees, points that one camera sees without depth, and
 // observations that make no sense (index out of range, numbers not finite, sigma not positive, point behind the

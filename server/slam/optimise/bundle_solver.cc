@@ -1,6 +1,7 @@
 #include "server/slam/optimise/bundle_solver.h"
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 
 #include <algorithm>
 #include <array>
@@ -14,9 +15,6 @@
 
 namespace romap {
 namespace {
-
-// A relative fall of the cost per iteration below which a map no longer changes visibly.
-constexpr double kFunctionTolerance = 1e-4;
 
 class AbortCallback : public ceres::IterationCallback {
  public:
@@ -52,6 +50,9 @@ class BundleSolver {
   void MeasureUnit();
   void SelectPoints();
   void AddObservations();
+  template <class Cost>
+  void AddResidual(const BundleObservation& observation, std::deque<Cost>& costs, std::deque<LensedCost<Cost>>& lensed,
+                   ceres::LossFunction* loss);
   void AddPriors();
   ceres::Solver::Options SolverOptions(const BundleOptions& options, int max_iterations, const BundleRun& run);
   bool WriteBack() const;
@@ -66,6 +67,7 @@ class BundleSolver {
   std::vector<std::array<double, 3>> points_;
   std::vector<uint8_t> varied_cameras_;  // per camera: has a free parameter block in the Ceres problem
   std::vector<uint8_t> varied_points_;   // per point
+  double lens_k1_ = 0;                   // of RadialCorrection, where the problem has a lens
 
   RefreshCameras refresh_{&cameras_};
   ceres::HuberLoss loss_{std::sqrt(kChi2Bound2)};
@@ -73,7 +75,10 @@ class BundleSolver {
   // Costs cannot be moved, hence no vectors.
   std::deque<ReprojectionCost> costs_;
   std::deque<ReprojectionDepthCost> depth_costs_;
+  std::deque<LensedCost<ReprojectionCost>> lensed_costs_;
+  std::deque<LensedCost<ReprojectionDepthCost>> lensed_depth_costs_;
   std::deque<PosePriorCost> prior_costs_;
+  std::unique_ptr<ceres::NormalPrior> lens_prior_;
   ceres::Problem ceres_;  // last: it refers to all the others
 };
 
@@ -98,6 +103,7 @@ BundleSolver::BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& u
   for (size_t i = 0; i < points_.size(); ++i) {
     Eigen::Map<Eigen::Vector3d>(points_[i].data()) = problem.points[i].position_world / unit_mu_;
   }
+  if (problem.lens) lens_k1_ = problem.lens->correction.k1;
   varied_cameras_.assign(cameras_.size(), 0);
   varied_points_.assign(points_.size(), 0);
   SelectPoints();
@@ -150,26 +156,42 @@ void BundleSolver::AddObservations() {
     const bool camera_fixed = problem_.cameras[observation.camera].fixed;
     const bool point_fixed = problem_.points[observation.point].fixed;
     if (camera_fixed && point_fixed) continue;
-    CameraState& camera = cameras_[observation.camera];
-    double* increment = camera.increment.data();
-    double* point = points_[observation.point].data();
-
+    const CameraState* camera = &cameras_[observation.camera];
     if (HasDepth(observation)) {
-      depth_costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px,
+      depth_costs_.emplace_back(problem_.camera, camera, observation.pixel_px, observation.sigma_px,
                                 observation.depth_mu / unit_mu_, observation.depth_sigma_mu / unit_mu_);
-      ceres_.AddResidualBlock(&depth_costs_.back(), &depth_loss_, increment, point);
+      AddResidual(observation, depth_costs_, lensed_depth_costs_, &depth_loss_);
     } else {
-      costs_.emplace_back(problem_.camera, &camera, observation.pixel_px, observation.sigma_px);
-      ceres_.AddResidualBlock(&costs_.back(), &loss_, increment, point);
+      costs_.emplace_back(problem_.camera, camera, observation.pixel_px, observation.sigma_px);
+      AddResidual(observation, costs_, lensed_costs_, &loss_);
     }
-    if (camera_fixed) ceres_.SetParameterBlockConstant(increment);
-    if (point_fixed) ceres_.SetParameterBlockConstant(point);
+    if (camera_fixed) ceres_.SetParameterBlockConstant(cameras_[observation.camera].increment.data());
+    if (point_fixed) ceres_.SetParameterBlockConstant(points_[observation.point].data());
     varied_cameras_[observation.camera] = !camera_fixed;
     varied_points_[observation.point] = !point_fixed;
   }
 }
 
+// The newest of `costs`, with the lens where it is to be found.
+template <class Cost>
+void BundleSolver::AddResidual(const BundleObservation& observation, std::deque<Cost>& costs,
+                               std::deque<LensedCost<Cost>>& lensed, ceres::LossFunction* loss) {
+  double* increment = cameras_[observation.camera].increment.data();
+  double* point = points_[observation.point].data();
+  if (!problem_.lens) {
+    ceres_.AddResidualBlock(&costs.back(), loss, increment, point);
+    return;
+  }
+  lensed.emplace_back(problem_.camera, observation.pixel_px, observation.sigma_px, &costs.back());
+  ceres_.AddResidualBlock(&lensed.back(), loss, increment, point, &lens_k1_);
+}
+
 void BundleSolver::AddPriors() {
+  if (problem_.lens && ceres_.HasParameterBlock(&lens_k1_)) {
+    const ceres::Matrix weight = ceres::Matrix::Constant(1, 1, 1 / problem_.lens->sigma);
+    lens_prior_ = std::make_unique<ceres::NormalPrior>(weight, ceres::Vector::Zero(1));
+    ceres_.AddResidualBlock(lens_prior_.get(), nullptr, &lens_k1_);
+  }
   for (size_t i = 0; i < cameras_.size(); ++i) {
     const BundleCamera& camera = problem_.cameras[i];
     if (camera.fixed || !camera.prior || !IsUsable(*camera.prior) || !camera.T_world_camera.IsFinite()) continue;
@@ -187,7 +209,7 @@ ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options,
                                                    const BundleRun& run) {
   ceres::Solver::Options solver;
   solver.max_num_iterations = max_iterations;
-  solver.function_tolerance = kFunctionTolerance;
+  solver.function_tolerance = options.function_tolerance;
   solver.initial_trust_region_radius = run.trust_region_radius;
   solver.num_threads = std::max(1, options.threads);
   solver.linear_solver_type = options.dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
@@ -207,6 +229,7 @@ ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options,
       ordering->AddElementToGroup(points_[i].data(), 1);
     }
   }
+  if (ceres_.HasParameterBlock(&lens_k1_)) ordering->AddElementToGroup(&lens_k1_, 1);
   solver.linear_solver_ordering = ordering;
   return solver;
 }
@@ -229,6 +252,7 @@ void BundleSolver::Run(const BundleOptions& options, int max_iterations, BundleR
 
 // False, and nothing written, when a number is not finite.
 bool BundleSolver::WriteBack() const {
+  if (!std::isfinite(lens_k1_)) return false;
   for (size_t i = 0; i < cameras_.size(); ++i) {
     if (varied_cameras_[i] && !cameras_[i].Pose().IsFinite()) return false;
   }
@@ -236,6 +260,7 @@ bool BundleSolver::WriteBack() const {
     const bool finite = std::isfinite(points_[i][0]) && std::isfinite(points_[i][1]) && std::isfinite(points_[i][2]);
     if (varied_points_[i] && !finite) return false;
   }
+  if (problem_.lens) problem_.lens->correction.k1 = lens_k1_;
   for (size_t i = 0; i < cameras_.size(); ++i) {
     if (!varied_cameras_[i]) continue;
     const SE3<World, Camera> pose = cameras_[i].Pose();

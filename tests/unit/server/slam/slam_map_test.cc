@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "server/slam/correction_log.h"
@@ -148,6 +149,28 @@ TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
   EXPECT_NEAR(correction.keyframes[0].S_new_old.scale(), 1.5, 1e-9);
   EXPECT_LT((correction.keyframes[0].T_world_camera.translation() - before.translation()).norm(), 1e-9);
   EXPECT_TRUE(log.Take(map_).keyframes.empty());
+}
+
+TEST_F(SlamMapTest, ALensCorrectsAllKeyframesAndThoseThatCome) {
+  const RadialCorrection lens{-0.05};
+  MapKeyframe& before = AddKeyframe(0);
+  const Eigen::Vector2f seen_px = before.features()[0].pixel_px;
+  map_.CorrectLens(lens);
+  MapKeyframe& after = AddKeyframe(1);
+  for (const MapKeyframe* keyframe : {&before, &after}) {
+    const Eigen::Vector2d pixel_px = keyframe->features()[0].pixel_px.cast<double>();
+    EXPECT_GT((pixel_px - seen_px.cast<double>()).norm(), 1);
+    EXPECT_LT((lens.Distort(keyframe->camera(), pixel_px) - seen_px.cast<double>()).norm(), 0.01);
+    EXPECT_EQ(keyframe->sight->seen_px[0], seen_px);
+    EXPECT_LT((keyframe->camera().Project(keyframe->sight->bearings_camera[0]) - pixel_px).norm(), 0.01);
+    std::vector<int> near;
+    keyframe->sight->grid.Near(pixel_px, 1, near);
+    EXPECT_NE(std::find(near.begin(), near.end(), 0), near.end());
+  }
+  EXPECT_EQ(SeenFeatures(*after.sight)[0].pixel_px, seen_px);
+  // Corrections are of what was seen and do not add up.
+  map_.CorrectLens({});
+  EXPECT_LT((before.features()[0].pixel_px - seen_px).norm(), 1e-3);
 }
 
 }  // namespace

@@ -56,6 +56,35 @@ TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
   EXPECT_TRUE(by_point.isZero());
 }
 
+TEST(LensedCost, IsTheErrorInThePictureThatTheLensGives) {
+  Sight sight({0.6, -0.4, 1.5});
+  const CameraModel model = BundleWorldCamera();
+  double k1 = -0.1;
+  const Eigen::Vector2d seen_px = RadialCorrection{k1}.Distort(model, model.Project({0.6, -0.4, 1.5}));
+  const Eigen::Vector2d pixel_px = seen_px + Eigen::Vector2d(3, -4);
+  const ReprojectionCost inner(model, &sight.camera, pixel_px, 2);
+  const LensedCost<ReprojectionCost> cost(model, pixel_px, 2, &inner);
+  std::vector<double*> parameters = sight.Parameters();
+  parameters.push_back(&k1);
+  Eigen::Vector2d residual;
+  ASSERT_TRUE(cost.Evaluate(parameters.data(), residual.data(), nullptr));
+  EXPECT_LT((residual - Eigen::Vector2d(-1.5, 2)).norm(), 1e-9);
+}
+
+TEST(LensedCost, JacobiansMatchFiniteDifferences) {
+  Sight sight({0.6, -0.4, 1.5});
+  const CameraModel model = BundleWorldCamera();
+  double k1 = -0.1;
+  std::vector<double*> parameters = sight.Parameters();
+  parameters.push_back(&k1);
+  const ReprojectionCost pixel(model, &sight.camera, {400, 200}, 1.7);
+  ExpectJacobiansMatch(LensedCost<ReprojectionCost>(model, {400, 200}, 1.7, &pixel), parameters,
+                       [&] { sight.camera.Refresh(); });
+  const ReprojectionDepthCost depth(model, &sight.camera, {400, 200}, 1.7, 2.5, 0.1);
+  ExpectJacobiansMatch(LensedCost<ReprojectionDepthCost>(model, {400, 200}, 1.7, &depth), parameters,
+                       [&] { sight.camera.Refresh(); });
+}
+
 TEST(ReprojectionDepthCost, AddsTheErrorOfInverseDepthInSigmas) {
   Sight sight({0.3, -0.2, 2.0});
   const CameraModel model = BundleWorldCamera();

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/camera_model.h"
+
+namespace romap {
+
+// What the calibration that comes with the frames leaves of the lens. Many cameras are calibrated as plain pinholes;
+// that they are not bends the whole map. Brown's first radial term says most of it: what a pinhole shows at
+// m = (p - c) / f the picture shows at m (1 + k1 |m|^2).
+struct RadialCorrection {
+  double k1 = 0;
+
+  Eigen::Vector2d Distort(const CameraModel& camera, const Eigen::Vector2d& pinhole_px) const {
+    const Eigen::Vector2d center_px(camera.cx_px, camera.cy_px);
+    const Eigen::Vector2d off_px = pinhole_px - center_px;
+    return center_px + (1 + k1 * Radius2(camera, off_px)) * off_px;
+  }
+
+  // The other way round, by fixed-point iteration; to 0.001 px for the small k1 that a calibration leaves.
+  Eigen::Vector2d Undistort(const CameraModel& camera, const Eigen::Vector2d& seen_px) const {
+    constexpr int kIterations = 6;
+    const Eigen::Vector2d center_px(camera.cx_px, camera.cy_px);
+    Eigen::Vector2d off_px = seen_px - center_px;
+    for (int i = 0; i < kIterations; ++i) off_px = (seen_px - center_px) / (1 + k1 * Radius2(camera, off_px));
+    return center_px + off_px;
+  }
+
+  bool operator==(const RadialCorrection&) const = default;
+
+ private:
+  static double Radius2(const CameraModel& camera, const Eigen::Vector2d& off_px) {
+    return Eigen::Vector2d(off_px.x() / camera.fx_px, off_px.y() / camera.fy_px).squaredNorm();
+  }
+};
+
+}  // namespace romap
