@@ -49,7 +49,7 @@ struct ObjectSnapshot {
 struct MapSnapshot {
   std::string session_id;
   SessionState state = SessionState::kOpen;
-  std::vector<ObjectSnapshot> objects;  // confirmed ones, by id
+  std::vector<ObjectSnapshot> objects;  // confirmed and lost ones, by id
   std::vector<FrameAck> trajectory;     // one entry per accepted frame with a pose, by frame id
   std::vector<int64_t> timestamps_ns;   // of `trajectory`
   Statistics statistics;
@@ -67,13 +67,16 @@ class EventStream {
   virtual void Cancel() = 0;
 };
 
-// The bidirectional stream of the client that owns the session: frames in, events out.
+// The bidirectional stream of the client that owns the session: frames and late masks in, events out.
 class MapStream : public EventStream {
  public:
   // Blocks while the server pushes back. A frame that is bad in itself is answered with a FrameAck{accepted=false} and
   // the stream lives on; a non-OK status here means the stream is over.
   virtual absl::Status Send(FrameInput frame) = 0;
-  // No more frames on this stream. Events keep coming until the accepted frames are processed, then the stream ends.
+  // The masks of a frame that was sent before, without any. Blocks and fails as Send(); answered with a MasksAck.
+  virtual absl::Status SendMasks(MasksInput masks) = 0;
+  // No more frames and masks on this stream. Events keep coming until those that were accepted are processed, then the
+  // stream ends.
   virtual absl::Status CloseSend() = 0;
 };
 

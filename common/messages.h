@@ -41,25 +41,37 @@ struct Instance {
   std::optional<uint64_t> track_id;  // the detector's own tracker, if it has one; a hint, not a verdict
 };
 
-// One frame as a client sends it, still encoded.
-struct FrameInput {
+// Which pixel of a frame belongs to which instance, still encoded.
+struct EncodedMasks {
+  MaskEncoding mask_encoding = MaskEncoding::kNone;
+  std::string label_png;  // kLabelPng: 8 or 16 bit single channel, 0 = nothing, size of the image
+  std::vector<uint32_t>
+      label_runs;                   // kRunLength: (label, length) pairs in row-major order, lengths sum to width*height
+  std::vector<Instance> instances;  // labels of the mask that are not listed get class "object", score 1
+};
+
+// One frame as a client sends it, still encoded. kNone: no masks, or they follow in a MasksInput.
+struct FrameInput : EncodedMasks {
   uint64_t frame_id = 0;     // chosen by the client, strictly increasing within a session
   int64_t timestamp_ns = 0;  // capture time, strictly increasing within a session
   ImageEncoding image_encoding = ImageEncoding::kJpeg;
   std::string image;     // JPEG, PNG or rows of raw pixels without padding
   int raw_width_px = 0;  // raw encodings only
   int raw_height_px = 0;
-  MaskEncoding mask_encoding = MaskEncoding::kNone;
-  std::string label_png;  // kLabelPng: 8 or 16 bit single channel, 0 = nothing, size of the image
-  std::vector<uint32_t>
-      label_runs;                   // kRunLength: (label, length) pairs in row-major order, lengths sum to width*height
-  std::vector<Instance> instances;  // labels of the mask that are not listed get class "object", score 1
   std::optional<SE3<World, Camera>> T_world_camera;
   DepthEncoding depth_encoding = DepthEncoding::kNone;
   std::string depth;                              // z depth (not ray length) registered to the image, size of the image
   double depth_scale_mu = 0;                      // map units per depth unit
   std::optional<Eigen::Vector3d> gravity_camera;  // direction of gravity (down) in the camera frame, any length > 0
 };
+
+// The masks of a frame that was sent without any: what a detector finds that is slower than the camera.
+struct MasksInput : EncodedMasks {
+  uint64_t frame_id = 0;  // of a frame that was accepted
+};
+
+// All that a client feeds a session with. The order counts: masks come after their frame.
+using SessionInput = std::variant<FrameInput, MasksInput>;
 
 // ---------------------------------------------------------------------------------------------- session -> slam
 
@@ -186,7 +198,7 @@ struct ObjectRemoved {
 struct ObjectMerged {
   ObjectId from;
   ObjectId into;
-  uint64_t revision = 0;  // of `into`
+  uint64_t revision = 0;  // of `into`, which it is at from now on
 };
 
 // ---------------------------------------------------------------------------------------------- objects -> nerf
@@ -289,6 +301,13 @@ struct FrameAck {
   std::string state_reason = {};  // for people: why the state is not kTracking, e.g. "too little parallax"
 };
 
+// Answer to one MasksInput.
+struct MasksAck {
+  uint64_t frame_id = 0;
+  bool accepted = true;
+  std::string error;  // why not accepted
+};
+
 struct Statistics {
   uint64_t frames_received = 0;
   uint64_t frames_processed = 0;
@@ -303,6 +322,6 @@ struct Statistics {
   uint64_t resident_bytes = 0;   // of the server process
 };
 
-using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics>;
+using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck>;
 
 }  // namespace romap

@@ -32,17 +32,21 @@ struct ReplayOptions {
 // Share of the progress bar that the frames take; training has the rest.
 constexpr double kFrameShare = 0.6;
 
-// Sends every frame and waits until the map is finished. The events say nothing that the export does not say later.
+// Sends all there is and waits until the map is finished. The events say nothing that the export does not say later.
 absl::Status Feed(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto stream, service.OpenMap(session_id));
   Progress progress("replaying");
   for (size_t i = 0; i < recording.size() && !Interrupted(); ++i) {
-    ROMAP_ASSIGN_OR_RETURN(FrameInput frame, recording.Load(i));
-    ROMAP_RETURN_IF_ERROR(stream->Send(std::move(frame)));
+    ROMAP_ASSIGN_OR_RETURN(SessionInput input, recording.Load(i));
+    if (auto* masks = std::get_if<MasksInput>(&input)) {
+      ROMAP_RETURN_IF_ERROR(stream->SendMasks(std::move(*masks)));
+    } else {
+      ROMAP_RETURN_IF_ERROR(stream->Send(std::get<FrameInput>(std::move(input))));
+    }
     while (stream->Next(std::chrono::milliseconds(0))) {
     }
     progress.Show(kFrameShare * static_cast<double>(i) / static_cast<double>(recording.size()),
-                  fmt::format("frame {}/{}", i + 1, recording.size()));
+                  fmt::format("record {}/{}", i + 1, recording.size()));
   }
   if (Interrupted())
     return absl::CancelledError("interrupted, nothing is written: half a replay compares with nothing");
@@ -79,6 +83,7 @@ nlohmann::json ToJson(const wire::Recording& recording, const Statistics& statis
             {"accepted", statistics.frames_processed},
             {"rejected", statistics.frames_rejected},
             {"keyframes", statistics.keyframes}}},
+          {"late_masks", recording.size() - recording.frames()},
           {"map_points", statistics.map_points},
           {"objects", list},
           {"faults", faults}};
@@ -91,7 +96,7 @@ absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& re
   ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
   const nlohmann::json summary = ToJson(recording, snapshot.statistics, objects, faults);
   ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), summary.dump(1) + "\n"));
-  fmt::print("{} frames replayed ({} keyframes): {} objects and {} camera poses written to {}\n", recording.size(),
+  fmt::print("{} frames replayed ({} keyframes): {} objects and {} camera poses written to {}\n", recording.frames(),
              snapshot.statistics.keyframes, objects.size(), snapshot.trajectory.size(), options.out);
   return absl::OkStatus();
 }
@@ -100,7 +105,7 @@ absl::Status RunReplay(ReplayOptions options) {
   ROMAP_ASSIGN_OR_RETURN(const wire::Recording recording, wire::Recording::Open(options.file));
   if (recording.lost_bytes() > 0) {
     fmt::print(stderr, "romap: {}: the last record is cut off, its {} bytes are left out; {} frames are replayed\n",
-               options.file, recording.lost_bytes(), recording.size());
+               options.file, recording.lost_bytes(), recording.frames());
   }
   options.service.local = true;
   // In front, so that what the user sets has the last word.

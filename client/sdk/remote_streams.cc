@@ -35,20 +35,34 @@ void RemoteMapStream::Reactor::QueueStart(const std::string& session_id) {
 }
 
 absl::Status RemoteMapStream::Reactor::Send(FrameInput frame) {
-  const uint64_t frame_id = frame.frame_id;
+  FrameAck refusal;
+  refusal.frame_id = frame.frame_id;
+  v1::MapRequest request;
+  *request.mutable_frame() = wire::ToProto(std::move(frame));
+  return SendRequest(std::move(request), std::move(refusal));
+}
+
+absl::Status RemoteMapStream::Reactor::SendMasks(MasksInput masks) {
+  MasksAck refusal;
+  refusal.frame_id = masks.frame_id;
+  v1::MapRequest request;
+  *request.mutable_late_masks() = wire::ToProto(std::move(masks));
+  return SendRequest(std::move(request), std::move(refusal));
+}
+
+template <class Ack>
+absl::Status RemoteMapStream::Reactor::SendRequest(v1::MapRequest request, Ack refusal) {
   std::lock_guard sending(send_mutex_);
   if (send_closed_) return FailedPrecondition("this stream was closed for sending");
   ROMAP_RETURN_IF_ERROR(WaitForWrite());
-  *request_.mutable_frame() = wire::ToProto(std::move(frame));
-  const size_t bytes = request_.ByteSizeLong();
+  const size_t bytes = request.ByteSizeLong();
   if (bytes > static_cast<size_t>(max_message_bytes_)) {
-    FrameAck refusal;
-    refusal.frame_id = frame_id;
     refusal.accepted = false;
-    refusal.error = fmt::format("frame: {} bytes, at most {} are allowed", bytes, max_message_bytes_);
+    refusal.error = fmt::format("message of {} bytes, at most {} are allowed", bytes, max_message_bytes_);
     Deliver(std::move(refusal));
     return absl::OkStatus();
   }
+  request_ = std::move(request);
   {
     std::lock_guard lock(write_mutex_);
     write_pending_ = true;

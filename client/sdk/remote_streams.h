@@ -53,6 +53,7 @@ class RemoteMapStream : public MapStream {
   absl::Status status() const override { return reactor_.status(); }
   void Cancel() override { reactor_.Cancel(); }
   absl::Status Send(FrameInput frame) override { return reactor_.Send(std::move(frame)); }
+  absl::Status SendMasks(MasksInput masks) override { return reactor_.SendMasks(std::move(masks)); }
   absl::Status CloseSend() override { return reactor_.CloseSend(); }
 
  private:
@@ -65,10 +66,14 @@ class RemoteMapStream : public MapStream {
     // The first request goes out with the start of the call.
     void QueueStart(const std::string& session_id);
     absl::Status Send(FrameInput frame);
+    absl::Status SendMasks(MasksInput masks);
     absl::Status CloseSend();
     void OnWriteDone(bool ok) override;
 
    private:
+    // Writes one request. When that is too large for a message, `refusal` is delivered instead, with the reason in it.
+    template <class Ack>
+    absl::Status SendRequest(v1::MapRequest request, Ack refusal);
     absl::Status WaitForWrite();
 
     const int max_message_bytes_;

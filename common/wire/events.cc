@@ -72,6 +72,18 @@ absl::StatusOr<ObjectMerged> FromProto(const v1::ObjectMerged& proto, const std:
   return merged;
 }
 
+v1::MasksAck ToProto(MasksAck ack) {
+  v1::MasksAck proto;
+  proto.set_frame_id(ack.frame_id);
+  proto.set_accepted(ack.accepted);
+  proto.set_error(std::move(ack.error));
+  return proto;
+}
+
+MasksAck FromProto(v1::MasksAck proto) {
+  return {.frame_id = proto.frame_id(), .accepted = proto.accepted(), .error = std::move(*proto.mutable_error())};
+}
+
 // Puts each kind of event into its member of the oneof.
 struct EventWriter {
   v1::MapEvent& proto;
@@ -81,6 +93,7 @@ struct EventWriter {
   void operator()(ObjectRemoved&& removed) const { *proto.mutable_removed() = ToProto(std::move(removed)); }
   void operator()(ObjectMerged&& merged) const { *proto.mutable_merged() = ToProto(merged); }
   void operator()(Statistics&& statistics) const { *proto.mutable_statistics() = ToProto(statistics); }
+  void operator()(MasksAck&& ack) const { *proto.mutable_masks_ack() = ToProto(std::move(ack)); }
 };
 
 }  // namespace
@@ -105,6 +118,8 @@ absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where)
       return FromProto(proto.merged(), where + ".merged");
     case v1::MapEvent::kStatistics:
       return FromProto(proto.statistics(), where + ".statistics");
+    case v1::MapEvent::kMasksAck:
+      return FromProto(std::move(*proto.mutable_masks_ack()));
     default:
       return InvalidArgument("{}: of a kind that is not known here", where);
   }

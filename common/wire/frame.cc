@@ -26,14 +26,15 @@ v1::Instance ToProto(Instance instance) {
   return proto;
 }
 
-v1::Masks MasksToProto(FrameInput& frame) {
+// Leaves `masks` empty.
+v1::Masks MasksToProto(EncodedMasks& masks) {
   v1::Masks proto;
-  if (frame.mask_encoding == MaskEncoding::kLabelPng) {
-    proto.set_label_png(std::move(frame.label_png));
-  } else {
-    proto.mutable_label_runs()->mutable_label_length_pairs()->Add(frame.label_runs.begin(), frame.label_runs.end());
+  if (masks.mask_encoding == MaskEncoding::kLabelPng) {
+    proto.set_label_png(std::move(masks.label_png));
+  } else if (masks.mask_encoding == MaskEncoding::kRunLength) {
+    proto.mutable_label_runs()->mutable_label_length_pairs()->Add(masks.label_runs.begin(), masks.label_runs.end());
   }
-  for (Instance& instance : frame.instances) *proto.add_instances() = ToProto(std::move(instance));
+  for (Instance& instance : masks.instances) *proto.add_instances() = ToProto(std::move(instance));
   return proto;
 }
 
@@ -68,32 +69,32 @@ absl::StatusOr<Instance> InstanceFromProto(v1::Instance& proto, const std::strin
   return instance;
 }
 
-absl::Status ReadMasks(v1::Masks& proto, FrameInput& frame) {
+absl::Status ReadMasks(v1::Masks& proto, const std::string& where, EncodedMasks& masks) {
   switch (proto.labels_case()) {
     case v1::Masks::kLabelPng:
-      frame.mask_encoding = MaskEncoding::kLabelPng;
-      if (proto.label_png().empty()) return InvalidArgument("frame.masks.label_png: empty");
-      frame.label_png = std::move(*proto.mutable_label_png());
+      masks.mask_encoding = MaskEncoding::kLabelPng;
+      if (proto.label_png().empty()) return InvalidArgument("{}.label_png: empty", where);
+      masks.label_png = std::move(*proto.mutable_label_png());
       break;
     case v1::Masks::kLabelRuns: {
       const auto& pairs = proto.label_runs().label_length_pairs();
       if (pairs.empty() || pairs.size() % 2 != 0) {
-        return InvalidArgument("frame.masks.label_runs: {} numbers, must be pairs of label and length", pairs.size());
+        return InvalidArgument("{}.label_runs: {} numbers, must be pairs of label and length", where, pairs.size());
       }
-      frame.mask_encoding = MaskEncoding::kRunLength;
-      frame.label_runs.assign(pairs.begin(), pairs.end());
+      masks.mask_encoding = MaskEncoding::kRunLength;
+      masks.label_runs.assign(pairs.begin(), pairs.end());
       break;
     }
     default:
-      return InvalidArgument("frame.masks: needs label_png or label_runs");
+      return InvalidArgument("{}: needs label_png or label_runs", where);
   }
   std::unordered_set<uint32_t> labels;
   for (int i = 0; i < proto.instances_size(); ++i) {
-    const std::string where = fmt::format("frame.masks.instances[{}]", i);
-    ROMAP_ASSIGN_OR_RETURN(Instance instance, InstanceFromProto(*proto.mutable_instances(i), where));
+    const std::string which = fmt::format("{}.instances[{}]", where, i);
+    ROMAP_ASSIGN_OR_RETURN(Instance instance, InstanceFromProto(*proto.mutable_instances(i), which));
     if (!labels.insert(instance.label).second)
-      return InvalidArgument("{}.label: {} occurs twice", where, instance.label);
-    frame.instances.push_back(std::move(instance));
+      return InvalidArgument("{}.label: {} occurs twice", which, instance.label);
+    masks.instances.push_back(std::move(instance));
   }
   return absl::OkStatus();
 }
@@ -140,7 +141,7 @@ absl::StatusOr<FrameInput> FromProto(v1::Frame proto) {
   frame.timestamp_ns = proto.timestamp_ns();
   if (!proto.has_image()) return InvalidArgument("frame.image: missing");
   ROMAP_RETURN_IF_ERROR(ReadImage(*proto.mutable_image(), frame));
-  if (proto.has_masks()) ROMAP_RETURN_IF_ERROR(ReadMasks(*proto.mutable_masks(), frame));
+  if (proto.has_masks()) ROMAP_RETURN_IF_ERROR(ReadMasks(*proto.mutable_masks(), "frame.masks", frame));
   if (proto.has_t_world_camera()) {
     ROMAP_ASSIGN_OR_RETURN(frame.T_world_camera,
                            (TransformFromProto<World, Camera>(proto.t_world_camera(), "frame.t_world_camera")));
@@ -152,6 +153,21 @@ absl::StatusOr<FrameInput> FromProto(v1::Frame proto) {
     frame.gravity_camera = gravity;
   }
   return frame;
+}
+
+v1::LateMasks ToProto(MasksInput masks) {
+  v1::LateMasks proto;
+  proto.set_frame_id(masks.frame_id);
+  *proto.mutable_masks() = MasksToProto(masks);
+  return proto;
+}
+
+absl::StatusOr<MasksInput> FromProto(v1::LateMasks proto) {
+  MasksInput masks;
+  masks.frame_id = proto.frame_id();
+  if (!proto.has_masks()) return InvalidArgument("late_masks.masks: missing");
+  ROMAP_RETURN_IF_ERROR(ReadMasks(*proto.mutable_masks(), "late_masks.masks", masks));
+  return masks;
 }
 
 }  // namespace romap::wire

@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kMagic[] = "ROMAPREC";
 constexpr size_t kMagicBytes = sizeof(kMagic) - 1;
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kFramesOnly = 1, kVersion = 2;
 constexpr size_t kNumberBytes = 4;
 
 std::string NumberBytes(uint32_t number) {
@@ -45,6 +45,30 @@ std::string Record(const google::protobuf::MessageLite& message) {
   return NumberBytes(static_cast<uint32_t>(bytes.size())) + bytes;
 }
 
+v1::MapRequest ToRequest(SessionInput input) {
+  v1::MapRequest request;
+  if (auto* masks = std::get_if<MasksInput>(&input)) {
+    *request.mutable_late_masks() = ToProto(std::move(*masks));
+  } else {
+    *request.mutable_frame() = ToProto(std::get<FrameInput>(std::move(input)));
+  }
+  return request;
+}
+
+// nullopt: the bytes are no record of that version.
+std::optional<v1::MapRequest> ParseRequest(const std::string& bytes, uint32_t version) {
+  v1::MapRequest request;
+  const bool parsed =
+      version == kFramesOnly ? request.mutable_frame()->ParseFromString(bytes) : request.ParseFromString(bytes);
+  if (!parsed || !(request.has_frame() || request.has_late_masks())) return std::nullopt;
+  return request;
+}
+
+absl::StatusOr<SessionInput> FromRequest(v1::MapRequest request) {
+  if (request.has_late_masks()) return FromProto(std::move(*request.mutable_late_masks()));
+  return FromProto(std::move(*request.mutable_frame()));
+}
+
 }  // namespace
 
 RecordingWriter::RecordingWriter(const std::string& path)
@@ -58,7 +82,7 @@ absl::StatusOr<std::unique_ptr<RecordingWriter>> RecordingWriter::Create(const s
   return writer;
 }
 
-absl::Status RecordingWriter::Append(FrameInput frame) { return Write(Record(ToProto(std::move(frame)))); }
+absl::Status RecordingWriter::Append(SessionInput input) { return Write(Record(ToRequest(std::move(input)))); }
 
 absl::Status RecordingWriter::Write(const std::string& bytes) {
   file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
@@ -76,7 +100,7 @@ absl::StatusOr<Recording> Recording::Open(const std::string& path) {
   Recording recording;
   recording.path_ = path;
   ROMAP_RETURN_IF_ERROR(recording.ReadHead(file));
-  ROMAP_RETURN_IF_ERROR(recording.FindFrames(file, file_bytes));
+  ROMAP_RETURN_IF_ERROR(recording.FindRecords(file, file_bytes));
   return recording;
 }
 
@@ -86,9 +110,11 @@ absl::Status Recording::ReadHead(std::ifstream& file) {
   }
   const std::optional<uint32_t> version = ReadNumber(file);
   if (!version) return InvalidArgument("{}: cut off within its first bytes, nothing can be replayed", path_);
-  if (*version != kVersion) {
-    return InvalidArgument("{}: a recording of version {}, this program reads version {}", path_, *version, kVersion);
+  if (*version < kFramesOnly || *version > kVersion) {
+    return InvalidArgument("{}: a recording of version {}, this program reads versions {} to {}", path_, *version,
+                           kFramesOnly, kVersion);
   }
+  version_ = *version;
   const std::optional<uint32_t> length = ReadNumber(file);
   const std::optional<std::string> bytes = length && *length < (1U << 20) ? ReadBytes(file, *length) : std::nullopt;
   v1::CreateSessionRequest request;
@@ -101,7 +127,7 @@ absl::Status Recording::ReadHead(std::ifstream& file) {
   return absl::OkStatus();
 }
 
-absl::Status Recording::FindFrames(std::ifstream& file, uint64_t file_bytes) {
+absl::Status Recording::FindRecords(std::ifstream& file, uint64_t file_bytes) {
   uint64_t offset = static_cast<uint64_t>(file.tellg());
   while (offset < file_bytes) {
     const std::optional<uint32_t> length = ReadNumber(file);
@@ -111,30 +137,31 @@ absl::Status Recording::FindFrames(std::ifstream& file, uint64_t file_bytes) {
       break;
     }
     const std::optional<std::string> bytes = ReadBytes(file, *length);
-    v1::Frame frame;
-    if (!bytes || !frame.ParseFromString(*bytes)) {
-      return InvalidArgument("{}: record {} (at byte {}) should be a Frame, but is damaged", path_, frames_.size() + 1,
-                             begin);
+    const std::optional<v1::MapRequest> request = bytes ? ParseRequest(*bytes, version_) : std::nullopt;
+    if (!request) {
+      return InvalidArgument("{}: record {} (at byte {}) should be a frame or masks, but is damaged", path_,
+                             places_.size() + 1, begin);
     }
-    frames_.push_back({begin, *length, frame.timestamp_ns(), frame.has_masks()});
+    if (request->has_frame()) ++frames_;
+    places_.push_back({begin, *length});
     offset = begin + *length;
   }
   return absl::OkStatus();
 }
 
-absl::StatusOr<FrameInput> Recording::Load(size_t index) const {
-  if (index >= frames_.size()) return InvalidArgument("{}: no frame {}, there are {}", path_, index, frames_.size());
-  const Place& place = frames_[index];
+absl::StatusOr<SessionInput> Recording::Load(size_t index) const {
+  if (index >= size()) return InvalidArgument("{}: no record {}, there are {}", path_, index, size());
+  const Place& place = places_[index];
   std::ifstream file(path_, std::ios::binary);
   file.seekg(static_cast<std::streamoff>(place.offset));
   const std::optional<std::string> bytes = file ? ReadBytes(file, place.length) : std::nullopt;
-  v1::Frame proto;
-  if (!bytes || !proto.ParseFromString(*bytes)) {
-    return InvalidArgument("{}: frame {} can no longer be read, was the file changed?", path_, index + 1);
+  std::optional<v1::MapRequest> request = bytes ? ParseRequest(*bytes, version_) : std::nullopt;
+  if (!request) {
+    return InvalidArgument("{}: record {} can no longer be read, was the file changed?", path_, index + 1);
   }
-  auto frame = FromProto(std::move(proto));
-  if (!frame.ok()) return InvalidArgument("{}: frame {}: {}", path_, index + 1, Message(frame.status()));
-  return frame;
+  auto input = FromRequest(*std::move(request));
+  if (!input.ok()) return InvalidArgument("{}: record {}: {}", path_, index + 1, Message(input.status()));
+  return input;
 }
 
 }  // namespace romap::wire

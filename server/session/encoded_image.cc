@@ -143,10 +143,10 @@ absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraMo
   }
 }
 
-absl::StatusOr<cv::Mat> DecodeLabels(const FrameInput& input, const CameraModel& camera) {
-  if (input.mask_encoding == MaskEncoding::kNone) return cv::Mat();
-  if (input.mask_encoding == MaskEncoding::kRunLength) return ExpandRuns(input.label_runs, camera);
-  ROMAP_ASSIGN_OR_RETURN(cv::Mat decoded, DecodePng("mask", input.label_png, cv::IMREAD_UNCHANGED, camera));
+absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera) {
+  if (masks.mask_encoding == MaskEncoding::kNone) return cv::Mat();
+  if (masks.mask_encoding == MaskEncoding::kRunLength) return ExpandRuns(masks.label_runs, camera);
+  ROMAP_ASSIGN_OR_RETURN(cv::Mat decoded, DecodePng("mask", masks.label_png, cv::IMREAD_UNCHANGED, camera));
   if (decoded.channels() != 1 || (decoded.depth() != CV_8U && decoded.depth() != CV_16U)) {
     return InvalidArgument("mask: PNG has {} channels, labels need one channel of 8 or 16 bits", decoded.channels());
   }

@@ -16,9 +16,9 @@ namespace romap {
 // small file cannot claim a huge image. INVALID_ARGUMENT: truncated, not of the stated encoding, not the camera's size.
 absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera);
 
-// Decodes a frame's instance masks to CV_16UC1 labels; empty Mat when the frame has none. INVALID_ARGUMENT: as above,
+// Decodes instance masks to CV_16UC1 labels; empty Mat when there are none (kNone). INVALID_ARGUMENT: as above,
 // or runs that do not add up to the image.
-absl::StatusOr<cv::Mat> DecodeLabels(const FrameInput& input, const CameraModel& camera);
+absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera);
 
 // Decodes a frame's depth to CV_32FC1 in map units, 0 = unknown; empty Mat when the frame has none.
 absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera);

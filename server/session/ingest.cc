@@ -51,33 +51,34 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
 }
 
 // Every label in the mask gets an entry, so that later stages need not ask whether one is listed.
-void ListAllLabels(Frame& frame) {
+void ListAllLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
   std::vector<bool> listed(65536, false);
   listed[0] = true;
-  for (const Instance& instance : frame.instances) listed[instance.label] = true;
-  for (int y = 0; y < frame.labels.rows; ++y) {
-    const auto* row = frame.labels.ptr<uint16_t>(y);
-    for (int x = 0; x < frame.labels.cols; ++x) {
+  for (const Instance& instance : instances) listed[instance.label] = true;
+  for (int y = 0; y < labels.rows; ++y) {
+    const auto* row = labels.ptr<uint16_t>(y);
+    for (int x = 0; x < labels.cols; ++x) {
       if (listed[row[x]]) continue;
       listed[row[x]] = true;
-      frame.instances.push_back({.label = row[x], .class_name = "object", .score = 1.0, .track_id = std::nullopt});
+      instances.push_back({.label = row[x], .class_name = "object", .score = 1.0, .track_id = std::nullopt});
     }
   }
 }
 
 }  // namespace
 
-Ingest::Ingest(const CameraModel& camera) : camera_(camera) {
+Ingest::Ingest(const CameraModel& camera, double mask_patience_s) : camera_(camera), mask_patience_s_(mask_patience_s) {
   if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
 }
 
 absl::Status Ingest::CheckOrder(const FrameInput& input) const {
-  if (!any_accepted_) return absl::OkStatus();
-  if (input.frame_id <= last_frame_id_) {
-    return InvalidArgument("frame id does not grow: {} after {}", input.frame_id, last_frame_id_);
+  if (accepted_.empty()) return absl::OkStatus();
+  const AcceptedFrame& last = accepted_.back();
+  if (input.frame_id <= last.frame_id) {
+    return InvalidArgument("frame id does not grow: {} after {}", input.frame_id, last.frame_id);
   }
-  if (input.timestamp_ns <= last_timestamp_ns_) {
-    return InvalidArgument("timestamp goes back: {} ns after {} ns", input.timestamp_ns, last_timestamp_ns_);
+  if (input.timestamp_ns <= last.timestamp_ns) {
+    return InvalidArgument("timestamp goes back: {} ns after {} ns", input.timestamp_ns, last.timestamp_ns);
   }
   return absl::OkStatus();
 }
@@ -99,27 +100,64 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
   frame->has_masks = !frame->labels.empty();
   if (camera_.HasDistortion()) Undistort(*frame);
-  if (frame->has_masks) ListAllLabels(*frame);
-
-  any_accepted_ = true;
-  last_frame_id_ = input.frame_id;
-  last_timestamp_ns_ = input.timestamp_ns;
+  if (frame->has_masks) ListAllLabels(frame->labels, frame->instances);
+  Remember(*frame);
   return std::shared_ptr<const Frame>(std::move(frame));
+}
+
+void Ingest::Remember(const Frame& frame) {
+  accepted_.push_back({frame.frame_id, frame.timestamp_ns, frame.has_masks});
+  const auto is_too_old = [&](const AcceptedFrame& old) {
+    // The clock's epoch is the client's: only the unsigned difference of two far times cannot overflow.
+    const uint64_t behind_ns = static_cast<uint64_t>(frame.timestamp_ns) - static_cast<uint64_t>(old.timestamp_ns);
+    return static_cast<double>(behind_ns) > 1e9 * mask_patience_s_;
+  };
+  while (is_too_old(accepted_.front())) {
+    accepted_.pop_front();
+    any_forgotten_ = true;
+  }
+}
+
+absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
+  ROMAP_ASSIGN_OR_RETURN(AcceptedFrame* const frame, FindMaskless(input.frame_id));
+  if (input.mask_encoding == MaskEncoding::kNone) return InvalidArgument("mask: missing");
+  ROMAP_RETURN_IF_ERROR(CheckInstances(input.instances));
+  FrameMasks masks{.frame_id = input.frame_id, .labels = {}, .instances = input.instances};
+  ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_));
+  if (camera_.HasDistortion()) UndistortNearest(masks.labels);
+  ListAllLabels(masks.labels, masks.instances);
+  frame->has_masks = true;
+  return masks;
+}
+
+absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindMaskless(uint64_t frame_id) {
+  const auto found = std::lower_bound(accepted_.begin(), accepted_.end(), frame_id,
+                                      [](const AcceptedFrame& frame, uint64_t id) { return frame.frame_id < id; });
+  if (found == accepted_.begin() && any_forgotten_ && found->frame_id != frame_id) {
+    return InvalidArgument("too late: the frame lies more than {} s (objects.mask_patience_s) behind the newest",
+                           mask_patience_s_);
+  }
+  if (found == accepted_.end() || found->frame_id != frame_id) return InvalidArgument("no such frame was accepted");
+  if (found->has_masks) return InvalidArgument("the frame has masks already");
+  return &*found;
 }
 
 void Ingest::Undistort(Frame& frame) const {
   cv::cvtColor(frame.image_bgr, frame.source_grey, cv::COLOR_BGR2GRAY);
   frame.source_camera = camera_;
-  // Labels and depth must not be blended; what comes from outside the image is black, unlabelled and without depth.
-  const auto remap = [&](cv::Mat& image, int interpolation) {
-    if (image.empty()) return;
-    cv::Mat undistorted;
-    cv::remap(image, undistorted, maps_.xy, maps_.fraction, interpolation, cv::BORDER_CONSTANT);
-    image = undistorted;
-  };
-  remap(frame.image_bgr, cv::INTER_LINEAR);
-  remap(frame.labels, cv::INTER_NEAREST);
-  remap(frame.depth_mu, cv::INTER_NEAREST);
+  cv::Mat undistorted;
+  cv::remap(frame.image_bgr, undistorted, maps_.xy, maps_.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  frame.image_bgr = undistorted;
+  UndistortNearest(frame.labels);
+  UndistortNearest(frame.depth_mu);
+}
+
+// Labels and depth must not be blended; what comes from outside the image is black, unlabelled and without depth.
+void Ingest::UndistortNearest(cv::Mat& image) const {
+  if (image.empty()) return;
+  cv::Mat undistorted;
+  cv::remap(image, undistorted, maps_.xy, maps_.fraction, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
+  image = undistorted;
 }
 
 }  // namespace romap

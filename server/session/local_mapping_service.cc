@@ -37,6 +37,11 @@ class LocalEventStream : public MapStream {
     return session_->Offer(std::move(frame));
   }
 
+  absl::Status SendMasks(MasksInput masks) override {
+    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    return session_->Offer(std::move(masks));
+  }
+
   absl::Status CloseSend() override {
     if (!StopSending()) return FailedPrecondition("this stream was closed for sending");
     session_->WhenDrained([outbox = outbox_] { outbox->Close(); });

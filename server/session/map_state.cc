@@ -14,17 +14,14 @@ void MapState::Apply(MapEvent event) {
   if (auto* update = std::get_if<ObjectUpdate>(&event)) {
     ApplyUpdate(std::move(*update));
   } else if (auto* removed = std::get_if<ObjectRemoved>(&event)) {
-    removed->revision = Forget(removed->id);
-    Send(event);
+    ApplyRemoval(std::move(*removed));
   } else if (auto* merged = std::get_if<ObjectMerged>(&event)) {
-    Forget(merged->from);
-    const auto into = objects_.find(merged->into);
-    merged->revision = into == objects_.end() ? 0 : ++into->second.object.revision;
-    Send(event);
+    ApplyMerge(*merged);
   }
 }
 
 void MapState::ApplyUpdate(ObjectUpdate update) {
+  if (gone_.contains(update.id)) return;
   Object& entry = objects_[update.id];
   update.revision = entry.object.revision + 1;
   update.T_world_mesh = entry.object.T_world_mesh;
@@ -33,13 +30,29 @@ void MapState::ApplyUpdate(ObjectUpdate update) {
   Send(entry.object);
 }
 
-// Drops the object and returns the revision that says so.
-uint64_t MapState::Forget(ObjectId id) {
-  const auto it = objects_.find(id);
-  if (it == objects_.end()) return 1;
-  const uint64_t revision = it->second.object.revision + 1;
+void MapState::ApplyRemoval(ObjectRemoved removed) {
+  const auto it = objects_.find(removed.id);
+  if (it == objects_.end()) return;
+  removed.revision = it->second.object.revision + 1;
+  gone_.insert(removed.id);
   objects_.erase(it);
-  return revision;
+  Send(removed);
+}
+
+void MapState::ApplyMerge(ObjectMerged merged) {
+  if (merged.from == merged.into) return;
+  const auto into = objects_.find(merged.into);
+  if (into == objects_.end()) {
+    return ApplyRemoval({.id = merged.from, .revision = 0, .reason = "merged into " + merged.into.ToString()});
+  }
+  if (objects_.erase(merged.from) == 0) return;
+  gone_.insert(merged.from);
+  ObjectUpdate& object = into->second.object;
+  merged.revision = ++object.revision;
+  Send(merged);
+  // Who is slow may never hear of the merge, but must learn of the revision.
+  ++object.revision;
+  Send(object);
 }
 
 void MapState::MoveObject(ObjectId object, const Sim3<World, World>& S_new_old) {
@@ -93,6 +106,11 @@ SE3<World, Camera> MapState::PoseNow(const TrajectoryEntry& entry) const {
   const Reference& reference = references_.at(entry.reference);
   return reference.T_world_camera * SE3<Camera, Camera>(entry.T_reference_camera.rotation(),
                                                         reference.scale * entry.T_reference_camera.translation());
+}
+
+void MapState::Acknowledge(MasksAck ack) {
+  std::lock_guard lock(mutex_);
+  Send(ack);
 }
 
 void MapState::Publish(const Statistics& statistics) {

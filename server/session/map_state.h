@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "common/mapping_service.h"
@@ -17,10 +18,11 @@ namespace romap {
 
 // The map as clients see it: the newest cuboid and mesh of every object, the trajectory, and who listens. Every change
 // gets its revision here and goes to all outboxes. Corrections move meshes and frames that are there already; the mesh
-// itself is never sent again for it. Thread-safe.
+// itself is never sent again for it. What is gone stays gone: its id is never used again. Thread-safe.
 class MapState {
  public:
-  // What the objects stage says: updates, removals, merges.
+  // What the objects stage says: updates, removals, merges. Passed over when it is about objects that are gone, or that
+  // were never told of; an object that is merged into such a one is removed.
   void Apply(MapEvent event);
   // The space of an object underwent `S_new_old`: its mesh goes along, and so will meshes that are being made of older
   // snapshots. Clients learn of it by the object's next update, so call it before Apply() of what the same correction
@@ -33,6 +35,8 @@ class MapState {
                    const SE3<Camera, Camera>& T_reference_camera = {});
   // Keyframes were corrected: the frames of the trajectory that hang on them go along.
   void Correct(const MapCorrection& correction);
+  // Answer to late masks.
+  void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
 
   // Starts with the objects there are, if `with_snapshot`. Already closed when the map is.
@@ -64,11 +68,13 @@ class MapState {
 
   void Send(const MapEvent& event);
   void ApplyUpdate(ObjectUpdate update);
-  uint64_t Forget(ObjectId id);
+  void ApplyRemoval(ObjectRemoved removed);
+  void ApplyMerge(ObjectMerged merged);
   SE3<World, Camera> PoseNow(const TrajectoryEntry& entry) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
+  std::set<ObjectId> gone_;
   std::vector<TrajectoryEntry> trajectory_;
   std::map<KeyframeId, Reference> references_;
   std::vector<std::shared_ptr<Outbox>> outboxes_;

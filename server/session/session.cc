@@ -1,23 +1,13 @@
 #include "server/session/session.h"
 
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <fstream>
 #include <utility>
 
 #include "common/status.h"
 
 namespace romap {
 namespace {
-
-uint64_t ResidentBytes() {
-  std::ifstream statm("/proc/self/statm");
-  uint64_t pages_total = 0, pages_resident = 0;
-  statm >> pages_total >> pages_resident;
-  return pages_resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
-}
 
 int64_t UnixNow_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -32,8 +22,6 @@ bool ChangesMap(const TrackedImage& image) {
   return !image.pose_given && (image.tracked.is_keyframe || image.start || image.tracked.state == TrackingState::kLost);
 }
 
-double Seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
-
 }  // namespace
 
 Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
@@ -45,12 +33,12 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       pool_(pool),
       mesher_(mesher),
       recorder_(std::move(recorder)),
-      ingest_(options.camera),
+      ingest_(options.camera, config.objects.mask_patience_s),
       tracker_(config.slam, options.pose_use, &local_map_),
       sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
       object_mapper_(config.objects),
       next_statistics_(Clock::now()),
-      frames_(config.session.frame_queue),
+      inputs_(config.session.frame_queue),
       tracked_(config.session.mapping_queue) {
   mesher_client_ =
       mesher_->Register([this](MeshUpdate mesh, const MeshPlace& place) { map_.PublishMesh(std::move(mesh), place); });
@@ -72,7 +60,7 @@ Session::~Session() {
 
 void Session::Stop(const absl::Status& status) {
   stopping_ = true;
-  frames_.Close();
+  inputs_.Close();
   tracked_.Close();
   map_.Close(status);
   if (tracking_thread_.joinable()) tracking_thread_.join();
@@ -83,8 +71,8 @@ void Session::Stop(const absl::Status& status) {
 
 void Session::RunTracking() {
   try {
-    while (std::optional<Arrival> arrival = frames_.Pop()) {
-      if (!stopping_) TrackFrame(*arrival);
+    while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (!stopping_) Take(*arrival);
     }
   } catch (const std::exception& e) {
     Fail("tracking", e.what());
@@ -95,8 +83,8 @@ void Session::RunTracking() {
 // Tracking, mapping and training in turns.
 void Session::RunAll() {
   try {
-    while (std::optional<Arrival> arrival = frames_.Pop()) {
-      if (!stopping_) TrackFrame(*arrival);
+    while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (!stopping_) Take(*arrival);
       PublishStatistics();
     }
     EndMapping();
@@ -106,11 +94,14 @@ void Session::RunAll() {
   }
 }
 
+void Session::Take(const Arrival& arrival) {
+  std::holds_alternative<FrameInput>(arrival.input) ? TrackFrame(arrival) : TakeMasks(arrival);
+}
+
 void Session::TrackFrame(const Arrival& arrival) {
-  const FrameInput& input = arrival.input;
-  auto frame = ingest_.Accept(input);
-  if (!frame.ok()) return Reject(input, Message(frame.status()), arrival.time);
-  Record(input);
+  auto frame = ingest_.Accept(std::get<FrameInput>(arrival.input));
+  if (!frame.ok()) return Reject(arrival, Message(frame.status()));
+  Record(arrival.input);
   TrackedImage image = tracker_.Track(*frame);
   Acknowledge(arrival, image.tracked);
   if (config_.session.single_thread) {
@@ -121,13 +112,25 @@ void Session::TrackFrame(const Arrival& arrival) {
   options_.mode == FrameMode::kLive ? QueueLive(std::move(image)) : QueueReplay(std::move(image));
 }
 
+// What a detector says is rarer than frames, and dear: it waits for room, as keyframes do.
+void Session::TakeMasks(const Arrival& arrival) {
+  auto masks = ingest_.AcceptMasks(std::get<MasksInput>(arrival.input));
+  if (!masks.ok()) return Reject(arrival, Message(masks.status()));
+  Record(arrival.input);
+  map_.Acknowledge(MasksAck{.frame_id = masks->frame_id, .accepted = true, .error = ""});
+  if (config_.session.single_thread) return MapMasks(*masks);
+  tracked_.Push(*std::move(masks));
+}
+
 // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
 // objects.
 void Session::QueueLive(TrackedImage image) {
   if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
-  if (tracked_.TryPush(image)) return;
-  if (image.tracked.is_keyframe || image.start) {
-    tracked_.Push(std::move(image));
+  const bool must_be_mapped = image.tracked.is_keyframe || image.start;
+  MappingTask task = std::move(image);
+  if (tracked_.TryPush(task)) return;
+  if (must_be_mapped) {
+    tracked_.Push(std::move(task));
   } else {
     Settle();
   }
@@ -148,28 +151,12 @@ void Session::CountMapChange(int change) {
   map_changed_.notify_all();
 }
 
-void Session::Acknowledge(const Arrival& arrival, const TrackedFrame& tracked) {
-  const bool has_pose = tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalised;
-  FrameAck ack;
-  ack.frame_id = arrival.input.frame_id;
-  ack.state = tracked.state;
-  if (has_pose) ack.T_world_camera = tracked.T_world_camera;
-  ack.is_keyframe = tracked.is_keyframe;
-  ack.latency_s = Seconds(Clock::now() - arrival.time);
-  ack.state_reason = tracked.reason;
-  map_.Acknowledge(std::move(ack), arrival.input.timestamp_ns, tracked.reference, tracked.T_reference_camera);
-}
-
 void Session::RunMapping() {
   const auto period = std::chrono::milliseconds(static_cast<int64_t>(1000 * config_.session.statistics_period_s));
   try {
     while (!tracked_.Drained()) {
-      const std::optional<TrackedImage> image = tracked_.PopFor(period);
-      if (image && options_.mode == FrameMode::kLive && image->tracked.is_keyframe) {
-        sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
-      }
-      if (image && !stopping_) MapFrame(*image);
-      if (image && ChangesMap(*image)) CountMapChange(-1);
+      const std::optional<MappingTask> task = tracked_.PopFor(period);
+      if (task) Map(*task);
       PublishStatistics();
     }
     EndMapping();
@@ -182,6 +169,22 @@ void Session::RunMapping() {
 void Session::EndMapping() {
   SettleAll();
   if (state_ != SessionState::kFailed && !stopping_) TrainToTheEnd();
+}
+
+void Session::Map(const MappingTask& task) {
+  if (const auto* masks = std::get_if<FrameMasks>(&task)) {
+    if (!stopping_) MapMasks(*masks);
+    return;
+  }
+  const TrackedImage& image = std::get<TrackedImage>(task);
+  if (options_.mode == FrameMode::kLive && image.tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
+  if (!stopping_) MapFrame(image);
+  if (ChangesMap(image)) CountMapChange(-1);
+}
+
+void Session::MapMasks(const FrameMasks& masks) {
+  Publish(object_mapper_.ObserveLateMasks(masks));
+  Settle();
 }
 
 void Session::MapFrame(const TrackedImage& image) {
@@ -237,156 +240,6 @@ void Session::TrainToTheEnd() {
   map_.Publish(CurrentStatistics());
   state_ = SessionState::kFinished;
   map_.Close(absl::OkStatus());
-}
-
-// ------------------------------------------------------------------------------------------------ bookkeeping
-
-void Session::Reject(const FrameInput& input, const std::string& why, Clock::time_point arrival) {
-  ++frames_rejected_;
-  spdlog::info("session {}: frame {} not accepted: {}", id_, input.frame_id, why);
-  map_.Acknowledge({.frame_id = input.frame_id,
-                    .accepted = false,
-                    .error = why,
-                    .state = TrackingState::kLost,
-                    .T_world_camera = std::nullopt,
-                    .is_keyframe = false,
-                    .latency_s = Seconds(Clock::now() - arrival)},
-                   input.timestamp_ns);
-  Settle();
-}
-
-// A disk that fails costs the recording, not the session.
-void Session::Record(const FrameInput& input) {
-  if (!recorder_) return;
-  const absl::Status status = recorder_->Append(input);
-  if (status.ok()) return;
-  spdlog::error("session {}: its recording ends: {}", id_, Message(status));
-  recorder_ = nullptr;
-}
-
-void Session::Fail(const char* stage, const std::string& what) {
-  spdlog::error("session {}: {} failed, the session ends: {}", id_, stage, what);
-  state_ = SessionState::kFailed;
-  frames_.Close();
-  tracked_.Close();
-  map_.Close(Internal("session {}: {} failed: {}", id_, stage, what));
-}
-
-absl::Status Session::Offer(FrameInput input) {
-  const auto closed = [&] { return FailedPrecondition("session {} takes no more frames: it is finished", id_); };
-  Arrival arrival{std::move(input), Clock::now()};
-  if (options_.mode == FrameMode::kReplay) {
-    if (!frames_.Push(std::move(arrival))) return closed();
-    ++frames_received_;
-    return absl::OkStatus();
-  }
-  bool accepted = false;
-  const std::optional<Arrival> dropped = frames_.PushDroppingOldest(std::move(arrival), &accepted);
-  if (!accepted) return closed();
-  ++frames_received_;
-  if (dropped) {
-    ++frames_dropped_;
-    map_.Acknowledge({.frame_id = dropped->input.frame_id,
-                      .accepted = false,
-                      .error = "dropped: the server is behind the live stream",
-                      .state = TrackingState::kTracking,
-                      .T_world_camera = std::nullopt,
-                      .is_keyframe = false,
-                      .latency_s = Seconds(Clock::now() - dropped->time)},
-                     dropped->input.timestamp_ns);
-    Settle();
-  }
-  return absl::OkStatus();
-}
-
-void Session::Finish() {
-  SessionState open = SessionState::kOpen;
-  state_.compare_exchange_strong(open, SessionState::kFinishing);
-  frames_.Close();
-}
-
-bool Session::AttachSender() { return !sender_attached_.exchange(true); }
-void Session::DetachSender() { sender_attached_ = false; }
-
-void Session::WhenDrained(std::function<void()> done) {
-  {
-    std::lock_guard lock(drain_mutex_);
-    const uint64_t target = frames_received_;
-    if (!all_settled_ && frames_settled_ < target) {
-      drain_waiters_.emplace(target, std::move(done));
-      return;
-    }
-  }
-  done();
-}
-
-void Session::Settle() {
-  std::vector<std::function<void()>> due;
-  {
-    std::lock_guard lock(drain_mutex_);
-    ++frames_settled_;
-    const auto end = drain_waiters_.upper_bound(frames_settled_);
-    for (auto it = drain_waiters_.begin(); it != end; ++it) due.push_back(std::move(it->second));
-    drain_waiters_.erase(drain_waiters_.begin(), end);
-  }
-  for (const auto& done : due) done();
-}
-
-void Session::SettleAll() {
-  std::multimap<uint64_t, std::function<void()>> due;
-  {
-    std::lock_guard lock(drain_mutex_);
-    all_settled_ = true;
-    map_changed_.notify_all();
-    due.swap(drain_waiters_);
-  }
-  for (const auto& [target, done] : due) done();
-}
-
-void Session::PublishStatistics() {
-  const Clock::time_point now = Clock::now();
-  if (now < next_statistics_) return;
-  next_statistics_ = now + std::chrono::duration_cast<Clock::duration>(
-                               std::chrono::duration<double>(config_.session.statistics_period_s));
-  map_.Publish(CurrentStatistics());
-}
-
-Statistics Session::CurrentStatistics() const {
-  const TrainingPool::Progress progress = pool_->GetProgress(pool_client_);
-  Statistics statistics;
-  statistics.frames_received = frames_received_;
-  statistics.frames_processed = frames_processed_;
-  statistics.frames_dropped = frames_dropped_;
-  statistics.frames_rejected = frames_rejected_;
-  statistics.keyframes = keyframes_;
-  statistics.map_points = map_points_;
-  statistics.objects = map_.ConfirmedObjects();
-  statistics.objects_training = static_cast<uint64_t>(std::max(0, progress.objects_training));
-  statistics.training_steps = progress.steps;
-  statistics.training_progress = progress.progress;
-  statistics.resident_bytes = ResidentBytes();
-  return statistics;
-}
-
-SessionInfo Session::Info() const {
-  SessionInfo info;
-  info.id = id_;
-  info.name = options_.name;
-  info.camera = options_.camera;
-  info.mode = options_.mode;
-  info.state = state_;
-  info.created_unix_ns = created_unix_ns_;
-  info.stream_open = sender_attached_;
-  info.statistics = CurrentStatistics();
-  return info;
-}
-
-MapSnapshot Session::Export() const {
-  MapSnapshot snapshot = map_.Snapshot();
-  snapshot.session_id = id_;
-  snapshot.state = state_;
-  snapshot.statistics = CurrentStatistics();
-  return snapshot;
 }
 
 }  // namespace romap

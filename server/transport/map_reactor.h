@@ -8,8 +8,8 @@
 
 namespace romap::transport {
 
-// One Map call: frames from the client to MapStream::Send, events from MapStream::Next to the client. The next frame is
-// read only when Send has taken the last one; that is what slows the client down.
+// One Map call: frames and late masks from the client to the MapStream, events from MapStream::Next to the client. The
+// next request is read only when the stream has taken the last one; that is what slows the client down.
 class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
  public:
   using StreamReactor::StreamReactor;
@@ -22,11 +22,13 @@ class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, 
 
   // Waits for the next request, into request_; false when the client has closed its side, nullopt when the call stops.
   std::optional<bool> Read();
-  // Body of the frame thread.
-  void PumpFrames(MapStream& stream);
-  // Hands the frame in request_ on, or refuses it; otherwise why the call must end.
+  // Body of the thread that reads requests.
+  void PumpRequests(MapStream& stream);
+  // Hands what is in request_ on, or refuses it; otherwise why the call must end.
+  absl::Status TakeRequest(MapStream& stream);
   absl::Status TakeFrame(MapStream& stream);
-  void Refuse(uint64_t frame_id, const absl::Status& why);
+  absl::Status TakeMasks(MapStream& stream);
+  void Answer(MapEvent refusal);
 
   Completion read_;
   v1::MapRequest request_;

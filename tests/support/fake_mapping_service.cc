@@ -111,9 +111,22 @@ class FakeSession {
     ++(ack.accepted ? statistics.frames_processed : statistics.frames_rejected);
     Publish(ack);
     if (!ack.accepted) return absl::OkStatus();
+    if (frame.mask_encoding == MaskEncoding::kNone) awaiting_masks_.insert(frame.frame_id);
     trajectory_.push_back(ack);
     timestamps_ns_.push_back(frame.timestamp_ns);
     for (const Instance& instance : frame.instances) See(instance);
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeMasks(const MasksInput& masks) {
+    std::lock_guard lock(mutex_);
+    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
+    const bool awaited = awaiting_masks_.erase(masks.frame_id) > 0;
+    Publish(MasksAck{.frame_id = masks.frame_id,
+                     .accepted = awaited,
+                     .error = awaited ? "" : "no such frame was accepted, or it has masks already"});
+    if (!awaited) return absl::OkStatus();
+    for (const Instance& instance : masks.instances) See(instance);
     return absl::OkStatus();
   }
 
@@ -185,6 +198,7 @@ class FakeSession {
   SessionInfo info_;
   std::set<std::shared_ptr<Mailbox>> subscribers_;
   std::map<std::string, ObjectUpdate> objects_;  // by class name
+  std::set<uint64_t> awaiting_masks_;            // frames that were accepted without
   std::vector<FrameAck> trajectory_;
   std::vector<int64_t> timestamps_ns_;
 };
@@ -207,6 +221,10 @@ class FakeStream : public MapStream {
     if (!sending_) return FailedPrecondition("this stream was closed for sending");
     hook_(frame);
     return session_->Take(frame);
+  }
+  absl::Status SendMasks(MasksInput masks) override {
+    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    return session_->TakeMasks(masks);
   }
   absl::Status CloseSend() override {
     if (!StopSending()) return FailedPrecondition("this stream was closed for sending");

@@ -18,7 +18,8 @@ class FakeSession;
 
 // A mapping service that does no mapping, for tests of whatever stands in front of one. Keeps the promises of
 // MappingService, and
-//   - answers every frame within Send(): a frame with an image is accepted, one without is not;
+//   - answers every frame within Send(): a frame with an image is accepted, one without is not; and late masks within
+//     SendMasks(): those of an accepted frame without masks are accepted;
 //   - makes one confirmed object per class name among the instances, and with every frame that shows it sends an update
 //     and a mesh of it, each with a higher revision;
 //   - finishes a session at once.

@@ -55,6 +55,13 @@ TEST(WireEvents, FrameAckComesBack) {
   EXPECT_EQ(got.latency_s, ack.latency_s);
 }
 
+TEST(WireEvents, MasksAckComesBack) {
+  const MasksAck got = RoundTrip(MasksAck{.frame_id = 3, .accepted = false, .error = "too late"});
+  EXPECT_EQ(got.frame_id, 3u);
+  EXPECT_FALSE(got.accepted);
+  EXPECT_EQ(got.error, "too late");
+}
+
 TEST(WireEvents, ObjectUpdateComesBack) {
   const ObjectUpdate object = FullObject();
   const ObjectUpdate got = RoundTrip(object);

@@ -85,6 +85,37 @@ TEST(WireFrame, ADetectorThatFoundNothingDiffersFromNoDetector) {
   EXPECT_EQ(got->label_png, sent.label_png);
 }
 
+TEST(WireFrame, LateMasksComeBack) {
+  MasksInput sent;
+  sent.frame_id = 42;
+  static_cast<EncodedMasks&>(sent) = FullFrame();
+  const auto runs = FromProto(ToProto(sent));
+  ASSERT_TRUE(runs.ok()) << Message(runs.status());
+  EXPECT_EQ(runs->frame_id, 42u);
+  EXPECT_EQ(runs->mask_encoding, MaskEncoding::kRunLength);
+  EXPECT_EQ(runs->label_runs, sent.label_runs);
+  ASSERT_EQ(runs->instances.size(), 2u);
+  EXPECT_EQ(runs->instances[0].class_name, "mug");
+  EXPECT_EQ(runs->instances[0].track_id, 7u);
+  sent.mask_encoding = MaskEncoding::kLabelPng;
+  sent.label_png = "png";
+  const auto png = FromProto(ToProto(sent));
+  ASSERT_TRUE(png.ok()) << Message(png.status());
+  EXPECT_EQ(png->mask_encoding, MaskEncoding::kLabelPng);
+  EXPECT_EQ(png->label_png, "png");
+}
+
+TEST(WireFrame, AFaultOfLateMasksIsNamed) {
+  MasksInput sent;
+  static_cast<EncodedMasks&>(sent) = FullFrame();
+  v1::LateMasks without = ToProto(sent), bad = without;
+  without.clear_masks();
+  EXPECT_THAT(Message(FromProto(without).status()), HasSubstr("late_masks.masks: missing"));
+  EXPECT_THAT(Message(FromProto(ToProto(MasksInput{})).status()), HasSubstr("late_masks.masks: needs label_png"));
+  bad.mutable_masks()->mutable_instances(1)->set_label(3);
+  EXPECT_THAT(Message(FromProto(bad).status()), HasSubstr("late_masks.masks.instances[1].label: 3 occurs twice"));
+}
+
 TEST(WireFrame, WhatAnInstanceLeavesOutHasADefault) {
   v1::Frame proto = ToProto(FullFrame());
   v1::Instance& instance = *proto.mutable_masks()->mutable_instances(0);

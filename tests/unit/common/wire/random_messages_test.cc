@@ -98,6 +98,14 @@ void ExpectPlainRefusal(const absl::Status& status) {
   EXPECT_NE(romap::Message(status).find(':'), std::string::npos) << "names no field: " << romap::Message(status);
 }
 
+void ExpectSound(const std::vector<Instance>& instances) {
+  for (const Instance& instance : instances) {
+    EXPECT_TRUE(instance.label >= 1 && instance.label <= 65535);
+    EXPECT_TRUE(instance.score >= 0 && instance.score <= 1);
+    EXPECT_FALSE(instance.class_name.empty());
+  }
+}
+
 TEST(WireRandomMessages, FramesAreSoundOrRefused) {
   RandomMessages random(1);
   int sound = 0;
@@ -114,11 +122,26 @@ TEST(WireRandomMessages, FramesAreSoundOrRefused) {
     EXPECT_TRUE(!frame->T_world_camera || frame->T_world_camera->IsFinite());
     EXPECT_TRUE(!frame->gravity_camera || (frame->gravity_camera->allFinite() && frame->gravity_camera->norm() > 0));
     EXPECT_TRUE(frame->depth_encoding == DepthEncoding::kNone || frame->depth_scale_mu > 0);
-    for (const Instance& instance : frame->instances) {
-      EXPECT_TRUE(instance.label >= 1 && instance.label <= 65535);
-      EXPECT_TRUE(instance.score >= 0 && instance.score <= 1);
-      EXPECT_FALSE(instance.class_name.empty());
+    ExpectSound(frame->instances);
+  }
+  EXPECT_GT(sound, 0) << "the messages were all refused, so that nothing was tested";
+}
+
+TEST(WireRandomMessages, LateMasksAreSoundOrRefused) {
+  RandomMessages random(6);
+  int sound = 0;
+  for (int i = 0; i < kRounds; ++i) {
+    v1::LateMasks proto;
+    random.Fill(proto);
+    const auto masks = FromProto(std::move(proto));
+    if (!masks.ok()) {
+      ExpectPlainRefusal(masks.status());
+      continue;
     }
+    ++sound;
+    EXPECT_NE(masks->mask_encoding, MaskEncoding::kNone);
+    EXPECT_TRUE(masks->label_png.empty() != masks->label_runs.empty());
+    ExpectSound(masks->instances);
   }
   EXPECT_GT(sound, 0) << "the messages were all refused, so that nothing was tested";
 }

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -14,6 +15,8 @@ using ::testing::HasSubstr;
 
 const CameraModel kCamera{
     .width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 31.5, .cy_px = 23.5, .distortion = {}};
+
+constexpr double kMaskPatience_s = 1;
 
 std::string Encode(const char* extension, const cv::Mat& image) {
   std::vector<uint8_t> bytes;
@@ -49,7 +52,7 @@ std::string Fault(Ingest& ingest, const FrameInput& input) {
 
 TEST(IngestTest, DecodesEveryImageEncoding) {
   const cv::Mat image = Gradient(64, 48);
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   FrameInput png = GoodFrame(1);
   auto frame = ingest.Accept(png);
   ASSERT_TRUE(frame.ok()) << frame.status();
@@ -89,7 +92,7 @@ TEST(IngestTest, ReadsMasksAsPngAndAsRuns) {
     runs.label_runs.insert(runs.label_runs.end(), {label, static_cast<uint32_t>(end - i)});
     i = end;
   }
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   for (const FrameInput& input : {png, runs}) {
     const auto frame = ingest.Accept(input);
     ASSERT_TRUE(frame.ok()) << frame.status();
@@ -107,13 +110,13 @@ TEST(IngestTest, DepthBecomesMapUnits) {
   input.depth_encoding = DepthEncoding::kPng16;
   input.depth = Encode(".png", depth);
   input.depth_scale_mu = 0.001;
-  const auto frame = Ingest(kCamera).Accept(input);
+  const auto frame = Ingest(kCamera, kMaskPatience_s).Accept(input);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_FLOAT_EQ((*frame)->depth_mu.at<float>(20, 20), 1.5f);
 }
 
 TEST(IngestTest, TruncatedImagesAreRefused) {
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   FrameInput png = GoodFrame();
   png.image.resize(png.image.size() / 2);
   EXPECT_THAT(Fault(ingest, png), HasSubstr("image: PNG file is truncated"));
@@ -130,7 +133,7 @@ TEST(IngestTest, TruncatedImagesAreRefused) {
 }
 
 TEST(IngestTest, WrongSizesAreNamed) {
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   FrameInput image = GoodFrame();
   image.image = Encode(".png", Gradient(32, 48));
   EXPECT_THAT(Fault(ingest, image), HasSubstr("image is 32x48 px, the session's camera says 64x48 px"));
@@ -157,12 +160,12 @@ TEST(IngestTest, WrongSizesAreNamed) {
 TEST(IngestTest, ASmallFileThatClaimsAHugeImageIsNotDecoded) {
   FrameInput input = GoodFrame();
   for (size_t at : {16, 20}) input.image.replace(at, 4, "\x00\x01\x00\x00", 4);
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   EXPECT_THAT(Fault(ingest, input), HasSubstr("65536x65536"));
 }
 
 TEST(IngestTest, NumbersThatAreNotFiniteAreRefused) {
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   FrameInput pose = GoodFrame();
   pose.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, std::nan(""), 0));
   EXPECT_THAT(Fault(ingest, pose), HasSubstr("T_world_camera"));
@@ -179,7 +182,7 @@ TEST(IngestTest, NumbersThatAreNotFiniteAreRefused) {
 }
 
 TEST(IngestTest, TimeAndIdsOnlyGrow) {
-  Ingest ingest(kCamera);
+  Ingest ingest(kCamera, kMaskPatience_s);
   ASSERT_EQ(Fault(ingest, GoodFrame(5)), "accepted");
   EXPECT_THAT(Fault(ingest, GoodFrame(5)), HasSubstr("frame id does not grow: 5 after 5"));
   FrameInput back = GoodFrame(6);
@@ -203,7 +206,7 @@ TEST(IngestTest, DistortionIsTakenOut) {
              cv::Scalar::all(255), -1);
   FrameInput input = GoodFrame();
   input.image = Encode(".png", image);
-  const auto frame = Ingest(distorted).Accept(input);
+  const auto frame = Ingest(distorted, kMaskPatience_s).Accept(input);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_FALSE((*frame)->camera.HasDistortion());
   cv::Mat gray;
@@ -220,7 +223,7 @@ std::shared_ptr<const Frame> AcceptDot(const CameraModel& camera, const Eigen::V
              cv::Scalar::all(255), -1);
   FrameInput input = GoodFrame();
   input.image = Encode(".png", image);
-  return Ingest(camera).Accept(input).value();
+  return Ingest(camera, kMaskPatience_s).Accept(input).value();
 }
 
 TEST(IngestTest, AFisheyeImageBecomesAPinholeImage) {
@@ -246,6 +249,103 @@ TEST(IngestTest, ThePictureIsKeptAsADistortingLensGaveIt) {
   ASSERT_EQ(frame->source_grey.size(), cv::Size(64, 48));
   EXPECT_EQ(frame->source_grey.at<uint8_t>(10, 50), 255);
   EXPECT_TRUE(AcceptDot(kCamera, {50, 10})->source_grey.empty());
+}
+
+// ------------------------------------------------------------------------------------------------ late masks
+
+MasksInput GoodMasks(uint64_t frame_id) {
+  cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
+  labels(cv::Rect(10, 10, 20, 8)) = 7;
+  labels(cv::Rect(40, 10, 5, 5)) = 9;
+  MasksInput input;
+  input.frame_id = frame_id;
+  input.mask_encoding = MaskEncoding::kLabelPng;
+  input.label_png = Encode(".png", labels);
+  input.instances = {{.label = 7, .class_name = "mug", .score = 0.5, .track_id = std::nullopt}};
+  return input;
+}
+
+std::string MaskFault(Ingest& ingest, const MasksInput& input) {
+  const auto masks = ingest.AcceptMasks(input);
+  if (masks.ok()) return "accepted";
+  EXPECT_EQ(masks.status().code(), absl::StatusCode::kInvalidArgument);
+  return Message(masks.status());
+}
+
+TEST(IngestTest, LateMasksAreWhatTheFrameWouldHaveHad) {
+  CameraModel lens = kCamera;
+  lens.distortion = {-0.2, 0.05, 0, 0, 0};
+  for (const CameraModel& camera : {kCamera, lens}) {
+    FrameInput whole = GoodFrame();
+    static_cast<EncodedMasks&>(whole) = GoodMasks(1);
+    const auto frame = Ingest(camera, kMaskPatience_s).Accept(whole).value();
+    Ingest ingest(camera, kMaskPatience_s);
+    ASSERT_EQ(Fault(ingest, GoodFrame()), "accepted");
+    const auto masks = ingest.AcceptMasks(GoodMasks(1));
+    ASSERT_TRUE(masks.ok()) << masks.status();
+    EXPECT_EQ(masks->frame_id, 1u);
+    EXPECT_EQ(masks->labels.type(), CV_16UC1);
+    EXPECT_EQ(cv::norm(masks->labels, frame->labels, cv::NORM_INF), 0);
+    ASSERT_EQ(masks->instances.size(), 2u) << "a label that is not listed is listed by ingest";
+    EXPECT_EQ(masks->instances[0].class_name, "mug");
+    EXPECT_EQ(masks->instances[1].label, 9u);
+  }
+}
+
+TEST(IngestTest, LateMasksNeedAFrameThatHasNone) {
+  Ingest ingest(kCamera, kMaskPatience_s);
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("no such frame was accepted"));
+  FrameInput with_masks = GoodFrame(2);
+  static_cast<EncodedMasks&>(with_masks) = GoodMasks(2);
+  FrameInput bad = GoodFrame(3);
+  bad.image.clear();
+  EXPECT_EQ(Fault(ingest, GoodFrame(1)), "accepted");
+  EXPECT_EQ(Fault(ingest, with_masks), "accepted");
+  EXPECT_NE(Fault(ingest, bad), "accepted");
+  EXPECT_EQ(Fault(ingest, GoodFrame(4)), "accepted");
+  EXPECT_EQ(MaskFault(ingest, GoodMasks(1)), "accepted");
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("has masks already"));
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(2)), HasSubstr("has masks already"));
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(3)), HasSubstr("no such frame was accepted"));
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(5)), HasSubstr("no such frame was accepted"));
+}
+
+TEST(IngestTest, BadLateMasksCountAsNeverSent) {
+  Ingest ingest(kCamera, kMaskPatience_s);
+  ASSERT_EQ(Fault(ingest, GoodFrame()), "accepted");
+  MasksInput none;
+  none.frame_id = 1;
+  EXPECT_THAT(MaskFault(ingest, none), HasSubstr("mask: missing"));
+  MasksInput small = GoodMasks(1);
+  small.label_png = Encode(".png", cv::Mat::zeros(24, 32, CV_8UC1));
+  EXPECT_THAT(MaskFault(ingest, small), HasSubstr("mask is 32x24 px, the session's camera says 64x48 px"));
+  MasksInput twice = GoodMasks(1);
+  twice.instances.push_back(twice.instances[0]);
+  EXPECT_THAT(MaskFault(ingest, twice), HasSubstr("listed twice"));
+  EXPECT_EQ(MaskFault(ingest, GoodMasks(1)), "accepted");
+}
+
+// Frames come every 40 ms; 25 of them make the patience of one second.
+TEST(IngestTest, LateMasksMayComeUntilThePatienceIsOver) {
+  Ingest ingest(kCamera, kMaskPatience_s);
+  for (uint64_t id = 1; id <= 30; ++id) ASSERT_EQ(Fault(ingest, GoodFrame(id)), "accepted");
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(4)), HasSubstr("more than 1 s (objects.mask_patience_s) behind"));
+  EXPECT_EQ(MaskFault(ingest, GoodMasks(5)), "accepted");
+  EXPECT_EQ(MaskFault(ingest, GoodMasks(30)), "accepted");
+  Ingest impatient(kCamera, 0);
+  for (uint64_t id = 1; id <= 2; ++id) ASSERT_EQ(Fault(impatient, GoodFrame(id)), "accepted");
+  EXPECT_THAT(MaskFault(impatient, GoodMasks(1)), HasSubstr("too late"));
+  EXPECT_EQ(MaskFault(impatient, GoodMasks(2)), "accepted");
+}
+
+TEST(IngestTest, TimestampsAtBothEndsOfTimeAreFarApart) {
+  Ingest ingest(kCamera, kMaskPatience_s);
+  FrameInput first = GoodFrame(1), last = GoodFrame(2);
+  first.timestamp_ns = std::numeric_limits<int64_t>::min();
+  last.timestamp_ns = std::numeric_limits<int64_t>::max();
+  EXPECT_EQ(Fault(ingest, first), "accepted");
+  EXPECT_EQ(Fault(ingest, last), "accepted");
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("too late"));
 }
 
 }  // namespace

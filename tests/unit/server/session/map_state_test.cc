@@ -47,6 +47,45 @@ TEST(MapStateTest, AMeshWhoseObjectIsGoneIsNotPublished) {
   while (const auto event = outbox->Next(kNoWait)) EXPECT_FALSE(std::holds_alternative<MeshUpdate>(*event));
 }
 
+TEST(MapStateTest, WhatIsGoneStaysGone) {
+  MapState map;
+  for (uint64_t id : {1, 2, 3}) map.Apply(Update(id));
+  map.Apply(ObjectRemoved{ObjectId{1}, 0, "ghost"});
+  map.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 0});
+  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100, false);
+  for (uint64_t id : {1, 2}) {
+    map.Apply(Update(id));
+    map.Apply(ObjectRemoved{ObjectId{id}, 0, "once more"});
+    map.Apply(ObjectMerged{ObjectId{id}, ObjectId{3}, 0});
+  }
+  EXPECT_EQ(outbox->Next(kNoWait), std::nullopt);
+  EXPECT_EQ(map.Snapshot().objects.size(), 1u);
+}
+
+TEST(MapStateTest, AMergeTellsTheRevisionOfWhatStays) {
+  MapState map;
+  const auto outbox = Listen(map);
+  for (uint64_t id : {1, 2}) {
+    map.Apply(Update(id));
+    EXPECT_TRUE(outbox->Next(kNoWait).has_value());
+  }
+  map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
+  EXPECT_EQ(std::get<ObjectMerged>(*outbox->Next(kNoWait)).revision, 2u);
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "for those who do not hear of the merge";
+  EXPECT_EQ(map.Snapshot().objects.at(0).object.revision, 3u);
+}
+
+TEST(MapStateTest, WhatIsMergedIntoTheUnknownIsRemoved) {
+  MapState map;
+  const auto outbox = Listen(map);
+  map.Apply(Update(1));
+  EXPECT_TRUE(outbox->Next(kNoWait).has_value());
+  map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
+  const auto removed = std::get<ObjectRemoved>(*outbox->Next(kNoWait));
+  EXPECT_EQ(removed.id, ObjectId{1});
+  EXPECT_EQ(removed.revision, 2u);
+}
+
 TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
   MapState map;
   map.Apply(Update(1));

@@ -29,13 +29,15 @@ FrameAck Ack(uint64_t frame_id) {
   return ack;
 }
 
-TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaits) {
+TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaitsBehindItsAnnouncement) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   outbox.Put(Update(1, 1));
+  outbox.Put(Update(1, 2));
   outbox.Put(NewMesh(1, 2));
   outbox.Put(Update(2, 1));
   outbox.Put(Update(1, 3));
   outbox.Put(NewMesh(1, 4));
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 1u);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).id, ObjectId{2});
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u) << "revisions come in their order";
   EXPECT_EQ(std::get<MeshUpdate>(*outbox.Next(kNoWait)).revision, 4u);
@@ -44,16 +46,65 @@ TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaits) {
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 5u) << "what was taken no longer coalesces";
 }
 
+TEST(OutboxTest, AMeshWaitsBehindTheFirstUpdateEvenWhenAnotherFollows) {
+  Outbox outbox(Outbox::Acks::kAll, 100);
+  outbox.Put(Update(1, 1));
+  outbox.Put(NewMesh(1, 2));
+  outbox.Put(Update(1, 3));
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 1u);
+  EXPECT_EQ(std::get<MeshUpdate>(*outbox.Next(kNoWait)).revision, 2u);
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u);
+}
+
 TEST(OutboxTest, WhatWaitsOfAGoneObjectIsForgotten) {
+  Outbox outbox(Outbox::Acks::kAll, 100);
+  for (uint64_t id : {1, 2, 3}) outbox.Put(Update(id, 1));
+  while (outbox.Next(kNoWait)) {
+  }
+  outbox.Put(Update(1, 2));
+  outbox.Put(NewMesh(1, 3));
+  outbox.Put(ObjectRemoved{ObjectId{1}, 4, "ghost"});
+  outbox.Put(Update(2, 2));
+  outbox.Put(ObjectMerged{ObjectId{2}, ObjectId{3}, 9});
+  EXPECT_TRUE(std::holds_alternative<ObjectRemoved>(*outbox.Next(kNoWait)));
+  EXPECT_TRUE(std::holds_alternative<ObjectMerged>(*outbox.Next(kNoWait)));
+  EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
+}
+
+TEST(OutboxTest, WhatCameAndWentUnheardIsPassedOverInSilence) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   outbox.Put(Update(1, 1));
   outbox.Put(NewMesh(1, 2));
   outbox.Put(ObjectRemoved{ObjectId{1}, 3, "ghost"});
   outbox.Put(Update(2, 1));
-  outbox.Put(ObjectMerged{ObjectId{2}, ObjectId{3}, 9});
-  EXPECT_TRUE(std::holds_alternative<ObjectRemoved>(*outbox.Next(kNoWait)));
-  EXPECT_TRUE(std::holds_alternative<ObjectMerged>(*outbox.Next(kNoWait)));
+  outbox.Put(Update(3, 1));
+  outbox.Put(ObjectMerged{ObjectId{3}, ObjectId{2}, 2});
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).id, ObjectId{2});
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
+}
+
+TEST(OutboxTest, AMergeIntoWhatIsNotHeardOfGoesWhereThatWent) {
+  for (const bool removed : {false, true}) {
+    Outbox outbox(Outbox::Acks::kAll, 100);
+    outbox.Put(Update(1, 5));
+    EXPECT_TRUE(outbox.Next(kNoWait).has_value());  // the reader knows the first only
+    outbox.Put(Update(2, 1));
+    outbox.Put(ObjectMerged{ObjectId{1}, ObjectId{2}, 2});
+    if (removed) {
+      outbox.Put(ObjectRemoved{ObjectId{2}, 3, "ghost"});
+      const auto gone = std::get<ObjectRemoved>(*outbox.Next(kNoWait));
+      EXPECT_EQ(gone.id, ObjectId{1});
+      EXPECT_EQ(gone.revision, 6u);
+    } else {
+      outbox.Put(Update(3, 1));
+      outbox.Put(ObjectMerged{ObjectId{2}, ObjectId{3}, 2});
+      EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).id, ObjectId{3});
+      const auto merged = std::get<ObjectMerged>(*outbox.Next(kNoWait));
+      EXPECT_EQ(merged.from, ObjectId{1});
+      EXPECT_EQ(merged.into, ObjectId{3});
+    }
+    EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
+  }
 }
 
 TEST(OutboxTest, TheSenderGetsEveryAckAndAViewerTheNewest) {
@@ -64,6 +115,17 @@ TEST(OutboxTest, TheSenderGetsEveryAckAndAViewerTheNewest) {
   }
   for (uint64_t i = 1; i <= 3; ++i) EXPECT_EQ(std::get<FrameAck>(*sender.Next(kNoWait)).frame_id, i);
   EXPECT_EQ(std::get<FrameAck>(*viewer.Next(kNoWait)).frame_id, 3u);
+  EXPECT_EQ(viewer.Next(kNoWait), std::nullopt);
+}
+
+TEST(OutboxTest, OnlyTheSenderHearsOfItsMasks) {
+  Outbox sender(Outbox::Acks::kAll, 2), viewer(Outbox::Acks::kNewest, 1);
+  sender.Put(Ack(1));
+  for (Outbox* outbox : {&sender, &viewer}) {
+    for (uint64_t i = 1; i <= 2; ++i) outbox->Put(MasksAck{.frame_id = i, .accepted = true, .error = ""});
+  }
+  for (uint64_t i = 1; i <= 2; ++i) EXPECT_EQ(std::get<MasksAck>(*sender.Next(kNoWait)).frame_id, i) << "two may wait";
+  EXPECT_EQ(sender.Next(kNoWait), std::nullopt);
   EXPECT_EQ(viewer.Next(kNoWait), std::nullopt);
 }
 

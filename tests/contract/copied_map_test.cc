@@ -1,0 +1,78 @@
+// A client's copy of a map that changes all the time, over a real connection.
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <thread>
+
+#include "client/sdk/remote_mapping_service.h"
+#include "server/session/map_state.h"
+#include "server/transport/grpc_server.h"
+#include "tests/support/checked_copy.h"
+#include "tests/support/fake_mapping_service.h"
+#include "tests/support/random_map.h"
+#include "tests/support/streams.h"
+
+namespace romap {
+namespace {
+
+using testing::CheckedCopy;
+using testing::RandomMap;
+
+class OutboxStream : public EventStream {
+ public:
+  explicit OutboxStream(std::shared_ptr<Outbox> outbox) : outbox_(std::move(outbox)) {}
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
+  bool Done() const override { return outbox_->Done(); }
+  absl::Status status() const override { return outbox_->status(); }
+  void Cancel() override { outbox_->Close(absl::CancelledError("the stream was cancelled")); }
+
+ private:
+  const std::shared_ptr<Outbox> outbox_;
+};
+
+// Whoever watches any session watches one map.
+class OneMapService : public testing::FakeMappingService {
+ public:
+  absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& /*session_id*/) override {
+    return std::make_unique<OutboxStream>(map.Subscribe(Outbox::Acks::kNewest, 1, /*with_snapshot=*/true));
+  }
+  MapState map;
+};
+
+void ReadToEnd(EventStream& stream, CheckedCopy& copy, std::chrono::microseconds pause) {
+  while (!stream.Done()) {
+    if (const auto event = stream.Next(std::chrono::milliseconds(100))) copy.Apply(*event);
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
+  OneMapService service;
+  TransportConfig config;
+  config.listen_address = "127.0.0.1:0";
+  const auto server = GrpcServer::Start(&service, config).value();
+  const auto remote = RemoteMappingService::Connect(server->address()).value();
+  CheckedCopy fast, slow, latecomer, truth;
+  const auto fast_stream = remote->Watch("any").value(), slow_stream = remote->Watch("any").value();
+  std::thread fast_reader([&] { ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
+  std::thread slow_reader([&] { ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
+  RandomMap random(7, &service.map);
+  for (int step = 0; step < 6000; ++step) random.Step();
+  const auto late_stream = remote->Watch("any").value();
+  std::thread late_reader([&] { ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
+  for (int step = 0; step < 2000; ++step) random.Step();
+  const auto all = service.map.Subscribe(Outbox::Acks::kAll, 16, /*with_snapshot=*/true);
+  service.map.Close(absl::OkStatus());
+  for (std::thread* reader : {&fast_reader, &slow_reader, &late_reader}) reader->join();
+  OutboxStream truth_stream(all);
+  ReadToEnd(truth_stream, truth, std::chrono::microseconds(0));
+  EXPECT_FALSE(truth.Bytes().empty());
+  EXPECT_EQ(fast.Bytes(), truth.Bytes());
+  EXPECT_EQ(slow.Bytes(), truth.Bytes());
+  EXPECT_EQ(latecomer.Bytes(), truth.Bytes());
+  EXPECT_OK(slow_stream->status());
+}
+
+}  // namespace
+}  // namespace romap
