@@ -16,9 +16,10 @@ double MapCollector::Now_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
-void MapCollector::NoteSent(uint64_t frame_id, int64_t timestamp_ns) {
+void MapCollector::NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks) {
   if (sent_.empty()) first_sent_s_ = Now_s();
   sent_[frame_id] = {timestamp_ns, Now_s()};
+  if (has_masks) ++sent_with_masks_;
 }
 
 double MapCollector::SentAt_s(uint64_t frame_id) const {
@@ -32,7 +33,7 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
   latencies_s_.push_back(ack.latency_s);
   if (!ack.accepted) {
     ++rejected_;
-    if (faults_.size() < kFaultsKept) faults_.push_back(fmt::format("frame {}: {}", ack.frame_id, ack.error));
+    NoteFault(fmt::format("frame {}: {}", ack.frame_id, ack.error));
     return;
   }
   if (ack.is_keyframe) ++keyframes_;
@@ -47,33 +48,42 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
   }
 }
 
-void MapCollector::Apply(MapEvent event) {
+void MapCollector::ApplyMasksAck(const MasksAck& ack) {
+  ++late_masks_.acknowledged;
+  if (ack.accepted) return;
+  ++late_masks_.rejected;
+  NoteFault(fmt::format("late masks of frame {}: {}", ack.frame_id, ack.error));
+}
+
+void MapCollector::NoteFault(std::string fault) {
+  if (faults_.size() < kFaultsKept) faults_.push_back(std::move(fault));
+}
+
+void MapCollector::Apply(const MapEvent& event) {
+  map_.Apply(event);
   if (const auto* ack = std::get_if<FrameAck>(&event)) {
     ApplyAck(*ack);
-  } else if (auto* update = std::get_if<ObjectUpdate>(&event)) {
-    Object& entry = objects_[update->id];
-    if (update->revision < entry.object.revision) return;
-    entry.object = std::move(*update);
-    if (entry.first_cuboid_s < 0 && entry.object.state != ObjectState::kProvisional) entry.first_cuboid_s = Now_s();
-  } else if (auto* mesh = std::get_if<MeshUpdate>(&event)) {
-    const auto it = objects_.find(mesh->id);
-    if (it == objects_.end()) return;
-    if (it->second.mesh && mesh->revision < it->second.mesh->revision) return;
-    it->second.mesh = std::move(*mesh);
-    ++it->second.meshes;
-    if (it->second.first_mesh_s < 0) it->second.first_mesh_s = Now_s();
-  } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
-    objects_.erase(removed->id);
-  } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
-    objects_.erase(merged->from);
+  } else if (const auto* masks = std::get_if<MasksAck>(&event)) {
+    ApplyMasksAck(*masks);
+  } else if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
+    double& first_cuboid_s = arrivals_[update->id].first_cuboid_s;
+    if (first_cuboid_s < 0 && update->state != ObjectState::kProvisional) first_cuboid_s = Now_s();
+  } else if (const auto* mesh = std::get_if<MeshUpdate>(&event)) {
+    double& first_mesh_s = arrivals_[mesh->id].first_mesh_s;
+    if (first_mesh_s < 0) first_mesh_s = Now_s();
   } else if (const auto* statistics = std::get_if<Statistics>(&event)) {
     statistics_ = *statistics;
     server_peak_bytes_ = std::max(server_peak_bytes_, statistics->resident_bytes);
   }
 }
 
+MapCollector::Arrival MapCollector::ArrivalOf(ObjectId id) const {
+  const auto it = arrivals_.find(id);
+  return it == arrivals_.end() ? Arrival{} : it->second;
+}
+
 size_t MapCollector::ConfirmedObjects() const {
-  return std::count_if(objects_.begin(), objects_.end(),
+  return std::count_if(objects().begin(), objects().end(),
                        [](const auto& entry) { return entry.second.object.state != ObjectState::kProvisional; });
 }
 

@@ -8,28 +8,28 @@
 #include <vector>
 
 #include "client/files/tum.h"
+#include "client/sdk/map_copy.h"
 #include "common/messages.h"
 
 namespace romap {
 
-// What a client keeps of the map: applying all events in order leaves exactly the server's map. Also notes when things
-// arrived. Times are seconds on a steady clock, from construction.
+// What a run keeps of its stream: a copy of the map, the answers to what was sent, and when things arrived. Times are
+// seconds on a steady clock, from construction.
 class MapCollector {
  public:
-  struct Object {
-    ObjectUpdate object;
-    std::optional<MeshUpdate> mesh;
+  struct Arrival {
     double first_cuboid_s = -1;  // confirmed, with a cuboid; -1 = not yet
     double first_mesh_s = -1;
-    int meshes = 0;
   };
 
-  // Call before the frame is handed over.
-  void NoteSent(uint64_t frame_id, int64_t timestamp_ns);
-  void Apply(MapEvent event);
+  // Call before the frame, or the masks that come after their frame, are handed over.
+  void NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks);
+  void NoteLateMasksSent() { ++late_masks_.sent; }
+  void Apply(const MapEvent& event);
 
   double Now_s() const;
-  const std::map<ObjectId, Object>& objects() const { return objects_; }
+  const std::map<ObjectId, ObjectSnapshot>& objects() const { return map_.objects(); }
+  Arrival ArrivalOf(ObjectId id) const;
   size_t ConfirmedObjects() const;
   // Accepted frames with a pose, in the order they were acknowledged.
   std::vector<StampedPose> Trajectory() const;
@@ -44,6 +44,11 @@ class MapCollector {
     std::string last_reason;  // why the last frame that was not tracked was not; empty: all were
   };
   const Tracking& tracking() const { return tracking_; }
+  struct LateMasks {
+    size_t sent = 0, acknowledged = 0, rejected = 0;  // the rejected ones count as acknowledged too
+  };
+  size_t sent_with_masks() const { return sent_with_masks_; }
+  const LateMasks& late_masks() const { return late_masks_; }
   const std::vector<std::string>& faults() const { return faults_; }  // the first few, for people
   // The most that a server's statistics reported; 0 = none came.
   uint64_t server_peak_bytes() const { return server_peak_bytes_; }
@@ -59,16 +64,20 @@ class MapCollector {
   };
 
   void ApplyAck(const FrameAck& ack);
+  void ApplyMasksAck(const MasksAck& ack);
+  void NoteFault(std::string fault);
 
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<uint64_t, Sent> sent_;
-  std::map<ObjectId, Object> objects_;
+  MapCopy map_;
+  std::map<ObjectId, Arrival> arrivals_;
   std::vector<StampedPose> trajectory_;
   std::vector<double> latencies_s_;
   std::vector<std::string> faults_;
   std::optional<Statistics> statistics_;
   Tracking tracking_;
-  size_t acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
+  LateMasks late_masks_;
+  size_t sent_with_masks_ = 0, acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
   uint64_t server_peak_bytes_ = 0;
   double last_ack_s_ = 0, first_sent_s_ = 0;
 };

@@ -53,7 +53,7 @@ SequenceOptions ToSequenceOptions(const RunOptions& options) {
 
 std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
   std::vector<ObjectSnapshot> snapshots;
-  for (const auto& [id, entry] : collector.objects()) snapshots.push_back({entry.object, entry.mesh});
+  for (const auto& [id, snapshot] : collector.objects()) snapshots.push_back(snapshot);
   return snapshots;
 }
 
@@ -122,6 +122,17 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
       ->capture_default_str();
   command->add_option("--masks", options->sequence.masks, "List of mask images in the sequence")->capture_default_str();
   command->add_option("--detections", options->sequence.detections, "What the labels of each frame mean")
+      ->capture_default_str();
+  command
+      ->add_option("--mask-rate", options->stream.mask_rate_hz,
+                   "Send masks of so many frames a second only, as a slow detector has them [Hz]; 0 = all there are")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--mask-delay", options->stream.mask_delay_s,
+                   "Send each frame without masks at once, and its masks so much later by the frames' timestamps [s]; "
+                   "the server takes them up to objects.mask_patience_s")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--depth", options->sequence.use_depth, "Send the depth images too");
   command->add_flag("--realtime", options->stream.realtime,

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <thread>
 
 #include "client/cli/interrupt.h"
 #include "client/cli/map_files.h"
+#include "client/cli/mask_schedule.h"
 #include "client/cli/progress.h"
 #include "common/status.h"
 
@@ -54,20 +56,37 @@ class Sender {
   absl::Status Run() {
     const size_t end =
         std::min(sequence_.size(), options_.first_frame + std::min(options_.frame_count, sequence_.size()));
-    const Clock::time_point start = Clock::now();
     for (size_t i = options_.first_frame; i < end && !stop_ && !Interrupted(); ++i) {
       ROMAP_ASSIGN_OR_RETURN(FrameInput frame, sequence_.Load(i));
-      if (options_.realtime) {
-        std::this_thread::sleep_until(
-            start + std::chrono::nanoseconds(sequence_.timestamp_ns(i) - sequence_.timestamp_ns(options_.first_frame)));
-      }
+      ROMAP_RETURN_IF_ERROR(SendMasksDueBy(frame.timestamp_ns));
+      WaitFor(frame.timestamp_ns);
+      schedule_.Apply(frame);
       {
         std::lock_guard lock(collector_mutex_);
-        collector_.NoteSent(frame.frame_id, frame.timestamp_ns);
+        collector_.NoteSent(frame.frame_id, frame.timestamp_ns, frame.mask_encoding != MaskEncoding::kNone);
       }
       ROMAP_RETURN_IF_ERROR(stream_.Send(std::move(frame)));
     }
+    return SendMasksDueBy(std::numeric_limits<int64_t>::max());
+  }
+
+  absl::Status SendMasksDueBy(int64_t timestamp_ns) {
+    while (auto late = stop_ || Interrupted() ? std::nullopt : schedule_.TakeDueBy(timestamp_ns)) {
+      WaitFor(late->due_ns);
+      {
+        std::lock_guard lock(collector_mutex_);
+        collector_.NoteLateMasksSent();
+      }
+      ROMAP_RETURN_IF_ERROR(stream_.SendMasks(std::move(late->masks)));
+    }
     return absl::OkStatus();
+  }
+
+  // Until the recorded time has come, counted from the first frame.
+  void WaitFor(int64_t timestamp_ns) const {
+    if (!options_.realtime) return;
+    std::this_thread::sleep_until(
+        start_ + std::chrono::nanoseconds(timestamp_ns - sequence_.timestamp_ns(options_.first_frame)));
   }
 
   const Sequence& sequence_;
@@ -75,6 +94,8 @@ class Sender {
   MapStream& stream_;
   MapCollector& collector_;
   std::mutex& collector_mutex_;
+  MaskSchedule schedule_{options_.mask_rate_hz, options_.mask_delay_s};
+  const Clock::time_point start_ = Clock::now();
   std::atomic<bool> stop_ = false;
   std::atomic<bool> done_ = false;
   absl::Status status_;
@@ -163,12 +184,13 @@ class Run {
     std::optional<MapEvent> event = stream_->Next(kEventWait);
     if (!event) return;
     std::lock_guard lock(collector_mutex_);
-    collector_.Apply(std::move(*event));
+    collector_.Apply(*event);
   }
 
   bool AllAcknowledged() {
     std::lock_guard lock(collector_mutex_);
-    return collector_.acknowledged() >= collector_.sent();
+    const MapCollector::LateMasks& masks = collector_.late_masks();
+    return collector_.acknowledged() >= collector_.sent() && masks.acknowledged >= masks.sent;
   }
 
   absl::Status StreamEnded() {

@@ -15,7 +15,9 @@ namespace romap {
 struct StreamOptions {
   PoseUse pose_use = PoseUse::kGiven;
   std::string session_name;
-  bool realtime = false;  // send at the recorded rate and let the server drop what it cannot keep up with
+  bool realtime = false;    // send at the recorded rate and let the server drop what it cannot keep up with
+  double mask_rate_hz = 0;  // frames whose masks are sent, per second of timestamps; 0 = all
+  double mask_delay_s = 0;  // masks come so much later than their frame, by timestamps; 0 = with it
   size_t first_frame = 0;
   size_t frame_count = SIZE_MAX;
   double max_training_s = 600;  // longest wait for training after the last frame

@@ -36,6 +36,8 @@ RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const
   summary.frames_sent = collector.sent();
   summary.frames_rejected = collector.rejected();
   summary.tracking = collector.tracking();
+  summary.frames_with_masks = collector.sent_with_masks();
+  summary.late_masks = collector.late_masks();
   summary.frames_accepted = collector.acknowledged() - collector.rejected();
   summary.keyframes = collector.keyframes();
   summary.mapping_s = stream.mapping_s;
@@ -64,11 +66,11 @@ RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const
     object.train_s = entry.train_seconds;
     object.vertices = entry.mesh_world.vertices.size();
     object.triangles = entry.mesh_world.triangles.size();
-    const MapCollector::Object& events = collector.objects().at(entry.object.id);
+    const MapCollector::Arrival arrival = collector.ArrivalOf(entry.object.id);
     if (const auto it = trackable.find(entry.object.id); it != trackable.end()) {
       const double trackable_s = collector.SentAt_s(it->second + 1);  // frame ids count from 1
-      if (events.first_cuboid_s >= 0) object.first_cuboid_s = std::max(0.0, events.first_cuboid_s - trackable_s);
-      if (events.first_mesh_s >= 0) object.first_mesh_s = std::max(0.0, events.first_mesh_s - trackable_s);
+      if (arrival.first_cuboid_s >= 0) object.first_cuboid_s = std::max(0.0, arrival.first_cuboid_s - trackable_s);
+      if (arrival.first_mesh_s >= 0) object.first_mesh_s = std::max(0.0, arrival.first_mesh_s - trackable_s);
     }
     summary.objects.push_back(object);
   }
@@ -97,6 +99,10 @@ nlohmann::json ToJson(const RunSummary& summary) {
             {"rejected", summary.frames_rejected},
             {"dropped", summary.frames_dropped},
             {"keyframes", summary.keyframes}}},
+          {"masks",
+           {{"sent_with_frames", summary.frames_with_masks},
+            {"sent_late", summary.late_masks.sent},
+            {"late_rejected", summary.late_masks.rejected}}},
           {"tracking",
            {{"initialising", summary.tracking.initialising},
             {"tracked", summary.tracking.tracked},
@@ -129,6 +135,10 @@ std::string FormatSummary(const RunSummary& summary) {
     text += fmt::format("camera: {} frames to begin, {} tracked, {} lost, found again {} times", tracking.initialising,
                         tracking.tracked, tracking.lost, tracking.relocalised);
     text += tracking.tracked == 0 ? fmt::format("; never tracked: {}\n", tracking.last_reason) : "\n";
+  }
+  if (summary.frames_with_masks < summary.frames_sent) {
+    text += fmt::format("masks: {} frames were sent with theirs, {} got them later, of which {} were rejected\n",
+                        summary.frames_with_masks, summary.late_masks.sent, summary.late_masks.rejected);
   }
   text += fmt::format("memory: mapping {} MB, client {} MB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);

@@ -31,6 +31,8 @@ struct RunSummary {
   size_t frames_sent = 0, frames_accepted = 0, frames_rejected = 0, keyframes = 0;
   uint64_t frames_dropped = 0, map_points = 0;
   MapCollector::Tracking tracking;
+  size_t frames_with_masks = 0;  // sent with them
+  MapCollector::LateMasks late_masks;
   double mapping_s = 0, training_s = 0, frames_per_s = 0;
   double median_latency_ms = 0;
   bool interrupted = false, training_complete = false;

@@ -50,10 +50,10 @@ TEST(MapCollectorTest, ProvisionalObjectsAreNotCounted) {
   MapCollector collector;
   collector.Apply(Update(1, 1, ObjectState::kProvisional));
   EXPECT_EQ(collector.ConfirmedObjects(), 0u);
-  EXPECT_LT(collector.objects().at(ObjectId{1}).first_cuboid_s, 0);
+  EXPECT_LT(collector.ArrivalOf(ObjectId{1}).first_cuboid_s, 0);
   collector.Apply(Update(1, 2));
   EXPECT_EQ(collector.ConfirmedObjects(), 1u);
-  EXPECT_GE(collector.objects().at(ObjectId{1}).first_cuboid_s, 0);
+  EXPECT_GE(collector.ArrivalOf(ObjectId{1}).first_cuboid_s, 0);
 }
 
 TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
@@ -78,8 +78,8 @@ TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
 
 TEST(MapCollectorTest, AcknowledgementsMakeTheTrajectory) {
   MapCollector collector;
-  collector.NoteSent(1, 1000);
-  collector.NoteSent(2, 2000);
+  collector.NoteSent(1, 1000, true);
+  collector.NoteSent(2, 2000, false);
   FrameAck good;
   good.frame_id = 1;
   good.T_world_camera = SE3<World, Camera>();
