@@ -48,6 +48,82 @@ TEST_P(StreamContract, ABadFrameIsRefusedAndTheStreamLivesOn) {
   EXPECT_OK(stream->status());
 }
 
+MasksInput MasksOf(uint64_t frame_id, const std::string& class_name) {
+  MasksInput masks;
+  masks.frame_id = frame_id;
+  static_cast<EncodedMasks&>(masks) = MakeFrame(frame_id, class_name);
+  return masks;
+}
+
+TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
+  const auto stream = Open(NewSession());
+  constexpr uint64_t kFrames = 20, kDelay = 5;
+  for (uint64_t id = 1; id <= kFrames + kDelay; ++id) {
+    if (id <= kFrames) EXPECT_OK(stream->Send(MakeFrame(id)));
+    if (id > kDelay) EXPECT_OK(stream->SendMasks(MasksOf(id - kDelay, "mug")));
+  }
+  EXPECT_OK(stream->CloseSend());
+  const auto events = ReadToEnd(*stream);
+  EXPECT_THAT(Only<FrameAck>(events), SizeIs(kFrames));
+  const auto acks = Only<MasksAck>(events);
+  ASSERT_THAT(acks, SizeIs(kFrames)) << "the stream ends when the last masks are mapped, too";
+  for (uint64_t i = 0; i < kFrames; ++i) {
+    EXPECT_EQ(acks[i].frame_id, i + 1);
+    EXPECT_TRUE(acks[i].accepted) << acks[i].error;
+    EXPECT_EQ(acks[i].error, "");
+  }
+  EXPECT_OK(stream->status());
+}
+
+TEST_P(StreamContract, MasksThatFitNoFrameAreRefusedAndTheStreamLivesOn) {
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(MakeFrame(2)));
+  EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));  // it brought its own
+  EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));
+  EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));  // twice
+  EXPECT_OK(stream->SendMasks(MasksOf(9, "mug")));  // not sent yet
+  EXPECT_OK(stream->Send(MakeFrame(3)));
+  EXPECT_OK(stream->CloseSend());
+  const auto events = ReadToEnd(*stream);
+  const auto acks = Only<MasksAck>(events);
+  ASSERT_THAT(acks, SizeIs(4));
+  for (size_t i = 0; i < acks.size(); ++i) {
+    EXPECT_EQ(acks[i].accepted, i == 1) << i;
+    EXPECT_EQ(acks[i].error.empty(), i == 1) << i;
+  }
+  EXPECT_THAT(Only<FrameAck>(events), SizeIs(3));
+  EXPECT_OK(stream->status());
+  EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 3u) << "masks are no frames";
+}
+
+TEST_P(StreamContract, LateMasksMakeObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+  const auto stream = Open(NewSession());
+  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));
+  const auto object = NextOf<ObjectUpdate>(*stream);
+  ASSERT_TRUE(object.has_value());
+  EXPECT_EQ(object->class_name, "mug");
+}
+
+TEST_P(StreamContract, ALiveSessionAnswersAllFramesAndMasks) {
+  SessionOptions options;
+  options.camera = SmallCamera();
+  options.mode = FrameMode::kLive;
+  const auto stream = Open(service().CreateSession(options)->id);
+  constexpr uint64_t kFrames = 60;
+  for (uint64_t id = 1; id <= kFrames; ++id) {
+    EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->SendMasks(MasksOf(id, "mug")));
+  }
+  EXPECT_OK(stream->CloseSend());
+  const auto events = ReadToEnd(*stream);
+  EXPECT_THAT(Only<FrameAck>(events), SizeIs(kFrames)) << "accepted or dropped";
+  EXPECT_THAT(Only<MasksAck>(events), SizeIs(kFrames));
+}
+
 TEST_P(StreamContract, AFrameWithAPoseThatIsNoneIsRefused) {
   const auto stream = Open(NewSession());
   FrameInput frame = MakeFrame(1);
@@ -93,6 +169,7 @@ TEST_P(StreamContract, NothingIsSentAfterCloseSend) {
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->CloseSend());
   EXPECT_CODE(stream->Send(MakeFrame(1)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->SendMasks(MasksOf(1, "mug")), StatusCode::kFailedPrecondition);
   EXPECT_CODE(stream->CloseSend(), StatusCode::kFailedPrecondition);
   ReadToEnd(*stream);
   EXPECT_OK(stream->status());

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "client/synth/synth.h"
 #include "tests/support/subprocess.h"
@@ -43,34 +44,48 @@ std::map<std::string, std::string> AllFiles(const std::string& dir) {
 class ReplayTest : public ::testing::Test {
  protected:
   // Maps a small sequence with recording on; the recording's path.
-  std::string Record() const {
+  std::string Record(const std::vector<std::string>& more_arguments = {}) const {
     synth::SynthOptions options{.seed = 3, .objects = 2, .frames = 40, .width_px = 240, .height_px = 180};
     EXPECT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
     fs::create_directory(folder_ / "recordings");
-    const ProcessResult run =
-        Romap({"run", folder_ / "sequence", "--local", "--set", "session.record_dir=" + (folder_ / "recordings"),
-               "--out", folder_ / "map", "--no-pictures"});
+    std::vector<std::string> arguments = {
+        "run",   folder_ / "sequence", "--local",      "--set", "session.record_dir=" + (folder_ / "recordings"),
+        "--out", folder_ / "map",      "--no-pictures"};
+    arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
+    const ProcessResult run = Romap(arguments);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const auto files = AllFiles(folder_ / "recordings");
     EXPECT_EQ(files.size(), 1U);
     return files.empty() ? "" : (folder_ / "recordings/") + files.begin()->first;
   }
 
+  void ExpectTwoEqualReplays(const std::string& recording) const {
+    for (const char* out : {"first", "second"}) {
+      const ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
+      ASSERT_EQ(replay.exit_code, 0) << replay.err;
+      EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
+    }
+    const auto first = AllFiles(folder_ / "first");
+    const auto second = AllFiles(folder_ / "second");
+    EXPECT_GE(first.size(), 7U) << "trajectory, cuboids, summary, and a .ply and a .glb of each object";
+    ASSERT_EQ(first.size(), second.size());
+    for (const auto& [name, bytes] : first) EXPECT_TRUE(second.at(name) == bytes) << name << " differs";
+  }
+
   TemporaryFolder folder_;
 };
 
-TEST_F(ReplayTest, TwoReplaysWriteTheSameBytes) {
-  const std::string recording = Record();
-  for (const char* out : {"first", "second"}) {
-    const ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
-    ASSERT_EQ(replay.exit_code, 0) << replay.err;
-    EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
-  }
-  const auto first = AllFiles(folder_ / "first");
-  const auto second = AllFiles(folder_ / "second");
-  EXPECT_GE(first.size(), 7U) << "trajectory, cuboids, summary, and a .ply and a .glb of each object";
-  ASSERT_EQ(first.size(), second.size());
-  for (const auto& [name, bytes] : first) EXPECT_TRUE(second.at(name) == bytes) << name << " differs";
+TEST_F(ReplayTest, TwoReplaysWriteTheSameBytes) { ExpectTwoEqualReplays(Record()); }
+
+TEST_F(ReplayTest, TwoReplaysWithLateMasksWriteTheSameBytes) {
+  const std::string recording = Record({"--mask-rate", "12", "--mask-delay", "0.2"});
+  const nlohmann::json run = nlohmann::json::parse(std::ifstream(folder_ / "map/summary.json"));
+  EXPECT_EQ(run["masks"]["sent_with_frames"], 0);
+  EXPECT_EQ(run["masks"]["sent_late"], 20) << "25 frames a second: every second frame, all 40 of them";
+  EXPECT_EQ(run["masks"]["late_rejected"], 0);
+  ExpectTwoEqualReplays(recording);
+  const nlohmann::json replay = nlohmann::json::parse(std::ifstream(folder_ / "first/summary.json"));
+  EXPECT_EQ(replay["late_masks"], 20);
 }
 
 TEST_F(ReplayTest, ACutOffRecordingIsReplayedAsFarAsItGoes) {
@@ -85,10 +100,11 @@ TEST_F(ReplayTest, ACutOffRecordingIsReplayedAsFarAsItGoes) {
 TEST_F(ReplayTest, WhatIsNoRecordingIsRefusedInOneLine) {
   const std::string text = folder_ / "notes.txt";
   std::ofstream(text) << "not a recording at all";
-  std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\2\0\0\0", 4);
-  for (const auto& [file, fault] : {std::pair{text, "should begin with ROMAPREC"},
-                                    std::pair{folder_ / "old.romaprec", "of version 2, this program reads version 1"},
-                                    std::pair{folder_ / "missing.romaprec", "no such file"}}) {
+  std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\x9\0\0\0", 4);
+  for (const auto& [file, fault] :
+       {std::pair{text, "should begin with ROMAPREC"},
+        std::pair{folder_ / "old.romaprec", "of version 9, this program reads versions 1 to 2"},
+        std::pair{folder_ / "missing.romaprec", "no such file"}}) {
     const ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
     EXPECT_EQ(replay.exit_code, 2);
     EXPECT_THAT(replay.err, HasSubstr(fault));

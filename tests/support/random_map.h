@@ -26,9 +26,7 @@ class RandomMap {
     if (what < 78) return Merge();
     if (what < 86) return Remove();
     if (what < 92) return ComeLate();
-    map_->Acknowledge(FrameAck{.frame_id = ++frames_, .error = ""}, static_cast<int64_t>(frames_));
-    map_->Acknowledge(MasksAck{.frame_id = frames_, .accepted = true, .error = ""});
-    map_->Publish(Statistics{.frames_received = frames_});
+    Answer();
   }
 
   int Pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
@@ -61,6 +59,17 @@ class RandomMap {
     mesh.steps = static_cast<uint64_t>(Pick(1, 1000));
     mesh.draco = "mesh";
     return mesh;
+  }
+
+  // What is not about objects, but waits with them.
+  void Answer() {
+    FrameAck ack;
+    ack.frame_id = ++frames_;
+    map_->Acknowledge(ack, static_cast<int64_t>(frames_));
+    map_->Acknowledge(MasksAck{.frame_id = frames_, .accepted = true, .error = ""});
+    Statistics statistics;
+    statistics.frames_received = frames_;
+    map_->Publish(statistics);
   }
 
   // As a session does it: all objects move, then clients are told.

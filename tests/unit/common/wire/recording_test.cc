@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "common/status.h"
+#include "common/wire/frame.h"
 #include "tests/support/subprocess.h"
 
 namespace romap::wire {
@@ -35,6 +36,13 @@ FrameInput NumberedFrame(uint64_t number) {
   }
   frame.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3.25));
   return frame;
+}
+
+MasksInput MasksOf(uint64_t frame_id) {
+  MasksInput masks;
+  masks.frame_id = frame_id;
+  static_cast<EncodedMasks&>(masks) = NumberedFrame(2);
+  return masks;
 }
 
 class RecordingTest : public ::testing::Test {
@@ -73,10 +81,11 @@ TEST_F(RecordingTest, GivesBackWhatWasWritten) {
   ASSERT_EQ(recording->size(), 5U);
   for (size_t i : {4U, 0U, 3U}) {  // in any order
     const FrameInput expected = NumberedFrame(i + 1);
-    EXPECT_EQ(recording->timestamp_ns(i), expected.timestamp_ns);
-    EXPECT_EQ(recording->has_mask(i), expected.mask_encoding == MaskEncoding::kLabelPng);
-    const auto frame = recording->Load(i);
-    ASSERT_TRUE(frame.ok()) << frame.status();
+    const auto input = recording->Load(i);
+    ASSERT_TRUE(input.ok()) << input.status();
+    const FrameInput* frame = std::get_if<FrameInput>(&*input);
+    ASSERT_NE(frame, nullptr);
+    EXPECT_EQ(frame->timestamp_ns, expected.timestamp_ns);
     EXPECT_EQ(frame->frame_id, expected.frame_id);
     EXPECT_EQ(frame->image, expected.image);
     EXPECT_EQ(frame->label_png, expected.label_png);
@@ -84,6 +93,42 @@ TEST_F(RecordingTest, GivesBackWhatWasWritten) {
     EXPECT_EQ(frame->T_world_camera->translation(), expected.T_world_camera->translation());
   }
   EXPECT_EQ(recording->Load(5).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(RecordingTest, KeepsLateMasksBetweenTheFramesWhereTheyCame) {
+  auto writer = RecordingWriter::Create(path(), Options());
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  ASSERT_TRUE((*writer)->Append(NumberedFrame(1)).ok());
+  ASSERT_TRUE((*writer)->Append(NumberedFrame(3)).ok());
+  ASSERT_TRUE((*writer)->Append(MasksOf(1)).ok());
+  ASSERT_TRUE((*writer)->Append(NumberedFrame(5)).ok());
+  const auto recording = Recording::Open(path());
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  EXPECT_EQ(recording->size(), 4U);
+  EXPECT_EQ(recording->frames(), 3U);
+  EXPECT_EQ(std::get<FrameInput>(*recording->Load(1)).frame_id, 3U);
+  const auto masks = std::get<MasksInput>(*recording->Load(2));
+  EXPECT_EQ(masks.frame_id, 1U);
+  EXPECT_EQ(masks.mask_encoding, MaskEncoding::kLabelPng);
+  EXPECT_EQ(masks.label_png, "mask");
+  EXPECT_EQ(masks.instances.at(0).class_name, "mug");
+  EXPECT_EQ(std::get<FrameInput>(*recording->Load(3)).frame_id, 5U);
+}
+
+// Before there were late masks a record was a bare frame.
+TEST_F(RecordingTest, ReadsVersionOne) {
+  WriteFrames(0);
+  std::string bytes = Bytes();
+  bytes[8] = 1;
+  const std::string frame = ToProto(NumberedFrame(2)).SerializeAsString();
+  ASSERT_LT(frame.size(), 256U);
+  bytes += std::string{static_cast<char>(frame.size()), 0, 0, 0} + frame;
+  SetBytes(bytes);
+  const auto recording = Recording::Open(path());
+  ASSERT_TRUE(recording.ok()) << recording.status();
+  ASSERT_EQ(recording->frames(), 1U);
+  EXPECT_EQ(std::get<FrameInput>(*recording->Load(0)).frame_id, 2U);
+  EXPECT_EQ(std::get<FrameInput>(*recording->Load(0)).label_png, "mask");
 }
 
 TEST_F(RecordingTest, AFrameIsOnDiskAsSoonAsItWasAppended) {
@@ -126,7 +171,7 @@ TEST_F(RecordingTest, SaysWhichVersionItReads) {
   std::string bytes = Bytes();
   bytes[8] = 7;
   SetBytes(bytes);
-  EXPECT_NE(OpenError().find("version 7, this program reads version 1"), std::string::npos);
+  EXPECT_NE(OpenError().find("version 7, this program reads versions 1 to 2"), std::string::npos);
 }
 
 TEST_F(RecordingTest, NamesTheDamagedRecord) {

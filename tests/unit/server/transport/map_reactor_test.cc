@@ -8,6 +8,8 @@
 #include <grpcpp/security/credentials.h>
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "common/wire/frame.h"
 #include "server/transport/grpc_server.h"
 #include "tests/support/fake_mapping_service.h"
@@ -80,8 +82,30 @@ TEST_F(MapReactorTest, ASecondStartEndsTheStreamAndFreesTheSession) {
   WriteStart();
   const grpc::Status status = Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(status.error_message(), HasSubstr("must be `frame`"));
+  EXPECT_THAT(status.error_message(), HasSubstr("must be `frame` or `late_masks`"));
   EXPECT_FALSE(fake_.GetSession(session_)->stream_open) << "must be free before the client learns of the end";
+}
+
+TEST_F(MapReactorTest, LateMasksThatAreMalformedAreRefusedByName) {
+  WriteStart();
+  WriteFrame(wire::ToProto(MakeFrame(1)));
+  v1::MapRequest request;
+  request.mutable_late_masks()->set_frame_id(1);
+  request.mutable_late_masks()->mutable_masks()->set_label_png("");
+  call_->Write(request);
+  request.mutable_late_masks()->mutable_masks()->set_label_png("png");
+  call_->Write(request);
+  call_->WritesDone();
+  std::vector<v1::MasksAck> acks;
+  for (v1::MapResponse response; call_->Read(&response);) {
+    if (response.event().has_masks_ack()) acks.push_back(response.event().masks_ack());
+  }
+  EXPECT_TRUE(call_->Finish().ok());
+  ASSERT_EQ(acks.size(), 2u);
+  EXPECT_EQ(acks[0].frame_id(), 1u);
+  EXPECT_FALSE(acks[0].accepted());
+  EXPECT_EQ(acks[0].error(), "late_masks.masks.label_png: empty");
+  EXPECT_TRUE(acks[1].accepted());
 }
 
 TEST_F(MapReactorTest, AFrameOfANewerClientIsRefusedByName) {
