@@ -202,7 +202,7 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
       changed += cv::countNonZero(is != was);
       // Smooth: one piece, and opening it takes nothing away but its corners.
       cv::Mat pieces;
-      EXPECT_EQ(cv::connectedComponents(is, pieces, 4), 2);
+      EXPECT_EQ(cv::connectedComponents(is, pieces), 2);
       cv::Mat opened;
       cv::morphologyEx(is, opened, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8UC1));
       EXPECT_LT(cv::countNonZero(is != opened), 30);
