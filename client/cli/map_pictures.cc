@@ -4,19 +4,20 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/mapped_frames.h"
 #include "client/pictures/pictures.h"
+#include "common/lens.h"
 
 namespace romap {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr size_t kCuboidFrames = 4;
+constexpr size_t kCuboidFrames = 6;  // evenly over the sequence
 
 std::optional<MappedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
                                     const std::vector<MappedFrame>& frames) {
@@ -32,20 +33,17 @@ std::optional<MappedFrame> BestView(const Cuboid& cuboid, const CameraModel& cam
   return best;
 }
 
-// The map lives in undistorted images, so what is drawn over an image needs one too.
-cv::Mat Undistort(const cv::Mat& image, const CameraModel& camera) {
-  const cv::Matx33d k(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
-  cv::Mat undistorted;
-  cv::undistort(image, undistorted, k, cv::Mat(1, 5, CV_64F, const_cast<double*>(camera.distortion.data())));
-  return undistorted;
-}
-
 absl::StatusOr<cv::Mat> LoadImage(const Sequence& sequence, size_t index) {
   ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(index));
   const cv::Mat buffer(1, static_cast<int>(frame.image.size()), CV_8UC1, const_cast<char*>(frame.image.data()));
   cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
   if (image.empty()) return InvalidArgument("frame {}: image cannot be decoded", index);
-  return sequence.camera().HasDistortion() ? Undistort(image, sequence.camera()) : image;
+  if (!sequence.camera().HasDistortion()) return image;
+  // The map lives in undistorted images, so what is drawn over an image needs one too.
+  const UndistortionMaps maps = MakeUndistortionMaps(sequence.camera());
+  cv::Mat undistorted;
+  cv::remap(image, undistorted, maps.xy, maps.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  return undistorted;
 }
 
 absl::Status WriteImage(const fs::path& path, const cv::Mat& image) {
@@ -81,11 +79,22 @@ absl::Status WriteMapPictures(const std::string& dir, const Sequence& sequence,
       objects.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
                       : objects.front().object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();
   ROMAP_RETURN_IF_ERROR(WriteImage(folder / "map.png", DrawOverview(meshes, updates, up_world)));
-  for (size_t i = 0; i < std::min(kCuboidFrames, frames.size()); ++i) {
-    const MappedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * std::min(kCuboidFrames, frames.size()))];
+  return WriteCuboidPictures(folder.string(), sequence, trajectory, updates);
+}
+
+absl::Status WriteCuboidPictures(const std::string& folder, const Sequence& sequence,
+                                 const std::vector<StampedPose>& trajectory, std::span<const ObjectUpdate> objects) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return InvalidArgument("cannot make the folder {}: {}", folder, error.message());
+  const std::vector<MappedFrame> frames = MappedFrames(sequence, trajectory);
+  const size_t count = std::min(kCuboidFrames, frames.size());
+  for (size_t i = 0; i < count; ++i) {
+    const MappedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
     ROMAP_ASSIGN_OR_RETURN(cv::Mat image, LoadImage(sequence, frame.index));
-    DrawCuboids(image, camera, frame.T_world_camera, updates);
-    ROMAP_RETURN_IF_ERROR(WriteImage(folder / fmt::format("frame_{:06d}.png", frame.index + 1), image));
+    DrawCuboids(image, sequence.camera(), frame.T_world_camera, objects);
+    const std::string name = fmt::format("cuboids_{:06d}.jpg", frame.index + 1);
+    ROMAP_RETURN_IF_ERROR(WriteImage(fs::path(folder) / name, image));
   }
   return absl::OkStatus();
 }

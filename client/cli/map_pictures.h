@@ -1,6 +1,6 @@
 #pragma once
 
-#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,9 +11,14 @@
 namespace romap {
 
 // Writes below `dir`/pictures: <id>_<class>.png, each object's mesh shaded beside its best view; map.png, the whole map
-// from above; and frame_<n>.png, the cuboids drawn into a few frames. `trajectory` holds the camera poses of the frames
-// that were mapped.
+// from above; and what WriteCuboidPictures writes. `trajectory` holds the camera poses of the frames that were mapped.
 absl::Status WriteMapPictures(const std::string& dir, const Sequence& sequence,
                               const std::vector<StampedPose>& trajectory, const std::vector<MapObject>& objects);
+
+// Writes into `folder`, which is made, cuboids_<n>.jpg: the cuboids with id and class drawn into a few frames of the
+// sequence, n counted from 1, as they would look from the poses of `trajectory`. Images with lens distortion are
+// undistorted first. Errors as Sequence::Load, and INVALID_ARGUMENT when a file cannot be written.
+absl::Status WriteCuboidPictures(const std::string& folder, const Sequence& sequence,
+                                 const std::vector<StampedPose>& trajectory, std::span<const ObjectUpdate> objects);
 
 }  // namespace romap

@@ -88,7 +88,7 @@ absl::Status RunSequence(const RunOptions& options) {
   const bool poses_given = options.poses == PoseUse::kGiven && sequence.has_poses();
   if (!objects.empty()) Evaluate(options, poses_given, json);
   ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
-  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures/*.png\nfigures: {0}/summary.json\n",
+  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures\nfigures: {0}/summary.json\n",
              options.out);
   if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
   if (!result.status.ok()) {

@@ -2,13 +2,13 @@
 // other seeds (of labels, tracking and damage) and with masks damaged as real detectors do it, and prints Markdown
 // tables.
 //
-//   object_quality SEQUENCE... [--poses given|none|both] [--seeds N] [--damage NAME|all]... [--objects]
-//                  [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N] [--draw DIR] [--debug]
+//   object_quality SEQUENCE... [--poses given|none|both] [--seeds N] [--damage NAME|usual|rare|all]... [--objects]
+//                  [--list] [--draw DIR] [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N]
+//                  [--debug]
 //
-// --damage says which rows there are besides "none". --masks and --detections name the results of a real detector, and
-// then what was found is listed object by object. --poses none tracks the camera from the images; trajectory and
-// cuboids are then moved to the true world by the similarity that fits the trajectories best. The same options print
-// the same tables, whatever the number of jobs.
+// --damage says which rows there are besides that of undamaged masks. --poses none tracks the camera from the images;
+// trajectory and cuboids are then moved to the true world by the similarity that fits the trajectories best. The same
+// options print the same tables, whatever the number of jobs.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -23,6 +23,7 @@
 #include <thread>
 #include <vector>
 
+#include "client/cli/map_pictures.h"
 #include "client/eval/alignment.h"
 #include "client/files/sequence.h"
 #include "common/config.h"
@@ -66,6 +67,8 @@ struct Options {
   int seeds = 5;
   std::vector<std::string> damages;
   bool objects = false;
+  bool list = false;
+  std::string draw;
   std::vector<std::string> assignments;
   SequenceOptions files;
   int jobs = 1;
@@ -75,6 +78,7 @@ struct Options {
 struct Job {
   const Sequence* sequence = nullptr;
   ObjectRunOptions options;
+  std::string picture_dir;  // empty = no pictures
   ScoredRun* result = nullptr;
   absl::Status status = absl::OkStatus();
 };
@@ -90,6 +94,10 @@ absl::Status Execute(const Job& job) {
   ROMAP_ASSIGN_OR_RETURN(const ObjectRun run, RunObjects(*job.sequence, job.options));
   job.result->tracked_share = static_cast<double>(run.trajectory.size()) / run.frames;
   const ObjectsYaml& truth = *job.sequence->objects();
+  const std::vector<ObjectUpdate> objects = run.Confirmed();
+  if (!job.picture_dir.empty()) {
+    ROMAP_RETURN_IF_ERROR(WriteCuboidPictures(job.picture_dir, *job.sequence, run.trajectory, objects));
+  }
   absl::StatusOr<Similarity> true_from_map = Similarity{};
   if (job.options.poses == PoseUse::kIgnore) true_from_map = TrueFromMap(*job.sequence, run);
   if (!true_from_map.ok()) {
@@ -97,7 +105,7 @@ absl::Status Execute(const Job& job) {
     job.result->score = ScoreMap(truth, {}, {});
     return absl::OkStatus();
   }
-  job.result->score = ScoreMap(truth, run.Confirmed(), *true_from_map);
+  job.result->score = ScoreMap(truth, objects, *true_from_map);
   return absl::OkStatus();
 }
 
@@ -120,10 +128,12 @@ class Measurement {
  public:
   Measurement(const Options& options, ObjectRunOptions base) : options_(options), base_(std::move(base)) {
     for (const DamageKind& kind : DamageKinds()) {
-      const auto asked = [&](const char* name) {
+      const auto asked = [&](const std::string& name) {
         return std::find(options.damages.begin(), options.damages.end(), name) != options.damages.end();
       };
-      if (kind.name == "none" || asked("all") || asked(kind.name.c_str())) kinds_.push_back(kind);
+      if (kind.name == "none" || asked("all") || asked(kind.rare ? "rare" : "usual") || asked(kind.name)) {
+        kinds_.push_back(kind);
+      }
     }
   }
 
@@ -159,13 +169,17 @@ class Measurement {
     for (size_t s = 0; s < sequences_.size(); ++s) {
       for (size_t k = 0; k < kinds_.size(); ++k) {
         for (int seed = 1; seed <= options_.seeds; ++seed) {
-          Job job{&sequences_[s], base_, &results[s].rows[k].runs[static_cast<size_t>(seed - 1)]};
+          Job job{&sequences_[s], base_, "", &results[s].rows[k].runs[static_cast<size_t>(seed - 1)]};
           job.result->seed = seed;
           job.options.poses = poses;
           job.options.slam.seed = seed;
           job.options.damage = kinds_[k].damage;
           job.options.damage.permute_labels = true;
           job.options.damage.seed = static_cast<uint64_t>(seed);
+          if (!options_.draw.empty() && seed == 1) {
+            job.picture_dir = fmt::format("{}/{}_{}_{}", options_.draw, results[s].sequence, kinds_[k].name,
+                                          poses == PoseUse::kGiven ? "given" : "tracked");
+          }
           jobs.push_back(job);
         }
       }
@@ -176,19 +190,19 @@ class Measurement {
   void Print(PoseUse poses, const std::vector<SequenceRuns>& results) const {
     fmt::print("## Camera poses {}, {} seeds\n\n{}\n", poses == PoseUse::kGiven ? "given" : "from the images",
                options_.seeds, SequencesTable(results));
-    if (options_.objects) {
-      for (const SequenceRuns& sequence : results) {
-        for (const DamageRuns& row : sequence.rows) {
-          fmt::print("{}, masks {}:\n\n{}\n", sequence.sequence, row.damage,
-                     ObjectsTable({.sequence = sequence.sequence, .rows = {row}}));
-        }
+    for (const SequenceRuns& sequence : results) {
+      for (const DamageRuns& row : sequence.rows) {
+        if (options_.objects) fmt::print("{}, masks {}:\n\n{}\n", sequence.sequence, row.damage, ObjectsTable(row));
       }
+      if (!options_.list) continue;
+      fmt::print("{}, the map of the first seed:\n\n{}\n", sequence.sequence,
+                 MapTable(sequence.rows.front().runs.front().score));
     }
     if (kinds_.size() > 1) {
       PrintDamage(results, /*rare=*/false, "Damaged masks");
       PrintDamage(results, /*rare=*/true, "Damaged masks, continued");
     }
-    PrintExtra(results);
+    if (const std::string faults = FaultList(results); !faults.empty()) fmt::print("Not once each:\n\n{}\n", faults);
     std::fflush(stdout);
   }
 
@@ -205,33 +219,6 @@ class Measurement {
       sequence.rows = rows;
     }
     if (any) fmt::print("{}:\n\n{}\n", title, DamageTable(results));
-  }
-
-  // What stands for no true object in the undamaged runs, and what is missing there.
-  void PrintExtra(const std::vector<SequenceRuns>& results) const {
-    for (const SequenceRuns& sequence : results) {
-      for (const DamageRuns& row : sequence.rows) {
-        for (const ScoredRun& run : row.runs) {
-          std::string line;
-          for (const TrueObject& object : run.score.objects) {
-            if (!object.found) line += fmt::format(" {} is missing;", object.name);
-          }
-          constexpr size_t kMostNamed = 4;
-          for (size_t i = 0; i < std::min(kMostNamed, run.score.extra.size()); ++i) {
-            const ExtraObject& extra = run.score.extra[i];
-            line += fmt::format(" {} ({}) is extra{};", extra.object.id.ToString(), extra.object.class_name,
-                                extra.overlaps.empty() ? "" : ", in the place of " + extra.overlaps);
-          }
-          if (run.score.extra.size() > kMostNamed) {
-            line += fmt::format(" and {} more are extra;", run.score.extra.size() - kMostNamed);
-          }
-          if (!line.empty()) {
-            line.back() = '\n';
-            fmt::print("- {}, {}, seed {}:{}", sequence.sequence, row.damage, run.seed, line);
-          }
-        }
-      }
-    }
   }
 
   Options options_;
@@ -261,12 +248,15 @@ int Main(int argc, char** argv) {
   app.add_option("--poses", options.poses, "Camera poses: given, none or both")
       ->check(CLI::IsMember({"given", "none", "both"}));
   app.add_option("--seeds", options.seeds, "Runs with seeds 1 to so many")->check(CLI::PositiveNumber);
-  std::vector<std::string> names = {"all"};
+  std::vector<std::string> names = {"all", "usual", "rare"};
   for (const DamageKind& kind : DamageKinds()) names.push_back(kind.name);
-  app.add_option("--damage", options.damages, "How masks are damaged, besides not at all")->check(CLI::IsMember(names));
+  app.add_option("--damage", options.damages, "How masks are damaged, besides not at all: some or all kinds")
+      ->check(CLI::IsMember(names));
   bool debug = false;
   app.add_flag("--debug", debug, "Log why each mask was given to which object");
   app.add_flag("--objects", options.objects, "Print the errors of each object too");
+  app.add_flag("--list", options.list, "Print what is in the map of the first seed too");
+  app.add_option("--draw", options.draw, "Folder for pictures of the cuboids of the first seed");
   app.add_option("--set", options.assignments, "SECTION.FIELD=VALUE of the configuration, slam or objects");
   app.add_option("--masks", options.files.masks, "List of mask images in the sequences");
   app.add_option("--detections", options.files.detections, "What the labels of each frame mean");

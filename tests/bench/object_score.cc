@@ -38,12 +38,28 @@ std::vector<int> Match(const std::vector<UprightBox>& boxes, const std::vector<U
   return match;
 }
 
+// Name of the found object that the box shares the most volume with; empty when it touches none.
+std::string MostOverlapped(const UprightBox& box, const std::vector<UprightBox>& truth,
+                           const std::vector<TrueObject>& objects) {
+  double most = 0;
+  std::string name;
+  for (size_t j = 0; j < truth.size(); ++j) {
+    const double iou = IntersectionOverUnion(box, truth[j]);
+    if (!objects[j].found || iou <= most) continue;
+    most = iou;
+    name = objects[j].name;
+  }
+  return name;
+}
+
 }  // namespace
 
 size_t MapScore::Found() const {
   return static_cast<size_t>(
       std::count_if(objects.begin(), objects.end(), [](const TrueObject& object) { return object.found; }));
 }
+
+size_t MapScore::Extra() const { return mapped.size() - Found(); }
 
 MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> objects, const Similarity& true_from_map) {
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
@@ -56,33 +72,23 @@ MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> object
   }
   for (const ObjectUpdate& object : objects) {
     const SE3<World, Object>& T = object.cuboid.T_world_object;
-    boxes.push_back(MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()),
-                                z_from_up * (true_from_map * T.translation()),
+    const Eigen::Vector3d center_m = true_from_map * T.translation();
+    boxes.push_back(MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()), z_from_up * center_m,
                                 true_from_map.scale * object.cuboid.half_extents));
+    score.mapped.push_back({object, center_m, "", ""});
   }
-  if (boxes.empty() || true_boxes.empty()) {
-    for (const ObjectUpdate& object : objects) score.extra.push_back({object, ""});
-    return score;
-  }
+  if (boxes.empty() || true_boxes.empty()) return score;
   const std::vector<int> match = Match(boxes, true_boxes);
   for (size_t i = 0; i < boxes.size(); ++i) {
     if (match[i] < 0) continue;
     const auto j = static_cast<size_t>(match[i]);
+    score.mapped[i].stands_for = score.objects[j].name;
     score.objects[j].found = true;
     score.objects[j].errors = Compare(boxes[i], true_boxes[j]);
     score.objects[j].errors.right_class = objects[i].class_name == truth.objects[j].class_name;
   }
   for (size_t i = 0; i < boxes.size(); ++i) {
-    if (match[i] >= 0) continue;
-    ExtraObject extra{objects[i], ""};
-    double most = 0;
-    for (size_t j = 0; j < true_boxes.size(); ++j) {
-      const double iou = IntersectionOverUnion(boxes[i], true_boxes[j]);
-      if (!score.objects[j].found || iou <= most) continue;
-      most = iou;
-      extra.overlaps = score.objects[j].name;
-    }
-    score.extra.push_back(extra);
+    if (match[i] < 0) score.mapped[i].overlaps = MostOverlapped(boxes[i], true_boxes, score.objects);
   }
   return score;
 }

@@ -27,18 +27,20 @@ struct TrueObject {
   ObjectErrors errors;  // when found
 };
 
-// An object of the map that stands for no true one.
-struct ExtraObject {
+// An object of the map.
+struct MappedObject {
   ObjectUpdate object;
-  std::string
-      overlaps;  // the true object that it shares the most of its volume with and that is found already, or none
+  Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  // in the true world
+  std::string stands_for;                              // the true object it was matched with; empty: it is extra
+  std::string overlaps;  // if extra: the true object, found already, that it shares the most volume with; or empty
 };
 
 struct MapScore {
-  std::vector<TrueObject> objects;  // in the order of the truth
-  std::vector<ExtraObject> extra;
+  std::vector<TrueObject> objects;   // in the order of the truth
+  std::vector<MappedObject> mapped;  // in the order of the map
 
   size_t Found() const;
+  size_t Extra() const;
 };
 
 // Pairs the objects of a map one to one with the true ones, such that the sum of the distances of their centres is the

@@ -27,7 +27,7 @@ class Summary {
     for (const MapScore* map : maps) {
       total += map->objects.size();
       found += map->Found();
-      extra += map->extra.size();
+      extra += map->Extra();
       for (const TrueObject& object : map->objects) {
         if (object.found) AddErrors(object.errors);
       }
@@ -89,6 +89,22 @@ std::string Line(int columns) {
   return line + "\n";
 }
 
+std::string Faults(const MapScore& score) {
+  constexpr size_t kMostNamed = 4;
+  std::string faults;
+  for (const TrueObject& object : score.objects) {
+    if (!object.found) faults += fmt::format("; {} is missing", object.name);
+  }
+  size_t extra = 0;
+  for (const MappedObject& mapped : score.mapped) {
+    if (!mapped.stands_for.empty() || ++extra > kMostNamed) continue;
+    const std::string place = mapped.overlaps.empty() ? "" : " at the place of " + mapped.overlaps;
+    faults += fmt::format("; {} ({}){} is extra", mapped.object.id.ToString(), mapped.object.class_name, place);
+  }
+  if (extra > kMostNamed) faults += fmt::format("; {} more are extra", extra - kMostNamed);
+  return faults.empty() ? "" : faults.substr(2);
+}
+
 }  // namespace
 
 std::string SequencesTable(std::span<const SequenceRuns> sequences) {
@@ -115,9 +131,9 @@ std::string DamageTable(std::span<const SequenceRuns> sequences) {
   return table;
 }
 
-std::string ObjectsTable(const SequenceRuns& sequence) {
+std::string ObjectsTable(const DamageRuns& row) {
   std::string table = fmt::format("| object | found | {} |\n", kErrorTitles) + Line(8);
-  const std::vector<ScoredRun>& runs = sequence.rows.front().runs;
+  const std::vector<ScoredRun>& runs = row.runs;
   for (size_t j = 0; j < runs.front().score.objects.size(); ++j) {
     Summary summary;
     size_t found = 0;
@@ -131,6 +147,41 @@ std::string ObjectsTable(const SequenceRuns& sequence) {
                          summary.ErrorCells());
   }
   return table;
+}
+
+std::string MapTable(const MapScore& score) {
+  std::string table = "| object | class | score | frames | centre [m] | is | IoU | centre off [cm] |\n" + Line(8);
+  for (const MappedObject& mapped : score.mapped) {
+    std::string is = "none of the true ones | - | -";
+    if (!mapped.overlaps.empty()) is = fmt::format("{} once more | - | -", mapped.overlaps);
+    for (const TrueObject& object : score.objects) {
+      if (object.name != mapped.stands_for) continue;
+      is = fmt::format("{} | {:.3f} | {:.1f}", object.name, object.errors.iou, object.errors.center_cm);
+    }
+    const Eigen::Vector3d& center_m = mapped.center_m;
+    table += fmt::format("| {} | {} | {:.2f} | {} | {:.2f} {:.2f} {:.2f} | {} |\n", mapped.object.id.ToString(),
+                         mapped.object.class_name, mapped.object.class_score, mapped.object.observations, center_m.x(),
+                         center_m.y(), center_m.z(), is);
+  }
+  std::string missing;
+  for (const TrueObject& object : score.objects) {
+    if (!object.found) missing += (missing.empty() ? "" : ", ") + object.name;
+  }
+  return table + (missing.empty() ? "" : fmt::format("\nMissing: {}.\n", missing));
+}
+
+std::string FaultList(std::span<const SequenceRuns> sequences) {
+  std::string list;
+  for (const SequenceRuns& sequence : sequences) {
+    for (const DamageRuns& row : sequence.rows) {
+      for (const ScoredRun& run : row.runs) {
+        const std::string faults = Faults(run.score);
+        if (faults.empty()) continue;
+        list += fmt::format("- {}, {}, seed {}: {}\n", sequence.sequence, row.damage, run.seed, faults);
+      }
+    }
+  }
+  return list;
 }
 
 }  // namespace romap

@@ -34,7 +34,12 @@ std::string SequencesTable(std::span<const SequenceRuns> sequences);
 // A line per damage, all sequences together; the sequences have the same rows. Found objects are summed over the
 // sequences for each seed.
 std::string DamageTable(std::span<const SequenceRuns> sequences);
-// A line per true object: its first row.
-std::string ObjectsTable(const SequenceRuns& sequence);
+// A line per true object.
+std::string ObjectsTable(const DamageRuns& row);
+// A line per object of one map: what it is said to be and where, and what it is.
+std::string MapTable(const MapScore& score);
+// What is missing or extra, a line for each run that is not perfect; empty when all are. Of many extra objects the
+// first few are named.
+std::string FaultList(std::span<const SequenceRuns> sequences);
 
 }  // namespace romap
