@@ -59,7 +59,7 @@ void ExpectMapOfThree(const std::string& out) {
   EXPECT_EQ(ReadJson(out + "/cuboids.json")["objects"].size(), 3u);
   EXPECT_EQ(CountFiles(out + "/objects", ".ply"), 3u);
   EXPECT_EQ(CountFiles(out + "/objects", ".glb"), 3u);
-  EXPECT_EQ(CountFiles(out + "/pictures", ".png"), 4u) << "each object, and the map";
+  EXPECT_GE(CountFiles(out + "/pictures", ".png"), 2u) << "the map, and objects that some frame shows as a whole";
   EXPECT_EQ(CountFiles(out + "/pictures", ".jpg"), 6u) << "cuboids in frames";
   EXPECT_GT(fs::file_size(out + "/trajectory.txt"), 1000u);
 }
