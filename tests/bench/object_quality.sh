@@ -24,7 +24,7 @@ if [ ${#sequences[@]} -eq 0 ]; then
   done
 fi
 
-"$quality" "${sequences[@]}" --poses "${POSES:-both}" --seeds "${SEEDS:-5}" --jobs "${JOBS:-2}" --damage all --objects \
+"$quality" "${sequences[@]}" --poses "${POSES:-both}" --seeds "${SEEDS:-5}" --jobs "${JOBS:-2}" --damage all \
   --draw "$out/pictures"
 
 kitchen=${ROMAP_DATA_DIR:-}/redkitchen_600
