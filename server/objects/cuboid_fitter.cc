@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "server/objects/box_search.h"
 #include "server/objects/footprint.h"
 
 namespace romap {
@@ -158,6 +159,37 @@ Interval BroadHeights(const std::vector<Eigen::Vector3d>& cells, double cell_hei
   return heights;
 }
 
+UprightBox BoxOver(const Footprint& footprint, const Interval& heights) {
+  const Eigen::Vector2d center = Eigen::Rotation2Dd(-footprint.yaw_rad) * footprint.center;
+  UprightBox box{.yaw_rad = footprint.yaw_rad};
+  box.low << center - footprint.half_extents, heights.low;
+  box.high << center + footprint.half_extents, heights.high;
+  return box;
+}
+
+// The outline of a box does not measure what leaves its corners empty (a ball, a plant): the looser it is, the more of
+// the outer box counts. Boxes have 0.01, balls 0.1.
+UprightBox Loosened(UprightBox tight, const UprightBox& outer, double looseness) {
+  constexpr double kBoxLike = 0.07;
+  constexpr double kRound = 0.09;
+  const double share = std::clamp((looseness - kBoxLike) / (kRound - kBoxLike), 0.0, 1.0);
+  tight.low += share * (outer.low - tight.low).cwiseMin(0);
+  tight.high += share * (outer.high - tight.high).cwiseMax(0);
+  return tight;
+}
+
+// The previous cuboid as a box; nullopt when it is turned against `yaw_rad`, so that its faces are other ones.
+std::optional<UprightBox> AtYaw(const std::optional<Cuboid>& cuboid, const HullRegion& region, double yaw_rad) {
+  constexpr double kSameYawRad = 0.03;
+  if (!cuboid) return std::nullopt;
+  if (std::abs(std::remainder(YawInGrid(*cuboid, region.R_world_grid) - yaw_rad, 2 * std::numbers::pi)) > kSameYawRad) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d center =
+      Eigen::AngleAxisd(-yaw_rad, Eigen::Vector3d::UnitZ()) * region.ToGrid(cuboid->T_world_object.translation());
+  return UprightBox{yaw_rad, center - cuboid->half_extents, center + cuboid->half_extents};
+}
+
 }  // namespace
 
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
@@ -213,7 +245,8 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
     const std::vector<Eigen::Vector3d> cells = ClipCells(evidence, heights, unbounded);
     std::optional<double> previous_yaw;
     if (previous) previous_yaw = YawInGrid(*previous, evidence.region.R_world_grid);
-    footprint = FitFootprint(cells, evidence.cell_size, previous_yaw);
+    footprint = evidence.yaw_rad ? FootprintAt(*evidence.yaw_rad, cells, evidence.cell_size, previous_yaw)
+                                 : FitFootprint(cells, evidence.cell_size, previous_yaw);
     if (!footprint) return std::nullopt;
     // A footprint that was cut to the points may be too short at its far end, and a box over it too low to cover.
     if (unbounded && enough_points) break;
@@ -224,13 +257,23 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
   }
   if (!(heights.high > heights.low)) return std::nullopt;
 
-  const Eigen::Vector3d center_grid(footprint->center.x(), footprint->center.y(), (heights.low + heights.high) / 2);
-  const Eigen::AngleAxisd yaw(footprint->yaw_rad, up);
+  const BoxSearch search({.region = evidence.region,
+                          .center = evidence.center,
+                          .object_size_mu = evidence.object_size_mu,
+                          .points = enough_points ? evidence.points : std::vector<Eigen::Vector3d>{},
+                          .support_height = support,
+                          .previous = AtYaw(previous, evidence.region, footprint->yaw_rad)},
+                         silhouettes, footprint->yaw_rad);
+  constexpr double kFirstStep = 0.1;  // of the size
+  const UprightBox outer = BoxOver(*footprint, heights);
+  const UprightBox tight = search.Refine(outer, kFirstStep * evidence.object_size_mu);
+  const UprightBox box = Loosened(tight, outer, search.Looseness(tight));
+  const Eigen::AngleAxisd yaw(box.yaw_rad, up);
   Cuboid cuboid;
   cuboid.T_world_object = {Eigen::Matrix3d(evidence.region.R_world_grid * yaw.toRotationMatrix()),
-                           evidence.region.ToWorld(center_grid)};
-  cuboid.half_extents << footprint->half_extents, (heights.high - heights.low) / 2;
-  cuboid.half_extents.array() += evidence.margin_mu;
+                           evidence.region.ToWorld(yaw * Eigen::Vector3d((box.low + box.high) / 2))};
+  cuboid.half_extents = (box.high - box.low) / 2;
+  cuboid.confidence = search.Agreement(box);
   if (!cuboid.half_extents.allFinite() || !cuboid.T_world_object.IsFinite()) return std::nullopt;
   return cuboid;
 }

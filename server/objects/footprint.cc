@@ -22,11 +22,7 @@ Footprint RectangleAt(double yaw_rad, const std::vector<cv::Point2f>& outline) {
   return {yaw_rad, to_rectangle.inverse() * Eigen::Vector2d((low + high) / 2), (high - low) / 2};
 }
 
-}  // namespace
-
-std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
-                                      std::optional<double> previous_yaw_rad) {
-  if (cells.size() < 4) return std::nullopt;
+std::vector<cv::Point2f> OutlineFromAbove(const std::vector<Eigen::Vector3d>& cells) {
   std::vector<cv::Point2f> points;
   points.reserve(cells.size());
   for (const Eigen::Vector3d& cell : cells) {
@@ -34,6 +30,25 @@ std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells,
   }
   std::vector<cv::Point2f> outline;
   cv::convexHull(points, outline);
+  return outline;
+}
+
+}  // namespace
+
+std::optional<Footprint> FootprintAt(double yaw_rad, const std::vector<Eigen::Vector3d>& cells,
+                                     const Eigen::Vector3d& cell_size, std::optional<double> previous_yaw_rad) {
+  if (cells.empty()) return std::nullopt;
+  const double reference = previous_yaw_rad.value_or(0);
+  const double nearest = reference + std::remainder(yaw_rad - reference, kQuarterTurn);
+  Footprint footprint = RectangleAt(nearest, OutlineFromAbove(cells));
+  footprint.half_extents.array() += (cell_size.x() + cell_size.y()) / 4;
+  return footprint;
+}
+
+std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
+                                      std::optional<double> previous_yaw_rad) {
+  if (cells.size() < 4) return std::nullopt;
+  const std::vector<cv::Point2f> outline = OutlineFromAbove(cells);
 
   const double pad = (cell_size.x() + cell_size.y()) / 4;
   const auto area = [&](const Footprint& f) { return (f.half_extents.array() + pad).prod(); };

@@ -22,6 +22,10 @@ struct Footprint {
 std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
                                       std::optional<double> previous_yaw_rad);
 
+// Rectangle around grid cells with one side along `yaw_rad`; named as FitFootprint does. nullopt without cells.
+std::optional<Footprint> FootprintAt(double yaw_rad, const std::vector<Eigen::Vector3d>& cells,
+                                     const Eigen::Vector3d& cell_size, std::optional<double> previous_yaw_rad);
+
 // Yaw of an upright cuboid in a Grid frame.
 double YawInGrid(const Cuboid& cuboid, const Eigen::Matrix3d& R_world_grid);
 

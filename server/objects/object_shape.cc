@@ -245,9 +245,6 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   }
   evidence.center = evidence.region.ToGrid(extent->center_world);
   evidence.object_size_mu = extent->size_mu;
-  const Silhouette& newest = silhouettes_.back();
-  evidence.margin_mu =
-      config_.cuboid_margin_px * (newest.CameraCenter() - extent->center_world).norm() / newest.camera.fx_px;
   evidence.min_points = config_.min_object_points;
   const auto cuboid = FitCuboid(evidence, silhouettes_, previous);
   if (!cuboid) return std::nullopt;
@@ -256,7 +253,8 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
   const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));
   const double seen_often = std::min(1.0, static_cast<double>(silhouettes_.size()) / 10);
-  fit.cuboid.confidence = 0.5 * seen_around + 0.5 * seen_often;
+  const double known_points = std::min(1.0, static_cast<double>(evidence.points.size()) / 50);
+  fit.cuboid.confidence = cuboid->confidence * (0.4 * seen_around + 0.3 * seen_often + 0.3 * known_points);
   return fit;
 }
 

@@ -22,11 +22,10 @@ struct ObjectsConfig {
   int provisional_patience_frames = 40;
   int lost_after_frames = 90;
 
-  int hull_cells = 40;
+  int hull_cells = 28;
   int max_silhouettes = 36;
   double silhouette_angle_deg = 3;
   int min_object_points = 8;
-  double cuboid_margin_px = 1;
 
   double update_change_share = 0.02;
   double update_yaw_deg = 2;
@@ -76,8 +75,6 @@ struct ObjectsConfig {
                {.unit = "deg", .min = 0, .max = 30, .help = "Masks from directions closer than this are redundant"});
     fields.Add("min_object_points", &min_object_points,
                {.unit = "points", .min = 3, .max = 1000, .help = "Fewer map points do not say where an object is"});
-    fields.Add("cuboid_margin_px", &cuboid_margin_px,
-               {.unit = "px", .min = 0, .max = 20, .help = "Cuboids are padded by what so many pixels span"});
     fields.Add("update_change_share", &update_change_share,
                {.min = 0, .max = 0.5, .help = "A cuboid is sent anew when it changed by this share of its size"});
     fields.Add("update_yaw_deg", &update_yaw_deg,

@@ -95,7 +95,8 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
                         .neighbours = {},
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
-                        .outline_rays_world = {}};
+                        .outline_rays_world = {},
+                        .extents = MeasureExtents(view.frame->labels, detection)};
   silhouette.P_image_world = ProjectionOf(silhouette);
   silhouette.outline_rays_world = OutlineRays(silhouette);
   return silhouette;
@@ -147,6 +148,25 @@ bool Silhouette::MayHide(int seen, const Eigen::Vector3d& p_world) const {
   const double near = t0.min(t1).maxCoeff();
   const double far = t0.max(t1).minCoeff();
   return near <= far && far >= 0 && near <= 1;
+}
+
+bool Silhouette::EndsFreely(int k, const Eigen::Vector3d& center_world) const {
+  const Eigen::Vector2f tip_px = extents.tip_px[static_cast<size_t>(k)];
+  const Eigen::Vector2d outward = ExtentDirection(k);
+  // A ray through the tip, as far as the object.
+  const Eigen::Vector3d direction = T_world_camera.rotation() * camera.Unproject(tip_px.x(), tip_px.y());
+  const Eigen::Vector3d to_center = center_world - CameraCenter();
+  const Eigen::Vector3d tip_world = CameraCenter() + direction * (to_center.dot(direction) / direction.squaredNorm());
+  constexpr int kGap_px = 6;  // masks of things that touch in the image may be that far apart
+  for (int step_px = 1; step_px <= kGap_px; ++step_px) {
+    const Eigen::Vector2d pixel = tip_px.cast<double>() + step_px * outward;
+    const auto u = static_cast<int>(std::lround(pixel.x() / masks->stride_px));
+    const auto v = static_cast<int>(std::lround(pixel.y() / masks->stride_px));
+    if (u < 0 || v < 0 || u >= masks->index.cols || v >= masks->index.rows) return false;
+    const int seen = masks->index.at<uint8_t>(v, u);
+    if (seen != 0 && seen != index && MayHide(seen, tip_world)) return false;
+  }
+  return true;
 }
 
 std::optional<Eigen::Vector3d> IntersectCenterRays(const std::vector<Silhouette>& silhouettes,

@@ -9,6 +9,7 @@
 
 #include "common/messages.h"
 #include "server/objects/detections.h"
+#include "server/objects/mask_extents.h"
 #include "server/objects/point_registry.h"
 
 namespace romap {
@@ -53,6 +54,7 @@ struct Silhouette {
   cv::Rect box_px;
   bool cut_by_border = false;
   std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
+  MaskExtents extents;
 
   // What lies under a point of the world.
   MaskHit Look(const Eigen::Vector3d& p_world) const {
@@ -77,6 +79,9 @@ struct Silhouette {
   }
   // Whether the thing with this index may stand between the camera and the point.
   bool MayHide(int seen, const Eigen::Vector3d& p_world) const;
+  // Whether the object itself ends the mask in direction k (see ExtentDirection), and not the image or something that
+  // may stand before the object, which is at about `center_world`.
+  bool EndsFreely(int k, const Eigen::Vector3d& center_world) const;
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };
 

@@ -1,0 +1,184 @@
+#include "server/objects/box_search.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace romap {
+namespace {
+
+// Costs of a map unit that an outline falls short of a mask or reaches farther: 19 masks in 20 are to be covered.
+constexpr float kFallShortWeight = 0.95F;
+constexpr float kReachFartherWeight = 1 - kFallShortWeight;
+// A corner that sticks out by more than this share of the object's size is one that the object does not fill; what it
+// costs is bounded, or round things would be squeezed.
+constexpr float kFilledCornerShare = 0.07F;
+// Most that one silhouette may cost, in terms of the object's size.
+constexpr float kMostSilhouetteCost = 0.3F;
+// Weights per silhouette, which a direction of a mask has as well: small extents, the mean distance of points outside
+// the box, the distance of the bottom from the support, of a face from where it was.
+constexpr double kExtentWeight = 0.04;
+constexpr double kPointsWeight = 3;
+constexpr double kSupportWeight = 2;
+constexpr double kPreviousWeight = 0.02;
+// A point farther outside than this share of the object's size is taken for a stray one.
+constexpr double kStrayPointShare = 0.02;
+constexpr size_t kMostPoints = 120;
+
+}  // namespace
+
+BoxSearch::BoxSearch(const BoxCriteria& criteria, const std::vector<Silhouette>& silhouettes, double yaw_rad)
+    : criteria_(criteria), yaw_rad_(yaw_rad) {
+  for (size_t k = 0; k < kHalf; ++k) directions_[k] = ExtentDirection(static_cast<int>(k)).cast<float>();
+  criteria_.points.clear();
+  const Eigen::Rotation2Dd to_box(-yaw_rad);
+  const size_t count = std::min(kMostPoints, criteria.points.size());
+  for (size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d& p = criteria.points[i * criteria.points.size() / count];
+    const Eigen::Vector2d xy = to_box * p.head<2>();
+    criteria_.points.emplace_back(xy.x(), xy.y(), p.z());
+  }
+  targets_.reserve(silhouettes.size());
+  for (const Silhouette& silhouette : silhouettes) AddTarget(silhouette);
+}
+
+void BoxSearch::AddTarget(const Silhouette& silhouette) {
+  const HullRegion& region = criteria_.region;
+  const Eigen::Matrix3d M = silhouette.P_image_world.leftCols<3>();
+  Eigen::Matrix<double, 3, 4> P;
+  P << M * region.R_world_grid, M * region.center_world + silhouette.P_image_world.col(3);
+  P.topRows<2>() *= silhouette.masks->stride_px;
+  const Eigen::Vector3d q = P * criteria_.center.homogeneous();
+  if (!(q.z() > 0)) return;
+  const Eigen::Vector2d origin_px = q.hnormalized();
+  const double mu_per_px = q.z() / silhouette.camera.fx_px;
+  P.row(0) = (P.row(0) - origin_px.x() * P.row(2)) * mu_per_px;
+  P.row(1) = (P.row(1) - origin_px.y() * P.row(2)) * mu_per_px;
+  P.leftCols<2>() *= Eigen::Rotation2Dd(yaw_rad_).toRotationMatrix();
+  Target target{.P = P.cast<float>(), .reach_mu = {}, .ends_freely = {}};
+  const Eigen::Vector3d center_world = region.ToWorld(criteria_.center);
+  for (size_t k = 0; k < kExtentDirections; ++k) {
+    const auto direction = static_cast<int>(k);
+    const double reach_px = silhouette.extents.reach_px[k] - ExtentDirection(direction).dot(origin_px);
+    target.reach_mu[k] = static_cast<float>(reach_px * mu_per_px);
+    target.ends_freely[k] = silhouette.EndsFreely(direction, center_world);
+  }
+  targets_.push_back(target);
+}
+
+BoxSearch::Reaches BoxSearch::OutlineOf(const UprightBox& box, const Target& target) const {
+  using Corners = Eigen::Array<float, 8, 1>;
+  const Eigen::Vector3f low = box.low.cast<float>();
+  const Eigen::Vector3f high = box.high.cast<float>();
+  const Corners x{low.x(), high.x(), low.x(), high.x(), low.x(), high.x(), low.x(), high.x()};
+  const Corners y{low.y(), low.y(), high.y(), high.y(), low.y(), low.y(), high.y(), high.y()};
+  const Corners z{low.z(), low.z(), low.z(), low.z(), high.z(), high.z(), high.z(), high.z()};
+  const auto& P = target.P;
+  // A corner behind the camera is far outside the image on some side.
+  const Corners depth = (P(2, 0) * x + P(2, 1) * y + P(2, 2) * z + P(2, 3)).max(1e-6F);
+  const Corners u = (P(0, 0) * x + P(0, 1) * y + P(0, 2) * z + P(0, 3)) / depth;
+  const Corners v = (P(1, 0) * x + P(1, 1) * y + P(1, 2) * z + P(1, 3)) / depth;
+  Reaches reaches;
+  for (size_t k = 0; k < kHalf; ++k) {
+    const Corners along = directions_[k].x() * u + directions_[k].y() * v;
+    reaches[k] = along.maxCoeff();
+    reaches[k + kHalf] = -along.minCoeff();
+  }
+  return reaches;
+}
+
+float BoxSearch::SilhouetteCost(const UprightBox& box, const Target& target) const {
+  const Reaches outline = OutlineOf(box, target);
+  const auto size_mu = static_cast<float>(criteria_.object_size_mu);
+  const float filled_mu = kFilledCornerShare * size_mu;
+  float cost = 0;
+  for (size_t k = 0; k < kExtentDirections; ++k) {
+    const float farther = outline[k] - target.reach_mu[k];
+    if (farther < 0) {
+      cost -= kFallShortWeight * farther;
+    } else if (target.ends_freely[k]) {
+      cost += kReachFartherWeight * farther * filled_mu / (filled_mu + farther);
+    }
+  }
+  return std::min(cost, kMostSilhouetteCost * size_mu);
+}
+
+double BoxSearch::PriorCost(const UprightBox& box) const {
+  double cost = kExtentWeight * (box.high - box.low).sum();
+  double outside = 0;
+  for (const Eigen::Vector3d& p : criteria_.points) {
+    const double distance = (box.low - p).cwiseMax(p - box.high).maxCoeff();
+    outside += std::clamp(distance, 0.0, kStrayPointShare * criteria_.object_size_mu);
+  }
+  if (outside > 0) cost += kPointsWeight * outside / static_cast<double>(criteria_.points.size());
+  if (criteria_.support_height) cost += kSupportWeight * std::abs(box.low.z() - *criteria_.support_height);
+  if (const auto& previous = criteria_.previous) {
+    cost += kPreviousWeight * ((box.low - previous->low).lpNorm<1>() + (box.high - previous->high).lpNorm<1>());
+  }
+  return cost * static_cast<double>(targets_.size());
+}
+
+double BoxSearch::Cost(const UprightBox& box) const {
+  double cost = PriorCost(box);
+  for (const Target& target : targets_) cost += static_cast<double>(SilhouetteCost(box, target));
+  return cost;
+}
+
+bool BoxSearch::TryMove(int axis, double low_step, double high_step, UprightBox* box, double* cost) const {
+  UprightBox moved = *box;
+  moved.low[axis] += low_step;
+  moved.high[axis] += high_step;
+  if (!(moved.high[axis] - moved.low[axis] > 1e-3 * criteria_.object_size_mu)) return false;
+  const double moved_cost = Cost(moved);
+  if (moved_cost >= *cost) return false;
+  *box = moved;
+  *cost = moved_cost;
+  return true;
+}
+
+UprightBox BoxSearch::Refine(const UprightBox& start, double step_mu) const {
+  constexpr double kLeastStepShare = 0.004;
+  constexpr double kLeastGain = 1e-3;  // of the cost, by a round of moves: less is not worth another round
+  UprightBox box = start;
+  double cost = Cost(box);
+  for (double step = step_mu; step > kLeastStepShare * criteria_.object_size_mu;) {
+    const double cost_before = cost;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!TryMove(axis, step, 0, &box, &cost)) TryMove(axis, -step, 0, &box, &cost);
+      if (!TryMove(axis, 0, -step, &box, &cost)) TryMove(axis, 0, step, &box, &cost);
+      if (!TryMove(axis, step, step, &box, &cost)) TryMove(axis, -step, -step, &box, &cost);
+    }
+    if (cost > (1 - kLeastGain) * cost_before) step /= 2;
+  }
+  return box;
+}
+
+double BoxSearch::Agreement(const UprightBox& box) const {
+  constexpr float kGoodShare = 0.05F;  // of the object's size
+  constexpr int kMostShort = 2;        // directions
+  if (targets_.empty()) return 0;
+  const float tolerance_mu = kGoodShare * static_cast<float>(criteria_.object_size_mu);
+  const auto agreeing = std::count_if(targets_.begin(), targets_.end(), [&](const Target& target) {
+    const Reaches outline = OutlineOf(box, target);
+    int fall_short = 0;
+    for (size_t k = 0; k < kExtentDirections; ++k) fall_short += target.reach_mu[k] - outline[k] > tolerance_mu ? 1 : 0;
+    return fall_short <= kMostShort;
+  });
+  return static_cast<double>(agreeing) / static_cast<double>(targets_.size());
+}
+
+double BoxSearch::Looseness(const UprightBox& box) const {
+  float sum = 0;
+  int count = 0;
+  for (const Target& target : targets_) {
+    const Reaches outline = OutlineOf(box, target);
+    for (size_t k = 0; k < kExtentDirections; ++k) {
+      if (!target.ends_freely[k]) continue;
+      sum += std::max(0.0F, outline[k] - target.reach_mu[k]);
+      ++count;
+    }
+  }
+  return count > 0 ? static_cast<double>(sum) / (count * criteria_.object_size_mu) : 0;
+}
+
+}  // namespace romap
