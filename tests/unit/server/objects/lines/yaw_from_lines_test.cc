@@ -72,7 +72,7 @@ class Scene {
   }
   // The upper and lower rim of an upright truncated cone as chords, and its outline's two sides, in every view.
   void AddRound(double bottom_radius, double top_radius, double height) {
-    constexpr int kChords = 24;
+    constexpr int kChords = 18;
     for (size_t view = 0; view < cameras(); ++view) {
       for (int i = 0; i < kChords; ++i) {
         const double a = 2 * kPi * (i + 0.5) / kChords;
@@ -80,7 +80,7 @@ class Scene {
         // Where a rim's ellipse bends much, no straight segment is found.
         const Eigen::Vector2d look = CameraCenter(view).head<2>().normalized();
         const double across = std::abs(look.dot(Eigen::Vector2d(std::cos((a + b) / 2), std::sin((a + b) / 2))));
-        if (across < 0.5) continue;
+        if (across < 0.97) continue;
         for (const auto& [radius, z] : {std::pair(bottom_radius, -height / 2), std::pair(top_radius, height / 2)}) {
           AddEdge(view, {radius * std::cos(a), radius * std::sin(a), z},
                   {radius * std::cos(b), radius * std::sin(b), z});
@@ -188,11 +188,11 @@ TEST_P(BoxYawTest, BearsATiltedUp) {
 INSTANTIATE_TEST_SUITE_P(Yaws, BoxYawTest, ::testing::Values(-1.4, -0.7, -0.2, 0.0, 0.35, 0.78, 1.1));
 
 TEST(YawFromLinesTest, DoubtsRoundThings) {
-  for (const double end_rad : {2 * kPi, kPi / 2, kPi / 6}) {
-    for (const double top_radius : {0.1, 0.16}) {
+  for (const double end_rad : {2 * kPi, kPi / 2, kPi / 6, kPi / 18}) {
+    for (const double top_radius : {0.2, 0.26}) {
       Scene scene;
       scene.AddRing(12, 0, end_rad);
-      scene.AddRound(0.1, top_radius, 0.2);
+      scene.AddRound(0.2, top_radius, 0.2);
       const auto yaw = scene.Yaw();
       ASSERT_TRUE(yaw.has_value());
       EXPECT_LT(yaw->confidence, 0.15) << "ring of " << end_rad << " rad, top radius " << top_radius;
