@@ -35,18 +35,8 @@ std::vector<cv::Point2f> OutlineFromAbove(const std::vector<Eigen::Vector3d>& ce
 
 }  // namespace
 
-std::optional<Footprint> FootprintAt(double yaw_rad, const std::vector<Eigen::Vector3d>& cells,
-                                     const Eigen::Vector3d& cell_size, std::optional<double> previous_yaw_rad) {
-  if (cells.empty()) return std::nullopt;
-  const double reference = previous_yaw_rad.value_or(0);
-  const double nearest = reference + std::remainder(yaw_rad - reference, kQuarterTurn);
-  Footprint footprint = RectangleAt(nearest, OutlineFromAbove(cells));
-  footprint.half_extents.array() += (cell_size.x() + cell_size.y()) / 4;
-  return footprint;
-}
-
 std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
-                                      std::optional<double> previous_yaw_rad) {
+                                      std::optional<double> previous_yaw_rad, std::optional<double> edge_yaw_rad) {
   if (cells.size() < 4) return std::nullopt;
   const std::vector<cv::Point2f> outline = OutlineFromAbove(cells);
 
@@ -67,6 +57,16 @@ std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells,
     if (candidate_area >= smallest) continue;
     smallest = candidate_area;
     best = candidate;
+  }
+  if (edge_yaw_rad) {
+    const double offset = std::remainder(*edge_yaw_rad - reference, kQuarterTurn);
+    const Footprint along_edges = RectangleAt(reference + offset, outline);
+    constexpr double kMostWaste = 1.35;  // more empty space, and the edges are a print's or a shadow's
+    if (area(along_edges) < kMostWaste * smallest) {
+      best = along_edges;
+      best.half_extents.array() += pad;
+      return best;
+    }
   }
   constexpr double kRoundShare = 0.88;   // of the largest rectangle: nothing to choose between
   constexpr double kNearlyBest = 1.015;  // below the noise of the cells
