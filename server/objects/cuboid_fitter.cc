@@ -245,7 +245,7 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
     const std::vector<Eigen::Vector3d> cells = ClipCells(evidence, heights, unbounded);
     std::optional<double> previous_yaw;
     if (previous) previous_yaw = YawInGrid(*previous, evidence.region.R_world_grid);
-    footprint = FitFootprint(cells, evidence.cell_size, previous_yaw, evidence.yaw_rad);
+    footprint = FitFootprint(cells, evidence.cell_size, previous_yaw, evidence.edge_yaw_rad);
     if (!footprint) return std::nullopt;
     // A footprint that was cut to the points may be too short at its far end, and a box over it too low to cover.
     if (unbounded && enough_points) break;

@@ -20,15 +20,15 @@ struct CuboidEvidence {
   std::vector<double> neighbour_bottoms;             // heights of what other objects stand on
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the masks' middles meet
   double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
-  std::optional<double> yaw_rad;  // of one side of the box, where something better than the hull knows
-  int min_points = 8;             // fewer points do not say how far the object reaches
+  std::optional<double> edge_yaw_rad;                // of its straight edges, in the grid; only when they agree
+  int min_points = 8;                                // fewer points do not say how far the object reaches
 };
 
 // The upright box around an object. The hull, the points and the support plane give a first box, BoxSearch the one that
 // agrees best with all of them: a hull is only an outer bound, loose where neighbours hide the object or the cameras
-// stand on one side, and it wears a cone on every flat top. Yaw: `yaw_rad`, else the rectangle of least area around the
-// footprint; `previous` wins over equally good ones and decides which of the four names of the same box is used. The
-// confidence is the share of silhouettes that agree with the box. nullopt when the evidence leaves no volume.
+// stand on one side, and it wears a cone on every flat top. Yaw: the straight edges', else the rectangle of least area
+// around the footprint; `previous` wins over equally good ones and decides which of the four names of the same box is
+// used. The confidence is the share of silhouettes that agree with the box. nullopt when the evidence leaves no volume.
 std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                 const std::optional<Cuboid>& previous);
 

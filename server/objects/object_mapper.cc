@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/objects/lines/line_segments.h"
+
 namespace romap {
 namespace {
 
@@ -265,6 +267,11 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
     landmark.keyframes.push_back(view.id);
     Silhouette silhouette = MakeSilhouette(view, masks, detection, d);
     UpdateNeighbours(cuboids, &silhouette);
+    // Not before it is known to be kept: edges cost more than all the rest of it.
+    if (!landmark.shape.IsRedundant(silhouette)) {
+      silhouette.segments =
+          FindLineSegments(view.frame->image_bgr, view.frame->labels, detection.label, detection.box_px);
+    }
     landmark.needs_fit |= landmark.shape.AddSilhouette(std::move(silhouette));
     ViewCandidate candidate{.keyframe = view.id,
                             .frame = view.frame,

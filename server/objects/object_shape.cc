@@ -8,6 +8,7 @@
 
 #include "server/objects/angles.h"
 #include "server/objects/cuboid_fitter.h"
+#include "server/objects/edge_yaw.h"
 #include "server/objects/isolation_forest.h"
 #include "server/objects/projection.h"
 
@@ -244,6 +245,7 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
     evidence.neighbour_bottoms.push_back(bottom - center_height);
   }
   evidence.center = evidence.region.ToGrid(extent->center_world);
+  evidence.edge_yaw_rad = EdgeYaw(silhouettes_, evidence.region.R_world_grid, config_.edge_yaw_min_confidence);
   evidence.object_size_mu = extent->size_mu;
   evidence.min_points = config_.min_object_points;
   const auto cuboid = FitCuboid(evidence, silhouettes_, previous);

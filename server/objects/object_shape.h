@@ -34,6 +34,7 @@ class ObjectShape {
   // Redundant silhouettes (direction close to another one's) are not kept, so that the cost of a fit stays bounded;
   // then the answer is false.
   bool AddSilhouette(Silhouette silhouette);
+  bool IsRedundant(const Silhouette& silhouette) const;
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
 
   // The map was corrected: `S_new_old` happened to the space the object stands in, and its keyframes have new poses.
@@ -51,7 +52,6 @@ class ObjectShape {
   };
 
   std::optional<Extent> EstimateExtent(const Surroundings& surroundings) const;
-  bool IsRedundant(const Silhouette& silhouette) const;
   void MakeRoom();
   void Carve(const HullRegion& region, const Surroundings& surroundings);
   void StraightenRegion(const Surroundings& surroundings);

@@ -26,6 +26,7 @@ struct ObjectsConfig {
   int max_silhouettes = 36;
   double silhouette_angle_deg = 3;
   int min_object_points = 8;
+  double edge_yaw_min_confidence = 0.25;
 
   double update_change_share = 0.02;
   double update_yaw_deg = 2;
@@ -75,6 +76,8 @@ struct ObjectsConfig {
                {.unit = "deg", .min = 0, .max = 30, .help = "Masks from directions closer than this are redundant"});
     fields.Add("min_object_points", &min_object_points,
                {.unit = "points", .min = 3, .max = 1000, .help = "Fewer map points do not say where an object is"});
+    fields.Add("edge_yaw_min_confidence", &edge_yaw_min_confidence,
+               {.min = 0, .max = 1, .help = "Straight edges that agree so well decide a cuboid's yaw; 1 = never"});
     fields.Add("update_change_share", &update_change_share,
                {.min = 0, .max = 0.5, .help = "A cuboid is sent anew when it changed by this share of its size"});
     fields.Add("update_yaw_deg", &update_yaw_deg,

@@ -96,7 +96,8 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
                         .outline_rays_world = {},
-                        .extents = MeasureExtents(view.frame->labels, detection)};
+                        .extents = MeasureExtents(view.frame->labels, detection),
+                        .segments = {}};
   silhouette.P_image_world = ProjectionOf(silhouette);
   silhouette.outline_rays_world = OutlineRays(silhouette);
   return silhouette;

@@ -9,6 +9,7 @@
 
 #include "common/messages.h"
 #include "server/objects/detections.h"
+#include "server/objects/lines/line_segments.h"
 #include "server/objects/mask_extents.h"
 #include "server/objects/point_registry.h"
 
@@ -55,6 +56,7 @@ struct Silhouette {
   bool cut_by_border = false;
   std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
   MaskExtents extents;
+  std::vector<LineSegment> segments;  // straight edges on the mask, once someone looked for them
 
   // What lies under a point of the world.
   MaskHit Look(const Eigen::Vector3d& p_world) const {
