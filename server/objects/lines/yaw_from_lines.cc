@@ -11,7 +11,7 @@ namespace romap {
 namespace {
 
 constexpr double kQuarterTurn = std::numbers::pi / 2;
-constexpr int kSamples = 90;  // of a quarter turn
+constexpr int kSamples = 45;  // of a quarter turn: finer than the narrowest kernel
 constexpr double kSample_rad = kQuarterTurn / kSamples;
 constexpr double kReach = 3;  // of the kernel, in standard deviations
 
@@ -113,9 +113,19 @@ double Refine(double yaw_rad, const std::vector<Vote>& votes) {
   return WrapQuarter(yaw_rad);
 }
 
+// The score at any yaw.
+double ScoreAt(double yaw_rad, const std::vector<Vote>& votes) {
+  double score = 0;
+  for (const Vote& vote : votes) {
+    const double x = WrapQuarter(vote.yaw_rad - yaw_rad) / (kReach * vote.sigma_rad);
+    if (std::abs(x) < 1) score += vote.weight * (1 - x * x) * (1 - x * x);
+  }
+  return score;
+}
+
 // The highest score that is clearly of another yaw than sample `best`.
 double BestOther(const Curve& curve, int best) {
-  constexpr int kNear = 12;
+  constexpr int kNear = 6;
   double highest = 0;
   for (int i = kNear; i <= kSamples - kNear; ++i) {
     highest = std::max(highest, curve[static_cast<size_t>((best + i) % kSamples)]);
@@ -154,7 +164,7 @@ std::optional<YawEstimate> YawFromLines(const Eigen::Matrix3d& R_world_reference
   const int best = static_cast<int>(highest - by_yaw.begin());
   YawEstimate estimate;
   estimate.yaw_rad = Refine(best * kSample_rad, ballot.votes);
-  estimate.share = *highest;
+  estimate.share = ScoreAt(estimate.yaw_rad, ballot.votes) / total;
   estimate.edges = static_cast<int>(ballot.votes.size());
   const double rival = std::max(BestOther(by_yaw, best), BestMirrored(by_yaw_in_view));
   const double effective_edges = total * total / total_squared;
