@@ -62,7 +62,7 @@ bool ObjectField::CarryOverTo(const TrainingBox& box) {
   if (unknown_share > kMostUnknownShare || growth > kMostGrowth || growth < 1 / kMostGrowth) return false;
   occupancy_.MoveTo(box_.ShareOf(box).cast<float>());
   // A box that was too small made the field paint what lies outside on the box's walls. That must be able to go.
-  trainer_.Soften(static_cast<float>(1 - std::min(0.5, 2 * unknown_share)));
+  trainer_.Loosen(static_cast<float>(1 - std::min(0.75, 3 * unknown_share)));
   plan_.OnNewBox(steps(), unknown_share);
   box_ = box;
   return true;

@@ -91,8 +91,12 @@ FieldTrainer::~FieldTrainer() = default;
 FieldTrainer::FieldTrainer(FieldTrainer&&) noexcept = default;
 FieldTrainer& FieldTrainer::operator=(FieldTrainer&&) noexcept = default;
 
-void FieldTrainer::Soften(float kept_share) {
-  for (size_t i = 0; i < model_.table.size(); ++i) model_.table[i] *= kept_share;
+void FieldTrainer::Loosen(float share) {
+  for (size_t i = 0; i < model_.table.size(); ++i) model_.table[i] *= share;
+  for (size_t i = static_cast<size_t>(model_.mlp.inputs * model_.mlp.hidden); i < model_.mlp.parameters.size(); ++i) {
+    model_.mlp.parameters[i] /= share;
+  }
+  model_.mlp.UpdateTransposed();
 }
 
 void FieldTrainer::ReleaseScratch() { workers_.clear(); }

@@ -34,10 +34,12 @@ class FieldTrainer {
   // `steps` more steps on `threads` threads (the caller is one of them). Nothing is allocated within a step.
   TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads);
 
-  // Makes a trained field ready to learn something else: its features shrink to `kept_share` (0..1] of what they are.
-  // What it shows stays much the same, but details are no longer so sure of themselves that new ones cannot displace
-  // them, which is what spoils warm starts (J. Ash, R. Adams, "On Warm-Starting Neural Network Training", 2020).
-  void Soften(float kept_share);
+  // Makes a trained field ready to learn something else without changing what it shows: features shrink to `share`
+  // (0..1] of what they are, and the weights that read them out grow to 1 / share. Hidden neurons are linear or zero,
+  // so the outputs stay, but a step of Adam changes them so much more. Without this, features that grew large in the
+  // first training hold on to their errors (the loss of plasticity of warm starts: J. Ash, R. Adams, "On Warm-Starting
+  // Neural Network Training", 2020).
+  void Loosen(float share);
 
   // Gives back the memory that only Run() needs; the next Run() takes it again.
   void ReleaseScratch();

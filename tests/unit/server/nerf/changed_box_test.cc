@@ -16,24 +16,20 @@ using testing::BallScene;
 using testing::BallSurfaceError;
 using testing::RawOnGrid;
 
-NerfConfig FastConfig() {
+NerfConfig ShortConfig() {
   NerfConfig config;
-  config.levels = 6;
-  config.log2_table_entries = 13;
-  config.finest_resolution = 256;
-  config.rays_per_step = 512;
-  config.full_budget_steps = 120;
+  config.full_budget_steps = 150;
   return config;
 }
 
 ObjectField MakeField(const BallScene& scene, const Cuboid& box, uint64_t seed = 1) {
-  ObjectField field(FastConfig(), scene.object, seed);
+  ObjectField field(ShortConfig(), scene.object, seed);
   EXPECT_TRUE(field.SetBox(box).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   return field;
 }
 
-// The ball's box scaled along its axes, seen from its lowest corner, and turned about its centre.
+// The ball's box scaled along its axes and turned, both about its centre.
 struct Change {
   std::string name;
   Eigen::Vector3d scale{1, 1, 1};
@@ -43,7 +39,7 @@ struct Change {
     Cuboid changed = box;
     changed.half_extents = box.half_extents.cwiseProduct(scale);
     const SE3<Object, Object> T_old_new(Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ())),
-                                        changed.half_extents - box.half_extents);
+                                        Eigen::Vector3d::Zero());
     changed.T_world_object = box.T_world_object * T_old_new;
     return changed;
   }
@@ -53,24 +49,25 @@ class ChangedBoxTest : public ::testing::TestWithParam<Change> {};
 
 TEST_P(ChangedBoxTest, FieldIsKeptAndSoonAsGoodAsOneOfTheRightBox) {
   const BallScene scene;
+  const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());
   const double new_loss = right.Train(1, 1).color_loss;
-  right.Train(119, 1);
+  right.Train(whole - 1, 1);
   const double right_error = BallSurfaceError(scene, right.Snapshot());
 
   ObjectField field = MakeField(scene, GetParam().Apply(scene.Box()));
-  field.Train(79, 1);
+  field.Train(99, 1);
   const double loss_before = field.Train(1, 1).color_loss;
   const double error_before = BallSurfaceError(scene, field.Snapshot());
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
-  EXPECT_EQ(field.steps(), 80u);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.3 * error_before + 0.03);
+  EXPECT_EQ(field.steps(), 100u);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), error_before + 0.02);
   const double loss_after = field.Train(1, 1).color_loss;
-  EXPECT_LT(loss_after, 0.35 * new_loss);
-  EXPECT_LT(loss_after, 2.5 * loss_before + 0.02);
+  EXPECT_LT(loss_after, 0.4 * new_loss);
+  EXPECT_LT(loss_after, 2.5 * loss_before + 0.01);
 
   const auto rest = static_cast<int>(field.AllowedSteps(true) - field.steps());
-  EXPECT_LE(rest, FastConfig().full_budget_steps);
+  EXPECT_LE(rest, whole);
   field.Train(rest, 1);
   EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.2 * right_error + 0.01);
 }
@@ -132,19 +129,7 @@ TEST(ChangedBoxSpaceTest, WhatIsLearnedStaysWhereItIs) {
   std::vector<float> raw_new(in_new.size()), raw_old(in_old.size());
   after.field->Sample(in_new, raw_new, {});
   before.field->Sample(in_old, raw_old, {});
-  // What was learned was softened by one factor, which the density bias takes no part in.
-  const float bias = static_cast<float>(FastConfig().density_bias);
-  double new_old = 0, old_old = 0;
-  for (size_t i = 0; i < raw_new.size(); ++i) {
-    new_old += (raw_new[i] - bias) * (raw_old[i] - bias);
-    old_old += (raw_old[i] - bias) * (raw_old[i] - bias);
-  }
-  const double kept_share = new_old / old_old;
-  EXPECT_GT(kept_share, 0.49);
-  EXPECT_LT(kept_share, 1.001);
-  for (size_t i = 0; i < raw_new.size(); ++i) {
-    EXPECT_NEAR(raw_new[i] - bias, kept_share * (raw_old[i] - bias), 0.05) << i;
-  }
+  for (size_t i = 0; i < raw_new.size(); ++i) EXPECT_NEAR(raw_new[i], raw_old[i], 0.02) << i;
 }
 
 TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
