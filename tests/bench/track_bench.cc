@@ -133,7 +133,7 @@ class Run {
       return 2;
     }
     cv::setNumThreads(1);
-    Ingest ingest(sequence->camera());
+    Ingest ingest(sequence->camera(), /*mask_patience_s=*/0);
     std::thread mapping;
     if (!options_.one_thread) {
       mapping = std::thread([this] {
