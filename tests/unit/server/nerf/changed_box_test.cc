@@ -1,5 +1,6 @@
 // What becomes of a field when its object's cuboid grows, shrinks or turns: it goes on over the new box.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -88,7 +89,7 @@ TEST_P(ChangedBoxTest, SnapshotIsOfTheNewBoxAtOnce) {
     for (size_t i = 0; i < hull.size(); ++i) differ += hull[i] != snapshot.hull.bits[i];
     EXPECT_LT(differ, static_cast<int>(hull.size() / 500));  // layers may be trimmed once steps were done
   } else {
-    EXPECT_EQ(GetParam().name, "Shrinks10Percent") << "only a box that still fits stays";
+    EXPECT_THAT(GetParam().name, ::testing::EndsWith("10Percent")) << "only a box that still fits stays";
   }
   std::vector<float> raw(1);
   const Eigen::Vector3f corner = 0.999f * snapshot.box_half_extents;
