@@ -187,6 +187,33 @@ bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<boo
   return false;
 }
 
+// Whether detection `piece`, which is no known landmark, is cut off a known thing: it lies where that one is, whose
+// mask `d` is too small without it.
+bool IsPieceOf(const Scene& scene, size_t piece, size_t d, size_t l) {
+  constexpr double kInside = 0.8;
+  constexpr double kBetter = 0.1;
+  if (scene.projected[l].empty() || scene.landmarks[l]->state == ObjectState::kProvisional) return false;
+  const cv::Rect& box = scene.detections[piece].box_px;
+  if ((box & scene.projected[l]).area() < kInside * box.area()) return false;
+  const cv::Rect& main_box = scene.detections[d].box_px;
+  return BoxIou(main_box | box, scene.projected[l]) > BoxIou(main_box, scene.projected[l]) + kBetter;
+}
+
+void DoubtPieces(const Scene& scene, std::vector<Match>* matches) {
+  for (size_t piece = 0; piece < matches->size(); ++piece) {
+    if ((*matches)[piece].landmark >= 0) continue;
+    for (size_t d = 0; d < matches->size(); ++d) {
+      const int l = (*matches)[d].landmark;
+      if (l < 0 || !IsPieceOf(scene, piece, d, static_cast<size_t>(l))) continue;
+      (*matches)[piece].doubt = "it is a piece of another thing";
+      (*matches)[d].doubt = "a piece of it is missing";
+      spdlog::debug("objects: frame {}: label {} is a piece of landmark {}", scene.tracked.frame->frame_id,
+                    scene.detections[piece].label, scene.landmarks[static_cast<size_t>(l)]->key);
+      break;
+    }
+  }
+}
+
 // Share of the body in the mask, and overlap of the mask's box with the cuboid's. Where the image or other masks cut
 // the landmark nothing is said.
 std::optional<double> Agreement(const Scene& scene, size_t d, size_t l) {
@@ -273,6 +300,7 @@ std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
                   scores(static_cast<Eigen::Index>(l), detection_of[l]), match.doubt ? ", in doubt: " : "",
                   match.doubt ? match.doubt : "");
   }
+  DoubtPieces(scene, &matches);
   return matches;
 }
 

@@ -16,7 +16,8 @@ namespace romap {
 // What one detection of a frame shows.
 struct Match {
   int landmark = -1;  // index into the landmarks; -1: none of them
-  // The match is good enough to stay on track, but not to learn from: why. nullptr = nothing speaks against it.
+  // The match is good enough to stay on track, but not to learn from: why. nullptr = nothing speaks against it. Without
+  // a landmark: why it is not the sight of a new thing either.
   const char* doubt = nullptr;
   // How well the mask agrees with what is known of the landmark's shape, 0..1; nullopt while nothing is.
   std::optional<double> agreement;
@@ -39,7 +40,8 @@ struct Association {
 //    camera's motion, as long as that is recent;
 //  - class and detector track: evidence, not a verdict.
 // A match is doubted when another one is nearly as good, and when the mask covers a second landmark as well and fits
-// both together better than one of them: neighbours that the detector took for one thing.
+// both together better than one of them: neighbours that the detector took for one thing. So are two masks that fit one
+// landmark together better than the matched one does alone: a thing that the detector cut in pieces.
 //
 // With ObjectsConfig::association = "greedy_iou" the recipe of the paper's first stage instead: boxes of consecutive
 // frames, best overlap first.

@@ -72,6 +72,11 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracke
   UpdateLost(association, &output);
   for (size_t d = 0; d < current_.detections.size(); ++d) {
     const Match& match = association.matches[d];
+    current_.certain.push_back(match.doubt == nullptr);
+    if (match.landmark < 0 && match.doubt != nullptr) {
+      current_.keys.push_back(kNobody);
+      continue;
+    }
     if (match.landmark < 0) {
       landmarks_.push_back(std::make_unique<Landmark>(++last_key_, config_));
       spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id,
@@ -79,7 +84,6 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracke
     }
     Landmark& landmark = match.landmark < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(match.landmark)];
     current_.keys.push_back(landmark.key);
-    current_.certain.push_back(match.doubt == nullptr);
     if (match.agreement) {
       landmark.agreement_sum += *match.agreement;
       ++landmark.agreement_count;
@@ -108,9 +112,10 @@ void ObjectMapper::RecordSighting(Landmark& landmark, const Detection& detection
 
 void ObjectMapper::RecordCompany(const Association& association, size_t landmarks_before) {
   for (size_t i = 0; i < current_.keys.size(); ++i) {
+    if (current_.keys[i] == kNobody) continue;
     Landmark& landmark = *FindLandmark(current_.keys[i]);
     for (size_t j = 0; j < current_.keys.size(); ++j) {
-      if (i != j) ++landmark.seen_beside[current_.keys[j]];
+      if (i != j && current_.keys[j] != kNobody) ++landmark.seen_beside[current_.keys[j]];
     }
   }
   for (size_t l = 0; l < landmarks_before; ++l) {
@@ -191,7 +196,8 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& vie
   CountPointVotes(view);
   UpdateSceneDepth(view);
   CollectEvidence(view);
-  const std::vector<LandmarkKey> seen = SortedUnique(current_.keys);
+  std::vector<LandmarkKey> seen = SortedUnique(current_.keys);
+  std::erase(seen, kNobody);
   FitShapes(seen);
   ConfirmProven(seen);
   MergeDuplicates(&output);

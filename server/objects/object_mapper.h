@@ -53,9 +53,10 @@ class ObjectMapper {
     bool usable = false;
     uint64_t frame_id = 0;
     std::vector<Detection> detections;
-    std::vector<LandmarkKey> keys;  // per detection; every detection has a landmark, if only a provisional one
+    std::vector<LandmarkKey> keys;  // per detection: its landmark, if only a provisional one, or kNobody
     std::vector<bool> certain;      // per detection: good enough to learn from
   };
+  static constexpr LandmarkKey kNobody = ~LandmarkKey{0};  // of a mask that is no thing of its own
   using PointGroups = std::map<LandmarkKey, std::vector<PointRegistry::Member>>;
 
   // Per frame.
@@ -76,11 +77,19 @@ class ObjectMapper {
   std::map<LandmarkKey, Cuboid> PublishedCuboids() const;
   void FitShapes(const std::vector<LandmarkKey>& keys);
   void FitShape(Landmark& landmark, const PointGroups& groups, const std::vector<Eigen::Vector3d>& background);
+  bool IsSteady(const Landmark& landmark) const;
   bool IsProven(const Landmark& landmark) const;
   void ConfirmProven(const std::vector<LandmarkKey>& keys);
   void MergeDuplicates(Output* output);
   void Merge(Landmark& from, Landmark& into, Output* output);
+  struct Company {
+    uint64_t together = 0;  // frames in which both had a mask
+    uint64_t covered = 0;   // frames in which one had none and the other one's mask lay over it
+  };
+  static Company CompanyOf(const Landmark& a, const Landmark& b);
   bool AreTheSame(const Landmark& a, const Landmark& b) const;
+  bool PointsAgree(const Landmark& a, const Landmark& b) const;
+  std::vector<Eigen::Vector3d> PointsOf(const Landmark& landmark) const;
   bool IsAnnounceable(const Landmark& landmark) const;
   void Publish(Landmark& landmark, bool force, Output* output);
   std::vector<ObjectView> TakeViews(Landmark& landmark, const Cuboid& cuboid);

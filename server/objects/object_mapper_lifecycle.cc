@@ -10,6 +10,7 @@
 #include "common/map_motion.h"
 #include "server/objects/angles.h"
 #include "server/objects/object_mapper.h"
+#include "server/objects/two_sample_test.h"
 
 namespace romap {
 namespace {
@@ -57,6 +58,20 @@ void RenameKey(LandmarkKey from, LandmarkKey into, LandmarkKey owner, std::map<L
 
 }  // namespace
 
+// Whether a landmark is there whenever it ought to be, in the shape that is known of it.
+bool ObjectMapper::IsSteady(const Landmark& landmark) const {
+  const auto sightings = static_cast<double>(landmark.sightings);
+  if (sightings < config_.confirm_seen_share * static_cast<double>(landmark.expected)) return false;
+  constexpr uint64_t kEnoughToJudge = 3;
+  const bool agrees =
+      landmark.agreement_count < kEnoughToJudge ||
+      landmark.agreement_sum >= config_.confirm_agreement * static_cast<double>(landmark.agreement_count);
+  // A piece of another thing is mostly a part of that one's mask.
+  const bool stands_alone = std::all_of(landmark.covered_by.begin(), landmark.covered_by.end(),
+                                        [&](const auto& cover) { return cover.second <= landmark.sightings; });
+  return agrees && stands_alone;
+}
+
 // Evidence that a landmark is a thing: seen often, from different sides, and with a box of believable form.
 bool ObjectMapper::IsProven(const Landmark& landmark) const {
   if (!landmark.cuboid) return false;
@@ -66,9 +81,7 @@ bool ObjectMapper::IsProven(const Landmark& landmark) const {
   // Without points the masks alone must say where it is, which takes a wider base.
   const bool has_points = landmark.points.size() >= static_cast<size_t>(config_.min_object_points);
   const double parallax_rad = (has_points ? 1.0 : 1.5) * config_.confirm_parallax_deg * kRadPerDeg;
-  const bool steady =
-      static_cast<double>(landmark.sightings) >= config_.confirm_seen_share * static_cast<double>(landmark.expected);
-  return believable && steady && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
+  return believable && IsSteady(landmark) && landmark.sightings >= static_cast<uint64_t>(config_.confirm_frames) &&
          landmark.keyframe_sightings >= config_.confirm_keyframes && landmark.parallax_rad >= parallax_rad;
 }
 
@@ -95,24 +108,62 @@ bool ObjectMapper::IsAnnounceable(const Landmark& landmark) const {
   return landmark.cuboid && landmark.cuboid->half_extents.minCoeff() > 0 && landmark.sightings >= kFewestSightings;
 }
 
-// Two landmarks are one thing when one's body lies in the other's box and they were never seen side by side. A detector
-// that cuts things in pieces shows one thing as two at times; then mostly one mask covers both.
-bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
-  if (!a.cuboid || !b.cuboid) return false;
-  const double reach = a.cuboid->half_extents.norm() + b.cuboid->half_extents.norm();
-  if ((a.cuboid->T_world_object.translation() - b.cuboid->T_world_object.translation()).norm() > reach) return false;
+// How many frames speak for two things, and how many for one thing twice.
+ObjectMapper::Company ObjectMapper::CompanyOf(const Landmark& a, const Landmark& b) {
   const auto count = [](const std::map<LandmarkKey, uint64_t>& counts, LandmarkKey key) {
     const auto found = counts.find(key);
-    return found == counts.end() ? 0.0 : static_cast<double>(found->second);
+    return found == counts.end() ? uint64_t{0} : found->second;
   };
-  const double together = count(a.seen_beside, b.key);
-  const double covered = count(a.covered_by, b.key) + count(b.covered_by, a.key);
-  // Every frame that shows both speaks for two, every one in which one mask lies over both for one.
-  const bool seen_as_two = together > 0;
-  if (seen_as_two && covered <= 2 * together) return false;
-  const double overlap = std::max(ShareInside(*a.cuboid, b.body_world), ShareInside(*b.cuboid, a.body_world));
+  return {.together = count(a.seen_beside, b.key), .covered = count(a.covered_by, b.key) + count(b.covered_by, a.key)};
+}
+
+// Two landmarks are one thing when they take the same place and were never seen side by side. A detector that cuts
+// things in pieces shows one thing as two at times; then mostly one mask covers both.
+bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
+  if (!a.cuboid && !b.cuboid) return false;
+  const auto [together, covered] = CompanyOf(a, b);
+  if (together > 0 && covered <= 2 * together) return false;
   const bool same_class = a.BestClass().first == b.BestClass().first;
-  return overlap > (same_class && !seen_as_two ? 0.5 : 0.7);
+  if (!a.cuboid || !b.cuboid) {
+    const Landmark& with_box = a.cuboid ? a : b;
+    const Landmark& without = a.cuboid ? b : a;
+    return same_class && together == 0 && ShareInside(*with_box.cuboid, without.body_world) > 0.7 &&
+           PointsAgree(with_box, without);
+  }
+  const double reach = a.cuboid->half_extents.norm() + b.cuboid->half_extents.norm();
+  if ((a.cuboid->T_world_object.translation() - b.cuboid->T_world_object.translation()).norm() > reach) return false;
+  const double overlap = std::max(ShareInside(*a.cuboid, b.body_world), ShareInside(*b.cuboid, a.body_world));
+  constexpr double kSurely = 0.7;
+  constexpr double kProbably = 0.5;
+  constexpr double kPossibly = 0.25;
+  if (overlap > kSurely) return true;
+  if (!same_class || together > 0) return false;
+  return overlap > kProbably || (overlap > kPossibly && PointsAgree(a, b));
+}
+
+// Whether the map points on both may be those of one thing that was looked at from two sides (SamePlace).
+bool ObjectMapper::PointsAgree(const Landmark& a, const Landmark& b) const {
+  constexpr double kAlpha = 0.05;
+  constexpr double kShiftShare = 0.25;  // of the size, between the means of two looks
+  constexpr double kPointSigmaShare = 0.02;
+  const std::vector<Eigen::Vector3d> points_a = PointsOf(a);
+  const std::vector<Eigen::Vector3d> points_b = PointsOf(b);
+  const double size_mu = 2 * (a.cuboid ? a : b).cuboid->half_extents.maxCoeff();
+  const auto same =
+      SamePlace(points_a, points_b, kAlpha, kShiftShare * size_mu, std::max(kPointSigmaShare * size_mu, 1e-9));
+  spdlog::debug("objects: landmarks {} and {}: {} and {} points {}", a.key, b.key, points_a.size(), points_b.size(),
+                !same   ? "are too few to compare"
+                : *same ? "may be of one thing"
+                        : "lie apart");
+  return same.value_or(false);
+}
+
+std::vector<Eigen::Vector3d> ObjectMapper::PointsOf(const Landmark& landmark) const {
+  std::vector<Eigen::Vector3d> points_world;
+  for (const MapPointId& id : landmark.points) {
+    if (const Eigen::Vector3d* p_world = registry_.Find(id)) points_world.push_back(*p_world);
+  }
+  return landmark.cuboid ? points_world : landmark.body_world;
 }
 
 void ObjectMapper::MergeDuplicates(Output* output) {
@@ -138,8 +189,7 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   spdlog::debug("objects: landmark {} merges into landmark {}", from.key, into.key);
   registry_.Merge(from.key, into.key);
   // Pieces of a thing do not show its outline.
-  const auto beside = from.seen_beside.find(into.key);
-  const bool is_piece = beside != from.seen_beside.end() && beside->second > 0.15 * static_cast<double>(from.sightings);
+  const bool is_piece = CompanyOf(from, into).together > 0;
   if (!is_piece) {
     for (const Silhouette& silhouette : from.shape.silhouettes())
       into.needs_fit |= into.shape.AddSilhouette(silhouette);

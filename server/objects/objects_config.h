@@ -19,6 +19,7 @@ struct ObjectsConfig {
   int confirm_keyframes = 3;
   double confirm_parallax_deg = 10;
   double confirm_seen_share = 0.2;
+  double confirm_agreement = 0.5;
   int provisional_patience_frames = 40;
   int lost_after_frames = 90;
 
@@ -64,6 +65,11 @@ struct ObjectsConfig {
                 .max = 1,
                 .help = "An object is a ghost when it is seen in a smaller share of the frames that "
                         "ought to show it"});
+    fields.Add("confirm_agreement", &confirm_agreement,
+               {.min = 0,
+                .max = 1,
+                .help = "Least mean agreement of an object's masks with its shape before it is "
+                        "announced"});
     fields.Add("provisional_patience_frames", &provisional_patience_frames,
                {.unit = "frames", .min = 1, .max = 10000, .help = "An unconfirmed object dies after so long unseen"});
     fields.Add("lost_after_frames", &lost_after_frames,
