@@ -75,18 +75,24 @@ TEST(CopiedMapTest, IsTheMapHoweverSlowlyItIsRead) {
 }
 
 TEST(CopiedMapTest, WhatIsExportedIsTheMapWithoutProvisionalObjects) {
-  MapState map;
-  RandomMap random(1, &map);
-  for (int step = 0; step < kSteps; ++step) random.Step();
-  std::map<ObjectId, std::string> exported;
-  for (const ObjectSnapshot& object : map.Snapshot().objects) {
-    EXPECT_NE(object.object.state, ObjectState::kProvisional);
-    exported[object.object.id] = CheckedCopy::ToBytes(object);
+  size_t exported = 0, all = 0;
+  for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
+    SCOPED_TRACE(seed);
+    MapState map;
+    RandomMap random(seed, &map);
+    for (int step = 0; step < kSteps; ++step) random.Step();
+    const std::vector<ObjectSnapshot> objects = map.Snapshot().objects;
+    const auto truth = TruthOf(map);
+    for (const ObjectSnapshot& object : objects) {
+      EXPECT_NE(object.object.state, ObjectState::kProvisional);
+      EXPECT_EQ(CheckedCopy::ToBytes(object), truth.at(object.object.id));
+    }
+    EXPECT_EQ(objects.size(), map.ConfirmedObjects());
+    exported += objects.size();
+    all += truth.size();
   }
-  const auto truth = TruthOf(map);
-  EXPECT_LT(exported.size(), truth.size());
-  EXPECT_EQ(exported.size(), map.ConfirmedObjects());
-  for (const auto& [id, bytes] : exported) EXPECT_EQ(bytes, truth.at(id));
+  EXPECT_GT(exported, 0u);
+  EXPECT_LT(exported, all);
 }
 
 TEST(CopiedMapTest, WhatWaitsForOneWhoNeverReadsIsBoundedByTheMap) {
