@@ -10,6 +10,7 @@
 #include "server/objects/cuboid_fitter.h"
 #include "server/objects/edge_yaw.h"
 #include "server/objects/isolation_forest.h"
+#include "server/objects/point_cuboid.h"
 #include "server/objects/projection.h"
 
 namespace romap {
@@ -170,11 +171,13 @@ void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surrou
 }
 
 std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) const {
+  if (config_.outlier_removal == "none") return std::vector<bool>(points_world.size(), true);
+  const bool use_hull = config_.outlier_removal == "hull_and_forest";
   std::vector<Eigen::Vector3d> inside;
   std::vector<size_t> inside_index;
   for (size_t i = 0; i < points_world.size(); ++i) {
     const Eigen::Vector3d p_grid = hull_.region().ToGrid(points_world[i]);
-    if (!hull_.Contains(p_grid, LenientVotes())) continue;
+    if (use_hull && !hull_.Contains(p_grid, LenientVotes())) continue;
     inside.push_back(p_grid);
     inside_index.push_back(i);
   }
@@ -248,7 +251,9 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   evidence.edge_yaw_rad = EdgeYaw(silhouettes_, evidence.region.R_world_grid, config_.edge_yaw_min_confidence);
   evidence.object_size_mu = extent->size_mu;
   evidence.min_points = config_.min_object_points;
-  const auto cuboid = FitCuboid(evidence, silhouettes_, previous);
+  const auto cuboid = config_.cuboid_from == "points"
+                          ? CuboidOfPoints(evidence.region, evidence.points, evidence.edge_yaw_rad)
+                          : FitCuboid(evidence, silhouettes_, previous);
   if (!cuboid) return std::nullopt;
   fit.cuboid = *cuboid;
   fit.body_world = SampleBody(*cuboid, surroundings.points, fit.point_is_inlier);

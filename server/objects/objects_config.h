@@ -27,6 +27,8 @@ struct ObjectsConfig {
   int max_silhouettes = 36;
   double silhouette_angle_deg = 3;
   int min_object_points = 8;
+  std::string outlier_removal = "hull_and_forest";
+  std::string cuboid_from = "silhouettes";
   double edge_yaw_min_confidence = 0.25;
 
   double update_change_share = 0.02;
@@ -82,6 +84,13 @@ struct ObjectsConfig {
                {.unit = "deg", .min = 0, .max = 30, .help = "Masks from directions closer than this are redundant"});
     fields.Add("min_object_points", &min_object_points,
                {.unit = "points", .min = 3, .max = 1000, .help = "Fewer map points do not say where an object is"});
+    fields.Add("outlier_removal", &outlier_removal,
+               {.choices = {"hull_and_forest", "forest", "none"},
+                .help = "Which map points under a mask are taken for the background's: those outside the visual hull, "
+                        "lonely ones"});
+    fields.Add("cuboid_from", &cuboid_from,
+               {.choices = {"silhouettes", "points"},
+                .help = "What bounds a cuboid: masks, points and the support together, or the paper's extreme points"});
     fields.Add("edge_yaw_min_confidence", &edge_yaw_min_confidence,
                {.min = 0, .max = 1, .help = "Straight edges that agree so well decide a cuboid's yaw; 1 = never"});
     fields.Add("update_change_share", &update_change_share,
