@@ -100,6 +100,44 @@ TEST_F(AssociationTest, AMaskOverTwoNeighboursIsDoubted) {
   for (double visible : association.visible_share) EXPECT_LT(visible, 0.3) << "no thing is missed";
 }
 
+TEST_F(AssociationTest, PiecesOfAThingAreNoNewThings) {
+  AddCube(0, "box");
+  const cv::Rect box = BoxOf(*landmarks_[0]);
+  const int third = box.width / 3;
+  AddMask(1, {box.x, box.y, box.width - third, box.height}, "box");
+  AddMask(2, {box.br().x - third, box.y, third, box.height}, "box");
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_THAT(association.matches[0].doubt, NotNull()) << "its mask is too small";
+  EXPECT_EQ(association.matches[1].landmark, -1);
+  EXPECT_THAT(association.matches[1].doubt, NotNull()) << "not to be born";
+}
+
+TEST_F(AssociationTest, AThingBeforeAnotherOneIsNoPieceOfIt) {
+  AddCube(0, "box");
+  const cv::Rect box = BoxOf(*landmarks_[0]);
+  AddMask(1, box, "box");
+  AddMask(2, {box.x + 8, box.y + 8, 12, 12}, "cup");  // all around it, the box is seen
+  const Association association = Run();
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[0].doubt, nullptr);
+  EXPECT_EQ(association.matches[1].landmark, -1);
+  EXPECT_EQ(association.matches[1].doubt, nullptr) << "a new thing";
+}
+
+TEST_F(AssociationTest, MasksAgreeWithTheShapeOrNot) {
+  AddCube(0, "box");
+  const cv::Rect box = BoxOf(*landmarks_[0]);
+  AddMask(1, box, "box");
+  const auto good = Run().matches[0].agreement;
+  frame_->labels.setTo(0);
+  cv::rectangle(frame_->labels, {box.x, box.y, box.width, box.height / 2}, cv::Scalar(1), cv::FILLED);
+  const auto half = Run().matches[0].agreement;
+  ASSERT_TRUE(good && half);
+  EXPECT_GT(*good, 0.9);
+  EXPECT_LT(*half, 0.65);
+}
+
 TEST_F(AssociationTest, AHiddenThingDoesNotSpoilTheMaskBeforeIt) {
   AddCube(0, "box");
   AddCube(0, "cup", 3);  // behind it, and smaller in the image
