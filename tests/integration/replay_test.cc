@@ -78,7 +78,7 @@ class ReplayTest : public ::testing::Test {
 TEST_F(ReplayTest, TwoReplaysWriteTheSameBytes) { ExpectTwoEqualReplays(Record()); }
 
 TEST_F(ReplayTest, TwoReplaysWithLateMasksWriteTheSameBytes) {
-  const std::string recording = Record({"--mask-rate", "12", "--mask-delay", "0.2"});
+  const std::string recording = Record({"--mask-rate", "12.5", "--mask-delay", "0.2"});
   const nlohmann::json run = nlohmann::json::parse(std::ifstream(folder_ / "map/summary.json"));
   EXPECT_EQ(run["masks"]["sent_with_frames"], 0);
   EXPECT_EQ(run["masks"]["sent_late"], 20) << "25 frames a second: every second frame, all 40 of them";
