@@ -183,6 +183,7 @@ void Session::Map(const MappingTask& task) {
 }
 
 void Session::MapMasks(const FrameMasks& masks) {
+  sparse_mapper_.ObserveMasks(masks);
   Publish(object_mapper_.ObserveLateMasks(masks));
   Settle();
 }

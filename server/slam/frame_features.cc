@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <utility>
+
+#include "common/label_image.h"
 
 namespace romap {
 namespace {
 
 constexpr int kCell_px = 16;
 constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighbourhood
-constexpr int kNearShrink = 8;          // masks are shrunk so many times to tell what is close to one
-constexpr double kNearShare = 0.08;     // of the image's width
 
 // z by the depth image, 0 where there is none or where the surface jumps.
 double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
@@ -26,16 +25,6 @@ double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
     }
   }
   return center_mu;
-}
-
-// Small image that is not 0 in and around masks.
-cv::Mat Surroundings(const cv::Mat& labels) {
-  cv::Mat small;
-  cv::resize(labels, small, {labels.cols / kNearShrink, labels.rows / kNearShrink}, 0, 0, cv::INTER_NEAREST);
-  const int reach = std::max(1, static_cast<int>(kNearShare * small.cols));
-  cv::Mat around;
-  cv::dilate(small > 0, around, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
-  return around;
 }
 
 }  // namespace
@@ -85,18 +74,15 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
   sight->features = std::move(features);
   const size_t count = sight->features.size();
   sight->ranges_mu.assign(count, 0);
-  sight->near_object.assign(count, 0);
-  const cv::Mat around = frame.labels.empty() ? cv::Mat() : Surroundings(frame.labels);
+  sight->has_masks = frame.has_masks;
+  const MaskPlaces places(frame.labels);
   for (size_t i = 0; i < count; ++i) {
     const Feature& feature = sight->features[i];
     sight->seen_px.push_back(feature.pixel_px);
     const Eigen::Vector3d ray = frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y());
     sight->bearings_camera.push_back(ray.normalized());
     if (!frame.depth_mu.empty()) sight->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
-    if (around.empty() || feature.label != 0) continue;
-    const int u = std::clamp(static_cast<int>(feature.pixel_px.x()) / kNearShrink, 0, around.cols - 1);
-    const int v = std::clamp(static_cast<int>(feature.pixel_px.y()) / kNearShrink, 0, around.rows - 1);
-    sight->near_object[i] = around.at<uint8_t>(v, u) != 0 ? 1 : 0;
+    sight->mask_places.push_back(places.At(feature.pixel_px, feature.octave_scale, feature.label));
   }
   sight->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, sight->features);
   return WithLens(std::move(sight), lens);
@@ -118,6 +104,19 @@ std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeature
   }
   corrected->grid = FeatureGrid(camera.width_px, camera.height_px, corrected->features);
   return corrected;
+}
+
+std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& sight, const cv::Mat& labels, int mask_erosion_px) {
+  auto masked = std::make_shared<FrameFeatures>(sight);
+  masked->has_masks = true;
+  const MaskPlaces places(labels);
+  for (size_t i = 0; i < sight.size(); ++i) {
+    Feature& feature = masked->features[i];
+    const auto erosion_px = static_cast<int>(std::lround(mask_erosion_px * feature.octave_scale));
+    feature.label = LabelAt(labels, sight.seen_px[i], erosion_px);
+    masked->mask_places[i] = places.At(sight.seen_px[i], feature.octave_scale, feature.label);
+  }
+  return masked;
 }
 
 std::vector<Feature> SeenFeatures(const FrameFeatures& sight) {

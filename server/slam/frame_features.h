@@ -7,6 +7,7 @@
 
 #include "common/messages.h"
 #include "server/slam/features/feature.h"
+#include "server/slam/mask_places.h"
 #include "server/slam/optimise/radial_correction.h"
 
 namespace romap {
@@ -32,12 +33,13 @@ struct FrameFeatures {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
   CameraModel camera = {};     // pinhole
+  bool has_masks = false;      // or have come since
   RadialCorrection lens = {};  // by which features and bearings were corrected
   std::vector<Feature> features = {};
   std::vector<Eigen::Vector2f> seen_px = {};          // where the picture shows them, before that
   std::vector<Eigen::Vector3d> bearings_camera = {};  // unit length; one per feature, as all below
   std::vector<double> ranges_mu = {};                 // by the depth image along the bearing, 0 = unknown
-  std::vector<uint8_t> near_object = {};              // 1: outside every mask, but close to one
+  std::vector<MaskPlace> mask_places = {};
   FeatureGrid grid = {};
 
   size_t size() const { return features.size(); }
@@ -49,6 +51,9 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
                                                        const RadialCorrection& lens = {});
 // The same frame, its features corrected by another lens. The same object, if it is no other.
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> sight, const RadialCorrection& lens);
+// The same frame, its features labelled by masks that came after it, as FeatureExtractor does it. `labels`: CV_16UC1 of
+// the frame's size.
+std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& sight, const cv::Mat& labels, int mask_erosion_px);
 // The features where the picture shows them.
 std::vector<Feature> SeenFeatures(const FrameFeatures& sight);
 

@@ -82,6 +82,7 @@ void SlamMap::MergePoints(MapPointId from, MapPointId into) {
   PointTrack* target = FindPoint(into);
   if (source == points_.end() || target == nullptr || target->point.id == from) return;
   const std::vector<PointSight> sights = source->second.sights;
+  target->votes.Add(source->second.votes);
   RemovePoint(from);
   merged_into_[from] = target->point.id;
   for (const PointSight& sight : sights) AddSight(*target, keyframes_.at(sight.keyframe), sight.feature);

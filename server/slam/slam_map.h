@@ -60,6 +60,7 @@ struct PointTrack {
   double size_mu = 0;          // width of one pixel of the feature's own octave at the point: size that does not change
   uint64_t born_keyframe = 0;  // number of the keyframe that made it
   uint64_t latest_keyframe = 0;  // number of the newest keyframe that saw it
+  MaskVotes votes = {};          // of masked frames that are no keyframes
 };
 
 // The keyframes and points of one session. For one thread. Ids are never used twice.

@@ -31,7 +31,11 @@ double Seconds(std::chrono::steady_clock::duration duration) { return std::chron
 }  // namespace
 
 SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment)
-    : config_(config), slot_(local_map), inline_adjustment_(inline_adjustment), extractor_(config) {
+    : config_(config),
+      slot_(local_map),
+      inline_adjustment_(inline_adjustment),
+      extractor_(config),
+      mask_voter_(config) {
   BeginAnew();
 }
 
@@ -46,6 +50,7 @@ void SparseMapper::BeginAnew() {
   places_ = std::make_unique<PlaceRecogniser>(config_, map_.get());
   corrections_.Forget();
   up_ = WorldUp(keyframes);
+  mask_voter_.Forget();
   next_whole_ = keyframes + 10;
   latest_ = {};
   frames_lost_ = 0;
@@ -85,6 +90,8 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
       mapped.tracked.T_reference_camera = {};
       mapped.view->up_world = mapped.tracked.up_world;
       moved = true;
+    } else if (!world_is_given_) {
+      mask_voter_.ObserveFrame(mapped.tracked, *map_);
     }
   } else if (lost && fits) {
     ++frames_lost_;
@@ -106,12 +113,16 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   return mapped;
 }
 
+void SparseMapper::ObserveMasks(const FrameMasks& masks) {
+  if (!world_is_given_) mask_voter_.ObserveMasks(masks, *map_);
+}
+
 MapCorrection SparseMapper::Finish() {
   TakeWholeAdjustment(/*wait=*/true);
   if (!world_is_given_ && map_->keyframes().size() > 2) {
     StartWholeAdjustment();
     TakeWholeAdjustment(/*wait=*/true);
-    TurnUp();
+    TurnUp(/*is_last=*/true);
   }
   return corrections_.Take(*map_);
 }
@@ -380,9 +391,9 @@ void SparseMapper::DropWholeAdjustment() {
   whole_ = nullptr;
 }
 
-bool SparseMapper::TurnUp() {
+bool SparseMapper::TurnUp(bool is_last) {
   if (world_is_given_) return false;
-  const std::optional<Eigen::Quaterniond> R_new_old = up_.Correct(*map_);
+  const std::optional<Eigen::Quaterniond> R_new_old = up_.Correct(*map_, is_last);
   figures_.up_confidence = up_.confidence();
   if (!R_new_old) return false;
   const bool was_adjusting = whole_ != nullptr;

@@ -12,6 +12,7 @@
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/local_map.h"
 #include "server/slam/map_adjustment.h"
+#include "server/slam/mask_voter.h"
 #include "server/slam/place_recogniser.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/slam_config.h"
@@ -43,6 +44,9 @@ class SparseMapper {
   ~SparseMapper();
 
   MappedFrame Process(const TrackedImage& image);
+  // Masks of an earlier frame that had none, in the order of their frames. They tell which points lie on objects, which
+  // is what WorldUp asks for; passed over when the frame is not known any more.
+  void ObserveMasks(const FrameMasks& masks);
   // No more frames: waits for adjustments under way; what moved by them.
   MapCorrection Finish();
   // So many keyframes wait: bundle adjustment ends early.
@@ -85,7 +89,7 @@ class SparseMapper {
   bool MayFindLens() const;
   bool TakeWholeAdjustment(bool wait);
   void DropWholeAdjustment();
-  bool TurnUp();
+  bool TurnUp(bool is_last = false);
   void PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised = {});
   KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe);
   void Place(TrackedFrame& tracked) const;
@@ -99,6 +103,7 @@ class SparseMapper {
   std::unique_ptr<PlaceRecogniser> places_;
   CorrectionLog corrections_;
   WorldUp up_;
+  MaskVoter mask_voter_;
   std::unique_ptr<WholeAdjustment> whole_;
   Figures figures_;
 

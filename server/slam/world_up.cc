@@ -19,6 +19,8 @@ constexpr uint64_t kPeriod_keyframes = 5;
 constexpr uint64_t kLongPeriod_keyframes = 20;  // once it is sure
 constexpr double kSure = 0.8;
 constexpr size_t kMaxCameras = 200;
+constexpr double kMaxStrayShare = 0.1;   // of the masks that a background point may meet, because masks err
+constexpr double kMaxBorderShare = 0.5;  // and of their borders
 
 struct Evidence {
   std::vector<SupportPoint> points;
@@ -27,25 +29,27 @@ struct Evidence {
   std::vector<Eigen::Vector3d> ups;
 };
 
+// Points that masks' borders keep meeting are edges of the objects, a little above what they stand on.
+bool IsBackground(const MaskVotes& votes) {
+  return votes.inside <= kMaxStrayShare * votes.total() && votes.border <= kMaxBorderShare * votes.total();
+}
+
 Evidence Gather(const SlamMap& map) {
   Evidence evidence;
   for (const auto& [id, track] : map.points()) {
-    int on_object = 0;
-    int near_object = 0;
+    MaskVotes votes = track.votes;
     for (const PointSight& sight : track.sights) {
-      const FrameFeatures& seen = *map.FindKeyframe(sight.keyframe)->sight;
-      on_object += seen.features[static_cast<size_t>(sight.feature)].label != 0 ? 1 : 0;
-      near_object += seen.near_object[static_cast<size_t>(sight.feature)];
+      votes.Add(map.FindKeyframe(sight.keyframe)->sight->mask_places[static_cast<size_t>(sight.feature)]);
     }
-    const auto sights = static_cast<int>(track.sights.size());
-    if (2 * on_object > sights) {
+    if (votes.total() == 0) continue;  // masks are late, or seldom: what it lies on is not known yet
+    if (2 * votes.inside > votes.total()) {
       evidence.object_points.push_back(track.point.position_world);
-    } else if (on_object == 0 && sights >= 2) {
+    } else if (IsBackground(votes) && track.sights.size() >= 2) {
       // One pixel across the ray, magnified along it by what parallax leaves.
       const double parallax_rad = std::max(track.point.max_parallax_rad, 0.02);
       evidence.points.push_back({.position_world = track.point.position_world,
                                  .sigma_mu = track.size_mu / parallax_rad,
-                                 .near_object = 2 * near_object > sights});
+                                 .near_object = 2 * (votes.near + votes.border) > votes.total()});
     }
   }
   const size_t step = 1 + map.keyframes().size() / kMaxCameras;
@@ -66,13 +70,13 @@ void WorldUp::Observe(const Frame& frame, const SE3<World, Camera>& T_world_came
   has_gravity_ = true;
 }
 
-std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map) {
+std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map, bool is_last) {
   Eigen::Vector3d up_world;
   if (has_gravity_) {
     up_world = gravity_.up_world();
     confidence_ = 1;
   } else {
-    if (map.keyframe_count() < next_try_) return std::nullopt;
+    if (!is_last && map.keyframe_count() < next_try_) return std::nullopt;
     next_try_ = map.keyframe_count() + (confidence_ >= kSure ? kLongPeriod_keyframes : kPeriod_keyframes);
     const Evidence evidence = Gather(map);
     const auto plane = FindSupportPlane({.points = evidence.points,
@@ -89,7 +93,7 @@ std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map) {
                   plane->confidence, plane->sigma_rad * 180 / std::numbers::pi);
   }
   const double angle_rad = std::acos(std::clamp(up_world.z(), -1.0, 1.0));
-  if (angle_rad < kWorthTurning_rad) return std::nullopt;
+  if (!is_last && angle_rad < kWorthTurning_rad) return std::nullopt;
   return RotationFromZTo(up_world).conjugate();
 }
 

@@ -20,8 +20,8 @@ class WorldUp {
   // A tracked frame: its gravity counts.
   void Observe(const Frame& frame, const SE3<World, Camera>& T_world_camera);
   // Called after each keyframe: a turn of the world that makes z up, if there is one worth making. Turns around the
-  // world's origin.
-  std::optional<Eigen::Quaterniond> Correct(const SlamMap& map);
+  // world's origin. At the end of a map (`is_last`) every turn is.
+  std::optional<Eigen::Quaterniond> Correct(const SlamMap& map, bool is_last = false);
   // The map changed as a whole: Correct looks again at once.
   void LookAgain() { next_try_ = 0; }
   // The world was turned as said.

@@ -84,11 +84,12 @@ class Runner {
   }
 
   void TakeLateMasks(int64_t now_ns) {
-    const double start_s = UserSeconds();
     while (const std::optional<FrameMasks> masks = damager_.TakeLateMasks(now_ns)) {
+      sparse_mapper_.ObserveMasks(*masks);
+      const double start_s = UserSeconds();
       Record(object_mapper_.ObserveLateMasks(*masks));
+      run_.frames_s += UserSeconds() - start_s;
     }
-    run_.frames_s += UserSeconds() - start_s;
   }
 
   void Remember(const TrackedFrame& tracked) {

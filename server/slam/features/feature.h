@@ -32,6 +32,7 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
 // Each octave of the image pyramid is this much smaller than the one before.
 inline constexpr double kOctaveFactor = 1.2;
 inline constexpr int kOctaves = 8;
+inline constexpr double kMaxOctaveScale = 3.58;  // kOctaveFactor ^ (kOctaves - 1)
 
 // A corner of one frame.
 struct Feature {

@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <deque>
 #include <memory>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include "server/slam/geometry/similarity.h"
@@ -85,6 +89,36 @@ class TrackingTest : public ::testing::Test {
     double worst = 0;
     for (size_t i = 0; i < estimated.size(); ++i) worst = std::max(worst, (*S * estimated[i] - truth[i]).norm());
     return {worst, S->scale()};
+  }
+
+  // Angle between the map's up, which is z, and the truth's.
+  double UpError_deg() const {
+    const Followed& last = frames_.back();
+    const auto reference = mapper_->map().Place(last.tracked.reference);
+    const Eigen::Quaterniond R_world_camera =
+        reference->T_world_camera.rotation() * last.tracked.T_reference_camera.rotation();
+    const Eigen::Vector3d up_in_map = R_world_camera * (last.truth.rotation().conjugate() * Eigen::Vector3d::UnitZ());
+    return std::acos(std::min(1.0, up_in_map.z())) * 180 / std::numbers::pi;
+  }
+
+  // Takes a piece of the floor for the only object, a tile that stands out by nothing.
+  void LabelTile(Frame& frame) const {
+    std::vector<cv::Point> corners_px;
+    for (const auto& [x, y] : {std::pair{0.25, 0.35}, {0.65, 0.35}, {0.65, 0.8}, {0.25, 0.8}}) {
+      const Eigen::Vector2d pixel_px = frame.camera.Project(frame.T_world_camera->Inverse() * Eigen::Vector3d(x, y, 0));
+      corners_px.emplace_back(static_cast<int>(pixel_px.x()), static_cast<int>(pixel_px.y()));
+    }
+    frame.labels.setTo(0);
+    cv::fillConvexPoly(frame.labels, corners_px, cv::Scalar(TexturedWorld::kPlateLabel));
+  }
+
+  // What a detector says that is slower than the camera: the frame goes on without.
+  static FrameMasks TakeMasks(Frame& frame) {
+    FrameMasks masks{.frame_id = frame.frame_id, .labels = frame.labels, .instances = frame.instances};
+    frame.has_masks = false;
+    frame.labels.release();
+    frame.instances.clear();
+    return masks;
   }
 
   const TexturedWorld world_{480, 360};
@@ -211,10 +245,55 @@ TEST_F(TrackingTest, GravityFromTheClientMakesZUp) {
     Feed(frame);
   }
   ASSERT_FALSE(frames_.empty());
-  const Followed& last = frames_.back();
-  const Eigen::Vector3d up_in_map =
-      last.tracked.T_world_camera.rotation() * (last.truth.rotation().conjugate() * Eigen::Vector3d::UnitZ());
-  EXPECT_GT(up_in_map.z(), std::cos(0.5 * std::numbers::pi / 180));
+  EXPECT_LT(UpError_deg(), 0.5);
+}
+
+// The first camera looks 40 degrees down, and its own up is the map's until an object stands on something.
+TEST_F(TrackingTest, WhatObjectsStandOnTellsUp) {
+  for (int i = 0; i < 60; ++i) {
+    auto frame = Render(i);
+    LabelTile(*frame);
+    Feed(frame);
+  }
+  mapper_->Finish();
+  EXPECT_LT(UpError_deg(), 0.5);
+}
+
+TEST_F(TrackingTest, MasksThatComeLateTellUpToo) {
+  std::deque<FrameMasks> late;
+  for (int i = 0; i < 60; ++i) {
+    auto frame = Render(i);
+    LabelTile(*frame);
+    late.push_back(TakeMasks(*frame));
+    Feed(frame);
+    if (late.size() <= 15) continue;
+    mapper_->ObserveMasks(late.front());
+    late.pop_front();
+  }
+  EXPECT_LT(UpError_deg(), 1);
+  for (const FrameMasks& masks : late) mapper_->ObserveMasks(masks);
+  mapper_->Finish();
+  EXPECT_LT(UpError_deg(), 0.5);
+}
+
+TEST_F(TrackingTest, MasksOfFramesThatAreNoKeyframesTellUpToo) {
+  int keyframes_without = 0, others_with = 0;
+  for (int i = 0; i < 60; ++i) {
+    auto frame = Render(i);
+    LabelTile(*frame);
+    const FrameMasks masks = TakeMasks(*frame);
+    const TrackingState state = Feed(frame);
+    if (state != TrackingState::kTracking || mapped_.view) {
+      ++keyframes_without;
+      continue;
+    }
+    mapper_->ObserveMasks(masks);
+    ++others_with;
+  }
+  EXPECT_GT(keyframes_without, 5);
+  EXPECT_GT(others_with, 3);
+  mapper_->Finish();
+  EXPECT_LT(UpError_deg(), 0.5);
 }
 
 TEST_F(TrackingTest, PosesMayStopComing) {

@@ -1,0 +1,57 @@
+#include "server/slam/mask_places.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace romap {
+namespace {
+
+constexpr int kShrink = 8;           // masks are shrunk so many times to tell what is close to one
+constexpr double kNearShare = 0.08;  // of the image's width
+constexpr double kBorder_px = 3;     // for the finest octave
+
+bool AnyMaskWithin(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int reach_px) {
+  const int u = static_cast<int>(std::lround(pixel_px.x()));
+  const int v = static_cast<int>(std::lround(pixel_px.y()));
+  const int side_px = 2 * reach_px + 1;
+  const cv::Rect part = cv::Rect(u - reach_px, v - reach_px, side_px, side_px) & cv::Rect({}, labels.size());
+  return !part.empty() && cv::countNonZero(labels(part)) > 0;
+}
+
+}  // namespace
+
+MaskPlaces::MaskPlaces(const cv::Mat& labels) : labels_(labels) {
+  if (labels.empty()) return;
+  cv::Mat small;
+  const cv::Size size(std::max(1, labels.cols / kShrink), std::max(1, labels.rows / kShrink));
+  cv::resize(labels, small, size, 0, 0, cv::INTER_NEAREST);
+  const int reach = std::max(1, static_cast<int>(kNearShare * small.cols));
+  cv::dilate(small > 0, around_, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+}
+
+MaskPlace MaskPlaces::At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const {
+  if (labels_.empty()) return MaskPlace::kUnknown;
+  if (label != 0) return MaskPlace::kInside;
+  const int u = std::clamp(static_cast<int>(pixel_px.x()) / kShrink, 0, around_.cols - 1);
+  const int v = std::clamp(static_cast<int>(pixel_px.y()) / kShrink, 0, around_.rows - 1);
+  if (around_.at<uint8_t>(v, u) == 0) return MaskPlace::kFar;
+  const int reach_px = static_cast<int>(std::lround(kBorder_px * octave_scale));
+  return AnyMaskWithin(labels_, pixel_px, reach_px) ? MaskPlace::kBorder : MaskPlace::kNear;
+}
+
+void MaskVotes::Add(MaskPlace place) {
+  inside += place == MaskPlace::kInside ? 1 : 0;
+  border += place == MaskPlace::kBorder ? 1 : 0;
+  near += place == MaskPlace::kNear ? 1 : 0;
+  far += place == MaskPlace::kFar ? 1 : 0;
+}
+
+void MaskVotes::Add(const MaskVotes& other) {
+  inside += other.inside;
+  border += other.border;
+  near += other.near;
+  far += other.far;
+}
+
+}  // namespace romap

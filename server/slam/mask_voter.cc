@@ -1,0 +1,75 @@
+#include "server/slam/mask_voter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/label_image.h"
+
+namespace romap {
+namespace {
+
+// More frames than any camera takes while masks are waited for.
+constexpr size_t kMaxPassedFrames = 512;
+
+MapKeyframe* KeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
+  // Late masks are of new keyframes; these are in the order of their frames.
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
+    const uint64_t of_keyframe = it->second.sight->frame_id;
+    if (of_keyframe == frame_id) return &it->second;
+    if (of_keyframe < frame_id) break;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void MaskVoter::ObserveFrame(const TrackedFrame& tracked, SlamMap& map) {
+  if (!tracked.reference) return;
+  const Frame& frame = *tracked.frame;
+  const PassedFrame passed{.frame_id = frame.frame_id,
+                           .camera = frame.camera,
+                           .reference = tracked.reference,
+                           .T_reference_camera = tracked.T_reference_camera};
+  if (frame.has_masks) return Vote(passed, frame.labels, map);
+  passed_.push_back(passed);
+  if (passed_.size() > kMaxPassedFrames) passed_.pop_front();
+}
+
+void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
+  if (MapKeyframe* keyframe = KeyframeOfFrame(masks.frame_id, map)) {
+    if (!keyframe->sight->has_masks) {
+      keyframe->sight = WithMasks(*keyframe->sight, masks.labels, config_.mask_erosion_px);
+    }
+    return;
+  }
+  const auto passed =
+      std::ranges::find_if(passed_, [&](const PassedFrame& frame) { return frame.frame_id == masks.frame_id; });
+  if (passed == passed_.end()) return;
+  Vote(*passed, masks.labels, map);
+  passed_.erase(passed);
+}
+
+void MaskVoter::Vote(const PassedFrame& frame, const cv::Mat& labels, SlamMap& map) const {
+  const MapKeyframe* reference = map.FindKeyframe(frame.reference);
+  if (reference == nullptr || reference->sight->has_masks || labels.empty()) return;
+  const SE3<Camera, Camera>& T = frame.T_reference_camera;
+  const SE3<Camera, World> T_camera_world =
+      SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation()).Inverse() * reference->T_camera_world();
+  const MaskPlaces places(labels);
+  for (const MapPointId id : reference->points) {
+    if (!id) continue;
+    PointTrack& track = *map.FindPoint(id);
+    const Eigen::Vector3d p_camera = T_camera_world * track.point.position_world;
+    if (!(p_camera.z() > 1e-9)) continue;
+    const Eigen::Vector2f pixel_px = map.lens().Distort(frame.camera, frame.camera.Project(p_camera)).cast<float>();
+    const bool inside = pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() <= static_cast<float>(labels.cols - 1) &&
+                        pixel_px.y() <= static_cast<float>(labels.rows - 1);
+    if (!inside) continue;
+    const double octave_scale = std::clamp(track.size_mu * frame.camera.fx_px / p_camera.norm(), 1.0, kMaxOctaveScale);
+    const int erosion_px = static_cast<int>(std::lround(config_.mask_erosion_px * octave_scale));
+    track.votes.Add(places.At(pixel_px, octave_scale, LabelAt(labels, pixel_px, erosion_px)));
+  }
+}
+
+}  // namespace romap
