@@ -1,6 +1,7 @@
 #include "server/objects/footprint.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -24,9 +25,13 @@ Footprint RectangleAt(double yaw_rad, const std::vector<cv::Point2f>& outline) {
 
 std::vector<cv::Point2f> OutlineFromAbove(const std::vector<Eigen::Vector3d>& cells) {
   std::vector<cv::Point2f> points;
-  points.reserve(cells.size());
-  for (const Eigen::Vector3d& cell : cells) {
-    points.emplace_back(static_cast<float>(cell.x()), static_cast<float>(cell.y()));
+  // Of cells in a row, as a grid lists them, only the two ends can be on the outline.
+  for (size_t first = 0, next = 0; first < cells.size(); first = next) {
+    Eigen::Vector2d ends(cells[first].x(), cells[first].x());
+    for (next = first + 1; next < cells.size() && cells[next].y() == cells[first].y(); ++next) {
+      ends = {std::min(ends[0], cells[next].x()), std::max(ends[1], cells[next].x())};
+    }
+    for (double x : ends) points.emplace_back(static_cast<float>(x), static_cast<float>(cells[first].y()));
   }
   std::vector<cv::Point2f> outline;
   cv::convexHull(points, outline);

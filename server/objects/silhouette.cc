@@ -74,7 +74,10 @@ std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std:
     index_of_label[detections[d].label] = static_cast<uint8_t>(d + 1);
   }
   const int stride = masks->stride_px;
-  masks->index.create((labels.rows + stride - 1) / stride, (labels.cols + stride - 1) / stride, CV_8UC1);
+  const cv::Size size((labels.cols + stride - 1) / stride, (labels.rows + stride - 1) / stride);
+  masks->framed.create(size.height + 2, size.width + 2, CV_8UC1);
+  masks->framed.setTo(kOtherMask);
+  masks->index = masks->framed(cv::Rect({1, 1}, size));
   for (int v = 0; v < masks->index.rows; ++v) {
     const auto* from = labels.ptr<uint16_t>(v * stride);
     auto* to = masks->index.ptr<uint8_t>(v);
@@ -201,11 +204,20 @@ std::optional<Eigen::Vector3d> IntersectCenterRays(const std::vector<Silhouette>
 }
 
 double ParallaxRad(const std::vector<Silhouette>& silhouettes, const Eigen::Vector3d& p_world) {
+  std::vector<Eigen::Vector3d> directions;
+  directions.reserve(silhouettes.size());
+  for (const Silhouette& silhouette : silhouettes) {
+    directions.push_back((silhouette.CameraCenter() - p_world).normalized());
+  }
+  // By cosines, for there are many pairs and an angle is dear.
+  double least_cosine = 1;
   double largest = 0;
-  for (size_t i = 0; i < silhouettes.size(); ++i) {
+  for (size_t i = 0; i < directions.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
-      largest = std::max(
-          largest, AngleBetween(silhouettes[i].CameraCenter() - p_world, silhouettes[j].CameraCenter() - p_world));
+      const double cosine = directions[i].dot(directions[j]);
+      if (cosine >= least_cosine) continue;
+      least_cosine = cosine;
+      largest = AngleBetween(directions[i], directions[j]);
     }
   }
   return largest;

@@ -17,7 +17,8 @@ namespace romap {
 
 // A keyframe's masks, thinned: they serve all objects of the keyframe and are kept long after the frame is gone.
 struct KeyframeMasks {
-  cv::Mat index;  // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
+  cv::Mat index;   // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
+  cv::Mat framed;  // the same with a border of one pixel of kOtherMask; `index` is the inner part of it
   int stride_px = 1;
   std::vector<LandmarkKey> keys;  // landmark of each detection
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <vector>
 
@@ -44,6 +45,8 @@ class SilhouetteHull {
   const HullRegion& region() const { return region_; }
   Eigen::Vector3d CellSize() const { return 2.0 / cells_ * region_.half_extents; }
 
+  // Box around the cells that pass, Grid frame; empty when none does.
+  Eigen::AlignedBox3d Bounds(const HullVotes& votes) const;
   // Centres of the cells that pass, Grid frame, z slowest.
   std::vector<Eigen::Vector3d> Cells(const HullVotes& votes) const;
   // Whether the cell under a point passes. False outside the region.
@@ -51,6 +54,9 @@ class SilhouetteHull {
 
  private:
   void Vote(const Silhouette& silhouette, int weight);
+  bool Passes(size_t index, const HullVotes& votes) const {
+    return outside_[index] <= votes.max_outside && inside_[index] >= votes.min_inside;
+  }
   Eigen::Vector3d CellCenter(int x, int y, int z) const {
     return (2.0 * (Eigen::Vector3d(x, y, z).array() + 0.5) / cells_ - 1) * region_.half_extents.array();
   }
