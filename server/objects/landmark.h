@@ -44,6 +44,7 @@ struct Landmark {
   // Geometry, always as of the newest correction of the map.
   ObjectShape shape;
   bool needs_fit = false;                   // silhouettes came since the last fit
+  uint64_t last_fit_frame = 0;              // counted as `last_frame`
   std::optional<Cuboid> cuboid;             // newest fit
   double parallax_rad = 0;                  // of the silhouettes behind it
   std::vector<Eigen::Vector3d> body_world;  // points spread over its volume; its map points while there is no cuboid

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/objects/fit_schedule.h"
 #include "server/objects/lines/line_segments.h"
 
 namespace romap {
@@ -196,12 +197,13 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& vie
   CountPointVotes(view);
   UpdateSceneDepth(view);
   CollectEvidence(view);
-  std::vector<LandmarkKey> seen = SortedUnique(current_.keys);
-  std::erase(seen, kNobody);
-  FitShapes(seen);
-  ConfirmProven(seen);
+  std::vector<LandmarkKey> changed = FitNeediest();
+  changed.insert(changed.end(), current_.keys.begin(), current_.keys.end());
+  changed = SortedUnique(std::move(changed));
+  std::erase(changed, kNobody);
+  ConfirmProven(changed);
   MergeDuplicates(&output);
-  PublishAll(seen, &output);
+  PublishAll(changed, &output);
   return output;
 }
 
@@ -209,7 +211,7 @@ ObjectMapper::Output ObjectMapper::Finish() {
   Output output;
   std::vector<LandmarkKey> keys;
   for (const auto& landmark : landmarks_) keys.push_back(landmark->key);
-  FitShapes(keys);
+  FitAll();
   ConfirmProven(keys);
   MergeDuplicates(&output);
   Bury(
@@ -298,7 +300,33 @@ void ObjectMapper::CollectEvidence(const KeyframeView& view) {
   }
 }
 
-void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
+std::vector<LandmarkKey> ObjectMapper::FitNeediest() {
+  std::vector<FitRequest> requests;
+  for (const auto& landmark : landmarks_) {
+    // Points alone move a box too little to pay for a fit, unless there is none yet.
+    const bool seeks_first_box = !landmark->cuboid && landmark->last_frame == frame_index_;
+    if (!landmark->needs_fit && !seeks_first_box) continue;
+    const FitRequest request{.key = landmark->key,
+                             .confirmed = landmark->state != ObjectState::kProvisional,
+                             .silhouettes = static_cast<int>(landmark->shape.silhouettes().size()),
+                             .news = landmark->shape.news(),
+                             .waiting_frames = frame_index_ - landmark->last_fit_frame};
+    if (IsWorthAFit(request)) requests.push_back(request);
+  }
+  return FitShapes(OrderByNeed(requests), static_cast<size_t>(config_.fits_per_keyframe));
+}
+
+void ObjectMapper::FitAll() {
+  std::vector<LandmarkKey> keys;
+  for (const auto& landmark : landmarks_) {
+    if (landmark->needs_fit || !landmark->cuboid) keys.push_back(landmark->key);
+  }
+  FitShapes(keys, keys.size());
+}
+
+std::vector<LandmarkKey> ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys, size_t most) {
+  std::vector<LandmarkKey> fitted;
+  if (keys.empty()) return fitted;
   const PointGroups groups = registry_.GroupByOwner();
   std::vector<Eigen::Vector3d> background;
   const auto found = groups.find(kBackgroundKey);
@@ -306,10 +334,10 @@ void ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys) {
     for (const PointRegistry::Member& member : found->second) background.push_back(member.position_world);
   }
   for (LandmarkKey key : keys) {
-    Landmark& landmark = *FindLandmark(key);
-    // Points alone move a box too little to pay for a fit, unless there is none yet.
-    if (landmark.needs_fit || !landmark.cuboid) FitShape(landmark, groups, background);
+    if (fitted.size() >= most) break;
+    if (FitShape(*FindLandmark(key), groups, background)) fitted.push_back(key);
   }
+  return fitted;
 }
 
 std::map<LandmarkKey, Cuboid> ObjectMapper::PublishedCuboids() const {
@@ -320,9 +348,9 @@ std::map<LandmarkKey, Cuboid> ObjectMapper::PublishedCuboids() const {
   return cuboids;
 }
 
-void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
+bool ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
                             const std::vector<Eigen::Vector3d>& background) {
-  if (landmark.shape.silhouettes().empty()) return;
+  if (landmark.shape.silhouettes().empty()) return false;
   std::vector<MapPointId> ids;
   std::vector<Eigen::Vector3d> positions;
   const auto members = groups.find(landmark.key);
@@ -338,9 +366,10 @@ void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
       {.up_world = up_world_, .points = positions, .background = background, .neighbours = &neighbours},
       landmark.cuboid);
   landmark.needs_fit = false;
+  landmark.last_fit_frame = frame_index_;
   if (!fit) {
     if (!landmark.cuboid) landmark.body_world = positions;
-    return;
+    return false;
   }
   landmark.cuboid = Upright(fit->cuboid, up_world_);
   landmark.body_world = fit->body_world;
@@ -349,6 +378,7 @@ void ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
   for (size_t i = 0; i < ids.size(); ++i) {
     if (fit->point_is_inlier[i]) landmark.points.push_back(ids[i]);
   }
+  return true;
 }
 
 }  // namespace romap

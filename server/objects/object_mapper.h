@@ -75,8 +75,13 @@ class ObjectMapper {
   void UpdateSceneDepth(const KeyframeView& view);
   void CollectEvidence(const KeyframeView& view);
   std::map<LandmarkKey, Cuboid> PublishedCuboids() const;
-  void FitShapes(const std::vector<LandmarkKey>& keys);
-  void FitShape(Landmark& landmark, const PointGroups& groups, const std::vector<Eigen::Vector3d>& background);
+  // The neediest landmarks get new boxes; returns their keys.
+  std::vector<LandmarkKey> FitNeediest();
+  void FitAll();
+  // In this order, until `most` boxes were found; returns whose.
+  std::vector<LandmarkKey> FitShapes(const std::vector<LandmarkKey>& keys, size_t most);
+  // False when the evidence does not suffice for a box.
+  bool FitShape(Landmark& landmark, const PointGroups& groups, const std::vector<Eigen::Vector3d>& background);
   bool IsSteady(const Landmark& landmark) const;
   bool IsProven(const Landmark& landmark) const;
   void ConfirmProven(const std::vector<LandmarkKey>& keys);

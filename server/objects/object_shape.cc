@@ -38,35 +38,50 @@ Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
 
 bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
   const double limit = config_.silhouette_angle_deg * kRadPerDeg;
+  const Eigen::Vector3d direction = ViewDirection(silhouette);
   return std::any_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
-    return other.cut_by_border <= silhouette.cut_by_border &&
-           AngleBetween(ViewDirection(other), ViewDirection(silhouette)) < limit;
+    return other.cut_by_border <= silhouette.cut_by_border && AngleBetween(ViewDirection(other), direction) < limit;
   });
 }
 
 bool ObjectShape::AddSilhouette(Silhouette silhouette) {
   if (IsRedundant(silhouette)) return false;
-  if (!hull_.empty()) hull_.Add(silhouette);
   silhouettes_.push_back(std::move(silhouette));
+  has_voted_.push_back(false);
+  ++news_;
   if (silhouettes_.size() > static_cast<size_t>(config_.max_silhouettes)) MakeRoom();
   return true;
 }
 
 // Drops the silhouette whose direction is nearest to another one's: it says least that the others do not.
 void ObjectShape::MakeRoom() {
+  std::vector<Eigen::Vector3d> directions;
+  for (const Silhouette& silhouette : silhouettes_) directions.push_back(ViewDirection(silhouette).normalized());
   size_t worst = 0;
-  double worst_angle = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < silhouettes_.size(); ++i) {
-    for (size_t j = 0; j < silhouettes_.size(); ++j) {
-      if (i == j) continue;
-      const double angle = AngleBetween(ViewDirection(silhouettes_[i]), ViewDirection(silhouettes_[j]));
-      if (angle >= worst_angle) continue;
-      worst_angle = angle;
+  double highest_cosine = -2;
+  for (size_t i = 0; i < directions.size(); ++i) {
+    for (size_t j = i + 1; j < directions.size(); ++j) {
+      const double cosine = directions[i].dot(directions[j]);
+      if (cosine <= highest_cosine) continue;
+      highest_cosine = cosine;
       worst = silhouettes_[i].cut_by_border ? i : j;
     }
   }
-  if (!hull_.empty()) hull_.Remove(silhouettes_[worst]);
+  Unvote(worst);
   silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(worst));
+  has_voted_.erase(has_voted_.begin() + static_cast<std::ptrdiff_t>(worst));
+}
+
+void ObjectShape::Unvote(size_t i) {
+  if (has_voted_[i]) hull_.Remove(silhouettes_[i]);
+  has_voted_[i] = false;
+}
+
+void ObjectShape::VoteForNews() {
+  for (size_t i = 0; i < silhouettes_.size(); ++i) {
+    if (!has_voted_[i]) hull_.Add(silhouettes_[i]);
+    has_voted_[i] = true;
+  }
 }
 
 bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes,
@@ -74,7 +89,8 @@ bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCor
   constexpr double kLeastShift_px = 0.5;  // masks are not exact to less
   bool changed = false;
   hull_.Move(S_new_old);
-  for (Silhouette& silhouette : silhouettes_) {
+  for (size_t i = 0; i < silhouettes_.size(); ++i) {
+    Silhouette& silhouette = silhouettes_[i];
     Move(S_new_old, &silhouette);
     const auto corrected = keyframes.find(silhouette.keyframe);
     if (corrected != keyframes.end()) silhouette.corrected_T_world_camera = corrected->second.T_world_camera;
@@ -82,9 +98,9 @@ bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCor
                                   silhouette.corrected_T_world_camera) < kLeastShift_px) {
       continue;
     }
-    if (!hull_.empty()) hull_.Remove(silhouette);
+    Unvote(i);
     ApplyCorrectedPose(&silhouette);
-    if (!hull_.empty()) hull_.Add(silhouette);
+    ++news_;
     changed = true;
   }
   return changed;
@@ -114,10 +130,9 @@ std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surrounding
 void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundings) {
   hull_.Reset(region, config_.hull_cells);
   silhouettes_when_carved_ = silhouettes_.size();
-  for (Silhouette& silhouette : silhouettes_) {
-    UpdateNeighbours(*surroundings.neighbours, &silhouette);
-    hull_.Add(silhouette);
-  }
+  for (Silhouette& silhouette : silhouettes_) UpdateNeighbours(*surroundings.neighbours, &silhouette);
+  has_voted_.assign(silhouettes_.size(), false);
+  VoteForNews();
 }
 
 // Corrections turn the grid with its object; a fit needs it upright.
@@ -144,16 +159,10 @@ HullVotes ObjectShape::LenientVotes() const {
 // Moves the grid to where the hull is when it reaches the grid's border, or when there are many more silhouettes than
 // at the last time: then it fills little of the grid.
 void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surroundings) {
-  const std::vector<Eigen::Vector3d> cells = hull_.Cells(StrictVotes());
-  if (cells.empty()) return;
-  Eigen::Vector3d low = cells.front();
-  Eigen::Vector3d high = cells.front();
-  for (const Eigen::Vector3d& cell : cells) {
-    low = low.cwiseMin(cell);
-    high = high.cwiseMax(cell);
-  }
-  low -= hull_.CellSize() / 2;
-  high += hull_.CellSize() / 2;
+  const Eigen::AlignedBox3d hull = hull_.Bounds(StrictVotes());
+  if (hull.isEmpty()) return;
+  const Eigen::Vector3d& low = hull.min();
+  const Eigen::Vector3d& high = hull.max();
   const HullRegion& region = hull_.region();
   const Eigen::Vector3d reach = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
   const double most_mu = 1.3 * extent.size_mu;
@@ -188,25 +197,29 @@ std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> poin
   return is_inlier;
 }
 
-std::vector<Eigen::Vector3d> ObjectShape::SampleBody(const Cuboid& cuboid,
+std::vector<Eigen::Vector3d> ObjectShape::SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> cells_grid,
                                                      std::span<const Eigen::Vector3d> points_world,
                                                      const std::vector<bool>& is_inlier) const {
   constexpr size_t kSamplesPerSource = 60;
   const SE3<Object, World> T_object_world = cuboid.T_world_object.Inverse();
+  const Eigen::Matrix3d R_object_grid = T_object_world.RotationMatrix() * hull_.region().R_world_grid;
+  const Eigen::Vector3d offset = T_object_world * hull_.region().center_world;
   std::vector<Eigen::Vector3d> cells;
-  for (const Eigen::Vector3d& cell : hull_.Cells(StrictVotes())) {
-    const Eigen::Vector3d p_world = hull_.region().ToWorld(cell);
-    if (((T_object_world * p_world).cwiseAbs().array() <= cuboid.half_extents.array()).all()) cells.push_back(p_world);
+  for (const Eigen::Vector3d& cell : cells_grid) {
+    const Eigen::Vector3d p_object = R_object_grid * cell + offset;
+    if ((p_object.cwiseAbs().array() <= cuboid.half_extents.array()).all()) cells.push_back(cell);
   }
   std::vector<Eigen::Vector3d> inliers;
   for (size_t i = 0; i < points_world.size(); ++i) {
     if (is_inlier[i]) inliers.push_back(points_world[i]);
   }
   std::vector<Eigen::Vector3d> body;
-  for (const auto* source : {&cells, &inliers}) {
-    const size_t count = std::min(kSamplesPerSource, source->size());
-    for (size_t i = 0; i < count; ++i) body.push_back((*source)[i * source->size() / count]);
+  const size_t cell_count = std::min(kSamplesPerSource, cells.size());
+  for (size_t i = 0; i < cell_count; ++i) {
+    body.push_back(hull_.region().ToWorld(cells[i * cells.size() / cell_count]));
   }
+  const size_t point_count = std::min(kSamplesPerSource, inliers.size());
+  for (size_t i = 0; i < point_count; ++i) body.push_back(inliers[i * inliers.size() / point_count]);
   return body;
 }
 
@@ -219,7 +232,9 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
            Eigen::Vector3d::Constant(0.85 * extent->size_mu)},
           surroundings);
   };
+  news_ = 0;
   if (hull_.empty()) start_over();
+  VoteForNews();
   StraightenRegion(surroundings);
   RefocusRegion(*extent, surroundings);
 
@@ -256,7 +271,7 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
                           : FitCuboid(evidence, silhouettes_, previous);
   if (!cuboid) return std::nullopt;
   fit.cuboid = *cuboid;
-  fit.body_world = SampleBody(*cuboid, surroundings.points, fit.point_is_inlier);
+  fit.body_world = SampleBody(*cuboid, evidence.hull_cells, surroundings.points, fit.point_is_inlier);
   fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
   const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));
   const double seen_often = std::min(1.0, static_cast<double>(silhouettes_.size()) / 10);

@@ -32,10 +32,12 @@ class ObjectShape {
   explicit ObjectShape(const ObjectsConfig& config) : config_(config) {}
 
   // Redundant silhouettes (direction close to another one's) are not kept, so that the cost of a fit stays bounded;
-  // then the answer is false.
+  // then the answer is false. One that is kept costs next to nothing before the next Update().
   bool AddSilhouette(Silhouette silhouette);
   bool IsRedundant(const Silhouette& silhouette) const;
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
+  // Silhouettes that came or were corrected since the last Update().
+  int news() const { return news_; }
 
   // The map was corrected: `S_new_old` happened to the space the object stands in, and its keyframes have new poses.
   // `cuboid`: the object's, moved already. True when some masks now say something else about the object.
@@ -53,17 +55,22 @@ class ObjectShape {
 
   std::optional<Extent> EstimateExtent(const Surroundings& surroundings) const;
   void MakeRoom();
+  void Unvote(size_t i);
+  void VoteForNews();
   void Carve(const HullRegion& region, const Surroundings& surroundings);
   void StraightenRegion(const Surroundings& surroundings);
   void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
   HullVotes StrictVotes() const;
   HullVotes LenientVotes() const;
   std::vector<bool> JudgePoints(std::span<const Eigen::Vector3d> points_world) const;
-  std::vector<Eigen::Vector3d> SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> points_world,
+  std::vector<Eigen::Vector3d> SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> cells_grid,
+                                          std::span<const Eigen::Vector3d> points_world,
                                           const std::vector<bool>& is_inlier) const;
 
   ObjectsConfig config_;
   std::vector<Silhouette> silhouettes_;
+  std::vector<bool> has_voted_;  // per silhouette: `hull_` knows it
+  int news_ = 0;
   SilhouetteHull hull_;
   size_t silhouettes_when_carved_ = 0;
 };

@@ -26,6 +26,7 @@ struct ObjectsConfig {
   int hull_cells = 28;
   int max_silhouettes = 36;
   double silhouette_angle_deg = 3;
+  int fits_per_keyframe = 3;
   int min_object_points = 8;
   std::string outlier_removal = "hull_and_forest";
   std::string cuboid_from = "silhouettes";
@@ -82,6 +83,11 @@ struct ObjectsConfig {
                {.unit = "keyframes", .min = 4, .max = 200, .help = "Masks that carve one object's hull"});
     fields.Add("silhouette_angle_deg", &silhouette_angle_deg,
                {.unit = "deg", .min = 0, .max = 30, .help = "Masks from directions closer than this are redundant"});
+    fields.Add("fits_per_keyframe", &fits_per_keyframe,
+               {.unit = "objects",
+                .min = 1,
+                .max = 1000,
+                .help = "So many objects get new cuboids at a keyframe; the others wait for their turn"});
     fields.Add("min_object_points", &min_object_points,
                {.unit = "points", .min = 3, .max = 1000, .help = "Fewer map points do not say where an object is"});
     fields.Add("outlier_removal", &outlier_removal,
