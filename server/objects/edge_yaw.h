@@ -4,13 +4,13 @@
 #include <optional>
 #include <span>
 
+#include "server/objects/lines/yaw_from_lines.h"
 #include "server/objects/silhouette.h"
 
 namespace romap {
 
 // Yaw of the straight edges on an object's masks, modulo a quarter turn, from the x axis of a grid whose z is up; see
-// YawFromLines(). nullopt when their confidence is not above `min_confidence`.
-std::optional<double> EdgeYaw(std::span<const Silhouette> silhouettes, const Eigen::Matrix3d& R_world_grid,
-                              double min_confidence);
+// YawFromLines(). nullopt when they tell nothing.
+std::optional<YawEstimate> EdgeYaw(std::span<const Silhouette> silhouettes, const Eigen::Matrix3d& R_world_grid);
 
 }  // namespace romap

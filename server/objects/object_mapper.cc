@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/objects/fit_schedule.h"
-#include "server/objects/lines/line_segments.h"
-
 namespace romap {
 namespace {
 
@@ -196,7 +193,8 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& vie
   Output output;
   CountPointVotes(view);
   UpdateSceneDepth(view);
-  CollectEvidence(view);
+  CollectSilhouettes(view);
+  OfferViews(view);
   std::vector<LandmarkKey> changed = FitNeediest();
   changed.insert(changed.end(), current_.keys.begin(), current_.keys.end());
   changed = SortedUnique(std::move(changed));
@@ -259,126 +257,6 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
   last_keyframe_ = view.id;
   std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
   scene_depth_mu_ = depths[depths.size() / 2];
-}
-
-void ObjectMapper::CollectEvidence(const KeyframeView& view) {
-  if (current_.detections.empty()) return;
-  const auto masks = ThinMasks(view.frame->labels, current_.detections, current_.keys);
-  const std::map<LandmarkKey, Cuboid> cuboids = PublishedCuboids();
-  std::vector<uint16_t> labels;
-  for (const Detection& detection : current_.detections) labels.push_back(detection.label);
-  for (size_t d = 0; d < current_.detections.size(); ++d) {
-    if (!current_.certain[d]) continue;
-    const Detection& detection = current_.detections[d];
-    Landmark& landmark = *FindLandmark(current_.keys[d]);
-    ++landmark.keyframe_sightings;
-    landmark.keyframes.push_back(view.id);
-    Silhouette silhouette = MakeSilhouette(view, masks, detection, d);
-    UpdateNeighbours(cuboids, &silhouette);
-    // Not before it is known to be kept: edges cost more than all the rest of it.
-    if (!landmark.shape.IsRedundant(silhouette)) {
-      silhouette.segments =
-          FindLineSegments(view.frame->image_bgr, view.frame->labels, detection.label, detection.box_px);
-    }
-    landmark.needs_fit |= landmark.shape.AddSilhouette(std::move(silhouette));
-    ViewCandidate candidate{.keyframe = view.id,
-                            .frame = view.frame,
-                            .T_world_camera = view.T_world_camera,
-                            .label = detection.label,
-                            .box_px = detection.box_px,
-                            .points = {},
-                            .pixels_px = {},
-                            .detected = current_.keys,
-                            .detected_labels = labels,
-                            .sharpness = MeasureSharpness(view.frame->image_bgr, detection.box_px)};
-    for (const PointObservation& observation : view.observations) {
-      if (observation.label != detection.label) continue;
-      candidate.points.push_back(observation.point);
-      candidate.pixels_px.push_back(observation.pixel_px);
-    }
-    landmark.views.Offer(std::move(candidate));
-  }
-}
-
-std::vector<LandmarkKey> ObjectMapper::FitNeediest() {
-  std::vector<FitRequest> requests;
-  for (const auto& landmark : landmarks_) {
-    // Points alone move a box too little to pay for a fit, unless there is none yet.
-    const bool seeks_first_box = !landmark->cuboid && landmark->last_frame == frame_index_;
-    if (!landmark->needs_fit && !seeks_first_box) continue;
-    const FitRequest request{.key = landmark->key,
-                             .confirmed = landmark->state != ObjectState::kProvisional,
-                             .silhouettes = static_cast<int>(landmark->shape.silhouettes().size()),
-                             .news = landmark->shape.news(),
-                             .waiting_frames = frame_index_ - landmark->last_fit_frame};
-    if (IsWorthAFit(request)) requests.push_back(request);
-  }
-  return FitShapes(OrderByNeed(requests), static_cast<size_t>(config_.fits_per_keyframe));
-}
-
-void ObjectMapper::FitAll() {
-  std::vector<LandmarkKey> keys;
-  for (const auto& landmark : landmarks_) {
-    if (landmark->needs_fit || !landmark->cuboid) keys.push_back(landmark->key);
-  }
-  FitShapes(keys, keys.size());
-}
-
-std::vector<LandmarkKey> ObjectMapper::FitShapes(const std::vector<LandmarkKey>& keys, size_t most) {
-  std::vector<LandmarkKey> fitted;
-  if (keys.empty()) return fitted;
-  const PointGroups groups = registry_.GroupByOwner();
-  std::vector<Eigen::Vector3d> background;
-  const auto found = groups.find(kBackgroundKey);
-  if (found != groups.end()) {
-    for (const PointRegistry::Member& member : found->second) background.push_back(member.position_world);
-  }
-  for (LandmarkKey key : keys) {
-    if (fitted.size() >= most) break;
-    if (FitShape(*FindLandmark(key), groups, background)) fitted.push_back(key);
-  }
-  return fitted;
-}
-
-std::map<LandmarkKey, Cuboid> ObjectMapper::PublishedCuboids() const {
-  std::map<LandmarkKey, Cuboid> cuboids;
-  for (const auto& landmark : landmarks_) {
-    if (landmark->IsConfirmed()) cuboids[landmark->key] = landmark->published->cuboid;
-  }
-  return cuboids;
-}
-
-bool ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
-                            const std::vector<Eigen::Vector3d>& background) {
-  if (landmark.shape.silhouettes().empty()) return false;
-  std::vector<MapPointId> ids;
-  std::vector<Eigen::Vector3d> positions;
-  const auto members = groups.find(landmark.key);
-  if (members != groups.end()) {
-    for (const PointRegistry::Member& member : members->second) {
-      ids.push_back(member.id);
-      positions.push_back(member.position_world);
-    }
-  }
-  std::map<LandmarkKey, Cuboid> neighbours = PublishedCuboids();
-  neighbours.erase(landmark.key);
-  const auto fit = landmark.shape.Update(
-      {.up_world = up_world_, .points = positions, .background = background, .neighbours = &neighbours},
-      landmark.cuboid);
-  landmark.needs_fit = false;
-  landmark.last_fit_frame = frame_index_;
-  if (!fit) {
-    if (!landmark.cuboid) landmark.body_world = positions;
-    return false;
-  }
-  landmark.cuboid = Upright(fit->cuboid, up_world_);
-  landmark.body_world = fit->body_world;
-  landmark.parallax_rad = fit->parallax_rad;
-  landmark.points.clear();
-  for (size_t i = 0; i < ids.size(); ++i) {
-    if (fit->point_is_inlier[i]) landmark.points.push_back(ids[i]);
-  }
-  return true;
 }
 
 }  // namespace romap

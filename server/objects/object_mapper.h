@@ -73,7 +73,15 @@ class ObjectMapper {
   Output ObserveMaskedKeyframe(const KeyframeView& view);
   void CountPointVotes(const KeyframeView& view);
   void UpdateSceneDepth(const KeyframeView& view);
-  void CollectEvidence(const KeyframeView& view);
+  struct KeptSilhouette {
+    Landmark* landmark = nullptr;
+    const Detection* detection = nullptr;
+    Silhouette silhouette;
+  };
+  void CollectSilhouettes(const KeyframeView& view);
+  // Looks for straight edges where they tell most.
+  void FindSegments(const KeyframeView& view, std::vector<KeptSilhouette>* kept) const;
+  void OfferViews(const KeyframeView& view);
   std::map<LandmarkKey, Cuboid> PublishedCuboids() const;
   // The neediest landmarks get new boxes; returns their keys.
   std::vector<LandmarkKey> FitNeediest();

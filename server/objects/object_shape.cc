@@ -9,7 +9,6 @@
 #include "server/objects/angles.h"
 #include "server/objects/cuboid_fitter.h"
 #include "server/objects/edge_yaw.h"
-#include "server/objects/isolation_forest.h"
 #include "server/objects/point_cuboid.h"
 #include "server/objects/projection.h"
 
@@ -42,6 +41,22 @@ bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
   return std::any_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
     return other.cut_by_border <= silhouette.cut_by_border && AngleBetween(ViewDirection(other), direction) < limit;
   });
+}
+
+bool ObjectShape::WantsSegments(const Silhouette& silhouette) const {
+  constexpr double kSureConfidence = 0.5;
+  constexpr size_t kSureViews = 8;
+  if (edge_yaw_confidence_ > kSureConfidence && SegmentViews() >= kSureViews) return false;
+  const double limit = 1.5 * config_.silhouette_angle_deg * kRadPerDeg;
+  const Eigen::Vector3d direction = ViewDirection(silhouette);
+  return std::none_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
+    return other.has_segments && AngleBetween(ViewDirection(other), direction) < limit;
+  });
+}
+
+size_t ObjectShape::SegmentViews() const {
+  return static_cast<size_t>(std::count_if(silhouettes_.begin(), silhouettes_.end(),
+                                           [](const Silhouette& silhouette) { return silhouette.has_segments; }));
 }
 
 bool ObjectShape::AddSilhouette(Silhouette silhouette) {
@@ -129,6 +144,7 @@ std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surrounding
 // Carving anew is also when the silhouettes learn where the other things in their pictures stand by now.
 void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundings) {
   hull_.Reset(region, config_.hull_cells);
+  forest_.reset();
   silhouettes_when_carved_ = silhouettes_.size();
   for (Silhouette& silhouette : silhouettes_) UpdateNeighbours(*surroundings.neighbours, &silhouette);
   has_voted_.assign(silhouettes_.size(), false);
@@ -179,7 +195,22 @@ void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surrou
   Carve(next, surroundings);
 }
 
-std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) const {
+// Growing trees costs more than asking them, so they are kept while the points are nearly the same.
+std::vector<double> ObjectShape::Loneliness(const std::vector<Eigen::Vector3d>& points_grid) {
+  constexpr size_t kFewestPoints = 4;
+  constexpr double kMostChange = 0.1;
+  if (points_grid.size() < kFewestPoints) return std::vector<double>(points_grid.size(), 0.5);
+  std::vector<Eigen::Vector3d> scaled;
+  for (const Eigen::Vector3d& p : points_grid) scaled.emplace_back(p / hull_.region().half_extents.x());
+  const double change = std::abs(static_cast<double>(scaled.size()) - static_cast<double>(points_when_grown_));
+  if (!forest_ || change > kMostChange * static_cast<double>(points_when_grown_)) {
+    forest_.emplace(scaled, IsolationForestOptions{});
+    points_when_grown_ = scaled.size();
+  }
+  return forest_->Scores(scaled);
+}
+
+std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) {
   if (config_.outlier_removal == "none") return std::vector<bool>(points_world.size(), true);
   const bool use_hull = config_.outlier_removal == "hull_and_forest";
   std::vector<Eigen::Vector3d> inside;
@@ -191,7 +222,7 @@ std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> poin
     inside_index.push_back(i);
   }
   constexpr double kLonelyScore = 0.65;
-  const std::vector<double> scores = IsolationScores(inside, {});
+  const std::vector<double> scores = Loneliness(inside);
   std::vector<bool> is_inlier(points_world.size(), false);
   for (size_t i = 0; i < inside.size(); ++i) is_inlier[inside_index[i]] = scores[i] < kLonelyScore;
   return is_inlier;
@@ -263,7 +294,9 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
     evidence.neighbour_bottoms.push_back(bottom - center_height);
   }
   evidence.center = evidence.region.ToGrid(extent->center_world);
-  evidence.edge_yaw_rad = EdgeYaw(silhouettes_, evidence.region.R_world_grid, config_.edge_yaw_min_confidence);
+  const auto edge_yaw = EdgeYaw(silhouettes_, evidence.region.R_world_grid);
+  edge_yaw_confidence_ = edge_yaw ? edge_yaw->confidence : 0;
+  if (edge_yaw_confidence_ > config_.edge_yaw_min_confidence) evidence.edge_yaw_rad = edge_yaw->yaw_rad;
   evidence.object_size_mu = extent->size_mu;
   evidence.min_points = config_.min_object_points;
   const auto cuboid = config_.cuboid_from == "points"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/objects/correction.h"
+#include "server/objects/isolation_forest.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/silhouette.h"
 #include "server/objects/silhouette_hull.h"
@@ -36,6 +37,11 @@ class ObjectShape {
   bool AddSilhouette(Silhouette silhouette);
   bool IsRedundant(const Silhouette& silhouette) const;
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
+  // Whether straight edges on this mask (not redundant) would tell something new: not when edges were looked for from
+  // about the same direction, nor once the yaw is sure.
+  bool WantsSegments(const Silhouette& silhouette) const;
+  // Silhouettes on which edges were looked for.
+  size_t SegmentViews() const;
   // Silhouettes that came or were corrected since the last Update().
   int news() const { return news_; }
 
@@ -62,7 +68,8 @@ class ObjectShape {
   void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
   HullVotes StrictVotes() const;
   HullVotes LenientVotes() const;
-  std::vector<bool> JudgePoints(std::span<const Eigen::Vector3d> points_world) const;
+  std::vector<bool> JudgePoints(std::span<const Eigen::Vector3d> points_world);
+  std::vector<double> Loneliness(const std::vector<Eigen::Vector3d>& points_grid);
   std::vector<Eigen::Vector3d> SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> cells_grid,
                                           std::span<const Eigen::Vector3d> points_world,
                                           const std::vector<bool>& is_inlier) const;
@@ -71,8 +78,12 @@ class ObjectShape {
   std::vector<Silhouette> silhouettes_;
   std::vector<bool> has_voted_;  // per silhouette: `hull_` knows it
   int news_ = 0;
+  double edge_yaw_confidence_ = 0;
   SilhouetteHull hull_;
   size_t silhouettes_when_carved_ = 0;
+  // Grown on the object's points, in terms of the grid's half width, so that it need not move with the map.
+  std::optional<IsolationForest> forest_;
+  size_t points_when_grown_ = 0;
 };
 
 }  // namespace romap

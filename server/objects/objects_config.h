@@ -31,6 +31,7 @@ struct ObjectsConfig {
   std::string outlier_removal = "hull_and_forest";
   std::string cuboid_from = "silhouettes";
   double edge_yaw_min_confidence = 0.25;
+  int edge_searches_per_keyframe = 3;
 
   double update_change_share = 0.02;
   double update_yaw_deg = 2;
@@ -99,6 +100,8 @@ struct ObjectsConfig {
                 .help = "What bounds a cuboid: masks, points and the support together, or the paper's extreme points"});
     fields.Add("edge_yaw_min_confidence", &edge_yaw_min_confidence,
                {.min = 0, .max = 1, .help = "Straight edges that agree so well decide a cuboid's yaw; 1 = never"});
+    fields.Add("edge_searches_per_keyframe", &edge_searches_per_keyframe,
+               {.unit = "masks", .min = 0, .max = 254, .help = "On so many masks of a keyframe edges are looked for"});
     fields.Add("update_change_share", &update_change_share,
                {.min = 0, .max = 0.5, .help = "A cuboid is sent anew when it changed by this share of its size"});
     fields.Add("update_yaw_deg", &update_yaw_deg,

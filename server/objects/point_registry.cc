@@ -1,44 +1,80 @@
 #include "server/objects/point_registry.h"
 
 #include <algorithm>
+#include <set>
 
 namespace romap {
 
+size_t PointRegistry::IndexOf(MapPointId point) const {
+  const auto entry = std::lower_bound(points_.begin(), points_.end(), point,
+                                      [](const Entry& e, const MapPointId& id) { return e.id < id; });
+  const bool found = entry != points_.end() && entry->id == point;
+  return found ? static_cast<size_t>(entry - points_.begin()) : points_.size();
+}
+
 void PointRegistry::UpdatePositions(const KeyframeView& view) {
-  for (const MapPointId& id : view.removed_points) points_.erase(id);
+  std::set<MapPointId> gone(view.removed_points.begin(), view.removed_points.end());
+  std::map<MapPointId, Eigen::Vector3d> added;
   for (const MapPoint& point : view.points) {
-    if (point.position_world.allFinite()) {
-      points_[point.id].position_world = point.position_world;
+    if (!point.position_world.allFinite()) {
+      gone.insert(point.id);
+      added.erase(point.id);
+      continue;
+    }
+    const size_t index = gone.contains(point.id) ? points_.size() : IndexOf(point.id);
+    if (index < points_.size()) {
+      points_[index].position_world = point.position_world;
     } else {
-      points_.erase(point.id);
+      added[point.id] = point.position_world;
     }
   }
+  if (!gone.empty()) std::erase_if(points_, [&](const Entry& entry) { return gone.contains(entry.id); });
+  const auto old_count = static_cast<std::ptrdiff_t>(points_.size());
+  for (const auto& [id, position_world] : added) {
+    points_.push_back({.id = id, .position_world = position_world, .votes = {}, .owner = {}});
+  }
+  std::inplace_merge(points_.begin(), points_.begin() + old_count, points_.end(),
+                     [](const Entry& a, const Entry& b) { return a.id < b.id; });
 }
 
 void PointRegistry::MovePoints(const std::vector<MapPoint>& points) {
   for (const MapPoint& point : points) {
-    const auto entry = points_.find(point.id);
-    if (entry != points_.end() && point.position_world.allFinite()) {
-      entry->second.position_world = point.position_world;
+    const size_t index = IndexOf(point.id);
+    if (index < points_.size() && point.position_world.allFinite()) {
+      points_[index].position_world = point.position_world;
     }
   }
 }
 
+void PointRegistry::JudgeOwner(Entry* entry) {
+  constexpr double kClearMajority = 0.6;
+  int total = 0;
+  std::pair<LandmarkKey, int> best{kBackgroundKey, 0};
+  for (const auto& vote : entry->votes) {
+    total += vote.second;
+    if (vote.second > best.second) best = vote;
+  }
+  entry->owner.reset();
+  if (total > 0 && best.second >= kClearMajority * total) entry->owner = best.first;
+}
+
 void PointRegistry::Vote(MapPointId point, LandmarkKey key) {
-  const auto entry = points_.find(point);
-  if (entry == points_.end()) return;
-  auto& votes = entry->second.votes;
+  const size_t index = IndexOf(point);
+  if (index == points_.size()) return;
+  auto& votes = points_[index].votes;
   auto vote = std::find_if(votes.begin(), votes.end(), [&](const auto& v) { return v.first == key; });
   if (vote == votes.end()) vote = votes.insert(votes.end(), {key, 0});
   ++vote->second;
   // Old votes fade, so that an early mix-up does not rule for ever.
   constexpr int kFullVotes = 24;
-  if (vote->second < kFullVotes) return;
-  for (auto& [owner, count] : votes) count /= 2;
+  if (vote->second >= kFullVotes) {
+    for (auto& [owner, count] : votes) count /= 2;
+  }
+  JudgeOwner(&points_[index]);
 }
 
 void PointRegistry::Merge(LandmarkKey from, LandmarkKey into) {
-  for (auto& [id, entry] : points_) {
+  for (Entry& entry : points_) {
     const auto source =
         std::find_if(entry.votes.begin(), entry.votes.end(), [&](const auto& v) { return v.first == from; });
     if (source == entry.votes.end()) continue;
@@ -51,25 +87,19 @@ void PointRegistry::Merge(LandmarkKey from, LandmarkKey into) {
     } else {
       target->second += count;
     }
+    JudgeOwner(&entry);
   }
 }
 
 const Eigen::Vector3d* PointRegistry::Find(MapPointId point) const {
-  const auto entry = points_.find(point);
-  return entry == points_.end() ? nullptr : &entry->second.position_world;
+  const size_t index = IndexOf(point);
+  return index == points_.size() ? nullptr : &points_[index].position_world;
 }
 
 std::map<LandmarkKey, std::vector<PointRegistry::Member>> PointRegistry::GroupByOwner() const {
-  constexpr double kClearMajority = 0.6;
   std::map<LandmarkKey, std::vector<Member>> groups;
-  for (const auto& [id, entry] : points_) {
-    int total = 0;
-    std::pair<LandmarkKey, int> best{kBackgroundKey, 0};
-    for (const auto& vote : entry.votes) {
-      total += vote.second;
-      if (vote.second > best.second) best = vote;
-    }
-    if (total > 0 && best.second >= kClearMajority * total) groups[best.first].push_back({id, entry.position_world});
+  for (const Entry& entry : points_) {
+    if (entry.owner) groups[*entry.owner].push_back({entry.id, entry.position_world});
   }
   return groups;
 }

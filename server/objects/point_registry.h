@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -38,11 +39,17 @@ class PointRegistry {
 
  private:
   struct Entry {
-    Eigen::Vector3d position_world;
+    MapPointId id;
+    Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
     std::vector<std::pair<LandmarkKey, int>> votes;
+    std::optional<LandmarkKey> owner;  // to whom it clearly belongs
   };
 
-  std::map<MapPointId, Entry> points_;
+  // Place in `points_`; its size for a point that is not known.
+  size_t IndexOf(MapPointId point) const;
+  static void JudgeOwner(Entry* entry);
+
+  std::vector<Entry> points_;  // by id: all of them are looked through at every keyframe
 };
 
 }  // namespace romap

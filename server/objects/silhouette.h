@@ -17,7 +17,7 @@ namespace romap {
 
 // A keyframe's masks, thinned: they serve all objects of the keyframe and are kept long after the frame is gone.
 struct KeyframeMasks {
-  cv::Mat index;   // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
+  cv::Mat index;  // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
   cv::Mat framed;  // the same with a border of one pixel of kOtherMask; `index` is the inner part of it
   int stride_px = 1;
   std::vector<LandmarkKey> keys;  // landmark of each detection
@@ -57,7 +57,8 @@ struct Silhouette {
   bool cut_by_border = false;
   std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
   MaskExtents extents;
-  std::vector<LineSegment> segments;  // straight edges on the mask, once someone looked for them
+  bool has_segments = false;  // someone looked for straight edges
+  std::vector<LineSegment> segments;
 
   // What lies under a point of the world.
   MaskHit Look(const Eigen::Vector3d& p_world) const {

@@ -142,9 +142,6 @@ double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px) {
 }
 
 void ViewPicker::Offer(ViewCandidate candidate) {
-  constexpr size_t kHistory = 30;
-  sharpness_history_.push_back(candidate.sharpness);
-  if (sharpness_history_.size() > kHistory) sharpness_history_.erase(sharpness_history_.begin());
   if (waiting_.size() >= static_cast<size_t>(config_.max_waiting_keyframes)) {
     std::vector<ViewCandidate> kept;
     for (size_t i = 0; i < waiting_.size(); i += 2) kept.push_back(std::move(waiting_[i]));
@@ -165,8 +162,11 @@ bool ViewPicker::IsNewDirection(const Eigen::Vector3d& camera_center, const Eige
   });
 }
 
-bool ViewPicker::IsSharp(double sharpness) const {
-  if (sharpness_history_.empty()) return true;
+bool ViewPicker::IsSharp(const ViewCandidate& candidate) {
+  constexpr size_t kHistory = 30;
+  const double sharpness = MeasureSharpness(candidate.frame->image_bgr, candidate.box_px);
+  sharpness_history_.push_back(sharpness);
+  if (sharpness_history_.size() > kHistory) sharpness_history_.erase(sharpness_history_.begin());
   std::vector<double> sorted = sharpness_history_;
   std::sort(sorted.begin(), sorted.end());
   return sharpness >= config_.view_min_sharpness_share * sorted[sorted.size() / 2];
@@ -178,10 +178,11 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
   std::vector<ObjectView> views;
   for (const ViewCandidate& candidate : waiting_) {
     if (taken_.size() >= static_cast<size_t>(config_.max_views)) break;
-    const double patience = IsSharp(candidate.sharpness) ? 1 : kPatience;
     const bool first = taken_.size() < static_cast<size_t>(config_.first_views);
-    const double angle_rad = patience * (first ? config_.first_view_angle_deg : config_.view_angle_deg) * kRadPerDeg;
-    if (!IsNewDirection(candidate.T_world_camera.translation(), center, angle_rad)) continue;
+    const double angle_rad = (first ? config_.first_view_angle_deg : config_.view_angle_deg) * kRadPerDeg;
+    const Eigen::Vector3d& camera_center = candidate.T_world_camera.translation();
+    if (!IsNewDirection(camera_center, center, angle_rad)) continue;
+    if (!IsSharp(candidate) && !IsNewDirection(camera_center, center, kPatience * angle_rad)) continue;
     if (const char* doubt = FindDoubt(candidate, context)) {
       spdlog::debug("objects: {}: {} is no view: {}", context.object.ToString(), candidate.keyframe.ToString(), doubt);
       continue;

@@ -25,7 +25,6 @@ struct ViewCandidate {
   std::vector<Eigen::Vector2f> pixels_px;  // where, as long as `points`
   std::vector<LandmarkKey> detected;       // landmarks that have a mask in this frame
   std::vector<uint16_t> detected_labels;   // their labels, as long as `detected`
-  double sharpness = 0;                    // variance of the Laplacian inside the box
 };
 
 // What is known of the object and its neighbours when views are picked.
@@ -83,7 +82,8 @@ class ViewPicker {
 
   bool IsNewDirection(const Eigen::Vector3d& camera_center, const Eigen::Vector3d& object_center,
                       double angle_rad) const;
-  bool IsSharp(double sharpness) const;
+  // Against those that were asked about before; measured only when it matters, since it takes all the mask's pixels.
+  bool IsSharp(const ViewCandidate& candidate);
 
   ObjectsConfig config_;
   std::vector<ViewCandidate> waiting_;

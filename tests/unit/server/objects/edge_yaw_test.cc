@@ -39,11 +39,12 @@ std::vector<Silhouette> SeeSquare() {
 }
 
 TEST(EdgeYawTest, IsThatOfTheEdgesInTheGrid) {
-  const auto yaw = EdgeYaw(SeeSquare(), Eigen::Matrix3d::Identity(), 0.25);
-  ASSERT_TRUE(yaw.has_value());
-  EXPECT_NEAR(*yaw, kYaw_rad, 1e-6);
+  const auto estimate = EdgeYaw(SeeSquare(), Eigen::Matrix3d::Identity());
+  ASSERT_TRUE(estimate.has_value());
+  EXPECT_NEAR(estimate->yaw_rad, kYaw_rad, 1e-6);
+  EXPECT_GT(estimate->confidence, 0.25);
   const Eigen::Matrix3d turned = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  EXPECT_NEAR(EdgeYaw(SeeSquare(), turned, 0.25).value_or(9), kYaw_rad - 0.2, 1e-6);
+  EXPECT_NEAR(EdgeYaw(SeeSquare(), turned).value_or(YawEstimate{}).yaw_rad, kYaw_rad - 0.2, 1e-6);
 }
 
 // Where the map turns, silhouettes and their edges go along.
@@ -52,15 +53,16 @@ TEST(EdgeYawTest, FollowsCorrections) {
   const Sim3<World, World> S_new_old(1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
                                      {1, 2, 3});
   for (Silhouette& silhouette : silhouettes) Move(S_new_old, &silhouette);
-  EXPECT_NEAR(EdgeYaw(silhouettes, Eigen::Matrix3d::Identity(), 0.25).value_or(9), kYaw_rad + 0.1, 1e-6);
+  const auto estimate = EdgeYaw(silhouettes, Eigen::Matrix3d::Identity());
+  ASSERT_TRUE(estimate.has_value());
+  EXPECT_NEAR(estimate->yaw_rad, kYaw_rad + 0.1, 1e-6);
 }
 
-TEST(EdgeYawTest, IsNotToldWithoutConfidence) {
-  EXPECT_FALSE(EdgeYaw(SeeSquare(), Eigen::Matrix3d::Identity(), 1).has_value());
-  EXPECT_FALSE(EdgeYaw({}, Eigen::Matrix3d::Identity(), 0).has_value());
+TEST(EdgeYawTest, IsNotToldWithoutEdges) {
+  EXPECT_FALSE(EdgeYaw({}, Eigen::Matrix3d::Identity()).has_value());
   std::vector<Silhouette> plain = SeeSquare();
   for (Silhouette& silhouette : plain) silhouette.segments.clear();
-  EXPECT_FALSE(EdgeYaw(plain, Eigen::Matrix3d::Identity(), 0).has_value());
+  EXPECT_FALSE(EdgeYaw(plain, Eigen::Matrix3d::Identity()).has_value());
 }
 
 }  // namespace

@@ -1,0 +1,138 @@
+#include "server/objects/silhouette_hull.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <vector>
+
+namespace romap {
+namespace {
+
+constexpr int kCells = 20;
+constexpr uint16_t kObjectLabel = 1;
+constexpr uint16_t kNeighbourLabel = 2;
+constexpr uint16_t kUnknownLabel = 3;
+
+HullRegion Region() {
+  HullRegion region;
+  region.R_world_grid = Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.1, 0.2, 1).normalized()).toRotationMatrix();
+  region.center_world = {0.2, -0.1, 0.4};
+  region.half_extents = {0.3, 0.35, 0.25};
+  return region;
+}
+
+// A picture, from somewhere around the region, with random ellipses: the object, a neighbour whose cuboid is known, and
+// a thing of which nothing is known. Some cameras stand inside the region, so that a part of it is behind them.
+Silhouette RandomSilhouette(std::mt19937& random) {
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const Eigen::Vector3d center = Region().center_world;
+  const double azimuth = draw(0, 6.28);
+  const double distance = draw(0.1, 1.5);
+  const Eigen::Vector3d eye = center + distance * Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), draw(0, 1));
+  Eigen::Matrix3d R_world_camera;
+  R_world_camera.col(2) = (center - eye).normalized();
+  R_world_camera.col(0) = R_world_camera.col(2).cross(Eigen::Vector3d::UnitZ()).normalized();
+  R_world_camera.col(1) = R_world_camera.col(2).cross(R_world_camera.col(0));
+
+  auto frame = std::make_shared<Frame>();
+  frame->camera = {.width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500, .cx_px = 320, .cy_px = 240};
+  frame->labels = cv::Mat::zeros(480, 640, CV_16UC1);
+  for (const uint16_t label : {kObjectLabel, kNeighbourLabel, kUnknownLabel}) {
+    const cv::Point at(static_cast<int>(draw(100, 540)), static_cast<int>(draw(80, 400)));
+    const cv::Size axes(static_cast<int>(draw(40, 150)), static_cast<int>(draw(40, 150)));
+    cv::ellipse(frame->labels, at, axes, draw(0, 180), 0, 360, cv::Scalar(label), cv::FILLED);
+  }
+  std::vector<Detection> detections(3);
+  for (uint16_t d = 0; d < 3; ++d) {
+    detections[d].label = static_cast<uint16_t>(d + 1);
+    detections[d].box_px = cv::boundingRect(frame->labels == d + 1);
+  }
+  KeyframeView view;
+  view.frame = frame;
+  view.T_world_camera = {R_world_camera, eye};
+  Silhouette silhouette = MakeSilhouette(view, ThinMasks(frame->labels, detections, {1, 2, 3}), detections[0], 0);
+  const Cuboid neighbour{.T_world_object = {Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
+                                            center + Eigen::Vector3d(draw(-0.3, 0.3), draw(-0.3, 0.3), 0)},
+                         .half_extents = {0.1, 0.15, 0.2}};
+  UpdateNeighbours({{2, neighbour}}, &silhouette);
+  return silhouette;
+}
+
+// Counts cells for which the hull and a look through every silhouette, in double precision, say different things.
+int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& silhouettes, const HullVotes& votes) {
+  const HullRegion& region = hull.region();
+  int differences = 0;
+  for (int i = 0; i < kCells * kCells * kCells; ++i) {
+    const Eigen::Array3d cell(i % kCells, i / kCells % kCells, i / (kCells * kCells));
+    const Eigen::Vector3d p_grid = (2 * (cell + 0.5) / kCells - 1) * region.half_extents.array();
+    int inside = 0;
+    int outside = 0;
+    for (const Silhouette& silhouette : silhouettes) {
+      const MaskHit hit = silhouette.Look(region.ToWorld(p_grid));
+      inside += hit == MaskHit::kInside ? 1 : 0;
+      outside += hit == MaskHit::kOutside ? 1 : 0;
+    }
+    const bool expected = outside <= votes.max_outside && inside >= votes.min_inside;
+    differences += hull.Contains(p_grid, votes) != expected ? 1 : 0;
+  }
+  return differences;
+}
+
+// Cells whose image falls on the border between two pixels of a mask may differ: so few that they do not count.
+constexpr int kMostOnBorders = kCells * kCells * kCells / 1000;
+
+TEST(SilhouetteHullTest, EqualsALookThroughEverySilhouetteAtEveryCell) {
+  std::mt19937 random(7);
+  for (int round = 0; round < 6; ++round) {
+    SilhouetteHull hull;
+    hull.Reset(Region(), kCells);
+    std::vector<Silhouette> silhouettes;
+    for (int i = 0; i < 5; ++i) {
+      silhouettes.push_back(RandomSilhouette(random));
+      hull.Add(silhouettes.back());
+    }
+    for (const HullVotes votes : {HullVotes{0, 1}, HullVotes{1, 2}, HullVotes{2, 0}}) {
+      EXPECT_LE(CountDifferences(hull, silhouettes, votes), kMostOnBorders) << "round " << round;
+    }
+  }
+}
+
+TEST(SilhouetteHullTest, WhatIsRemovedLeavesNoTrace) {
+  std::mt19937 random(8);
+  const Silhouette stays = RandomSilhouette(random);
+  const Silhouette goes = RandomSilhouette(random);
+  SilhouetteHull hull, without;
+  hull.Reset(Region(), kCells);
+  without.Reset(Region(), kCells);
+  hull.Add(goes);
+  hull.Add(stays);
+  hull.Remove(goes);
+  without.Add(stays);
+  for (const HullVotes votes : {HullVotes{0, 0}, HullVotes{0, 1}, HullVotes{1, 1}}) {
+    EXPECT_EQ(hull.Cells(votes), without.Cells(votes));
+  }
+}
+
+TEST(SilhouetteHullTest, BoundsSurroundTheCells) {
+  std::mt19937 random(9);
+  SilhouetteHull hull;
+  hull.Reset(Region(), kCells);
+  EXPECT_TRUE(hull.Bounds({0, 1}).isEmpty());
+  hull.Add(RandomSilhouette(random));
+  const HullVotes votes{0, 1};
+  Eigen::AlignedBox3d expected;
+  for (const Eigen::Vector3d& cell : hull.Cells(votes)) {
+    expected.extend(cell - hull.CellSize() / 2);
+    expected.extend(cell + hull.CellSize() / 2);
+  }
+  ASSERT_FALSE(expected.isEmpty());
+  EXPECT_TRUE(hull.Bounds(votes).isApprox(expected, 1e-12));
+}
+
+}  // namespace
+}  // namespace romap
