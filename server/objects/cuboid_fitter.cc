@@ -167,14 +167,22 @@ UprightBox BoxOver(const Footprint& footprint, const Interval& heights) {
   return box;
 }
 
-// The outline of a box does not measure what leaves its corners empty (a ball, a plant): the looser it is, the more of
-// the outer box counts. Boxes have 0.01, balls 0.1.
-UprightBox Loosened(UprightBox tight, const UprightBox& outer, double looseness) {
-  constexpr double kBoxLike = 0.07;
-  constexpr double kRound = 0.09;
-  const double share = std::clamp((looseness - kBoxLike) / (kRound - kBoxLike), 0.0, 1.0);
-  tight.low += share * (outer.low - tight.low).cwiseMin(0);
-  tight.high += share * (outer.high - tight.high).cwiseMax(0);
+// A thing that leaves the corners of its box empty (a ball, a plant) gets a box that is too small: across the corners
+// the outline reaches farther than the masks from whatever side, and the search gives in to that a little. What it
+// gives in grows with the looseness: boxes have 0.01, things of revolution 0.1, and for these it is a tenth. The bottom
+// is where the support says. The top is that of the points and outlines: little looks over it. Never the hull's other
+// faces: it is much wider wherever something hid the object.
+UprightBox Loosened(UprightBox tight, double outer_top, double looseness) {
+  constexpr double kBoxLike = 0.02;
+  constexpr double kGrowth = 1.2;
+  const double growth = kGrowth * std::max(0.0, looseness - kBoxLike);
+  const Eigen::Vector2d grown = growth / 2 * (tight.high - tight.low).head<2>();
+  tight.low.head<2>() -= grown;
+  tight.high.head<2>() += grown;
+  constexpr double kFlatTop = 0.07;
+  constexpr double kRoundTop = 0.09;
+  const double share = std::clamp((looseness - kFlatTop) / (kRoundTop - kFlatTop), 0.0, 1.0);
+  tight.high.z() += share * std::max(0.0, outer_top - tight.high.z());
   return tight;
 }
 
@@ -202,6 +210,12 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
       enough_points ? Quantile(Along(evidence.points, up), 0.2) : evidence.center.z() + 0.1 * evidence.object_size_mu;
   const double floor = std::min(hull.low, ceiling) - 0.3 * evidence.object_size_mu;
   const double layer_mu = 0.05 * evidence.object_size_mu;
+  // What lies under the object hides the table there, and its own points are no background.
+  std::optional<double> carrier;
+  for (double top : evidence.carrier_tops) {
+    if (top >= floor && top <= ceiling + layer_mu) carrier = std::max(top, carrier.value_or(top));
+  }
+  if (carrier) return carrier;
   std::vector<double> heights;
   for (const Eigen::Vector3d& p : evidence.background) {
     if ((p - evidence.center).head<2>().norm() > 1.3 * evidence.object_size_mu) continue;
@@ -266,7 +280,7 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
   constexpr double kFirstStep = 0.1;  // of the size
   const UprightBox outer = BoxOver(*footprint, heights);
   const UprightBox tight = search.Refine(outer, kFirstStep * evidence.object_size_mu);
-  const UprightBox box = Loosened(tight, outer, search.Looseness(tight));
+  const UprightBox box = Loosened(tight, outer.high.z(), search.Looseness(tight));
   const Eigen::AngleAxisd yaw(box.yaw_rad, up);
   Cuboid cuboid;
   cuboid.T_world_object = {Eigen::Matrix3d(evidence.region.R_world_grid * yaw.toRotationMatrix()),

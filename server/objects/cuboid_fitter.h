@@ -18,6 +18,7 @@ struct CuboidEvidence {
   std::vector<Eigen::Vector3d> points;               // map points on the object, outliers removed
   std::vector<Eigen::Vector3d> background;           // map points that belong to no object
   std::vector<double> neighbour_bottoms;             // heights of what other objects stand on
+  std::vector<double> carrier_tops;                  // heights of the tops of other objects below its middle
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the masks' middles meet
   double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
   std::optional<double> edge_yaw_rad;                // of its straight edges, in the grid; only when they agree
@@ -32,8 +33,9 @@ struct CuboidEvidence {
 std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                 const std::optional<Cuboid>& previous);
 
-// Height (Grid z) of the horizontal surface that the object stands on: the densest thin layer of background points
-// around its footprint, else the median bottom of its neighbours. nullopt when neither is there.
+// Height (Grid z) of the horizontal surface that the object stands on: the top of another object below it, else the
+// densest thin layer of background points around its footprint, else the median bottom of its neighbours. nullopt when
+// none is there.
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
 
 }  // namespace romap

@@ -292,6 +292,9 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   for (const auto& [key, cuboid] : *surroundings.neighbours) {
     const double bottom = surroundings.up_world.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z();
     evidence.neighbour_bottoms.push_back(bottom - center_height);
+    const Eigen::Vector3d center = cuboid.T_world_object.Inverse() * extent->center_world;
+    const bool is_below = (center.head<2>().cwiseAbs().array() <= cuboid.half_extents.head<2>().array()).all();
+    if (is_below) evidence.carrier_tops.push_back(evidence.neighbour_bottoms.back() + 2 * cuboid.half_extents.z());
   }
   evidence.center = evidence.region.ToGrid(extent->center_world);
   const auto edge_yaw = EdgeYaw(silhouettes_, evidence.region.R_world_grid);
