@@ -35,7 +35,8 @@ struct MappedFrame {
 // thread; only Hurry() may be called from others.
 //
 // A point is tied to an object by the labels of its observations, one per keyframe that sees it. They are evidence, not
-// verdicts: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks.
+// verdicts: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks, or
+// whose masks have not come yet.
 class SparseMapper {
  public:
   // `local_map` outlives the mapper. `inline_adjustment`: the whole bundle is adjusted on the spot and not on a thread

@@ -1,0 +1,107 @@
+#include "server/slam/world_up.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "tests/unit/server/slam/textured_world.h"
+
+namespace romap {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// A thin book on a table, seen from all around: few points of the table on one side of it, many on the book's edge on
+// the other.
+class WorldUpTest : public ::testing::Test {
+ protected:
+  static constexpr double kThickness_mu = 0.012;
+
+  WorldUpTest() {
+    std::uniform_real_distribution<double> share(0, 1);
+    for (int i = 0; i < 150; ++i) points_.emplace_back(-0.6 + 0.55 * share(random_), -0.6 + 1.2 * share(random_), 0);
+    for (int i = 0; i < 300; ++i) points_.emplace_back(0.5, -0.2 + 0.4 * share(random_), kThickness_mu);
+    for (int i = 0; i < 60; ++i) {
+      points_.emplace_back(0.16 + 0.28 * share(random_), -0.14 + 0.28 * share(random_), kThickness_mu);
+    }
+    for (int i = 0; i < 12; ++i) AddKeyframe(i);
+  }
+
+  void AddKeyframe(int i) {
+    const SE3<World, Camera> T_world_camera = TexturedWorld::OrbitPose(30.0 * i);
+    Frame frame;
+    frame.frame_id = static_cast<uint64_t>(i + 1);
+    frame.camera = camera_;
+    std::vector<cv::Point> outline_px;
+    for (const auto& [x, y] : {std::pair{0.1, -0.2}, {0.5, -0.2}, {0.5, 0.2}, {0.1, 0.2}}) {
+      const Eigen::Vector2d pixel_px = camera_.Project(T_world_camera.Inverse() * Eigen::Vector3d(x, y, kThickness_mu));
+      outline_px.emplace_back(cvRound(pixel_px.x()), cvRound(pixel_px.y()));
+    }
+    cv::Mat book(camera_.height_px, camera_.width_px, CV_16UC1, cv::Scalar(0));
+    cv::fillConvexPoly(book, outline_px, cv::Scalar(1));
+    masks_.push_back({.frame_id = frame.frame_id, .labels = book, .instances = {}});
+    std::vector<Feature> features(points_.size());
+    for (size_t k = 0; k < points_.size(); ++k) {
+      features[k].pixel_px = camera_.Project(T_world_camera.Inverse() * points_[k]).cast<float>();
+    }
+    map_.AddKeyframe(MakeFrameFeatures(frame, features), T_world_camera);
+  }
+
+  void AddPoints() {
+    for (size_t k = 0; k < points_.size(); ++k) {
+      PointTrack& track = map_.AddPoint(points_[k]);
+      for (auto& [id, keyframe] : map_.keyframes()) map_.AddSight(track, keyframe, static_cast<int>(k));
+      map_.Refresh(track);
+    }
+  }
+
+  void TakeMasks() {
+    for (auto& [id, keyframe] : map_.keyframes()) {
+      keyframe.sight = WithMasks(*keyframe.sight, masks_[id.value - 1].labels, SlamConfig{}.mask_erosion_px);
+    }
+  }
+
+  const CameraModel camera_ = TexturedWorld(640, 480).camera();
+  std::mt19937_64 random_{3};
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<FrameMasks> masks_;
+  SlamMap map_{SlamConfig{}};
+};
+
+TEST_F(WorldUpTest, EdgesOfFlatThingsDoNotTiltTheWorld) {
+  AddPoints();
+  TakeMasks();
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(10 * kDegree, Eigen::Vector3d(1, 1, 0).normalized()));
+  map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
+  WorldUp up;
+  const auto R_new_old = up.Correct(map_);
+  ASSERT_TRUE(R_new_old);
+  const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
+  EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.2 * kDegree);
+}
+
+TEST_F(WorldUpTest, WithoutMasksNothingStandsOnAnything) {
+  AddPoints();
+  EXPECT_FALSE(WorldUp().Correct(map_, /*is_last=*/true));
+}
+
+TEST_F(WorldUpTest, SmallTurnsAreMadeAtTheEndOnly) {
+  AddPoints();
+  TakeMasks();
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.15 * kDegree, Eigen::Vector3d::UnitX()));
+  map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
+  WorldUp up;
+  EXPECT_FALSE(up.Correct(map_));
+  const auto R_new_old = up.Correct(map_, /*is_last=*/true);
+  ASSERT_TRUE(R_new_old);
+  const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
+  EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.1 * kDegree);
+}
+
+}  // namespace
+}  // namespace romap
