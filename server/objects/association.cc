@@ -98,6 +98,20 @@ class Score {
   double best_geometric_ = 0;
 };
 
+// Share of the visible body in the mask. What lies under other masks may be hidden and says little: so a thing that
+// comes out from behind another one is known by the first of it that shows, if that lies where the thing is.
+void AddBodyCue(const BodySight& sight, size_t d, const cv::Rect& projected, const cv::Rect& box, Score* score) {
+  constexpr double kWeight = 1.5;
+  constexpr double kMostlyHidden = 0.5;
+  constexpr double kLeastWeightShare = 0.2;
+  const double in_mask = sight.share_in_detection[d];
+  const double under_others = sight.share_hidden - in_mask;
+  if (under_others < kMostlyHidden || in_mask <= 0 || projected.empty()) return score->AddGeometric(kWeight, in_mask);
+  const double lies_there = static_cast<double>((box & projected).area()) / box.area();
+  const double weight = kWeight * std::max(kLeastWeightShare, 1 - under_others);
+  score->AddGeometric(weight, lies_there * in_mask / (1 - under_others));
+}
+
 double DepthOf(const Landmark& landmark, double scene_depth_mu) {
   if (landmark.body_world.empty()) return scene_depth_mu;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -137,7 +151,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
     if (recent) {
       score.AddGeometric(1.0 - static_cast<double>(gap) / (kRecentFrames + 1), BoxIou(carried, detection.box_px));
     }
-    if (sight.share_in_image > kInImage) score.AddGeometric(1.5, sight.share_in_detection[d]);
+    if (sight.share_in_image > kInImage) AddBodyCue(sight, d, scene.projected[l], detection.box_px, &score);
     if (scene.projected[l].area() > 0) score.AddGeometric(0.7, BoxIou(scene.projected[l], detection.box_px));
     const auto evidence = landmark.class_evidence.find(detection.class_name);
     const bool known_class = evidence != landmark.class_evidence.end() && total_evidence > 0;

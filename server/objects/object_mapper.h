@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/messages.h"
@@ -101,7 +102,7 @@ class ObjectMapper {
   };
   static Company CompanyOf(const Landmark& a, const Landmark& b);
   bool AreTheSame(const Landmark& a, const Landmark& b) const;
-  bool PointsAgree(const Landmark& a, const Landmark& b) const;
+  std::optional<bool> PointsAgree(const Landmark& a, const Landmark& b) const;
   std::vector<Eigen::Vector3d> PointsOf(const Landmark& landmark) const;
   bool IsAnnounceable(const Landmark& landmark) const;
   void Publish(Landmark& landmark, bool force, Output* output);

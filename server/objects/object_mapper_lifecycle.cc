@@ -128,7 +128,7 @@ bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
     const Landmark& with_box = a.cuboid ? a : b;
     const Landmark& without = a.cuboid ? b : a;
     return same_class && together == 0 && ShareInside(*with_box.cuboid, without.body_world) > 0.7 &&
-           PointsAgree(with_box, without);
+           PointsAgree(with_box, without).value_or(false);
   }
   const double reach = a.cuboid->half_extents.norm() + b.cuboid->half_extents.norm();
   if ((a.cuboid->T_world_object.translation() - b.cuboid->T_world_object.translation()).norm() > reach) return false;
@@ -138,11 +138,13 @@ bool ObjectMapper::AreTheSame(const Landmark& a, const Landmark& b) const {
   constexpr double kPossibly = 0.25;
   if (overlap > kSurely) return true;
   if (!same_class || together > 0) return false;
-  return overlap > kProbably || (overlap > kPossibly && PointsAgree(a, b));
+  // Two looks from far apart at a thing that is known from one side only may disagree on where it ends.
+  return overlap > kProbably || (overlap > kPossibly && PointsAgree(a, b).value_or(true));
 }
 
-// Whether the map points on both may be those of one thing that was looked at from two sides (SamePlace).
-bool ObjectMapper::PointsAgree(const Landmark& a, const Landmark& b) const {
+// Whether the map points on both may be those of one thing that was looked at from two sides (SamePlace); nullopt when
+// there are too few to tell.
+std::optional<bool> ObjectMapper::PointsAgree(const Landmark& a, const Landmark& b) const {
   constexpr double kAlpha = 0.05;
   constexpr double kShiftShare = 0.25;  // of the size, between the means of two looks
   constexpr double kPointSigmaShare = 0.02;
@@ -155,7 +157,7 @@ bool ObjectMapper::PointsAgree(const Landmark& a, const Landmark& b) const {
                 !same   ? "are too few to compare"
                 : *same ? "may be of one thing"
                         : "lie apart");
-  return same.value_or(false);
+  return same;
 }
 
 std::vector<Eigen::Vector3d> ObjectMapper::PointsOf(const Landmark& landmark) const {

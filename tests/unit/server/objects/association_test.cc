@@ -149,6 +149,20 @@ TEST_F(AssociationTest, AHiddenThingDoesNotSpoilTheMaskBeforeIt) {
   EXPECT_LT(association.visible_share[1], 0.1);
 }
 
+TEST_F(AssociationTest, AThingIsKnownByTheFirstOfItThatShowsFromBehindAnotherOne) {
+  AddCube(0, "cup").last_frame = 0;  // hidden for long
+  const cv::Rect box = BoxOf(*landmarks_[0]);
+  AddCube(0.05, "box", 1.7);
+  landmarks_[1]->last_box_px = BoxOf(*landmarks_[1]);
+  const int shown = box.width / 4;
+  AddMask(1, {box.x, box.y, shown, box.height}, "cup");
+  AddMask(2, {box.x + shown, box.y - 4, box.width + 6, box.height + 8}, "box");
+  const Association association = Associate(tracked_, ExtractDetections(*frame_, config_), landmarks_,
+                                            /*frame_index=*/60, 2, config_);
+  EXPECT_EQ(association.matches[0].landmark, 0);
+  EXPECT_EQ(association.matches[1].landmark, 1);
+}
+
 TEST_F(AssociationTest, AThingWithoutMaskIsMissedInPlainView) {
   AddCube(-0.15, "cup");
   AddCube(0.15, "cup");
