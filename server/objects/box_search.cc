@@ -16,8 +16,11 @@ constexpr float kFilledCornerShare = 0.07F;
 // Most that one silhouette may cost, in terms of the object's size.
 constexpr float kMostSilhouetteCost = 0.3F;
 // Weights per silhouette, which a direction of a mask has as well: small extents, the mean distance of points outside
-// the box, the distance of the bottom from the support, of a face from where it was.
+// the box, the distance of the bottom from the support, of a face from where it was. A height costs more than a width:
+// from above on one side, a higher top hides as much as a far side that is two or three times as much farther, and a
+// box would rather grow tall than deep.
 constexpr double kExtentWeight = 0.04;
+constexpr double kHeightWeight = 0.12;
 constexpr double kPointsWeight = 3;
 constexpr double kSupportWeight = 2;
 constexpr double kPreviousWeight = 0.02;
@@ -104,7 +107,8 @@ float BoxSearch::SilhouetteCost(const UprightBox& box, const Target& target) con
 }
 
 double BoxSearch::PriorCost(const UprightBox& box) const {
-  double cost = kExtentWeight * (box.high - box.low).sum();
+  const Eigen::Vector3d extents = box.high - box.low;
+  double cost = kExtentWeight * (extents.x() + extents.y()) + kHeightWeight * extents.z();
   double outside = 0;
   for (const Eigen::Vector3d& p : criteria_.points) {
     const double distance = (box.low - p).cwiseMax(p - box.high).maxCoeff();
