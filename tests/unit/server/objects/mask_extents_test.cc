@@ -9,7 +9,9 @@ namespace {
 
 constexpr double kBorder_px = 0.5;  // between a mask's last pixel's centre and its border
 
-Detection LabelThree(const cv::Rect& box_px) { return {.label = 3, .class_name = "", .box_px = box_px}; }
+Detection LabelThree(const cv::Rect& box_px) {
+  return {.label = 3, .class_name = "", .track_id = {}, .box_px = box_px};
+}
 
 TEST(MaskExtentsTest, DirectionsAreUnitVectorsAndOppositeOnesHalfTheCountApart) {
   EXPECT_NEAR((ExtentDirection(0) - Eigen::Vector2d(1, 0)).norm(), 0, 1e-12);
