@@ -17,10 +17,10 @@ constexpr float kFilledCornerShare = 0.07F;
 constexpr float kMostSilhouetteCost = 0.3F;
 // Weights per silhouette, which a direction of a mask has as well: small extents, the mean distance of points outside
 // the box, the distance of the bottom from the support, of a face from where it was. A height costs more than a width:
-// from above on one side, a higher top hides as much as a far side that is two or three times as much farther, and a
+// from above on one side, a higher top hides as much as a far side that is about twice as much farther, and a
 // box would rather grow tall than deep.
 constexpr double kExtentWeight = 0.04;
-constexpr double kHeightWeight = 0.12;
+constexpr double kHeightWeight = 0.08;
 constexpr double kPointsWeight = 3;
 constexpr double kSupportWeight = 2;
 constexpr double kPreviousWeight = 0.02;
