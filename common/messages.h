@@ -232,7 +232,7 @@ struct ObjectViews {
   std::optional<Sim3<World, World>> S_new_old =
       {};                                      // of the space the object stands in: its field goes along unchanged
   std::vector<ViewPose> corrected_views = {};  // in the corrected world
-  Cuboid cuboid;                               // training box before enlargement
+  Cuboid cuboid;                               // training box before enlargement; may be larger than the told one
   std::vector<ObjectView> new_views = {};
 };
 

@@ -198,6 +198,20 @@ std::optional<UprightBox> AtYaw(const std::optional<Cuboid>& cuboid, const HullR
   return UprightBox{yaw_rad, center - cuboid->half_extents, center + cuboid->half_extents};
 }
 
+// Boxes of the same yaw.
+UprightBox United(const UprightBox& a, const UprightBox& b) {
+  return {.yaw_rad = a.yaw_rad, .low = a.low.cwiseMin(b.low), .high = a.high.cwiseMax(b.high)};
+}
+
+Cuboid InWorld(const UprightBox& box, const HullRegion& region) {
+  const Eigen::AngleAxisd yaw(box.yaw_rad, Eigen::Vector3d::UnitZ());
+  Cuboid cuboid;
+  cuboid.T_world_object = {Eigen::Matrix3d(region.R_world_grid * yaw.toRotationMatrix()),
+                           region.ToWorld(yaw * Eigen::Vector3d((box.low + box.high) / 2))};
+  cuboid.half_extents = (box.high - box.low) / 2;
+  return cuboid;
+}
+
 }  // namespace
 
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
@@ -240,8 +254,8 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
   return Quantile(bottoms, 0.5);
 }
 
-std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
-                                const std::optional<Cuboid>& previous) {
+std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
+                                   const std::optional<Cuboid>& previous) {
   if (evidence.hull_cells.empty()) return std::nullopt;
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const std::optional<double> support = FindSupportHeight(evidence);
@@ -281,14 +295,12 @@ std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vecto
   const UprightBox outer = BoxOver(*footprint, heights);
   const UprightBox tight = search.Refine(outer, kFirstStep * evidence.object_size_mu);
   const UprightBox box = Loosened(tight, outer.high.z(), search.Looseness(tight));
-  const Eigen::AngleAxisd yaw(box.yaw_rad, up);
-  Cuboid cuboid;
-  cuboid.T_world_object = {Eigen::Matrix3d(evidence.region.R_world_grid * yaw.toRotationMatrix()),
-                           evidence.region.ToWorld(yaw * Eigen::Vector3d((box.low + box.high) / 2))};
-  cuboid.half_extents = (box.high - box.low) / 2;
-  cuboid.confidence = search.Agreement(box);
-  if (!cuboid.half_extents.allFinite() || !cuboid.T_world_object.IsFinite()) return std::nullopt;
-  return cuboid;
+  CuboidFit fit{.cuboid = InWorld(box, evidence.region), .reach = InWorld(United(box, outer), evidence.region)};
+  constexpr double kReachMargin = 0.02;  // of the size: borders of masks and of cells err by about so much
+  fit.reach.half_extents.array() += kReachMargin * evidence.object_size_mu;
+  fit.cuboid.confidence = search.Agreement(box);
+  const bool usable = fit.reach.half_extents.allFinite() && fit.reach.T_world_object.IsFinite();
+  return usable ? std::optional(fit) : std::nullopt;
 }
 
 }  // namespace romap

@@ -25,13 +25,20 @@ struct CuboidEvidence {
   int min_points = 8;                                // fewer points do not say how far the object reaches
 };
 
+struct CuboidFit {
+  Cuboid cuboid;
+  // The box of what the evidence leaves for the object: at least as large, with the same axes. A thin part that few
+  // masks show is in it, so fields learn in this one.
+  Cuboid reach;
+};
+
 // The upright box around an object. The hull, the points and the support plane give a first box, BoxSearch the one that
 // agrees best with all of them: a hull is only an outer bound, loose where neighbours hide the object or the cameras
 // stand on one side, and it wears a cone on every flat top. Yaw: the straight edges', else the rectangle of least area
 // around the footprint; `previous` wins over equally good ones and decides which of the four names of the same box is
 // used. The confidence is the share of silhouettes that agree with the box. nullopt when the evidence leaves no volume.
-std::optional<Cuboid> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
-                                const std::optional<Cuboid>& previous);
+std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
+                                   const std::optional<Cuboid>& previous);
 
 // Height (Grid z) of the horizontal surface that the object stands on: the top of another object below it, else the
 // densest thin layer of background points around its footprint, else the median bottom of its neighbours. nullopt when

@@ -46,6 +46,7 @@ struct Landmark {
   bool needs_fit = false;                   // silhouettes came since the last fit
   uint64_t last_fit_frame = 0;              // counted as `last_frame`
   std::optional<Cuboid> cuboid;             // newest fit
+  std::optional<Cuboid> reach;              // the same, see CuboidFit: what its field learns in
   double parallax_rad = 0;                  // of the silhouettes behind it
   std::vector<Eigen::Vector3d> body_world;  // points spread over its volume; its map points while there is no cuboid
   std::vector<MapPointId> points;           // its map points without outliers

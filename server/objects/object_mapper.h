@@ -28,7 +28,7 @@ class ObjectMapper {
  public:
   struct Output {
     std::vector<MapEvent> events;    // ObjectUpdate, ObjectRemoved, ObjectMerged, in this order of happening
-    std::vector<ObjectViews> views;  // of confirmed objects; the cuboid is that of the last ObjectUpdate
+    std::vector<ObjectViews> views;  // of confirmed objects; the cuboid is what they may fill, at least that told
   };
 
   explicit ObjectMapper(ObjectsConfig config) : config_(config), history_(config.mask_patience_s) {}

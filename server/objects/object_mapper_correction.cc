@@ -46,10 +46,12 @@ void ObjectMapper::CorrectLandmark(Landmark& landmark, const KeyframeCorrections
   if (S_new_old) {
     landmark.S_now_told = *S_new_old * landmark.S_now_told.value_or(Sim3<World, World>());
     if (landmark.cuboid) landmark.cuboid = Moved(*S_new_old, *landmark.cuboid);
+    if (landmark.reach) landmark.reach = Moved(*S_new_old, *landmark.reach);
     for (Eigen::Vector3d& p : landmark.body_world) p = *S_new_old * p;
     landmark.last_T_world_camera = S_new_old->Moved(landmark.last_T_world_camera);
   }
   if (landmark.cuboid) landmark.cuboid = Upright(*landmark.cuboid, up_world_);
+  if (landmark.reach) landmark.reach = Upright(*landmark.reach, up_world_);
   if (!S_new_old) return;
   landmark.needs_fit |= landmark.shape.Correct(*S_new_old, keyframes, landmark.cuboid);
   landmark.views.Correct(*S_new_old, keyframes);

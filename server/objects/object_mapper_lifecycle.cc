@@ -226,7 +226,7 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   output->events.emplace_back(ObjectMerged{.from = from.id, .into = into.id, .revision = ++into.revision});
   Publish(into, /*force=*/true, output);
   if (!adopted.empty()) {
-    output->views.push_back({.object = into.id, .cuboid = into.published->cuboid, .new_views = adopted});
+    output->views.push_back({.object = into.id, .cuboid = *into.reach, .new_views = adopted});
   }
 }
 
@@ -257,10 +257,10 @@ void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
       first || landmark.published->class_name != class_name || landmark.published->state != landmark.state;
   const bool moved =
       !first && MovedNoticeably(landmark.published->cuboid, told, landmark.S_now_told.value_or(Sim3<World, World>()));
-  ObjectViews views{.object = landmark.id, .cuboid = cuboid};
+  ObjectViews views{.object = landmark.id, .cuboid = *landmark.reach};
   if (landmark.state != ObjectState::kProvisional) {
-    views.new_views = TakeViews(landmark, cuboid);
-    views.corrected_views = landmark.views.TakeCorrectedPoses(cuboid);
+    views.new_views = TakeViews(landmark, *landmark.reach);
+    views.corrected_views = landmark.views.TakeCorrectedPoses(*landmark.reach);
   }
   const bool views_changed = !views.new_views.empty() || !views.corrected_views.empty();
   const bool tell = force || cuboid_changed || text_changed || moved;

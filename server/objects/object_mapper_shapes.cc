@@ -146,6 +146,7 @@ bool ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
     return false;
   }
   landmark.cuboid = Upright(fit->cuboid, up_world_);
+  landmark.reach = Upright(fit->reach, up_world_);
   landmark.body_world = fit->body_world;
   landmark.parallax_rad = fit->parallax_rad;
   landmark.points.clear();

@@ -26,6 +26,12 @@ Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
   return median;
 }
 
+std::optional<CuboidFit> FitToPoints(const CuboidEvidence& evidence) {
+  const auto cuboid = CuboidOfPoints(evidence.region, evidence.points, evidence.edge_yaw_rad);
+  if (!cuboid) return std::nullopt;
+  return CuboidFit{.cuboid = *cuboid, .reach = *cuboid};
+}
+
 // Without a centre, the optical axis stands for the direction to the object: good enough to compare cameras.
 Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
   const double u_px = silhouette.box_px.x + silhouette.box_px.width / 2.0;
@@ -183,7 +189,7 @@ void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surrou
   const Eigen::Vector3d reach = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
   const double most_mu = 1.3 * extent.size_mu;
   const bool may_grow = (region.half_extents.array() < 0.99 * most_mu).any() && reach.maxCoeff() > 0.97;
-  const bool much_news = silhouettes_.size() > 1.4 * static_cast<double>(silhouettes_when_carved_);
+  const bool much_news = silhouettes_.size() > 2.0 * static_cast<double>(silhouettes_when_carved_);
   const bool any_news = silhouettes_.size() != silhouettes_when_carved_;
   if (!much_news && !(may_grow && any_news)) return;
   HullRegion next = region;
@@ -302,11 +308,12 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   if (edge_yaw_confidence_ > config_.edge_yaw_min_confidence) evidence.edge_yaw_rad = edge_yaw->yaw_rad;
   evidence.object_size_mu = extent->size_mu;
   evidence.min_points = config_.min_object_points;
-  const auto cuboid = config_.cuboid_from == "points"
-                          ? CuboidOfPoints(evidence.region, evidence.points, evidence.edge_yaw_rad)
-                          : FitCuboid(evidence, silhouettes_, previous);
-  if (!cuboid) return std::nullopt;
-  fit.cuboid = *cuboid;
+  const auto fitted =
+      config_.cuboid_from == "points" ? FitToPoints(evidence) : FitCuboid(evidence, silhouettes_, previous);
+  if (!fitted) return std::nullopt;
+  const Cuboid* cuboid = &fitted->cuboid;
+  fit.cuboid = fitted->cuboid;
+  fit.reach = fitted->reach;
   fit.body_world = SampleBody(*cuboid, evidence.hull_cells, surroundings.points, fit.point_is_inlier);
   fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
   const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));

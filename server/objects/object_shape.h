@@ -25,6 +25,7 @@ class ObjectShape {
   };
   struct Fit {
     Cuboid cuboid;
+    Cuboid reach;                             // see CuboidFit
     std::vector<bool> point_is_inlier;        // as long as Surroundings::points
     std::vector<Eigen::Vector3d> body_world;  // points spread over the object's volume, for association
     double parallax_rad = 0;                  // between the directions it was seen from

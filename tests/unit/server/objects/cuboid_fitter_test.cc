@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/objects/footprint.h"
+#include "server/objects/projection.h"
 #include "tests/unit/server/objects/seen_object.h"
 
 namespace romap {
@@ -14,6 +15,14 @@ namespace {
 
 const Eigen::Vector3d kHalf(0.10, 0.07, 0.05);
 constexpr double kYaw_rad = 0.4;
+
+std::optional<Cuboid> Fitted(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
+                             const std::optional<Cuboid>& previous) {
+  const auto fit = FitCuboid(evidence, silhouettes, previous);
+  if (!fit) return std::nullopt;
+  EXPECT_GE(ContainedShare(fit->reach, CuboidCorners(fit->cuboid, 1), 1.0001), 1) << "the reach is the larger one";
+  return fit->cuboid;
+}
 
 SyntheticWorldOptions From(int frames, double sweep_deg) {
   SyntheticWorldOptions options;
@@ -27,7 +36,7 @@ SeenObject SeeBox() { return SeeObject(SyntheticShape::kBox, kHalf, kYaw_rad, Fr
 TEST(CuboidFitterTest, ABoxWithExactMasksIsFoundToLessThanAPixel) {
   SeenObject seen = SeeBox();
   seen.evidence.edge_yaw_rad = kYaw_rad;
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, {});
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, {});
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_LT(LargestFaceError(*cuboid, seen.truth), seen.pixel_mu);
   EXPECT_EQ(cuboid->confidence, 1);
@@ -35,7 +44,7 @@ TEST(CuboidFitterTest, ABoxWithExactMasksIsFoundToLessThanAPixel) {
 
 TEST(CuboidFitterTest, FindsTheYawWithoutEdges) {
   const SeenObject seen = SeeBox();
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, {});
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, {});
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_NEAR(YawInGrid(*cuboid, seen.evidence.region.R_world_grid), kYaw_rad, 0.06);
   EXPECT_GT(CuboidIou(*cuboid, seen.truth), 0.85);
@@ -43,7 +52,7 @@ TEST(CuboidFitterTest, FindsTheYawWithoutEdges) {
 
 TEST(CuboidFitterTest, ARoundThingFillsItsBox) {
   const SeenObject seen = SeeObject(SyntheticShape::kEllipsoid, Eigen::Vector3d::Constant(0.08), 0, From(20, 360));
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, {});
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, {});
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_LT(LargestFaceError(*cuboid, seen.truth), 0.1 * 0.16);
 }
@@ -54,7 +63,7 @@ TEST(CuboidFitterTest, AHullThatIsWideOnOneSideDoesNotDrawTheBox) {
   std::vector<Eigen::Vector3d> shadow;
   for (const Eigen::Vector3d& cell : seen.evidence.hull_cells) shadow.push_back(cell + Eigen::Vector3d(0.1, 0, 0));
   seen.evidence.hull_cells.insert(seen.evidence.hull_cells.end(), shadow.begin(), shadow.end());
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, {});
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, {});
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_LT((cuboid->T_world_object.translation() - seen.truth.T_world_object.translation()).norm(), 0.01);
 }
@@ -62,7 +71,7 @@ TEST(CuboidFitterTest, AHullThatIsWideOnOneSideDoesNotDrawTheBox) {
 TEST(CuboidFitterTest, PointsSayHowDeepAThingIsThatIsSeenFromOneSide) {
   SeenObject seen = SeeObject(SyntheticShape::kBox, kHalf, kYaw_rad, From(10, 30));
   seen.evidence.edge_yaw_rad = kYaw_rad;
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, {});
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, {});
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_LT(LargestFaceError(*cuboid, seen.truth), 4 * seen.pixel_mu);
 }
@@ -74,7 +83,7 @@ TEST(CuboidFitterTest, KeepsTheNameOfThePreviousYaw) {
   previous.T_world_object = {
       Eigen::Matrix3d(Eigen::AngleAxisd(kYaw_rad + std::numbers::pi / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix()),
       seen.truth.T_world_object.translation()};
-  const auto cuboid = FitCuboid(seen.evidence, seen.silhouettes, previous);
+  const auto cuboid = Fitted(seen.evidence, seen.silhouettes, previous);
   ASSERT_TRUE(cuboid.has_value());
   EXPECT_NEAR(cuboid->half_extents.x(), kHalf.y(), seen.pixel_mu);
   EXPECT_NEAR(cuboid->half_extents.y(), kHalf.x(), seen.pixel_mu);
@@ -83,7 +92,7 @@ TEST(CuboidFitterTest, KeepsTheNameOfThePreviousYaw) {
 TEST(CuboidFitterTest, NeedsAHull) {
   SeenObject seen = SeeBox();
   seen.evidence.hull_cells.clear();
-  EXPECT_FALSE(FitCuboid(seen.evidence, seen.silhouettes, {}).has_value());
+  EXPECT_FALSE(Fitted(seen.evidence, seen.silhouettes, {}).has_value());
   EXPECT_FALSE(FindSupportHeight(seen.evidence).has_value());
 }
 
