@@ -23,15 +23,15 @@ struct ObjectsConfig {
   int provisional_patience_frames = 40;
   int lost_after_frames = 90;
 
-  int hull_cells = 28;
+  int hull_cells = 20;
   int max_silhouettes = 36;
   double silhouette_angle_deg = 3;
-  int fits_per_keyframe = 2;
+  int fits_per_keyframe = 1;
   int min_object_points = 8;
   std::string outlier_removal = "hull_and_forest";
   std::string cuboid_from = "silhouettes";
   double edge_yaw_min_confidence = 0.25;
-  int edge_searches_per_keyframe = 2;
+  int edge_searches_per_keyframe = 1;
 
   double update_change_share = 0.02;
   double update_yaw_deg = 2;
