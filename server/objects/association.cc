@@ -169,15 +169,18 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
   }
 }
 
-// Whether another pairing of either partner scores almost as well.
-bool IsAmbiguous(const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::Index detection) {
+// Whether another pairing of either partner scores almost as well. Landmarks that were never seen side by side may be
+// one thing twice, and would keep each other from learning for ever: they are no rivals.
+bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::Index detection) {
   constexpr double kMargin = 0.1;
+  const std::map<LandmarkKey, uint64_t>& seen_beside = scene.landmarks[static_cast<size_t>(landmark)]->seen_beside;
   const double rival_score = scores(landmark, detection) - kMargin;
   for (Eigen::Index d = 0; d < scores.cols(); ++d) {
     if (d != detection && scores(landmark, d) > rival_score) return true;
   }
   for (Eigen::Index l = 0; l < scores.rows(); ++l) {
-    if (l != landmark && scores(l, detection) > rival_score) return true;
+    const bool are_two = seen_beside.contains(scene.landmarks[static_cast<size_t>(l)]->key);
+    if (l != landmark && are_two && scores(l, detection) > rival_score) return true;
   }
   return false;
 }
@@ -306,7 +309,7 @@ std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
     match.agreement = Agreement(scene, d, l);
     if (CoversAnother(scene, d, l, matched)) {
       match.doubt = "it covers another thing as well";
-    } else if (IsAmbiguous(scores, static_cast<Eigen::Index>(l), detection_of[l])) {
+    } else if (IsAmbiguous(scene, scores, static_cast<Eigen::Index>(l), detection_of[l])) {
       match.doubt = "another match is as good";
     }
     spdlog::debug("objects: frame {}: label {} ({}) is landmark {} with {:.2f}{}{}", scene.tracked.frame->frame_id,

@@ -72,6 +72,16 @@ TEST_F(AssociationTest, IdenticalNeighboursKeepTheirMasks) {
   EXPECT_EQ(association.matches[0].doubt, nullptr);
 }
 
+TEST_F(AssociationTest, OnlyWhatWasSeenAsTwoThingsIsARival) {
+  AddCube(0, "cup");
+  AddCube(0.005, "cup");
+  AddMask(1, BoxOf(*landmarks_[0]), "cup");
+  EXPECT_EQ(Run().matches[0].doubt, nullptr) << "one thing twice, it seems";
+  landmarks_[0]->seen_beside[landmarks_[1]->key] = 3;
+  landmarks_[1]->seen_beside[landmarks_[0]->key] = 3;
+  EXPECT_THAT(Run().matches[0].doubt, NotNull());
+}
+
 TEST_F(AssociationTest, AFlippedClassDoesNotDecide) {
   AddCube(-0.15, "cup");
   AddCube(0.15, "book");
