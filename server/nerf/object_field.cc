@@ -18,8 +18,9 @@ namespace {
 constexpr int kMostDivergences = 3;
 
 // Limits of carrying a field over to another box; beyond them a new training costs no more.
-constexpr double kMostUnknownShare = 0.8;  // of the new box, that lies outside the old one
-constexpr double kMostGrowth = 2.5;        // of the longest side since the hash grid was laid out
+constexpr double kMostUnknownShare = 0.8;    // of the new box, that lies outside the old one
+constexpr double kLeastFeatureShare = 0.25;  // see FieldTrainer::Loosen
+constexpr double kMostGrowth = 2.5;          // of the longest side since the hash grid was laid out
 
 NerfConfig WithWholeWidths(NerfConfig config) {
   config.hidden_width = (config.hidden_width + 15) / 16 * 16;
@@ -62,7 +63,10 @@ bool ObjectField::CarryOverTo(const TrainingBox& box) {
   if (unknown_share > kMostUnknownShare || growth > kMostGrowth || growth < 1 / kMostGrowth) return false;
   occupancy_.MoveTo(box_.ShareOf(box).cast<float>());
   // A box that was too small made the field paint what lies outside on the box's walls. That must be able to go.
-  trainer_.Loosen(static_cast<float>(1 - std::min(0.75, 3 * unknown_share)));
+  // Only so far over all boxes together: output weights that outgrow their features make training diverge.
+  const double looseness = std::max(kLeastFeatureShare, loosened_ * (1 - 3 * unknown_share));
+  trainer_.Loosen(static_cast<float>(looseness / loosened_));
+  loosened_ = looseness;
   plan_.OnNewBox(steps(), unknown_share);
   box_ = box;
   return true;
@@ -152,6 +156,7 @@ void ObjectField::Restart() {
   trainer_ = nerf::FieldTrainer(config_, nerf::RandomBits(seed_, 5, restarts_));
   occupancy_.Reset();
   plan_.Restart();
+  loosened_ = 1;
   loss_ = 0;
 }
 

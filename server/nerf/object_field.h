@@ -72,6 +72,7 @@ class ObjectField {
   uint64_t seed_;
   uint64_t restarts_ = 0;
   int divergences_ = 0;  // since the last new view or box
+  double loosened_ = 1;  // how far the features were shrunk for new boxes since training began
   // The field lives in the world as it was when the object was first told of, whatever corrections follow: box, views
   // and hull below never move. What comes in is taken back to that world, what goes out is brought to the present one.
   Sim3<World, World> S_new_first_;
