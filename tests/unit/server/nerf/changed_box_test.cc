@@ -154,6 +154,23 @@ TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
   for (size_t i = 0; i < raw_a.size(); ++i) EXPECT_NEAR(raw_a[i], raw_b[i], 0.05) << i;
 }
 
+// A thing that is seen from more and more sides gets many boxes; its field must outlive them all.
+TEST(ChangedBoxSpaceTest, ManyBoxesOneAfterAnotherDoNotWearTheFieldOut) {
+  const BallScene scene;
+  const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
+  ObjectField right = MakeField(scene, scene.Box());
+  right.Train(whole, 1);
+  ObjectField field = MakeField(scene, Change{"", {0.8, 1, 1}}.Apply(scene.Box()));
+  for (int i = 0; i < 14; ++i) {
+    field.Train(10, 1);
+    const Change change{"", i % 2 == 0 ? Eigen::Vector3d(0.75, 1.2, 1) : Eigen::Vector3d(1.2, 0.75, 1)};
+    ASSERT_TRUE(field.SetBox(change.Apply(scene.Box())).ok());
+  }
+  ASSERT_TRUE(field.SetBox(scene.Box()).ok());
+  field.Train(static_cast<int>(field.AllowedSteps(true) - field.steps()), 1);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.5 * BallSurfaceError(scene, right.Snapshot()) + 0.02);
+}
+
 TEST(ChangedBoxSpaceTest, IsDeterministic) {
   const BallScene scene;
   const auto train = [&](int threads) {
