@@ -186,8 +186,9 @@ TEST(CorrectedMapTest, MeshesMadeWhileTheMapIsCorrectedEndUpInTheirCuboids) {
   Client client;
   client.Read(*stages.outbox);
   ASSERT_THAT(client.meshes, SizeIs(2));
+  // The told cuboid is tight; the field learns in a larger box, and its mesh may stand out a little.
   for (const auto& [id, object] : client.objects) {
-    EXPECT_GT(ContainedShare(object.cuboid, client.VerticesInWorld(id), 1.15), 0.95) << id;
+    EXPECT_GT(ContainedShare(object.cuboid, client.VerticesInWorld(id), 1.35), 0.95) << id;
   }
 }
 
