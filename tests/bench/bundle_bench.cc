@@ -6,23 +6,17 @@
 // and after.
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
+#include "tests/bench/user_seconds.h"
 #include "tests/unit/server/slam/optimise/bundle_world.h"
 
 namespace romap {
 namespace {
-
-double UserSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
 
 void Measure(const std::string& name, const BundleWorldOptions& world_options, const BundleOptions& options,
              int repeats) {

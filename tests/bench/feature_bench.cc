@@ -7,8 +7,6 @@
 // known are correct, the share of the features that should be seen again and are matched correctly (recall), and how
 // evenly correct matches lie (cells of 40 x 40 pixels that hold one). Every N-th frame is the first of a pair.
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,6 +27,7 @@
 #include "client/files/sequence.h"
 #include "common/config.h"
 #include "server/slam/features/feature_extractor.h"
+#include "tests/bench/user_seconds.h"
 
 namespace romap {
 namespace {
@@ -36,12 +35,6 @@ namespace {
 constexpr std::array<size_t, 4> kGaps{1, 5, 10, 20};
 constexpr double kCorrect_px = 4;  // true depth and pose are good to a pixel or two
 constexpr int kCell_px = 40;
-
-double UserSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
 
 cv::Mat Decode(const std::string& bytes, int flags) {
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));

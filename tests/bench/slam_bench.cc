@@ -5,8 +5,6 @@
 // Prints keyframes, points, points by the label that most of their observations carry, user time per stage, and, where
 // the sequence has depth, the relative depth error of every observation of a point by its final position.
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -20,15 +18,10 @@
 #include "common/config.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
+#include "tests/bench/user_seconds.h"
 
 namespace romap {
 namespace {
-
-double UserSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
 
 cv::Mat Decode(const std::string& bytes, int flags) {
   if (bytes.empty()) return {};

@@ -6,11 +6,8 @@
 // error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2 degrees about x and
 // about y, and for runs of the first, second, ... few views; and the yaw of the principal axis of its map points.
 
-#include <sys/resource.h>
-
 #include <cstdio>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,35 +19,13 @@
 #include "server/objects/lines/line_segments.h"
 #include "server/objects/lines/yaw_from_lines.h"
 #include "server/objects/pca_yaw.h"
+#include "server/session/ingest.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
+#include "tests/bench/user_seconds.h"
 
 namespace romap {
 namespace {
-
-double UserSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
-
-cv::Mat Decode(const std::string& bytes, int flags) {
-  if (bytes.empty()) return {};
-  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-  return cv::imdecode(raw, flags);
-}
-
-std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraModel& camera) {
-  auto frame = std::make_shared<Frame>();
-  frame->frame_id = input.frame_id;
-  frame->timestamp_ns = input.timestamp_ns;
-  frame->camera = camera;
-  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
-  frame->has_masks = !input.label_png.empty();
-  if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
-  frame->T_world_camera = input.T_world_camera;
-  return frame;
-}
 
 // What was seen of one object.
 struct Seen {
@@ -99,10 +74,12 @@ absl::StatusOr<Run> LookAtSequence(const Sequence& sequence) {
   LocalMapSlot local_map;
   Tracker tracker(slam, PoseUse::kGiven, &local_map);
   SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
+  Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
-    const MappedFrame mapped = sparse.Process(tracker.Track(DecodeFrame(input, sequence.camera())));
+    ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest.Accept(input));
+    const MappedFrame mapped = sparse.Process(tracker.Track(frame));
     if (mapped.view) Look(*mapped.view, objects, run);
   }
   return run;
