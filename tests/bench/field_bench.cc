@@ -10,9 +10,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <map>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
@@ -21,6 +18,7 @@
 #include "common/config.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
+#include "tests/bench/true_views.h"
 
 namespace romap {
 namespace {
@@ -43,72 +41,6 @@ struct Options {
   NerfConfig nerf;
   MeshConfig mesh;
 };
-
-struct DecodedFrame {
-  KeyframeId id;
-  CameraModel camera;
-  SE3<World, Camera> T_world_camera;
-  cv::Mat image_bgr, labels, depth_mu;
-};
-
-cv::Mat Decode(const std::string& bytes, int flags) {
-  return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())), flags);
-}
-
-absl::StatusOr<std::vector<DecodedFrame>> LoadFrames(const Sequence& sequence, const Options& options) {
-  std::vector<DecodedFrame> frames;
-  for (size_t i = static_cast<size_t>(options.offset); i < sequence.size(); i += static_cast<size_t>(options.every)) {
-    if (!sequence.has_mask(i)) continue;
-    ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
-    if (!input.T_world_camera) continue;
-    DecodedFrame frame{KeyframeId{i + 1},
-                       sequence.camera(),
-                       *input.T_world_camera,
-                       Decode(input.image, cv::IMREAD_COLOR),
-                       Decode(input.label_png, cv::IMREAD_UNCHANGED),
-                       {}};
-    frame.labels.convertTo(frame.labels, CV_16U);
-    if (options.depth && !input.depth.empty()) {
-      Decode(input.depth, cv::IMREAD_UNCHANGED).convertTo(frame.depth_mu, CV_32F, input.depth_scale_mu);
-    }
-    frames.push_back(std::move(frame));
-  }
-  return frames;
-}
-
-// The crop around the projected cuboid, half as large again, and the mask.
-cv::Rect Crop(const DecodedFrame& frame, const ObjectRecord& object, const cv::Mat& is_object) {
-  const SE3<Camera, Object> T_camera_object = frame.T_world_camera.Inverse() * object.T_world_object;
-  std::vector<cv::Point2f> corners;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-    const Eigen::Vector3d p = T_camera_object * (1.5 * sign.cwiseProduct(object.half_extents));
-    if (p.z() <= 0) return {};
-    const Eigen::Vector2d pixel = frame.camera.Project(p);
-    corners.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-  }
-  const cv::Rect image(0, 0, frame.camera.width_px, frame.camera.height_px);
-  return (cv::boundingRect(corners) | cv::boundingRect(is_object)) & image;
-}
-
-std::optional<ObjectView> MakeView(const DecodedFrame& frame, const ObjectRecord& object) {
-  const cv::Mat is_object = frame.labels == static_cast<int>(object.id);
-  if (cv::countNonZero(is_object) < 100) return std::nullopt;
-  const cv::Rect roi = Crop(frame, object, is_object);
-  if (roi.empty()) return std::nullopt;
-  ObjectView view;
-  view.object = ObjectId{static_cast<uint64_t>(object.id)};
-  view.keyframe = frame.id;
-  view.camera = frame.camera;
-  view.T_world_camera = frame.T_world_camera;
-  view.roi_px = roi;
-  view.color_bgr = frame.image_bgr(roi).clone();
-  view.ray_kind = cv::Mat(roi.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kOccluder)));
-  view.ray_kind.setTo(static_cast<int>(RayKind::kObject), is_object(roi));
-  view.ray_kind.setTo(static_cast<int>(RayKind::kBackground), frame.labels(roi) == 0);
-  if (!frame.depth_mu.empty()) view.depth_mu = frame.depth_mu(roi).clone();
-  return view;
-}
 
 absl::Status WriteMesh(const FieldSnapshot& snapshot, const ObjectRecord& object, const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ExtractMesh(snapshot, options.mesh));
@@ -138,14 +70,14 @@ Cuboid FirstBox(const ObjectRecord& object, const Options& options) {
   return {object.T_world_object * T_object_first, half, 1.0};
 }
 
-absl::Status BenchObject(const std::vector<DecodedFrame>& frames, ObjectRecord object, const Options& options) {
+absl::Status BenchObject(const std::vector<TrueFrame>& frames, ObjectRecord object, const Options& options) {
   object.half_extents *= 1.0 + options.loosen;
   ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
   const Cuboid right{object.T_world_object, object.half_extents, 1.0};
   ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : right));
   const auto start = std::chrono::steady_clock::now();
-  for (const DecodedFrame& frame : frames) {
-    std::optional<ObjectView> view = MakeView(frame, object);
+  for (const TrueFrame& frame : frames) {
+    std::optional<ObjectView> view = MakeTrueView(frame, object);
     if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
   }
   if (field.views() == 0) return absl::OkStatus();
@@ -167,7 +99,7 @@ absl::Status Run(const Options& options) {
   SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
   ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, sequence_options));
   if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence);
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<DecodedFrame> frames, LoadFrames(sequence, options));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TrueFrame> frames, LoadTrueFrames(sequence, options.offset, options.every));
   std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
               "Msam/s", "active", "loss");
   for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);

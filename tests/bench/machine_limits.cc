@@ -1,0 +1,169 @@
+#include "tests/bench/machine_limits.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#define HWY_DISABLED_TARGETS HWY_SSSE3
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tests/bench/machine_limits.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace romap::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Returns the number of floating-point operations done. `sink` keeps the compiler from leaving them out.
+double MultiplyAdds(int rounds, float* sink) {
+  const hn::CappedTag<float, 16> d;
+  using V = hn::VFromD<decltype(d)>;
+  constexpr int kChains = 12;  // enough to hide the latency, few enough for the registers of every instruction set
+  const V factor = hn::Set(d, 0.999f), summand = hn::Set(d, 0.001f);
+  V v0 = summand, v1 = v0, v2 = v0, v3 = v0, v4 = v0, v5 = v0, v6 = v0, v7 = v0, v8 = v0, v9 = v0, v10 = v0, v11 = v0;
+  for (int i = 0; i < rounds; ++i) {
+    v0 = hn::MulAdd(v0, factor, summand);
+    v1 = hn::MulAdd(v1, factor, summand);
+    v2 = hn::MulAdd(v2, factor, summand);
+    v3 = hn::MulAdd(v3, factor, summand);
+    v4 = hn::MulAdd(v4, factor, summand);
+    v5 = hn::MulAdd(v5, factor, summand);
+    v6 = hn::MulAdd(v6, factor, summand);
+    v7 = hn::MulAdd(v7, factor, summand);
+    v8 = hn::MulAdd(v8, factor, summand);
+    v9 = hn::MulAdd(v9, factor, summand);
+    v10 = hn::MulAdd(v10, factor, summand);
+    v11 = hn::MulAdd(v11, factor, summand);
+  }
+  const V sum = v0 + v1 + v2 + v3 + v4 + v5 + v6 + v7 + v8 + v9 + v10 + v11;
+  *sink = hn::GetLane(sum);
+  return 2.0 * kChains * static_cast<double>(hn::Lanes(d)) * rounds;
+}
+
+// Sum of the four floats at each of `count` (a multiple of 4) places.
+float LoadAt(const float* table, const uint32_t* places, size_t count) {
+  const hn::CappedTag<float, 4> d;
+  auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;  // so that no addition waits for another
+  for (size_t i = 0; i < count; i += 4) {
+    s0 = s0 + hn::LoadU(d, table + places[i]);
+    s1 = s1 + hn::LoadU(d, table + places[i + 1]);
+    s2 = s2 + hn::LoadU(d, table + places[i + 2]);
+    s3 = s3 + hn::LoadU(d, table + places[i + 3]);
+  }
+  return hn::GetLane(s0 + s1 + s2 + s3);
+}
+
+void UpdateAt(float* table, const uint32_t* places, size_t count) {
+  const hn::CappedTag<float, 4> d;
+  const auto summand = hn::Set(d, 1e-9f);
+  for (size_t i = 0; i < count; ++i) {
+    float* at = table + places[i];
+    hn::StoreU(hn::LoadU(d, at) + summand, d, at);
+  }
+}
+
+void UpdateAll(float* array, size_t count) {
+  const hn::CappedTag<float, 16> d;
+  const auto summand = hn::Set(d, 1e-9f);
+  for (size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::LoadU(d, array + i) + summand, d, array + i);
+}
+
+}  // namespace romap::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace romap {
+
+HWY_EXPORT(MultiplyAdds);
+HWY_EXPORT(LoadAt);
+HWY_EXPORT(UpdateAt);
+HWY_EXPORT(UpdateAll);
+
+namespace {
+
+constexpr int kRepeats = 12;
+constexpr size_t kFloatsPerAccess = 4;  // 16 bytes
+constexpr size_t kMostLanes = 16;
+
+volatile float g_sink;
+
+double Now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Shortest time of several calls: what the machine can do when nobody disturbs it.
+template <class Work>
+double ShortestSeconds(const Work& work) {
+  double best_s = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kRepeats; ++i) {
+    const double start_s = Now_s();
+    work();
+    best_s = std::min(best_s, Now_s() - start_s);
+  }
+  return best_s;
+}
+
+// Calls access(places) for batches of random places in a table, the places in the first-level cache, and returns the
+// time of one access.
+template <class Access>
+double RandomAccessSeconds(size_t table_bytes, const Access& access) {
+  const size_t pairs = table_bytes / 8;  // accesses start at every second float, as those of the hash grid do
+  constexpr size_t kBatch = 2048;
+  constexpr int kBatches = 64;
+  std::vector<float> table(2 * pairs + kFloatsPerAccess);
+  std::vector<uint32_t> places(kBatch);
+  uint64_t state = 88172645463325252ull;
+  double best_s = std::numeric_limits<double>::infinity();
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    double spent_s = 0;
+    for (int batch = 0; batch < kBatches; ++batch) {
+      for (uint32_t& place : places) {
+        state = state * 6364136223846793005ull + 1442695040888963407ull;
+        place = static_cast<uint32_t>(2 * ((state >> 32) * pairs >> 32));
+      }
+      const double start_s = Now_s();
+      access(table.data(), places);
+      spent_s += Now_s() - start_s;
+    }
+    best_s = std::min(best_s, spent_s / (kBatch * kBatches));
+  }
+  return best_s;
+}
+
+}  // namespace
+
+double PeakFlopPerSecond() {
+  constexpr int kRounds = 1 << 18;
+  double operations = 0;
+  const double seconds = ShortestSeconds([&] {
+    float sink;
+    operations = HWY_DYNAMIC_DISPATCH(MultiplyAdds)(kRounds, &sink);
+    g_sink = sink;
+  });
+  return operations / seconds;
+}
+
+double RandomLoadSeconds(size_t table_bytes) {
+  return RandomAccessSeconds(table_bytes, [](const float* table, const std::vector<uint32_t>& places) {
+    g_sink = HWY_DYNAMIC_DISPATCH(LoadAt)(table, places.data(), places.size());
+  });
+}
+
+double RandomUpdateSeconds(size_t table_bytes) {
+  return RandomAccessSeconds(table_bytes, [](float* table, const std::vector<uint32_t>& places) {
+    HWY_DYNAMIC_DISPATCH(UpdateAt)(table, places.data(), places.size());
+  });
+}
+
+double StreamBytesPerSecond(size_t array_bytes) {
+  std::vector<float> array(array_bytes / sizeof(float) / kMostLanes * kMostLanes);
+  constexpr int kPasses = 8;
+  const double seconds = ShortestSeconds([&] {
+    for (int pass = 0; pass < kPasses; ++pass) HWY_DYNAMIC_DISPATCH(UpdateAll)(array.data(), array.size());
+  });
+  return 2.0 * kPasses * static_cast<double>(array_bytes) / seconds;
+}
+
+}  // namespace romap
+#endif
