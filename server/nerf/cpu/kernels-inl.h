@@ -111,57 +111,30 @@ void ToGrid(const GridPose& pose, int count, float* x, float* y, float* z) {
   }
 }
 
-// Cells of one point on Lane<Narrow>::kLanes levels from `level` on, in memory so that single lanes can be read.
-template <class Narrow>
-struct StoredCells {
-  static constexpr int kLanes = Lane<Narrow>::kLanes;
-  alignas(64) uint32_t pair[4 * kLanes];
-  alignas(64) float weight[4 * kLanes];
-  alignas(64) float along_x[kLanes];
+// One level after the other, as the formulas have it. Vector targets have their own form in vector_encode-inl.h.
 
-  StoredCells(const GridLayout& layout, int level, float x, float y, float z) {
-    using L = Lane<Narrow>;
-    const GridCell<Narrow> cell = LocateCell(L::Set(x), L::Set(y), L::Set(z), L::Load(layout.scale + level),
-                                             L::LoadInt(layout.stride_y + level), L::LoadInt(layout.stride_z + level),
-                                             L::LoadInt(layout.mask + level), L::LoadInt(layout.offset + level));
-    for (int c = 0; c < 4; ++c) {
-      L::StoreInt(cell.pair[c], pair + c * kLanes);
-      L::Store(cell.weight[c], weight + c * kLanes);
-    }
-    L::Store(cell.along_x, along_x);
-  }
-};
+inline GridCell<float> LocateOnLevel(const GridLayout& layout, int level, float x, float y, float z) {
+  return LocateCell(x, y, z, layout.scale[level], layout.stride_y[level], layout.stride_z[level], layout.mask[level],
+                    layout.offset[level]);
+}
 
-template <class Narrow, class Q>
-void Encode(const GridLayout& layout, const float* table, int count, const float* x, const float* y, const float* z,
-            float* features) {
-  using Cells = StoredCells<Narrow>;
-  const int used = kFeaturesPerLevel * layout.levels;
+inline void Encode(const GridLayout& layout, const float* table, int count, const float* x, const float* y,
+                   const float* z, float* features) {
   for (int i = 0; i < count; ++i, features += layout.features) {
-    for (int level = 0; level < layout.levels; level += Cells::kLanes) {
-      const Cells cells(layout, level, x[i], y[i], z[i]);
-      const int lanes = std::min(Cells::kLanes, layout.levels - level);
-      for (int k = 0; k < lanes; ++k) {
-        InterpolateCell<Q>(table, cells.pair + k, cells.weight + k, cells.along_x[k], Cells::kLanes,
-                           features + kFeaturesPerLevel * (level + k));
-      }
+    for (int level = 0; level < layout.levels; ++level) {
+      const GridCell<float> cell = LocateOnLevel(layout, level, x[i], y[i], z[i]);
+      InterpolateCell<Quad>(table, cell.pair, cell.weight, cell.along_x, 1, features + kFeaturesPerLevel * level);
     }
-    for (int f = used; f < layout.features; ++f) features[f] = 0.0f;
+    for (int f = kFeaturesPerLevel * layout.levels; f < layout.features; ++f) features[f] = 0.0f;
   }
 }
 
-template <class Narrow, class Q>
-void EncodeBackward(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
-                    const float* d_features, float* gradient) {
-  using Cells = StoredCells<Narrow>;
+inline void EncodeBackward(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
+                           const float* d_features, float* gradient) {
   for (int i = 0; i < count; ++i, d_features += layout.features) {
-    for (int level = 0; level < layout.levels; level += Cells::kLanes) {
-      const Cells cells(layout, level, x[i], y[i], z[i]);
-      const int lanes = std::min(Cells::kLanes, layout.levels - level);
-      for (int k = 0; k < lanes; ++k) {
-        ScatterCell<Q>(gradient, cells.pair + k, cells.weight + k, cells.along_x[k], Cells::kLanes,
-                       d_features + kFeaturesPerLevel * (level + k));
-      }
+    for (int level = 0; level < layout.levels; ++level) {
+      const GridCell<float> cell = LocateOnLevel(layout, level, x[i], y[i], z[i]);
+      ScatterCell<Quad>(gradient, cell.pair, cell.weight, cell.along_x, 1, d_features + kFeaturesPerLevel * level);
     }
   }
 }
@@ -271,14 +244,14 @@ void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, f
   }
 }
 
-// Wide: as many lanes as there are. Narrow: at most 8, for loops over levels. Four: the MLP's outputs.
-template <class Wide, class Narrow, class Four, class Q>
+// Wide: as many lanes as there are. Four: the MLP's outputs.
+template <class Wide, class Four>
 KernelTable MakeKernelTable(const char* name) {
   return {.name = name,
           .place_samples = PlaceSamples<Wide>,
           .to_grid = ToGrid<Wide>,
-          .encode = Encode<Narrow, Q>,
-          .encode_backward = EncodeBackward<Narrow, Q>,
+          .encode = Encode,
+          .encode_backward = EncodeBackward,
           .mlp_forward = MlpForward<Wide, Four>,
           .mlp_backward = MlpBackward<Wide>,
           .activate = Activate<Wide>,

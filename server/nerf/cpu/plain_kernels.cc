@@ -4,7 +4,7 @@
 namespace romap::nerf {
 
 const KernelTable& PlainKernels() {
-  static const KernelTable table = plain::MakeKernelTable<float, float, float, plain::Quad>("plain");
+  static const KernelTable table = plain::MakeKernelTable<float, float>("plain");
   return table;
 }
 

@@ -9,6 +9,7 @@
 
 #include "server/nerf/cpu/kernels-inl.h"
 #if HWY_TARGET != HWY_SCALAR
+#include "server/nerf/cpu/vector_encode-inl.h"
 #include "server/nerf/cpu/vector_lane-inl.h"
 #endif
 
@@ -17,12 +18,17 @@ namespace romap::nerf::HWY_NAMESPACE {
 
 const KernelTable& GetKernels() {
 #if HWY_TARGET == HWY_SCALAR
-  static const KernelTable table = MakeKernelTable<float, float, float, Quad>("SCALAR");
+  static const KernelTable table = MakeKernelTable<float, float>("SCALAR");
 #else
   using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes> >;
   using Narrow = hn::VFromD<hn::CappedTag<float, 8> >;
   using Four = hn::VFromD<hn::FixedTag<float, 4> >;
-  static const KernelTable table = MakeKernelTable<Wide, Narrow, Four, VectorQuad>(hwy::TargetName(HWY_TARGET));
+  static const KernelTable table = [] {
+    KernelTable made = MakeKernelTable<Wide, Four>(hwy::TargetName(HWY_TARGET));
+    made.encode = EncodeLevels<Narrow, Wide>;
+    made.encode_backward = EncodeLevelsBackward<Narrow, Wide>;
+    return made;
+  }();
 #endif
   return table;
 }

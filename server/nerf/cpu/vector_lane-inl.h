@@ -34,6 +34,10 @@ struct Lane {
   static HWY_INLINE void StoreInt(Int x, uint32_t* p) { hn::StoreU(x, DInt(), p); }
   static HWY_INLINE void Load4(const float* p, V& a, V& b, V& c, V& d) { hn::LoadInterleaved4(D(), p, a, b, c, d); }
   static HWY_INLINE V Exp(V x) { return hn::Exp(D(), x); }
+  static HWY_INLINE Int WholeToInt(V x) {
+    // 1.5 * 2^23 leaves no bits behind the point, and x in the lowest bits of the mantissa.
+    return hn::BitCast(DInt(), x + hn::Set(D(), 12582912.0f)) - SetInt(0x4b400000u);
+  }
   static HWY_INLINE Int Truncate(V x) { return hn::BitCast(DInt(), hn::ConvertTo(DSigned(), x)); }
   static HWY_INLINE V ToFloat(Int x) { return hn::ConvertTo(D(), hn::BitCast(DSigned(), x)); }
   static HWY_INLINE Int WordOfBit(Int bit) { return hn::ShiftRight<5>(bit); }
@@ -51,31 +55,6 @@ struct Lane {
   static HWY_INLINE bool AllZero(V x) { return hn::AllTrue(D(), hn::Eq(x, Zero())); }
   static HWY_INLINE V IfNonZero(V test, V yes, V no) { return hn::IfThenElse(hn::Ne(test, Zero()), yes, no); }
   static HWY_INLINE V IfPositive(V test, V yes) { return hn::IfThenElseZero(hn::Gt(test, Zero()), yes); }
-};
-
-struct VectorQuad {
-  using D = hn::FixedTag<float, 4>;
-  using V = hn::VFromD<D>;
-  V v;
-
-  static HWY_INLINE VectorQuad Load(const float* p) { return {hn::LoadU(D(), p)}; }
-  HWY_INLINE void Store(float* p) const { hn::StoreU(v, D(), p); }
-  static HWY_INLINE VectorQuad Twice(const float* p) {
-    const hn::FixedTag<float, 2> half;
-    const auto pair = hn::LoadU(half, p);
-    return {hn::Combine(D(), pair, pair)};
-  }
-  static HWY_INLINE VectorQuad Halves(float a, float b) {
-    return {hn::ConcatLowerLower(D(), hn::Set(D(), b), hn::Set(D(), a))};
-  }
-  HWY_INLINE VectorQuad Times(float s) const { return {v * hn::Set(D(), s)}; }
-  HWY_INLINE VectorQuad Times(const VectorQuad& o) const { return {v * o.v}; }
-  HWY_INLINE VectorQuad Plus(const VectorQuad& o, float s) const { return {hn::MulAdd(o.v, hn::Set(D(), s), v)}; }
-  HWY_INLINE void StoreBlend(float s, float* p) const {
-    const hn::FixedTag<float, 2> half;
-    const auto low = hn::LowerHalf(half, v), high = hn::UpperHalf(half, v);
-    hn::StoreU(hn::MulAdd(high - low, hn::Set(half, s), low), half, p);
-  }
 };
 
 ROMAP_MATH_END

@@ -34,7 +34,7 @@ ROMAP_HD GridCell<F> LocateCell(F x_unit, F y_unit, F z_unit, F scale, typename 
   const F half = Lane<F>::Set(0.5f), one = Lane<F>::Set(1.0f);
   const F px = MulAdd(x_unit, scale, half), py = MulAdd(y_unit, scale, half), pz = MulAdd(z_unit, scale, half);
   const F x0 = Floor(px), y0 = Floor(py), z0 = Floor(pz);
-  const auto ix = Lane<F>::Truncate(x0), iy = Lane<F>::Truncate(y0), iz = Lane<F>::Truncate(z0);
+  const auto ix = Lane<F>::WholeToInt(x0), iy = Lane<F>::WholeToInt(y0), iz = Lane<F>::WholeToInt(z0);
   const F fy = py - y0, fz = pz - z0;
   const F gy = one - fy, gz = one - fz;
   const auto base = ix + iy * stride_y + iz * stride_z;

@@ -47,6 +47,8 @@ struct Lane<float> {
     d = p[3];
   }
   static ROMAP_HD float Exp(float x) { return std::exp(x); }
+  // A whole number; |x| < 2^22. What is below 0 comes out modulo 2^32.
+  static ROMAP_HD Int WholeToInt(float x) { return static_cast<uint32_t>(static_cast<int32_t>(x)); }
   // Towards zero; |x| < 2^31. What is below 0 comes out modulo 2^32.
   static ROMAP_HD Int Truncate(float x) { return static_cast<uint32_t>(static_cast<int32_t>(x)); }
   static ROMAP_HD float ToFloat(Int x) { return static_cast<float>(x); }
