@@ -3,10 +3,12 @@
 #include <time.h>
 
 #include <algorithm>
+#include <atomic>
 #include <barrier>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <thread>
 #include <utility>
 
@@ -16,6 +18,11 @@ namespace romap::nerf {
 namespace {
 
 constexpr int kChunkSamples = 1024;  // activations of a chunk stay in the second-level cache
+
+constexpr size_t kOptimiserBlock = 8192;  // parameters that a thread takes at a time
+
+// Asking for the time of a thread is a call of the kernel: only one chunk in so many is timed by phase.
+constexpr int kTimedChunk = 8;
 
 double ThreadCpuSeconds() {
   timespec now;
@@ -48,11 +55,21 @@ struct FieldTrainer::Worker {
     visits.reserve(static_cast<size_t>(config.rays_per_step * config.max_samples_per_ray));
   }
 
-  // Books the time since the last call to `phase`.
+  // Books the CPU time since the last call to `phase`.
   void Book(TrainPhase phase) {
-    const double now = ThreadCpuSeconds();
-    stats.phase_cpu_s[static_cast<size_t>(phase)] += now - booked_until_s;
-    booked_until_s = now;
+    const double now_s = ThreadCpuSeconds();
+    phase_s[static_cast<size_t>(phase)] += now_s - booked_until_s;
+    booked_until_s = now_s;
+  }
+  void BookIfTimed(TrainPhase phase) {
+    if (timed) Book(phase);
+  }
+  // Divides the time that all chunks took among the phases as they shared the timed chunks.
+  void ShareRenderTime(double render_s) {
+    const double optimise_s = std::exchange(phase_s[static_cast<size_t>(TrainPhase::kOptimise)], 0);
+    const double timed_s = std::accumulate(phase_s.begin(), phase_s.end(), 0.0);
+    for (size_t p = 0; p < phase_s.size(); ++p) stats.phase_cpu_s[p] = phase_s[p] * render_s / std::max(1e-9, timed_s);
+    stats.phase_cpu_s[static_cast<size_t>(TrainPhase::kOptimise)] = optimise_s;
   }
 
   struct Visit {
@@ -67,7 +84,9 @@ struct FieldTrainer::Worker {
   std::vector<RaySpan> spans;
   std::vector<Visit> visits;  // of one step, for the occupancy
   AlignedBuffer<float> table_gradient, mlp_gradient;
+  bool timed = false;  // the chunk at work
   double booked_until_s = 0;
+  std::array<double, static_cast<size_t>(TrainPhase::kCount)> phase_s = {};  // of timed chunks; the optimiser's of all
   uint64_t object_rays = 0;
   TrainStats stats;
 };
@@ -75,6 +94,7 @@ struct FieldTrainer::Worker {
 struct FieldTrainer::StepShare {
   std::barrier<> barrier;
   int threads;
+  std::atomic<uint64_t> blocks_taken = 0;  // of the hash table, by the optimiser, over all steps; see OptimiseTable
 };
 
 FieldTrainer::FieldTrainer(const NerfConfig& config, uint64_t seed, const KernelTable& kernels)
@@ -104,7 +124,7 @@ void FieldTrainer::ReleaseScratch() { workers_.clear(); }
 TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) {
   const auto start = std::chrono::steady_clock::now();
   while (static_cast<int>(workers_.size()) < threads) workers_.push_back(std::make_unique<Worker>(config_, model_));
-  StepShare share{std::barrier<>(threads), threads};
+  StepShare share{.barrier = std::barrier<>(threads), .threads = threads};
   for (int t = 0; t < threads; ++t) {
     workers_[static_cast<size_t>(t)]->stats = {};
     workers_[static_cast<size_t>(t)]->object_rays = 0;
@@ -136,19 +156,32 @@ TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int
 
 void FieldTrainer::RunSteps(const StepSource& source, Occupancy& occupancy, int steps, int thread, StepShare& share) {
   Worker& worker = *workers_[static_cast<size_t>(thread)];
-  worker.booked_until_s = ThreadCpuSeconds();
+  worker.phase_s = {};
+  double render_s = 0;
   for (int i = 0; i < steps; ++i) {
     const uint64_t step = steps_done_ + static_cast<uint64_t>(i);
+    const double start_s = ThreadCpuSeconds();
     worker.visits.clear();
     const int chunks = (config_.rays_per_step + worker.chunk_rays - 1) / worker.chunk_rays;
     for (int chunk = thread; chunk < chunks; chunk += share.threads) {
+      worker.timed = (i + chunk / share.threads) % kTimedChunk == 0;
+      if (worker.timed) worker.booked_until_s = ThreadCpuSeconds();
       RenderChunk(source, occupancy, step, chunk * worker.chunk_rays, worker);
     }
+    worker.booked_until_s = ThreadCpuSeconds();
+    render_s += worker.booked_until_s - start_s;
     share.barrier.arrive_and_wait();
-    Optimise(source, occupancy, step, thread, share.threads);
+    const AdamRates rates{source.learning_rate(step), static_cast<float>(config_.adam_beta1),
+                          static_cast<float>(config_.adam_beta2)};
+    if (thread == 0) {
+      OptimiseMlp(rates, share.threads);
+      UpdateOccupancy(occupancy, step, share.threads);
+    }
+    OptimiseTable(rates, i, share);
     share.barrier.arrive_and_wait();
     worker.Book(TrainPhase::kOptimise);
   }
+  worker.ShareRenderTime(render_s);
 }
 
 void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray,
@@ -165,22 +198,22 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
   chunk.size = 0;
   kernels_->place_samples(worker.rays.data(), worker.ray_count, rule, chunk, worker.spans.data());
   kernels_->to_grid(source.grid, chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data());
-  worker.Book(TrainPhase::kSampling);
+  worker.BookIfTimed(TrainPhase::kSampling);
   kernels_->encode(model_.layout, model_.table.data(), chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                    chunk.features.data());
-  worker.Book(TrainPhase::kEncode);
+  worker.BookIfTimed(TrainPhase::kEncode);
   kernels_->mlp_forward(model_.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
-  worker.Book(TrainPhase::kMlp);
+  worker.BookIfTimed(TrainPhase::kMlp);
   kernels_->activate(chunk, model_.density_bias);
   CompositeRays(worker);
   const int active = CompactActive(worker);
-  worker.Book(TrainPhase::kRender);
+  worker.BookIfTimed(TrainPhase::kRender);
   kernels_->mlp_backward(model_.mlp, active, chunk.features.data(), chunk.hidden.data(), chunk.d_raw.data(),
                          worker.mlp_gradient.data());
-  worker.Book(TrainPhase::kMlpBackward);
+  worker.BookIfTimed(TrainPhase::kMlpBackward);
   kernels_->encode_backward(model_.layout, active, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                             chunk.features.data(), worker.table_gradient.data());
-  worker.Book(TrainPhase::kEncodeBackward);
+  worker.BookIfTimed(TrainPhase::kEncodeBackward);
   worker.stats.samples += static_cast<uint64_t>(chunk.size);
   worker.stats.active_samples += static_cast<uint64_t>(active);
 }
@@ -232,23 +265,15 @@ int FieldTrainer::CompactActive(Worker& worker) {
   return static_cast<int>(active);
 }
 
-void FieldTrainer::Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, int thread, int threads) {
-  constexpr int kMostThreads = 64;
-  float* gradients[kMostThreads];
-  const AdamRates rates{source.learning_rate(step), static_cast<float>(config_.adam_beta1),
-                        static_cast<float>(config_.adam_beta2)};
-  for (int t = 0; t < threads; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->table_gradient.data();
-  const auto border = [&](int t) {
-    const size_t all = model_.table.size();
-    return t == threads ? all : all * static_cast<size_t>(t) / static_cast<size_t>(threads) / kMaxLanes * kMaxLanes;
-  };
-  kernels_->adam(rates, border(thread), border(thread + 1), model_.table.data(), table_first_.data(),
-                 table_second_.data(), gradients, threads);
-  if (thread != 0) return;
+void FieldTrainer::OptimiseMlp(const AdamRates& rates, int threads) {
+  std::array<float*, kMostThreads> gradients;
   for (int t = 0; t < threads; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->mlp_gradient.data();
   kernels_->adam(rates, 0, model_.mlp.parameters.size(), model_.mlp.parameters.data(), mlp_first_.data(),
-                 mlp_second_.data(), gradients, threads);
+                 mlp_second_.data(), gradients.data(), threads);
   model_.mlp.UpdateTransposed();
+}
+
+void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads) {
   for (int t = 0; t < threads; ++t) {
     for (const auto& visit : workers_[static_cast<size_t>(t)]->visits) occupancy.Record(visit.cell, visit.weight);
   }
@@ -256,6 +281,24 @@ void FieldTrainer::Optimise(const StepSource& source, Occupancy& occupancy, uint
   if (done >= static_cast<uint64_t>(config_.occupancy_start_step) &&
       done % static_cast<uint64_t>(config_.occupancy_interval_steps) == 0) {
     occupancy.Update();
+  }
+}
+
+// Blocks go to whoever comes first: one thread has other things to do, and cores may be shared. What comes out does not
+// depend on who does it. `round`: steps since Run() began.
+void FieldTrainer::OptimiseTable(const AdamRates& rates, int round, StepShare& share) {
+  std::array<float*, kMostThreads> gradients;
+  for (int t = 0; t < share.threads; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->table_gradient.data();
+  const size_t size = model_.table.size();
+  const uint64_t blocks = (size + kOptimiserBlock - 1) / kOptimiserBlock;
+  // Each thread takes one block that is not there in each round, to learn that there are no more.
+  const uint64_t before = static_cast<uint64_t>(round) * (blocks + static_cast<uint64_t>(share.threads));
+  for (;;) {
+    const uint64_t block = share.blocks_taken.fetch_add(1, std::memory_order_relaxed) - before;
+    if (block >= blocks) return;
+    const size_t begin = block * kOptimiserBlock;
+    kernels_->adam(rates, begin, std::min(size, begin + kOptimiserBlock), model_.table.data(), table_first_.data(),
+                   table_second_.data(), gradients.data(), share.threads);
   }
 }
 

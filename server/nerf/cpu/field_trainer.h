@@ -31,7 +31,10 @@ class FieldTrainer {
   FieldTrainer(FieldTrainer&&) noexcept;
   FieldTrainer& operator=(FieldTrainer&&) noexcept;
 
-  // `steps` more steps on `threads` threads (the caller is one of them). Nothing is allocated within a step.
+  static constexpr int kMostThreads = 64;
+
+  // `steps` more steps on `threads` (1..kMostThreads) threads (the caller is one of them). Nothing is allocated within
+  // a step.
   TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads);
 
   // Makes a trained field ready to learn something else without changing what it shows: features shrink to `share`
@@ -55,7 +58,9 @@ class FieldTrainer {
   void RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray, Worker& worker);
   void CompositeRays(Worker& worker);
   int CompactActive(Worker& worker);
-  void Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, int thread, int threads);
+  void OptimiseMlp(const AdamRates& rates, int threads);
+  void UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads);
+  void OptimiseTable(const AdamRates& rates, int round, StepShare& share);
 
   NerfConfig config_;
   LossWeights loss_weights_;

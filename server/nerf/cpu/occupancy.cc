@@ -9,18 +9,17 @@ namespace romap::nerf {
 namespace {
 
 constexpr int kSide = kOccupancyResolution;
-constexpr size_t kRows = size_t{kSide} * kSide;
 static_assert(kSide == 64, "a row of cells must be one 64-bit word");
 
 // Joins each row with its two neighbours `stride` rows apart.
-std::vector<uint64_t> JoinNeighbours(const std::vector<uint64_t>& rows, size_t stride) {
-  std::vector<uint64_t> joined = rows;
-  for (size_t i = 0; i < kRows; ++i) {
+template <class Rows>
+void JoinNeighbours(const Rows& rows, size_t stride, Rows& joined) {
+  joined = rows;
+  for (size_t i = 0; i < rows.size(); ++i) {
     const size_t along = (i / stride) % kSide;
     if (along > 0) joined[i] |= rows[i - stride];
     if (along + 1 < kSide) joined[i] |= rows[i + stride];
   }
-  return joined;
 }
 
 }  // namespace
@@ -29,24 +28,29 @@ Occupancy::Occupancy(const NerfConfig& config)
     : decay_(static_cast<float>(config.occupancy_decay)),
       threshold_(static_cast<float>(config.occupancy_threshold)),
       hull_(kRows * kSide, 1),
-      score_(kRows * kSide),
+      hull_rows_(kRows, ~uint64_t{0}),
+      cells_(kRows * kSide),
       bits_(2 * kRows) {
   Reset();
 }
 
 void Occupancy::SetHull(std::vector<uint8_t> hull) {
   hull_ = std::move(hull);
+  for (size_t row = 0; row < kRows; ++row) {
+    hull_rows_[row] = 0;
+    for (size_t x = 0; x < kSide; ++x) hull_rows_[row] |= uint64_t{hull_[row * kSide + x] != 0} << x;
+  }
   Update();
 }
 
 void Occupancy::Reset() {
   layer_weight_ = {};
-  for (size_t i = 0; i < score_.size(); ++i) score_[i] = 1.0f;
+  for (size_t i = 0; i < cells_.size(); ++i) cells_[i] = {1.0f, 0.0f};
   Update();
 }
 
 void Occupancy::MoveTo(const Eigen::Affine3f& share_old_new) {
-  AlignedBuffer<float> moved(score_.size());
+  AlignedBuffer<CellState> moved(cells_.size());
   // Probes must not lie further apart than old cells, else they step over thin surfaces.
   const float spread = share_old_new.linear().cwiseAbs().rowwise().sum().maxCoeff();
   const int probes = std::clamp(static_cast<int>(std::ceil(spread)), 1, 4);
@@ -55,26 +59,48 @@ void Occupancy::MoveTo(const Eigen::Affine3f& share_old_new) {
   for (int z = 0; z < kSide * probes; ++z) {
     for (int y = 0; y < kSide * probes; ++y) {
       const Eigen::Vector3f row = origin + step.col(1) * static_cast<float>(y) + step.col(2) * static_cast<float>(z);
-      float* to = moved.data() + (static_cast<size_t>(z / probes) * kSide + static_cast<size_t>(y / probes)) * kSide;
+      CellState* to =
+          moved.data() + (static_cast<size_t>(z / probes) * kSide + static_cast<size_t>(y / probes)) * kSide;
       for (int x = 0; x < kSide * probes; ++x) {
         const Eigen::Vector3f at = row + step.col(0) * static_cast<float>(x);
         const bool inside = (at.array() >= 0).all() && (at.array() < kSide).all();
         const auto index = [&](const Eigen::Vector3i& cell) {
           return (cell.z() * kSide + cell.y()) * kSide + cell.x();
         };
-        const float score = inside ? score_[static_cast<size_t>(index(at.cast<int>()))] : 1.0f;
-        to[x / probes] = std::max(to[x / probes], score);
+        const float score = inside ? cells_[static_cast<size_t>(index(at.cast<int>()))].score : 1.0f;
+        to[x / probes].score = std::max(to[x / probes].score, score);
       }
     }
   }
-  score_ = std::move(moved);
+  cells_ = std::move(moved);
+  row_visited_ = {};
   layer_weight_ = {};
+}
+
+// Those that have faded, and those of the samples since.
+Occupancy::LayerWeights Occupancy::AllWeights() const {
+  LayerWeights all = layer_weight_;
+  std::array<float, kSide> by_x = {};
+  for (size_t row = 0; row < kRows; ++row) {
+    if (row_visited_[row] == 0) continue;
+    const CellState* cells = cells_.data() + row * kSide;
+    float sum = 0;
+    for (size_t x = 0; x < kSide; ++x) {
+      by_x[x] += cells[x].weight;
+      sum += cells[x].weight;
+    }
+    all[1][row % kSide] += sum;
+    all[2][row / kSide] += sum;
+  }
+  for (size_t x = 0; x < kSide; ++x) all[0][x] += by_x[x];
+  return all;
 }
 
 std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {
   std::array<int, 3> first, last;
+  const LayerWeights weights = AllWeights();
   for (size_t axis = 0; axis < 3; ++axis) {
-    const auto& weight = layer_weight_[axis];
+    const auto& weight = weights[axis];
     const double most_cut = share * std::accumulate(weight.begin(), weight.end(), 0.0);
     first[axis] = 0;
     last[axis] = kSide - 1;
@@ -97,21 +123,26 @@ std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {
 }
 
 void Occupancy::Update() {
+  layer_weight_ = AllWeights();
   for (auto& axis : layer_weight_) {
     for (double& weight : axis) weight *= 0.5;  // early steps end rays all over the hull
   }
-  std::vector<uint64_t> in_hull(kRows), live(kRows);
+  std::array<uint64_t, kRows> live = {}, joined_y, joined_z;
   for (size_t row = 0; row < kRows; ++row) {
-    for (int x = 0; x < kSide; ++x) {
-      const size_t cell = row * kSide + static_cast<size_t>(x);
-      in_hull[row] |= uint64_t{hull_[cell]} << x;
-      live[row] |= uint64_t{hull_[cell] != 0 && score_[cell] > threshold_} << x;
+    CellState* cells = cells_.data() + row * kSide;
+    if (row_visited_[row] != 0) {
+      for (size_t x = 0; x < kSide; ++x) cells[x].weight = 0;
     }
+    if (hull_rows_[row] == 0) continue;
+    for (size_t x = 0; x < kSide; ++x) live[row] |= uint64_t{cells[x].score > threshold_} << x;
+    live[row] &= hull_rows_[row];
     live[row] |= (live[row] << 1) | (live[row] >> 1);
   }
-  live = JoinNeighbours(JoinNeighbours(live, 1), kSide);
+  row_visited_ = {};
+  JoinNeighbours(live, 1, joined_y);
+  JoinNeighbours(joined_y, kSide, joined_z);
   for (size_t row = 0; row < kRows; ++row) {
-    const uint64_t occupied = live[row] & in_hull[row];
+    const uint64_t occupied = joined_z[row] & hull_rows_[row];
     bits_[2 * row] = static_cast<uint32_t>(occupied);
     bits_[2 * row + 1] = static_cast<uint32_t>(occupied >> 32);
   }

@@ -26,13 +26,13 @@ class Occupancy {
   void MoveTo(const Eigen::Affine3f& share_old_new);
   // A sample in `cell` got `weight`: the score becomes the larger of that and the decayed score.
   void Record(uint32_t cell, float weight) {
-    layer_weight_[0][cell % kOccupancyResolution] += weight;
-    layer_weight_[1][cell / kOccupancyResolution % kOccupancyResolution] += weight;
-    layer_weight_[2][cell / (kOccupancyResolution * kOccupancyResolution)] += weight;
-    const float decayed = score_[cell] * decay_;
-    score_[cell] = weight > decayed ? weight : decayed;
+    CellState& state = cells_[cell];
+    const float decayed = state.score * decay_;
+    state.score = weight > decayed ? weight : decayed;
+    state.weight += weight;
+    row_visited_[cell / kOccupancyResolution] = 1;
   }
-  // Occupied = in the hull, and within one cell of a hull cell whose score exceeds the threshold.
+  // Occupied = in the hull, and within one cell of a hull cell whose score exceeds the threshold. Allocates nothing.
   void Update();
 
   // The hull without the outermost layers along each axis in which rays have ended with less than `share` of all
@@ -44,12 +44,23 @@ class Occupancy {
   const std::vector<uint8_t>& hull() const { return hull_; }
 
  private:
+  static constexpr size_t kRows = size_t{kOccupancyResolution} * kOccupancyResolution;
+  using LayerWeights = std::array<std::array<double, kOccupancyResolution>, 3>;
+  struct CellState {
+    float score;
+    float weight;  // of all samples since the last Update
+  };
+
+  LayerWeights AllWeights() const;
+
   float decay_;
   float threshold_;
   std::vector<uint8_t> hull_;
-  AlignedBuffer<float> score_;
+  std::vector<uint64_t> hull_rows_;  // the hull, a bit per cell
+  AlignedBuffer<CellState> cells_;
+  std::array<uint8_t, kRows> row_visited_ = {};  // since the last Update
   AlignedBuffer<uint32_t> bits_;
-  std::array<std::array<double, kOccupancyResolution>, 3> layer_weight_ = {};  // fades from Update to Update
+  LayerWeights layer_weight_ = {};  // of the layers along x, y, z; fades from Update to Update
 };
 
 }  // namespace romap::nerf
