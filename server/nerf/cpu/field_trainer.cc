@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kChunkSamples = 1024;  // activations of a chunk stay in the second-level cache
 
+constexpr size_t kPrefetchVisits = 24;    // how far ahead cells of the occupancy are fetched
 constexpr size_t kOptimiserBlock = 8192;  // parameters that a thread takes at a time
 
 // Asking for the time of a thread is a call of the kernel: only one chunk in so many is timed by phase.
@@ -275,7 +276,11 @@ void FieldTrainer::OptimiseMlp(const AdamRates& rates, int threads) {
 
 void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads) {
   for (int t = 0; t < threads; ++t) {
-    for (const auto& visit : workers_[static_cast<size_t>(t)]->visits) occupancy.Record(visit.cell, visit.weight);
+    const std::vector<Worker::Visit>& visits = workers_[static_cast<size_t>(t)]->visits;
+    for (size_t i = 0; i < visits.size(); ++i) {
+      occupancy.Prefetch(visits[std::min(i + kPrefetchVisits, visits.size() - 1)].cell);
+      occupancy.Record(visits[i].cell, visits[i].weight);
+    }
   }
   const uint64_t done = step + 1;
   if (done >= static_cast<uint64_t>(config_.occupancy_start_step) &&

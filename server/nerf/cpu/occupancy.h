@@ -1,5 +1,7 @@
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
@@ -32,6 +34,8 @@ class Occupancy {
     state.weight += weight;
     row_visited_[cell / kOccupancyResolution] = 1;
   }
+  // A cell will be recorded soon.
+  void Prefetch(uint32_t cell) const { hwy::Prefetch(cells_.data() + cell); }
   // Occupied = in the hull, and within one cell of a hull cell whose score exceeds the threshold. Allocates nothing.
   void Update();
 
