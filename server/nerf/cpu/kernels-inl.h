@@ -1,7 +1,6 @@
 // The inner loops as templates over lane types: memory and loops here, formulas in math/. Included by plain_kernels.cc
 // with floats and by simd_kernels.cc once per instruction set with vectors.
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
 #include "server/nerf/cpu/kernels.h"
@@ -22,78 +21,89 @@ ROMAP_MATH_BEGIN
 
 // ----------------------------------------------------------------------------------------------------------- sampling
 
-// Bit i: the cell at probe i of the ray is occupied. Probes sit in the middle of kRayProbes equal pieces of the ray
-// between entry and exit, each at most 1.8 cells long.
+// A ray in cells of the occupancy grid.
 template <class Wide>
-uint64_t ProbeOccupancy(const Ray& ray, const SamplingRule& rule, float entry, float piece) {
-  using L = Lane<Wide>;
-  const Wide to_x = L::Set(kOccupancyResolution / rule.extent[0]);
-  const Wide to_y = L::Set(kOccupancyResolution / rule.extent[1]);
-  const Wide to_z = L::Set(kOccupancyResolution / rule.extent[2]);
-  uint64_t occupied = 0;
-  for (int i = 0; i < kRayProbes; i += L::kLanes) {
-    const Wide t = MulAdd(L::Iota() + L::Set(static_cast<float>(i) + 0.5f), L::Set(piece), L::Set(entry));
-    const auto cell =
-        CellIndex(MulAdd(L::Set(ray.direction[0]), t, L::Set(ray.origin[0])) * to_x,
-                  MulAdd(L::Set(ray.direction[1]), t, L::Set(ray.origin[1])) * to_y,
-                  MulAdd(L::Set(ray.direction[2]), t, L::Set(ray.origin[2])) * to_z, kOccupancyResolution);
-    occupied |= L::TestBits(L::Gather(rule.occupied_bits, L::WordOfBit(cell)), cell) << i;
-  }
-  return occupied;
-}
+struct RayInCells {
+  Wide origin[3], direction[3];
 
-// Spreads `count` samples evenly over the occupied pieces of a ray, as if these were one stretch: t[count].
-inline void SpreadSamples(uint64_t occupied, float entry, float piece, float jitter, int count, float* t) {
-  const float pieces_per_sample = static_cast<float>(std::popcount(occupied)) / static_cast<float>(count);
-  int passed = 0;  // occupied pieces before the first one left in `occupied`
-  for (int i = 0; i < count; ++i) {
-    const float at = (static_cast<float>(i) + jitter) * pieces_per_sample;
-    while (static_cast<float>(passed + 1) <= at && (occupied & (occupied - 1)) != 0) {
-      occupied &= occupied - 1;
-      ++passed;
+  RayInCells(const Ray& ray, const SamplingRule& rule) {
+    for (int a = 0; a < 3; ++a) {
+      const float cells_per_unit = kOccupancyResolution / rule.extent[a];
+      origin[a] = Lane<Wide>::Set(ray.origin[a] * cells_per_unit);
+      direction[a] = Lane<Wide>::Set(ray.direction[a] * cells_per_unit);
     }
-    t[i] = entry + piece * (static_cast<float>(std::countr_zero(occupied)) + at - static_cast<float>(passed));
   }
+  typename Lane<Wide>::Int CellAt(Wide t) const {
+    return CellIndex(MulAdd(direction[0], t, origin[0]), MulAdd(direction[1], t, origin[1]),
+                     MulAdd(direction[2], t, origin[2]), kOccupancyResolution);
+  }
+};
+
+// The occupied ones of the kRayProbes equal pieces, `piece` long, of a ray from `entry` on: their numbers, ascending,
+// in occupied[kRayProbes + kMaxLanes]; returns how many. A piece, which is at most 1.8 cells long, counts as occupied
+// when the cell in its middle is.
+template <class Wide>
+int FindOccupied(const RayInCells<Wide>& ray, const SamplingRule& rule, float entry, float piece, float* occupied) {
+  using L = Lane<Wide>;
+  int count = 0;
+  for (int i = 0; i < kRayProbes; i += L::kLanes) {
+    const Wide number = L::Iota() + L::Set(static_cast<float>(i));
+    if (rule.skip_empty) {
+      const auto cell = ray.CellAt(MulAdd(number + L::Set(0.5f), L::Set(piece), L::Set(entry)));
+      const auto word = L::Gather(rule.occupied_bits, L::WordOfBit(cell));
+      count += L::StoreWhereBit(number, word, cell, occupied + count);
+    } else {
+      L::Store(number, occupied + i);
+      count += L::kLanes;
+    }
+  }
+  return count;
 }
 
-// Fills in position and cell of samples [begin, end) whose t is set.
+// Spreads `count` samples evenly over the occupied pieces of a ray, as if these were one stretch.
 template <class Wide>
-void LocateSamples(const Ray& ray, const SamplingRule& rule, int begin, int end, float length, SampleChunk& chunk) {
+void SpreadSamples(const Ray& ray, const RayInCells<Wide>& in_cells, const SamplingRule& rule, float entry, float piece,
+                   const float* occupied, int occupied_count, int count, SampleChunk& chunk) {
   using L = Lane<Wide>;
-  for (int i = begin; i < end; i += L::kLanes) {
-    const Wide t = L::Load(chunk.t.data() + i);
-    const Wide x = MulAdd(L::Set(ray.direction[0]), t, L::Set(ray.origin[0]));
-    const Wide y = MulAdd(L::Set(ray.direction[1]), t, L::Set(ray.origin[1]));
-    const Wide z = MulAdd(L::Set(ray.direction[2]), t, L::Set(ray.origin[2]));
-    // Rounding may put a point a hair outside the box; the encoding wants it inside.
-    L::Store(Min(Max(x, L::Zero()), L::Set(rule.extent[0])), chunk.x.data() + i);
-    L::Store(Min(Max(y, L::Zero()), L::Set(rule.extent[1])), chunk.y.data() + i);
-    L::Store(Min(Max(z, L::Zero()), L::Set(rule.extent[2])), chunk.z.data() + i);
-    L::Store(L::Set(length), chunk.length.data() + i);
-    const auto cell =
-        CellIndex(x * L::Set(kOccupancyResolution / rule.extent[0]), y * L::Set(kOccupancyResolution / rule.extent[1]),
-                  z * L::Set(kOccupancyResolution / rule.extent[2]), kOccupancyResolution);
-    L::StoreInt(cell, chunk.cell.data() + i);
+  const float pieces_per_sample = static_cast<float>(occupied_count) / static_cast<float>(count);
+  const Wide last_piece = L::Set(static_cast<float>(occupied_count - 1));
+  for (int i = 0; i < count; i += L::kLanes) {
+    const int to = chunk.size + i;
+    const Wide number = L::Iota() + L::Set(static_cast<float>(i) + ray.jitter);
+    const Wide at = number * L::Set(pieces_per_sample);
+    const Wide passed = Min(Floor(at), last_piece);  // occupied pieces before the one that holds the sample
+    const Wide place = L::Gather(occupied, L::WholeToInt(passed)) + (at - passed);
+    const Wide t = MulAdd(place, L::Set(piece), L::Set(entry));
+    L::Store(t, chunk.t.data() + to);
+    L::Store(L::Set(piece * pieces_per_sample), chunk.length.data() + to);
+    L::StoreInt(in_cells.CellAt(t), chunk.cell.data() + to);
+    float* const position[3] = {chunk.x.data() + to, chunk.y.data() + to, chunk.z.data() + to};
+    for (int a = 0; a < 3; ++a) {
+      // Rounding may put a point a hair outside the box; the encoding wants it inside.
+      const Wide p = MulAdd(L::Set(ray.direction[a]), t, L::Set(ray.origin[a]));
+      L::Store(Min(Max(p, L::Zero()), L::Set(rule.extent[a])), position[a]);
+    }
   }
 }
 
 template <class Wide>
 void PlaceSamples(const Ray* rays, int ray_count, const SamplingRule& rule, SampleChunk& chunk, RaySpan* spans) {
+  float occupied[kRayProbes + kMaxLanes];
   for (int r = 0; r < ray_count; ++r) {
     const Ray& ray = rays[r];
     spans[r] = {chunk.size, 0};
     float entry, exit;
     if (!IntersectBox(ray.origin, ray.direction, rule.extent.data(), entry, exit)) continue;
     const float piece = (exit - entry) / kRayProbes;
-    const uint64_t occupied = rule.skip_empty ? ProbeOccupancy<Wide>(ray, rule, entry, piece) : ~uint64_t{0};
-    const float stretch = piece * static_cast<float>(std::popcount(occupied));
+    const RayInCells<Wide> in_cells(ray, rule);
+    const int occupied_count = FindOccupied(in_cells, rule, entry, piece, occupied);
+    const float stretch = piece * static_cast<float>(occupied_count);
     if (!(stretch > 1e-6f)) continue;
     const int wanted = static_cast<int>(stretch / rule.finest_step) + 1;
     const int count = rule.skip_empty ? std::clamp(wanted, rule.min_samples, rule.max_samples) : rule.max_samples;
-    SpreadSamples(occupied, entry, piece, ray.jitter, count, chunk.t.data() + chunk.size);
+    SpreadSamples(ray, in_cells, rule, entry, piece, occupied, occupied_count, count, chunk);
     spans[r].count = count;
     chunk.size += count;
-    LocateSamples<Wide>(ray, rule, spans[r].first, chunk.size, stretch / static_cast<float>(count), chunk);
   }
 }
 

@@ -38,19 +38,17 @@ struct Lane {
     // 1.5 * 2^23 leaves no bits behind the point, and x in the lowest bits of the mantissa.
     return hn::BitCast(DInt(), x + hn::Set(D(), 12582912.0f)) - SetInt(0x4b400000u);
   }
-  static HWY_INLINE Int Truncate(V x) { return hn::BitCast(DInt(), hn::ConvertTo(DSigned(), x)); }
-  static HWY_INLINE V ToFloat(Int x) { return hn::ConvertTo(D(), hn::BitCast(DSigned(), x)); }
   static HWY_INLINE Int WordOfBit(Int bit) { return hn::ShiftRight<5>(bit); }
   static HWY_INLINE Int Gather(const uint32_t* table, Int index) {
     return hn::GatherIndex(DInt(), table, hn::BitCast(DSigned(), index));
   }
-  static HWY_INLINE uint64_t TestBits(Int word, Int bit) {
-    const Int probe = hn::Shl(SetInt(1), bit & SetInt(31));
-    uint8_t packed[8] = {};
-    hn::StoreMaskBits(DInt(), hn::Ne(word & probe, SetInt(0)), packed);
-    uint64_t bits;
-    std::memcpy(&bits, packed, sizeof bits);
-    return bits;
+  static HWY_INLINE V Gather(const float* table, Int index) {
+    return hn::GatherIndex(D(), table, hn::BitCast(DSigned(), index));
+  }
+  static HWY_INLINE int StoreWhereBit(V x, Int word, Int bit, float* to) {
+    const auto chosen = hn::RebindMask(D(), hn::Ne(word & hn::Shl(SetInt(1), bit & SetInt(31)), SetInt(0)));
+    Store(hn::Compress(x, chosen), to);
+    return static_cast<int>(hn::CountTrue(D(), chosen));
   }
   static HWY_INLINE bool AllZero(V x) { return hn::AllTrue(D(), hn::Eq(x, Zero())); }
   static HWY_INLINE V IfNonZero(V test, V yes, V no) { return hn::IfThenElse(hn::Ne(test, Zero()), yes, no); }

@@ -49,14 +49,16 @@ struct Lane<float> {
   static ROMAP_HD float Exp(float x) { return std::exp(x); }
   // A whole number; |x| < 2^22. What is below 0 comes out modulo 2^32.
   static ROMAP_HD Int WholeToInt(float x) { return static_cast<uint32_t>(static_cast<int32_t>(x)); }
-  // Towards zero; |x| < 2^31. What is below 0 comes out modulo 2^32.
-  static ROMAP_HD Int Truncate(float x) { return static_cast<uint32_t>(static_cast<int32_t>(x)); }
-  static ROMAP_HD float ToFloat(Int x) { return static_cast<float>(x); }
   // Index of the 32-bit word that holds bit `bit` of a bit array.
   static ROMAP_HD Int WordOfBit(Int bit) { return bit >> 5; }
   static ROMAP_HD Int Gather(const uint32_t* table, Int index) { return table[index]; }
-  // Bit `bit & 31` of each lane's word, packed: bit i of the result belongs to lane i.
-  static ROMAP_HD uint64_t TestBits(Int word, Int bit) { return (word >> (bit & 31u)) & 1u; }
+  static ROMAP_HD float Gather(const float* table, Int index) { return table[index]; }
+  // Stores those of the lanes of `x` whose bit `bit & 31` is set in `word`, side by side, and returns how many they
+  // are. A whole vector may be written.
+  static ROMAP_HD int StoreWhereBit(float x, Int word, Int bit, float* to) {
+    *to = x;
+    return static_cast<int>((word >> (bit & 31u)) & 1u);
+  }
   static ROMAP_HD bool AllZero(float x) { return x == 0.0f; }
   // Lane by lane: test != 0 ? yes : no.
   static ROMAP_HD float IfNonZero(float test, float yes, float no) { return test != 0.0f ? yes : no; }

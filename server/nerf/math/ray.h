@@ -33,15 +33,15 @@ ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent,
   return exit > entry;
 }
 
-// Index of the cell of a `resolution`^3 grid that holds a point; the point is in cells and is clamped into the grid.
+// Index of the cell of a `resolution`^3 (at most 128^3) grid that holds a point; the point is in cells and is clamped into the grid.
 template <class F>
 ROMAP_HD typename Lane<F>::Int CellIndex(F x_cells, F y_cells, F z_cells, int resolution) {
   const F zero = Lane<F>::Zero(), last = Lane<F>::Set(static_cast<float>(resolution - 1));
-  const auto x = Lane<F>::Truncate(Min(Max(x_cells, zero), last));
-  const auto y = Lane<F>::Truncate(Min(Max(y_cells, zero), last));
-  const auto z = Lane<F>::Truncate(Min(Max(z_cells, zero), last));
-  const auto r = Lane<F>::SetInt(static_cast<uint32_t>(resolution));
-  return (z * r + y) * r + x;
+  const F x = Floor(Min(Max(x_cells, zero), last));
+  const F y = Floor(Min(Max(y_cells, zero), last));
+  const F z = Floor(Min(Max(z_cells, zero), last));
+  const F r = Lane<F>::Set(static_cast<float>(resolution));
+  return Lane<F>::WholeToInt(MulAdd(MulAdd(z, r, y), r, x));  // exact: all are whole and small
 }
 
 ROMAP_MATH_END
