@@ -195,13 +195,20 @@ void Outer(int samples, const float* a, int k_count, const float* b, int n, floa
 
 inline constexpr int kMlpBlock = 96;  // samples whose activations stay in the first-level cache
 
-template <class Wide, class Four>
+// The output layer as a product like any other.
+struct OutputByRows {
+  static void Run(const MlpWeights& mlp, int samples, const float* hidden, float* raw) {
+    Dense<float, DenseMode::kLinear>(samples, hidden, mlp.hidden, mlp.out_transposed.data(), kOutputs, raw);
+  }
+};
+
+template <class Wide, class Output>
 void MlpForward(const MlpWeights& mlp, int count, const float* features, float* hidden, float* raw) {
   for (int begin = 0; begin < count; begin += kMlpBlock) {
     const int n = std::min(kMlpBlock, count - begin);
     float* block = hidden + begin * mlp.hidden;
     Dense<Wide, DenseMode::kRelu>(n, features + begin * mlp.inputs, mlp.inputs, mlp.in_weights(), mlp.hidden, block);
-    Dense<Four, DenseMode::kLinear>(n, block, mlp.hidden, mlp.out_transposed.data(), kOutputs, raw + begin * kOutputs);
+    Output::Run(mlp, n, block, raw + begin * kOutputs);
   }
 }
 
@@ -254,15 +261,15 @@ void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, f
   }
 }
 
-// Wide: as many lanes as there are. Four: the MLP's outputs.
-template <class Wide, class Four>
+// Wide: as many lanes as there are. Output: of the MLP.
+template <class Wide, class Output>
 KernelTable MakeKernelTable(const char* name) {
   return {.name = name,
           .place_samples = PlaceSamples<Wide>,
           .to_grid = ToGrid<Wide>,
           .encode = Encode,
           .encode_backward = EncodeBackward,
-          .mlp_forward = MlpForward<Wide, Four>,
+          .mlp_forward = MlpForward<Wide, Output>,
           .mlp_backward = MlpBackward<Wide>,
           .activate = Activate<Wide>,
           .adam = Adam<Wide>};

@@ -4,7 +4,7 @@
 namespace romap::nerf {
 
 const KernelTable& PlainKernels() {
-  static const KernelTable table = plain::MakeKernelTable<float, float>("plain");
+  static const KernelTable table = plain::MakeKernelTable<float, plain::OutputByRows>("plain");
   return table;
 }
 

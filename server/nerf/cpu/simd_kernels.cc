@@ -11,6 +11,7 @@
 #if HWY_TARGET != HWY_SCALAR
 #include "server/nerf/cpu/vector_encode-inl.h"
 #include "server/nerf/cpu/vector_lane-inl.h"
+#include "server/nerf/cpu/vector_mlp-inl.h"
 #endif
 
 HWY_BEFORE_NAMESPACE();
@@ -18,13 +19,12 @@ namespace romap::nerf::HWY_NAMESPACE {
 
 const KernelTable& GetKernels() {
 #if HWY_TARGET == HWY_SCALAR
-  static const KernelTable table = MakeKernelTable<float, float>("SCALAR");
+  static const KernelTable table = MakeKernelTable<float, OutputByRows>("SCALAR");
 #else
   using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes> >;
   using Narrow = hn::VFromD<hn::CappedTag<float, 8> >;
-  using Four = hn::VFromD<hn::FixedTag<float, 4> >;
   static const KernelTable table = [] {
-    KernelTable made = MakeKernelTable<Wide, Four>(hwy::TargetName(HWY_TARGET));
+    KernelTable made = MakeKernelTable<Wide, OutputAcrossLanes>(hwy::TargetName(HWY_TARGET));
     made.encode = EncodeLevels<Narrow, Wide>;
     made.encode_backward = EncodeLevelsBackward<Narrow, Wide>;
     return made;
