@@ -8,6 +8,7 @@
 
 #include "common/map_motion.h"
 #include "common/status.h"
+#include "server/nerf/cpu/field_trainer.h"
 #include "server/nerf/field_sampler.h"
 #include "server/nerf/math/random.h"
 #include "server/nerf/view_check.h"
@@ -37,7 +38,7 @@ ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
       rays_(config_, seed),
       occupancy_(config_),
       plan_(config_),
-      trainer_(config_, seed) {}
+      trainer_(nerf::MakeTrainer(config_, seed)) {}
 
 absl::Status ObjectField::SetBox(const Cuboid& cuboid_new) {
   ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid_new));
@@ -65,7 +66,7 @@ bool ObjectField::CarryOverTo(const TrainingBox& box) {
   // A box that was too small made the field paint what lies outside on the box's walls. That must be able to go.
   // Only so far over all boxes together: output weights that outgrow their features make training diverge.
   const double looseness = std::max(kLeastFeatureShare, loosened_ * (1 - 3 * unknown_share));
-  trainer_.Loosen(static_cast<float>(looseness / loosened_));
+  trainer_->Loosen(static_cast<float>(looseness / loosened_));
   loosened_ = looseness;
   plan_.OnNewBox(steps(), unknown_share);
   box_ = box;
@@ -153,7 +154,7 @@ void ObjectField::PrepareViews() {
 
 void ObjectField::Restart() {
   ++restarts_;
-  trainer_ = nerf::FieldTrainer(config_, nerf::RandomBits(seed_, 5, restarts_));
+  trainer_ = nerf::MakeTrainer(config_, nerf::RandomBits(seed_, 5, restarts_));
   occupancy_.Reset();
   plan_.Restart();
   loosened_ = 1;
@@ -170,12 +171,12 @@ TrainStats ObjectField::Train(int steps, int threads) {
       .learning_rate = [this](uint64_t step) { return static_cast<float>(plan_.LearningRate(step)); },
       .extent = {extent.x(), extent.y(), extent.z()},
       .grid = box_.GridPose()};
-  TrainStats stats = trainer_.Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
+  TrainStats stats = trainer_->Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
   train_seconds_ += stats.wall_s;
   loss_ = stats.color_loss;
-  if (!trainer_.model().IsFinite()) {
+  if (!trainer_->model().IsFinite()) {
     spdlog::warn("{}: training diverged after {} steps with {} views; starting anew", id_.ToString(),
-                 trainer_.steps_done(), views());
+                 trainer_->steps_done(), views());
     ++divergences_;
     Restart();
     stats.restarted = true;
@@ -206,7 +207,7 @@ FieldSnapshot ObjectField::Snapshot() const {
     const Eigen::Vector3d center_object = T_object_world * view.T_world_camera.translation();
     snapshot.view_centers_object.push_back((S_new_first_.scale() * center_object).cast<float>());
   }
-  snapshot.field = std::make_shared<TrainedField>(trainer_.model().Clone(), box);
+  snapshot.field = std::make_shared<TrainedField>(trainer_->model().Clone(), box);
   return snapshot;
 }
 

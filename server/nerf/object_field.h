@@ -3,14 +3,15 @@
 #include <absl/status/status.h>
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/messages.h"
-#include "server/nerf/cpu/field_trainer.h"
 #include "server/nerf/cpu/occupancy.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/train_stats.h"
+#include "server/nerf/trainer.h"
 #include "server/nerf/training_box.h"
 #include "server/nerf/training_plan.h"
 #include "server/nerf/visual_hull.h"
@@ -50,11 +51,11 @@ class ObjectField {
   FieldSnapshot Snapshot() const;
 
   // Memory that only Train() needs is given back until the next call.
-  void ReleaseScratch() { trainer_.ReleaseScratch(); }
+  void ReleaseScratch() { trainer_->ReleaseScratch(); }
 
   ObjectId id() const { return id_; }
   int views() const { return static_cast<int>(views_.size()); }
-  uint64_t steps() const { return trainer_.steps_done(); }
+  uint64_t steps() const { return trainer_->steps_done(); }
   // Steps the training plan allows now; `complete`: no more views are expected. 0 once training has diverged again and
   // again with the views there are.
   uint64_t AllowedSteps(bool complete) const;
@@ -84,7 +85,7 @@ class ObjectField {
   RaySet rays_;
   nerf::Occupancy occupancy_;
   TrainingPlan plan_;
-  nerf::FieldTrainer trainer_;
+  std::unique_ptr<nerf::Trainer> trainer_;
   double train_seconds_ = 0;
   double loss_ = 0;
 };

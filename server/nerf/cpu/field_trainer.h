@@ -10,6 +10,7 @@
 #include "server/nerf/cpu/occupancy.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
+#include "server/nerf/trainer.h"
 
 namespace romap::nerf {
 
@@ -24,10 +25,10 @@ struct StepSource {
 // Optimises a FieldModel by stochastic gradient descent on rays: render chunks of rays, collect gradients per thread,
 // one Adam step. The work is divided by ray index and gradients are added in thread order, so the result depends on the
 // number of threads, but never on timing.
-class FieldTrainer {
+class FieldTrainer : public Trainer {
  public:
   FieldTrainer(const NerfConfig& config, uint64_t seed, const KernelTable& kernels = SimdKernels());
-  ~FieldTrainer();
+  ~FieldTrainer() override;
   FieldTrainer(FieldTrainer&&) noexcept;
   FieldTrainer& operator=(FieldTrainer&&) noexcept;
 
@@ -35,20 +36,20 @@ class FieldTrainer {
 
   // `steps` more steps on `threads` (1..kMostThreads) threads (the caller is one of them). Nothing is allocated within
   // a step.
-  TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads);
+  TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) override;
 
   // Makes a trained field ready to learn something else without changing what it shows: features shrink to `share`
   // (0..1] of what they are, and the weights that read them out grow to 1 / share. Hidden neurons are linear or zero,
   // so the outputs stay, but a step of Adam changes them so much more. Without this, features that grew large in the
   // first training hold on to their errors (the loss of plasticity of warm starts: J. Ash, R. Adams, "On Warm-Starting
   // Neural Network Training", 2020).
-  void Loosen(float share);
+  void Loosen(float share) override;
 
   // Gives back the memory that only Run() needs; the next Run() takes it again.
-  void ReleaseScratch();
+  void ReleaseScratch() override;
 
-  const FieldModel& model() const { return model_; }
-  uint64_t steps_done() const { return steps_done_; }
+  const FieldModel& model() const override { return model_; }
+  uint64_t steps_done() const override { return steps_done_; }
 
  private:
   struct Worker;
