@@ -18,6 +18,7 @@ namespace {
 namespace context = boost::context;
 
 constexpr size_t kStackBytes = 256 * 1024;
+constexpr size_t kSharedAlignment = 128;  // what kernels ask for by ROMAP_DYNAMIC_SHARED
 // Passes over a block in which threads only spun. A lock is free after a few; more is a lock that nobody opens.
 constexpr int kMaxSpinPasses = 100'000;
 
@@ -46,7 +47,7 @@ class BlockRunner {
       : grid_dim(grid),
         block_dim(block),
         thread_count(block.x * block.y * block.z),
-        dynamic_shared(dynamic_shared_bytes + 16),
+        dynamic_shared(dynamic_shared_bytes + kSharedAlignment),
         kernel_(kernel),
         threads_(thread_count),
         order_(thread_count) {}
@@ -250,7 +251,7 @@ LaneSlot& SlotOfLane(unsigned lane) { return Runner().CurrentWarp().slots[lane];
 
 void* DynamicShared() {
   const auto address = reinterpret_cast<uintptr_t>(Runner().dynamic_shared.data());
-  return reinterpret_cast<void*>((address + 15) / 16 * 16);
+  return reinterpret_cast<void*>((address + kSharedAlignment - 1) / kSharedAlignment * kSharedAlignment);
 }
 
 void YieldInSpin() {

@@ -44,7 +44,7 @@ const uint3& BlockIndex();
 const dim3& BlockDim();
 const dim3& GridDim();
 unsigned Lane();
-void* DynamicShared();  // 16-byte aligned, all NaN when the block starts
+void* DynamicShared();  // 128-byte aligned, all NaN when the block starts
 
 // Waits for all threads of the block; returns for how many of them `predicate` held. `line` tells barriers apart.
 unsigned BlockBarrier(int line, bool predicate);

@@ -15,8 +15,8 @@
 #define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...) \
   kernel<<<grid, block, dynamic_shared_bytes, stream>>>(__VA_ARGS__)
 // Declares `T* name`, the block's dynamic shared memory.
-#define ROMAP_DYNAMIC_SHARED(T, name)                                \
-  extern __shared__ __align__(16) unsigned char name##_shared_raw[]; \
+#define ROMAP_DYNAMIC_SHARED(T, name)                                 \
+  extern __shared__ __align__(128) unsigned char name##_shared_raw[]; \
   T* const name = reinterpret_cast<T*>(name##_shared_raw)
 
 #else
@@ -25,9 +25,8 @@
 #include "tests/support/cuda_on_host/runtime_api.h"
 #include "tests/support/cuda_on_host/wmma.h"
 
-#define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...)                          \
-  ((void)(stream), ::romap::cuda_on_host::Launch(reinterpret_cast<const void*>(&kernel), grid, block, \
-                                                 dynamic_shared_bytes, [&] { kernel(__VA_ARGS__); }))
+#define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...) \
+  ::romap::cuda_on_host::Launch(&kernel, grid, block, dynamic_shared_bytes, stream __VA_OPT__(, ) __VA_ARGS__)
 #define ROMAP_DYNAMIC_SHARED(T, name) T* const name = static_cast<T*>(::romap::cuda_on_host::DynamicShared())
 
 #endif

@@ -1,6 +1,5 @@
 #include "tests/support/cuda_on_host/runtime_api.h"
 
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <map>
@@ -8,11 +7,6 @@
 #include <utility>
 
 #include "tests/support/cuda_on_host/block_runner.h"
-
-struct CudaStreamOnHost {};
-struct CudaEventOnHost {
-  std::chrono::steady_clock::time_point at;
-};
 
 namespace romap::cuda_on_host {
 namespace {
@@ -25,6 +19,7 @@ struct Machine {
   std::mutex mutex;
   DeviceTraits traits;
   cudaError_t last_error = cudaSuccess;
+  bool lost = false;
   std::map<uintptr_t, size_t> allocations;  // address -> bytes
   size_t allocated_bytes = 0;
   std::map<const void*, size_t> shared_limits;  // of kernels that asked for more
@@ -49,10 +44,16 @@ bool IsAllocated(uintptr_t address, size_t bytes) {
   return address + bytes <= begin + size;
 }
 
+// The caller holds the mutex.
+cudaError_t CheckDevice() {
+  if (TheMachine().traits.devices == 0) return Fail(cudaErrorNoDevice);
+  return TheMachine().lost ? Fail(cudaErrorLaunchFailure) : cudaSuccess;
+}
+
 // As IsAllocated, for the addresses of the API.
 cudaError_t CheckDevice(const void* p, size_t bytes) {
   std::lock_guard lock(TheMachine().mutex);
-  if (TheMachine().traits.devices == 0) return Fail(cudaErrorNoDevice);
+  if (const cudaError_t error = CheckDevice()) return error;
   if (bytes > 0 && !IsAllocated(reinterpret_cast<uintptr_t>(p), bytes)) return Fail(cudaErrorInvalidValue);
   return cudaSuccess;
 }
@@ -70,25 +71,45 @@ bool FitsDevice(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared
 
 }  // namespace
 
-void Launch(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& body) {
+// Runs a kernel, unless it is the one that is to fail.
+cudaError_t RunKernel(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& body) {
   {
     std::lock_guard lock(TheMachine().mutex);
-    if (TheMachine().traits.devices == 0) {
-      Fail(cudaErrorNoDevice);
-      return;
+    if (const cudaError_t error = CheckDevice()) return error;
+    int& left = TheMachine().traits.kernels_before_fault;
+    if (left == 0) {
+      TheMachine().lost = true;
+      return Fail(cudaErrorLaunchFailure);
     }
+    if (left > 0) --left;
+  }
+  RunGrid(grid, block, dynamic_shared_bytes, body);
+  return cudaSuccess;
+}
+
+void LaunchBody(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared_bytes, cudaStream_t stream,
+                std::function<void()> body) {
+  {
+    std::lock_guard lock(TheMachine().mutex);
+    if (CheckDevice() != cudaSuccess) return;
     if (!FitsDevice(kernel, grid, block, dynamic_shared_bytes)) {
       Fail(cudaErrorInvalidConfiguration);
       return;
     }
   }
-  RunGrid(grid, block, dynamic_shared_bytes, body);
+  Enqueue(stream, [=, body = std::move(body)] { return RunKernel(grid, block, dynamic_shared_bytes, body); });
+}
+
+cudaError_t DeviceFault() {
+  std::lock_guard lock(TheMachine().mutex);
+  return TheMachine().lost ? cudaErrorLaunchFailure : cudaSuccess;
 }
 
 void SetDeviceTraits(const DeviceTraits& traits) {
   std::lock_guard lock(TheMachine().mutex);
   TheMachine().traits = traits;
   TheMachine().last_error = cudaSuccess;
+  TheMachine().lost = false;
 }
 
 size_t AllocatedBytes() {
@@ -121,6 +142,8 @@ const char* cudaGetErrorString(cudaError_t error) {
       return "no CUDA-capable device is detected";
     case cudaErrorLaunchFailure:
       return "unspecified launch failure";
+    case cudaErrorStreamCaptureUnsupported:
+      return "operation not permitted when stream is capturing";
   }
   return "unrecognized error code";
 }
@@ -146,12 +169,17 @@ cudaError_t cudaSetDevice(int device) {
   return device >= 0 && device < TheMachine().traits.devices ? cudaSuccess : Fail(cudaErrorInvalidValue);
 }
 
-cudaError_t cudaDeviceSynchronize() { return cudaPeekAtLastError(); }
+cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
+  std::lock_guard lock(TheMachine().mutex);
+  if (device < 0 || device >= TheMachine().traits.devices) return Fail(cudaErrorInvalidValue);
+  *properties = {.name = "this host", .major = 8, .minor = 0, .multiProcessorCount = 4};
+  return cudaSuccess;
+}
 
 cudaError_t cudaMalloc(void** p, size_t bytes) {
   std::lock_guard lock(TheMachine().mutex);
   *p = nullptr;
-  if (TheMachine().traits.devices == 0) return Fail(cudaErrorNoDevice);
+  if (const cudaError_t error = CheckDevice()) return error;
   if (bytes == 0) return cudaSuccess;
   if (TheMachine().allocated_bytes + bytes > TheMachine().traits.memory_bytes) return Fail(cudaErrorMemoryAllocation);
   constexpr size_t kAlignment = 256;
@@ -171,6 +199,22 @@ cudaError_t cudaFree(void* p) {
   TheMachine().allocated_bytes -= found->second;
   TheMachine().allocations.erase(found);
   std::free(p);
+  return CheckDevice();
+}
+
+cudaError_t cudaMallocHost(void** p, size_t bytes) {
+  std::lock_guard lock(TheMachine().mutex);
+  *p = nullptr;
+  if (const cudaError_t error = CheckDevice()) return error;
+  if (bytes == 0) return cudaSuccess;
+  *p = std::malloc(bytes);
+  if (*p == nullptr) return Fail(cudaErrorMemoryAllocation);
+  std::memset(*p, 0xff, bytes);
+  return cudaSuccess;
+}
+
+cudaError_t cudaFreeHost(void* p) {
+  std::free(p);
   return cudaSuccess;
 }
 
@@ -180,8 +224,6 @@ cudaError_t cudaMemset(void* p, int value, size_t bytes) {
   return cudaSuccess;
 }
 
-cudaError_t cudaMemsetAsync(void* p, int value, size_t bytes, cudaStream_t) { return cudaMemset(p, value, bytes); }
-
 cudaError_t cudaMemcpy(void* to, const void* from, size_t bytes, cudaMemcpyKind kind) {
   if (kind == cudaMemcpyHostToDevice || kind == cudaMemcpyDeviceToDevice) {
     if (const cudaError_t error = CheckDevice(to, bytes)) return error;
@@ -190,42 +232,6 @@ cudaError_t cudaMemcpy(void* to, const void* from, size_t bytes, cudaMemcpyKind 
     if (const cudaError_t error = CheckDevice(from, bytes)) return error;
   }
   if (bytes > 0) std::memmove(to, from, bytes);
-  return cudaSuccess;
-}
-
-cudaError_t cudaMemcpyAsync(void* to, const void* from, size_t bytes, cudaMemcpyKind kind, cudaStream_t) {
-  return cudaMemcpy(to, from, bytes, kind);
-}
-
-cudaError_t cudaStreamCreate(cudaStream_t* stream) {
-  *stream = new CudaStreamOnHost;
-  return cudaSuccess;
-}
-
-cudaError_t cudaStreamDestroy(cudaStream_t stream) {
-  delete stream;
-  return cudaSuccess;
-}
-
-cudaError_t cudaStreamSynchronize(cudaStream_t) { return cudaPeekAtLastError(); }
-
-cudaError_t cudaEventCreate(cudaEvent_t* event) {
-  *event = new CudaEventOnHost;
-  return cudaSuccess;
-}
-
-cudaError_t cudaEventDestroy(cudaEvent_t event) {
-  delete event;
-  return cudaSuccess;
-}
-
-cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t) {
-  event->at = std::chrono::steady_clock::now();
-  return cudaSuccess;
-}
-
-cudaError_t cudaEventElapsedTime(float* milliseconds, cudaEvent_t start, cudaEvent_t end) {
-  *milliseconds = std::chrono::duration<float, std::milli>(end->at - start->at).count();
   return cudaSuccess;
 }
 

@@ -62,6 +62,19 @@ void load_matrix_sync(fragment<Use, M, N, K, T, Layout>& f, const T* p, unsigned
 }
 
 template <int M, int N, int K, class T>
+void load_matrix_sync(fragment<accumulator, M, N, K, T>& f, const T* p, unsigned leading_dimension, layout_t layout) {
+  CheckAccess(p, leading_dimension);
+  __syncwarp();
+  const int lane = static_cast<int>(romap::cuda_on_host::Lane());
+  for (int i = 0; i < f.num_elements; ++i) {
+    const unsigned row = static_cast<unsigned>(f.Row(lane, i));
+    const unsigned col = static_cast<unsigned>(f.Col(lane, i));
+    f.x[i] = layout == mem_row_major ? p[row * leading_dimension + col] : p[col * leading_dimension + row];
+  }
+  __syncwarp();
+}
+
+template <int M, int N, int K, class T>
 void store_matrix_sync(T* p, const fragment<accumulator, M, N, K, T>& f, unsigned leading_dimension, layout_t layout) {
   CheckAccess(p, leading_dimension);
   __syncwarp();
