@@ -86,6 +86,10 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("adam_beta2", &c.adam_beta2, {.min = 0, .max = 0.9999, .help = "Adam's decay of the square"});
   fields.Add("gradient_cut", &c.gradient_cut,
              {.min = 0, .max = 1, .help = "Samples with a smaller gradient are left out of the backward pass"});
+  fields.Add(
+      "backend", &c.backend,
+      {.choices = {"auto", "cpu", "cuda"},
+       .help = "Where fields are trained; auto = on a CUDA device where there is one; without one always the CPU"});
   fields.Add("min_views", &c.min_views,
              {.unit = "views", .min = 1, .max = 100, .help = "Views before training starts"});
   fields.Add("first_budget_steps", &c.first_budget_steps,

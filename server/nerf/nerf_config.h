@@ -54,6 +54,9 @@ struct NerfConfig {
   double adam_beta2 = 0.95;
   double gradient_cut = 1e-5;
 
+  // Where training runs.
+  std::string backend = "auto";
+
   // Schedule of the training pool.
   int min_views = 3;
   int first_budget_steps = 60;

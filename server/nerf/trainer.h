@@ -32,7 +32,8 @@ class Trainer {
   virtual uint64_t steps_done() const = 0;
 };
 
-// A new field and its trainer. The same seed gives the same field on every back end.
+// A new field and its trainer on the back end that `config.backend` asks for. Where that is not there, or has failed in
+// this process, on the CPU; the log says once which it is. The same seed gives the same new field on every back end.
 std::unique_ptr<Trainer> MakeTrainer(const NerfConfig& config, uint64_t seed);
 
 }  // namespace romap::nerf

@@ -31,6 +31,8 @@ double ThreadCpuSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+}  // namespace
+
 LossWeights MakeLossWeights(const NerfConfig& config) {
   LossWeights w;
   w.opacity_object = static_cast<float>(config.opacity_weight_object);
@@ -41,8 +43,6 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
   w.random_background = config.random_background;
   return w;
 }
-
-}  // namespace
 
 // One thread's buffers.
 struct FieldTrainer::Worker {

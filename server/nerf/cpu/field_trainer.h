@@ -22,6 +22,8 @@ struct StepSource {
   GridPose grid = {};
 };
 
+LossWeights MakeLossWeights(const NerfConfig& config);
+
 // Optimises a FieldModel by stochastic gradient descent on rays: render chunks of rays, collect gradients per thread,
 // one Adam step. The work is divided by ray index and gradients are added in thread order, so the result depends on the
 // number of threads, but never on timing.
@@ -50,6 +52,14 @@ class FieldTrainer : public Trainer {
 
   const FieldModel& model() const override { return model_; }
   uint64_t steps_done() const override { return steps_done_; }
+
+  // What training changes, for a back end that keeps it elsewhere meanwhile. Moments are laid out as their parameters.
+  struct State {
+    FieldModel& model;
+    AlignedBuffer<float>&table_first, &table_second, &mlp_first, &mlp_second;
+    uint64_t& steps_done;
+  };
+  State state() { return {model_, table_first_, table_second_, mlp_first_, mlp_second_, steps_done_}; }
 
  private:
   struct Worker;

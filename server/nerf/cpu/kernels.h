@@ -13,18 +13,6 @@ namespace romap::nerf {
 // their last sample; kernels work in whole vectors.
 inline constexpr int kMaxLanes = 16;
 
-inline constexpr int kOccupancyResolution = 64;  // one row of cells is one machine word (see occupancy.h)
-inline constexpr int kRayProbes = 64;            // probes of the occupancy grid along a ray, one bit each
-inline constexpr int kMaxSamplesPerRay = 64;
-
-// A ray in Unit space (see TrainingBox), direction of unit length.
-struct Ray {
-  float origin[3];
-  float direction[3];
-  float jitter;  // 0..1, where in its stratum each sample lies
-  RayTarget target;
-};
-
 struct SamplingRule {
   const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
   std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space

@@ -96,6 +96,20 @@ Occupancy::LayerWeights Occupancy::AllWeights() const {
   return all;
 }
 
+Occupancy::State Occupancy::state() const {
+  State state{.score = {}, .bits = {bits_.span().begin(), bits_.span().end()}, .layer_weight = AllWeights()};
+  state.score.reserve(cells_.size());
+  for (const CellState& cell : cells_.span()) state.score.push_back(cell.score);
+  return state;
+}
+
+void Occupancy::SetState(const State& state) {
+  for (size_t i = 0; i < cells_.size(); ++i) cells_[i] = {state.score[i], 0.0f};
+  std::ranges::copy(state.bits, bits_.data());
+  row_visited_ = {};
+  layer_weight_ = state.layer_weight;
+}
+
 std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {
   std::array<int, 3> first, last;
   const LayerWeights weights = AllWeights();

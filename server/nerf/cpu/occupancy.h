@@ -44,12 +44,21 @@ class Occupancy {
   // the object does not.
   std::vector<uint8_t> TrimmedHull(double share) const;
 
+  // What training changes, for a back end that keeps it elsewhere meanwhile.
+  using LayerWeights = std::array<std::array<double, kOccupancyResolution>, 3>;
+  struct State {
+    std::vector<float> score;    // [kOccupancyResolution^3], x fastest
+    std::vector<uint32_t> bits;  // the same cells, bit by bit: occupied
+    LayerWeights layer_weight;   // of the layers along x, y, z
+  };
+  State state() const;
+  void SetState(const State& state);
+
   const uint32_t* bits() const { return bits_.data(); }
   const std::vector<uint8_t>& hull() const { return hull_; }
 
  private:
   static constexpr size_t kRows = size_t{kOccupancyResolution} * kOccupancyResolution;
-  using LayerWeights = std::array<std::array<double, kOccupancyResolution>, 3>;
   struct CellState {
     float score;
     float weight;  // of all samples since the last Update
@@ -64,7 +73,7 @@ class Occupancy {
   AlignedBuffer<CellState> cells_;
   std::array<uint8_t, kRows> row_visited_ = {};  // since the last Update
   AlignedBuffer<uint32_t> bits_;
-  LayerWeights layer_weight_ = {};  // of the layers along x, y, z; fades from Update to Update
+  LayerWeights layer_weight_ = {};  // fades from Update to Update
 };
 
 }  // namespace romap::nerf

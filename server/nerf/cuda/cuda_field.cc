@@ -1,27 +1,6 @@
 #include "server/nerf/cuda/cuda_field.h"
 
-#include "server/nerf/cuda/field_kernels.h"
-
 namespace romap::nerf::cuda {
-
-absl::StatusOr<int> ProbeDevices() {
-  int count = 0;
-  ROMAP_RETURN_IF_ERROR(ToStatus(cudaGetDeviceCount(&count), "find a device"));
-  if (count == 0) return absl::UnavailableError("CUDA: there is no device");
-  ROMAP_RETURN_IF_ERROR(ToStatus(cudaSetDevice(0), "use device 0"));
-  // A device that counts may still be unable to run our code: too old, or out of order.
-  ROMAP_ASSIGN_OR_RETURN(DeviceArray<float> parameter, DeviceArray<float>::CopyOf(std::vector<float>{1.0f}));
-  ROMAP_ASSIGN_OR_RETURN(DeviceArray<float> gradient, DeviceArray<float>::CopyOf(std::vector<float>{0.0f}));
-  const AdamParams params{.rates = {},
-                          .count = 1,
-                          .parameters = parameter.data(),
-                          .first = parameter.data(),
-                          .second = parameter.data(),
-                          .gradient = gradient.data()};
-  ROMAP_RETURN_IF_ERROR(ToStatus(LaunchAdam(params, nullptr), "run a kernel on device 0"));
-  ROMAP_RETURN_IF_ERROR(ToStatus(cudaDeviceSynchronize(), "run a kernel on device 0"));
-  return count;
-}
 
 absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
   if (model.mlp.hidden > kMaxHidden) {
@@ -38,7 +17,7 @@ absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
 }
 
 absl::StatusOr<std::vector<float>> CudaField::Evaluate(std::span<const float> x, std::span<const float> y,
-                                                       std::span<const float> z) const {
+                                                       std::span<const float> z, MlpPath path) const {
   if (x.size() != y.size() || x.size() != z.size()) {
     return InvalidArgument("CUDA: {} x, {} y and {} z coordinates; there must be as many of each", x.size(), y.size(),
                            z.size());
@@ -55,7 +34,7 @@ absl::StatusOr<std::vector<float>> CudaField::Evaluate(std::span<const float> x,
                               .y = device_y.data(),
                               .z = device_z.data(),
                               .value = device_value.data()};
-  ROMAP_RETURN_IF_ERROR(ToStatus(LaunchEvaluate(params, nullptr), "evaluate a field"));
+  ROMAP_RETURN_IF_ERROR(ToStatus(LaunchEvaluate(params, path, nullptr), "evaluate a field"));
   ROMAP_RETURN_IF_ERROR(device_value.Read(value));
   return value;
 }

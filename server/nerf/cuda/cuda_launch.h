@@ -1,13 +1,23 @@
 #pragma once
 
 // How this folder meets CUDA. Kernels are launched by ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream,
-// arguments...). A program that runs them on the host defines it, and what it needs of CUDA, before it includes the
-// sources of this folder; everywhere else the real CUDA is used.
+// arguments...) and declare dynamic shared memory by ROMAP_DYNAMIC_SHARED(type, name). A program that runs them on the
+// host defines both, and what it needs of CUDA, before it includes the sources of this folder; everywhere else the real
+// CUDA is used.
 #ifndef ROMAP_LAUNCH
 
 #include <cuda_runtime.h>
 
 #define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...) \
   kernel<<<grid, block, dynamic_shared_bytes, stream>>>(__VA_ARGS__)
+
+#define ROMAP_DYNAMIC_SHARED(T, name)                                 \
+  extern __shared__ __align__(128) unsigned char name##_shared_raw[]; \
+  T* const name = reinterpret_cast<T*>(name##_shared_raw)
+
+#ifdef __CUDACC__
+#include <cuda_fp16.h>
+#include <mma.h>
+#endif
 
 #endif

@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <span>
+#include <string>
 #include <utility>
 
 #include "common/status.h"
@@ -11,43 +12,50 @@
 
 namespace romap::nerf::cuda {
 
-// UNAVAILABLE "CUDA: cannot <doing>: <CUDA's words>", or OK.
+// OK, or "CUDA: cannot <doing>: <CUDA's words>": RESOURCE_EXHAUSTED when memory is, which harms nobody else,
+// UNAVAILABLE for everything that leaves the device in doubt.
 inline absl::Status ToStatus(cudaError_t error, const char* doing) {
   if (error == cudaSuccess) return absl::OkStatus();
   cudaGetLastError();  // else the next launch would report this error once more
-  return absl::UnavailableError(fmt::format("CUDA: cannot {}: {}", doing, cudaGetErrorString(error)));
+  const std::string what = fmt::format("CUDA: cannot {}: {}", doing, cudaGetErrorString(error));
+  return error == cudaErrorMemoryAllocation ? absl::ResourceExhaustedError(what) : absl::UnavailableError(what);
 }
 
-// Owns an array in device memory.
-template <class T>
-class DeviceArray {
+// Owns an array in device memory, or one of the host's that devices copy from and to without detour.
+enum class MemoryKind { kDevice, kPinned };
+
+template <class T, MemoryKind kKind>
+class CudaArray {
  public:
-  DeviceArray() = default;
-  DeviceArray(DeviceArray&& other) noexcept
+  CudaArray() = default;
+  CudaArray(CudaArray&& other) noexcept
       : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-  DeviceArray& operator=(DeviceArray&& other) noexcept {
+  CudaArray& operator=(CudaArray&& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
     return *this;
   }
-  ~DeviceArray() {
-    if (data_ != nullptr) cudaFree(data_);
+  ~CudaArray() {
+    if (data_ != nullptr) kKind == MemoryKind::kDevice ? cudaFree(data_) : cudaFreeHost(data_);
   }
 
   // Not initialised.
-  static absl::StatusOr<DeviceArray> Allocate(size_t count) {
-    DeviceArray array;
+  static absl::StatusOr<CudaArray> Allocate(size_t count) {
+    CudaArray array;
     array.size_ = count;
-    ROMAP_RETURN_IF_ERROR(ToStatus(cudaMalloc(&array.data_, count * sizeof(T)), "allocate memory"));
+    const size_t bytes = count * sizeof(T);
+    ROMAP_RETURN_IF_ERROR(
+        ToStatus(kKind == MemoryKind::kDevice ? cudaMalloc(&array.data_, bytes) : cudaMallocHost(&array.data_, bytes),
+                 "allocate memory"));
     return array;
   }
-  static absl::StatusOr<DeviceArray> CopyOf(std::span<const T> values) {
-    ROMAP_ASSIGN_OR_RETURN(DeviceArray array, Allocate(values.size()));
+  static absl::StatusOr<CudaArray> CopyOf(std::span<const T> values) {
+    ROMAP_ASSIGN_OR_RETURN(CudaArray array, Allocate(values.size()));
     ROMAP_RETURN_IF_ERROR(
         ToStatus(cudaMemcpy(array.data_, values.data(), values.size_bytes(), cudaMemcpyHostToDevice), "copy to it"));
     return array;
   }
-  // Waits for the launches before it; `values` must be as long as the array.
+  // Waits for the launches before it on the default stream; `values` must be as long as the array.
   absl::Status Read(std::span<T> values) const {
     if (values.size() != size_) return InvalidArgument("CUDA: read {} values of {}", values.size(), size_);
     return ToStatus(cudaMemcpy(values.data(), data_, values.size_bytes(), cudaMemcpyDeviceToHost), "copy from it");
@@ -56,10 +64,16 @@ class DeviceArray {
   T* data() { return data_; }
   const T* data() const { return data_; }
   size_t size() const { return size_; }
+  size_t bytes() const { return size_ * sizeof(T); }
 
  private:
   T* data_ = nullptr;
   size_t size_ = 0;
 };
+
+template <class T>
+using DeviceArray = CudaArray<T, MemoryKind::kDevice>;
+template <class T>
+using PinnedArray = CudaArray<T, MemoryKind::kPinned>;
 
 }  // namespace romap::nerf::cuda

@@ -53,6 +53,18 @@ struct RayTarget {
   bool is_object = true;
 };
 
+inline constexpr int kOccupancyResolution = 64;  // one row of cells is one machine word (see cpu/occupancy.h)
+inline constexpr int kRayProbes = 64;            // probes of the occupancy grid along a ray, one bit each
+inline constexpr int kMaxSamplesPerRay = 64;
+
+// A ray in Unit space (see TrainingBox), direction of unit length.
+struct Ray {
+  float origin[3];
+  float direction[3];
+  float jitter;  // 0..1, where in its stratum each sample lies
+  RayTarget target;
+};
+
 // Samples of one ray, front to back: arrays of `count`.
 struct RaySamples {
   int count;

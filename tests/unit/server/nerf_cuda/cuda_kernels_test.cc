@@ -1,52 +1,25 @@
 // The CUDA kernels, run on the host in every order of threads, against the CPU's kernels.
-// clang-format off
-#include "tests/support/cuda_on_host/cuda_on_host.h"
-// clang-format on
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
+#include "tests/unit/server/nerf_cuda/device_test.h"
+// Its macros must come first.
 #include <limits>
-#include <numeric>
 
 #include "server/nerf/cuda/cuda_field.h"
-#include "tests/support/cuda_on_host/race_checker.h"
 #include "tests/unit/server/nerf_cuda/step_on_cpu.h"
 #include "tests/unit/server/nerf_cuda/step_on_device.h"
 
 namespace romap::nerf::cuda {
 namespace {
 
-using cuda_on_host::RunOptions;
-using cuda_on_host::SetDeviceTraits;
-using cuda_on_host::SetRunOptions;
-using cuda_on_host::ThreadOrder;
-
 // The same formulas in the same precision: only the order of sums differs. Against vectors, cells of the finest level
-// magnify the rounding of positions, as between the CPU's own kernels.
+// magnify the rounding of positions, as between the CPU's own kernels. Sums that lie between two halves may be rounded
+// to either. Between halves and floats neurons near 0 make a difference, which are on or off.
 constexpr double kPlainTolerance = 2e-5;
 constexpr double kSimdTolerance = 2e-3;
+constexpr double kRoundedTolerance = 5e-4;
+constexpr double kHalfTolerance = 4e-3;
 
-class CudaKernelsTest : public testing::TestWithParam<RunOptions> {
- protected:
-  void SetUp() override {
-    SetRunOptions(GetParam());
-    SetDeviceTraits({});
-  }
-  void TearDown() override {
-    EXPECT_EQ(cudaGetLastError(), cudaSuccess);
-#ifdef ROMAP_TEST_FINDS_RACES
-    EXPECT_EQ(cuda_on_host::RaceCount(), 0) << cuda_on_host::FirstRace();
-    cuda_on_host::ResetRaces();
-#endif
-  }
-};
-
-INSTANTIATE_TEST_SUITE_P(Orders, CudaKernelsTest,
-                         testing::Values(RunOptions{ThreadOrder::kForward}, RunOptions{ThreadOrder::kReverse},
-                                         RunOptions{ThreadOrder::kShuffled, 3},
-                                         RunOptions{ThreadOrder::kShuffled, 4, 2, true}),
-                         [](const auto& info) { return fmt::format("Order{}", info.index); });
+using CudaKernelsTest = OrderedDeviceTest;
+INSTANTIATE_TEST_SUITE_P(Orders, CudaKernelsTest, AllOrders(), OrderName);
 
 std::vector<float> EvaluateOnCpu(const KernelTable& kernels, const FieldModel& field, const SampleChunk& points) {
   const int n = points.size;
@@ -72,126 +45,166 @@ TEST_P(CudaKernelsTest, FieldHasTheValuesOfTheCpu) {
     points.y[i] = i < 2 ? static_cast<float>(i) : RandomUniform(1, 1, i);
     points.z[i] = i < 2 ? static_cast<float>(i) : RandomUniform(1, 2, i);
   }
-  for (const auto& [levels, hidden] : {std::pair(3, 16), std::pair(8, 32), std::pair(16, 128)}) {
+  for (const auto& [levels, hidden] : {std::pair(3, 16), std::pair(8, 32), std::pair(9, 48), std::pair(16, 128)}) {
     const FieldModel field = NoisyField(levels, hidden);
     const auto device = CudaField::Create(field);
     ASSERT_TRUE(device.ok()) << device.status();
-    const auto got = device->Evaluate(points.x.span().first(kPoints), points.y.span().first(kPoints),
-                                      points.z.span().first(kPoints));
-    ASSERT_TRUE(got.ok()) << got.status();
-    EXPECT_EQ(Difference(EvaluateOnCpu(PlainKernels(), field, points), *got, kPlainTolerance), "") << levels;
-    EXPECT_EQ(Difference(EvaluateOnCpu(SimdKernels(), field, points), *got, kSimdTolerance), "") << levels;
+    const auto evaluate = [&](MlpPath path) {
+      const auto got = device->Evaluate(points.x.span().first(kPoints), points.y.span().first(kPoints),
+                                        points.z.span().first(kPoints), path);
+      EXPECT_TRUE(got.ok()) << got.status();
+      return got.value_or(std::vector<float>{});
+    };
+    const std::vector<float> got = evaluate(MlpPath::kFloat);
+    EXPECT_EQ(Difference(EvaluateOnCpu(PlainKernels(), field, points), got, kPlainTolerance), "") << levels;
+    EXPECT_EQ(Difference(EvaluateOnCpu(SimdKernels(), field, points), got, kSimdTolerance), "") << levels;
+    EXPECT_EQ(Difference(got, evaluate(MlpPath::kTensorCores), kHalfTolerance), "") << levels;
   }
 }
 
-TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
-  for (const bool random_background : {false, true}) {
-    const FieldModel field = NoisyField(random_background ? 8 : 5, 32);
-    const StepInput input = TestStep(70, random_background);
-    StepOnCpu plain(field, input), simd(field, input);
-    StepOnDevice device(field, input, plain);
-    plain.Run(PlainKernels(), field, input);
-    simd.Run(SimdKernels(), field, input);
-    device.ComputeGradients();
-
-    const size_t table = field.table.size(), samples = static_cast<size_t>(plain.chunk.size);
-    EXPECT_GT(plain.cut_samples, 5);
-    EXPECT_LT(plain.cut_samples, plain.chunk.size / 2);
-    EXPECT_LT(samples, 70u * 12u);  // some rays miss
-    const std::vector<float> table_gradient = FromDevice(device.table_gradient);
-    const std::vector<float> mlp_gradient = FromDevice(device.mlp_gradient);
-    EXPECT_EQ(Difference(plain.table_gradient.span().first(table), table_gradient, kPlainTolerance), "");
-    EXPECT_EQ(Difference(simd.table_gradient.span().first(table), table_gradient, kSimdTolerance), "");
-    EXPECT_EQ(Difference(plain.mlp_gradient.span(), mlp_gradient, kPlainTolerance), "");
-    EXPECT_EQ(Difference(simd.mlp_gradient.span(), mlp_gradient, kSimdTolerance), "");
-    EXPECT_EQ(Difference(plain.chunk.weight.span().first(samples), device.Weights(), kPlainTolerance), "");
-    std::vector<float> want, got;
-    for (const RayResult& result : plain.results) want.insert(want.end(), {result.loss, result.opacity});
-    for (const RayResult& result : device.Results()) got.insert(got.end(), {result.loss, result.opacity});
-    EXPECT_EQ(Difference(want, got, kPlainTolerance), "");
-  }
-}
-
-TEST_P(CudaKernelsTest, AdamMovesParametersAsTheCpu) {
-  constexpr size_t kCount = 400;
-  const auto noise = [](uint64_t stream) {
-    AlignedBuffer<float> values(kCount);
-    for (size_t i = 0; i < kCount; ++i) values[i] = RandomUniform(8, stream, i) - 0.5f;
-    return values;
-  };
-  AlignedBuffer<float> parameters = noise(0), first = noise(1), second = noise(2), gradient = noise(3);
-  for (size_t i = 0; i < kCount; ++i) second[i] += 0.5f;
-  for (size_t i = 100; i < 200; ++i) gradient[i] = 0.0f;
-  DeviceArray<float> device[] = {ToDevice(parameters.span()), ToDevice(first.span()), ToDevice(second.span()),
-                                 ToDevice(gradient.span())};
-  const AdamRates rates{0.01f, 0.8f, 0.95f};
-  const AdamParams params{rates, kCount, device[0].data(), device[1].data(), device[2].data(), device[3].data()};
-  ASSERT_EQ(LaunchAdam(params, nullptr), cudaSuccess);
-  float* gradients = gradient.data();
-  PlainKernels().adam(rates, 0, kCount, parameters.data(), first.data(), second.data(), &gradients, 1);
-  EXPECT_EQ(Difference(parameters.span(), FromDevice(device[0]), 1e-6), "");
-  EXPECT_EQ(Difference(first.span(), FromDevice(device[1]), 1e-6), "");
-  EXPECT_EQ(Difference(second.span(), FromDevice(device[2]), 1e-6), "");
-  EXPECT_EQ(FromDevice(device[3]), std::vector<float>(kCount, 0.0f));
-}
-
-TEST_P(CudaKernelsTest, StepsLearnAsFastAsOnTheCpu) {
-  constexpr int kSteps = 8;
-  FieldModel field = NoisyField(4, 16);
-  const StepInput input = TestStep(60, false);
-  StepOnCpu cpu(field, input);
-  StepOnDevice device(field, input, cpu);
-  const AdamRates rates{0.02f, 0.8f, 0.95f};
-  AlignedBuffer<float> table_first(field.table.size()), table_second(field.table.size());
-  AlignedBuffer<float> mlp_first(field.mlp.parameters.size()), mlp_second(field.mlp.parameters.size());
-  const auto loss = [](const std::vector<RayResult>& results) {
-    return std::accumulate(results.begin(), results.end(), 0.0,
-                           [](double sum, const RayResult& r) { return sum + r.loss; });
-  };
-  double first_loss = 0;
-  for (int step = 0; step < kSteps; ++step) {
-    cpu.Run(PlainKernels(), field, input);
-    float* table_gradient = cpu.table_gradient.data();
-    float* mlp_gradient = cpu.mlp_gradient.data();
-    PlainKernels().adam(rates, 0, field.table.size(), field.table.data(), table_first.data(), table_second.data(),
-                        &table_gradient, 1);
-    PlainKernels().adam(rates, 0, field.mlp.parameters.size(), field.mlp.parameters.data(), mlp_first.data(),
-                        mlp_second.data(), &mlp_gradient, 1);
-    field.mlp.UpdateTransposed();
-    device.ComputeGradients();
-    device.Optimise(rates);
-    if (step == 0) first_loss = loss(device.Results());
-  }
-  const double last_loss = loss(device.Results());
-  EXPECT_LT(last_loss, 0.9 * first_loss);
-  EXPECT_NEAR(last_loss, loss(cpu.results), 0.01 * first_loss);
-}
-
-// ----------------------------------------------------------------------------------------------------- what goes wrong
-
-class CudaFieldTest : public testing::Test {
- protected:
-  void SetUp() override { SetDeviceTraits({}); }
-  void TearDown() override { SetDeviceTraits({}); }
+struct Shape {
+  int levels, hidden, rays;
+  SampleBudget budget;
+  bool random_background;
 };
 
-TEST_F(CudaFieldTest, DevicesAreFoundAndTried) {
-  const auto devices = ProbeDevices();
-  ASSERT_TRUE(devices.ok()) << devices.status();
-  EXPECT_EQ(*devices, 1);
+// Tiles that are not full, tiles of many and of two rays, rays across warps, fields that need padding.
+const Shape kShapes[] = {
+    {5, 32, 33, {.finest_step = 0.02f, .least = 3, .most = 12}, false},
+    {8, 32, 41, {.finest_step = 0.01f, .least = 4, .most = 16}, true},
+    {16, 64, 9, {.finest_step = 0.02f, .least = 4, .most = 32, .skip_empty = false}, false},
+    {9, 48, 5, {.finest_step = 0.004f, .least = 4, .most = 64}, false},
+    {2, 16, 131, {.finest_step = 0.01f, .least = 1, .most = 1}, true},
+};
+
+TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
+  for (const Shape& shape : kShapes) {
+    SCOPED_TRACE(fmt::format("{} levels, {} neurons, {} rays", shape.levels, shape.hidden, shape.rays));
+    const FieldModel field = NoisyField(shape.levels, shape.hidden);
+    const StepInput input = TestStep(shape.rays, shape.budget, shape.random_background);
+    for (const MlpPath path : {MlpPath::kFloat, MlpPath::kTensorCores}) {
+      const bool plain = path == MlpPath::kFloat;
+      const double tolerance = plain ? kPlainTolerance : kRoundedTolerance;
+      StepOnCpu cpu(field, input);
+      plain ? cpu.Run(PlainKernels(), field, input) : cpu.RunRounded(field, input);
+      ASSERT_GT(cpu.active_samples, cpu.chunk.size / 10);
+      ASSERT_TRUE(cpu.active_samples < cpu.chunk.size || shape.budget.most == 1);
+      const std::span<const float> table_gradient = cpu.table_gradient.span().first(field.table.size());
+      StepOnDevice device(field, input);
+      device.ComputeGradients(path);
+      EXPECT_EQ(Difference(table_gradient, FromDevice(device.table_gradient), tolerance), "");
+      EXPECT_EQ(Difference(cpu.mlp_gradient.span(), device.MlpGradient(), tolerance), "");
+      EXPECT_EQ(Difference(cpu.ColorLosses(input), FromDevice(device.color_loss), tolerance), "");
+      const StepCounters counters = device.Counters();
+      EXPECT_EQ(counters.samples, static_cast<unsigned>(cpu.chunk.size));
+      EXPECT_EQ(counters.rays,
+                static_cast<unsigned>(std::ranges::count_if(cpu.spans, [](RaySpan s) { return s.count > 0; })));
+      EXPECT_EQ(counters.active_samples, static_cast<unsigned>(cpu.active_samples));
+      EXPECT_EQ(device.Slice().running, 0u);
+      EXPECT_EQ(device.Slice().next, 0u);  // the last launch of a step moves it
+    }
+  }
 }
 
+TEST_P(CudaKernelsTest, StepTellsTheOccupancyWhereRaysEnded) {
+  const FieldModel field = NoisyField(5, 16);
+  const StepInput input = TestStep(60, {.finest_step = 0.02f, .least = 4, .most = 14}, false);
+  StepOnCpu cpu(field, input);
+  cpu.Run(PlainKernels(), field, input);
+  std::vector<uint32_t> visits(kCells);
+  std::vector<float> weight(kCells), layers(kLayers);
+  for (size_t i = 0; i < static_cast<size_t>(cpu.chunk.size); ++i) {
+    const uint32_t cell = cpu.chunk.cell[i];
+    ++visits[cell];
+    weight[cell] = std::max(weight[cell], cpu.chunk.weight[i]);
+    layers[cell % 64] += cpu.chunk.weight[i];
+    layers[64 + cell / 64 % 64] += cpu.chunk.weight[i];
+    layers[128 + cell / 4096] += cpu.chunk.weight[i];
+  }
+  StepOnDevice device(field, input);
+  device.ComputeGradients(MlpPath::kFloat);
+  EXPECT_EQ(FromDevice(device.cell_visits), visits);
+  std::vector<float> got;
+  for (const uint32_t bits : FromDevice(device.cell_weight)) got.push_back(std::bit_cast<float>(bits));
+  EXPECT_EQ(Difference(weight, got, kPlainTolerance), "");
+  got.clear();
+  for (const unsigned long long units : FromDevice(device.layer_weight)) {
+    got.push_back(static_cast<float>(units) * kLayerUnit);
+  }
+  EXPECT_EQ(Difference(layers, got, kPlainTolerance), "");
+}
+
+// A block works on a second tile when there are more tiles than blocks.
+TEST_P(CudaKernelsTest, BlocksTakeTileAfterTile) {
+  const FieldModel field = NoisyField(2, 16);
+  const StepInput input = TestStep(2 * kMaxStepBlocks + 7, {.finest_step = 0.3f, .least = 1, .most = 64}, false);
+  ASSERT_EQ(StepBlocks(static_cast<int>(input.rays.size()), input.budget.most), kMaxStepBlocks);
+  StepOnCpu cpu(field, input);
+  cpu.Run(PlainKernels(), field, input);
+  StepOnDevice device(field, input);
+  device.ComputeGradients(MlpPath::kFloat);
+  EXPECT_EQ(Difference(cpu.table_gradient.span().first(field.table.size()), FromDevice(device.table_gradient),
+                       kPlainTolerance),
+            "");
+  EXPECT_EQ(Difference(cpu.mlp_gradient.span(), device.MlpGradient(), kPlainTolerance), "");
+  EXPECT_EQ(Difference(cpu.ColorLosses(input), FromDevice(device.color_loss), kPlainTolerance), "");
+}
+
+// Derivatives far below what a half can hold, and far above, come through.
+TEST_P(CudaKernelsTest, TensorCoresKeepSmallAndLargeDerivatives) {
+  const FieldModel field = NoisyField(8, 32);
+  for (const float factor : {1e-7f, 1e6f}) {
+    StepInput input = TestStep(30, {}, false);
+    input.gradient_cut = 0;
+    LossWeights& w = input.loss_weights;
+    w = {.opacity_object = factor, .opacity_background = factor, .density = 0.01f * factor};
+    for (Ray& ray : input.rays) ray.target.is_object = false;  // else colours count, too
+    StepOnCpu cpu(field, input);
+    cpu.RunRounded(field, input);
+    StepOnDevice device(field, input);
+    device.ComputeGradients(MlpPath::kTensorCores);
+    EXPECT_EQ(Difference(cpu.table_gradient.span().first(field.table.size()), FromDevice(device.table_gradient),
+                         kRoundedTolerance),
+              "");
+    EXPECT_EQ(Difference(cpu.mlp_gradient.span(), device.MlpGradient(), kRoundedTolerance), "");
+  }
+}
+
+TEST_P(CudaKernelsTest, WhatIsNotANumberShows) {
+  const FieldModel field = NoisyField(8, 32);
+  StepInput input = TestStep(20, {}, false);
+  for (Ray& ray : input.rays) ray.target.rgb[1] = std::numeric_limits<float>::quiet_NaN();
+  for (const MlpPath path : {MlpPath::kFloat, MlpPath::kTensorCores}) {
+    StepOnDevice device(field, input);
+    device.ComputeGradients(path);
+    EXPECT_TRUE(std::ranges::any_of(device.MlpGradient(), [](float x) { return std::isnan(x); }));
+    EXPECT_TRUE(std::ranges::any_of(FromDevice(device.color_loss), [](float x) { return std::isnan(x); }));
+  }
+}
+
+// -------------------------------------------------------------------------------------------------- what goes wrong
+
+using CudaFieldTest = DeviceTest;
+
+TEST_F(CudaFieldTest, TheDeviceIsTried) { EXPECT_TRUE(DeviceStatus().ok()) << DeviceStatus(); }
+
 TEST_F(CudaFieldTest, NoDeviceIsSaidInOneLine) {
-  SetDeviceTraits({.devices = 0});
-  const auto devices = ProbeDevices();
-  EXPECT_EQ(devices.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_EQ(Message(devices.status()), "CUDA: cannot find a device: no CUDA-capable device is detected");
+  cuda_on_host::SetDeviceTraits({.devices = 0});
+  EXPECT_EQ(DeviceStatus().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(Message(DeviceStatus()), "CUDA: cannot find a device: no CUDA-capable device is detected");
+}
+
+TEST_F(CudaFieldTest, ADeviceThatFailsIsNotUsedAgain) {
+  cuda_on_host::SetDeviceTraits({.kernels_before_fault = 0});
+  EXPECT_EQ(Message(DeviceStatus()), "CUDA: cannot run a kernel on device 0: unspecified launch failure");
+  cuda_on_host::SetDeviceTraits({});
+  EXPECT_FALSE(DeviceStatus().ok());
 }
 
 TEST_F(CudaFieldTest, TooLittleMemoryIsSaidAndGivenBack) {
   const size_t before = cuda_on_host::AllocatedBytes();
   const FieldModel field = NoisyField(8, 32);
-  SetDeviceTraits({.memory_bytes = before + field.table.size() * sizeof(float)});
+  cuda_on_host::SetDeviceTraits({.memory_bytes = before + field.table.size() * sizeof(float)});
   const auto device = CudaField::Create(field);
   EXPECT_EQ(Message(device.status()), "CUDA: cannot allocate memory: out of memory");
   EXPECT_EQ(cuda_on_host::AllocatedBytes(), before);
@@ -205,6 +218,17 @@ TEST_F(CudaFieldTest, TooWideAFieldAndUnequalCoordinatesAreRefused) {
   EXPECT_EQ(Message(device->Evaluate(three, two, three).status()),
             "CUDA: 3 x, 2 y and 3 z coordinates; there must be as many of each");
   EXPECT_TRUE(device->Evaluate({}, {}, {})->empty());
+}
+
+// The largest field that the configuration allows fits into what every device since compute capability 8.0 has.
+TEST_F(CudaFieldTest, TheLargestFieldFitsIntoABlock) {
+  const FieldModel field = NoisyField(16, kMaxHidden);
+  StepOnDevice device(field, TestStep(8, {}, false));
+  for (const int most : {1, 16, 64}) {
+    StepParams params = device.Params();
+    params.budget.most = most;
+    EXPECT_EQ(PrepareStep(params, MlpPath::kTensorCores), cudaSuccess) << most;
+  }
 }
 
 TEST(DifferenceTest, IsSeenAlsoWhenNotANumber) {

@@ -1,9 +1,10 @@
 #pragma once
 
-// One training step by the CUDA kernels, on copies of what StepOnCpu has.
+// One training step by the CUDA kernels.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "server/nerf/cuda/device_array.h"
@@ -26,78 +27,88 @@ std::vector<T> FromDevice(const DeviceArray<T>& array) {
   return values;
 }
 
-inline DeviceArray<float> Zeros(size_t count) { return ToDevice<float>(std::vector<float>(count, 0.0f)); }
+template <class T = float>
+DeviceArray<T> Zeros(size_t count) {
+  return ToDevice<T>(std::vector<T>(count, T(0)));
+}
 
 class StepOnDevice {
  public:
-  StepOnDevice(const FieldModel& field, const StepInput& input, const StepOnCpu& cpu)
-      : grid_(field.layout),
-        hidden_(field.mlp.hidden),
-        density_bias_(field.density_bias),
-        count_(cpu.chunk.size),
-        loss_weights_(input.loss_weights),
-        gradient_cut_(input.gradient_cut),
-        gradient_scale_(input.gradient_scale()) {
-    const size_t n = static_cast<size_t>(count_);
-    for (const AlignedBuffer<float>* array :
-         {&cpu.chunk.x, &cpu.chunk.y, &cpu.chunk.z, &cpu.chunk.t, &cpu.chunk.length}) {
-      inputs_.push_back(ToDevice<float>(array->span().first(n)));
-    }
-    for (const int width : {grid_.features, hidden_, 1, 1, 1, 1, 1, 1, 1, kOutputs, hidden_}) {
-      // Uninitialised, which on the host means NaN: what a kernel reads, a kernel before it must have written.
-      scratch_.push_back(DeviceArray<float>::Allocate(n * static_cast<size_t>(width)).value());
-    }
-    std::vector<RayTarget> targets;
-    for (const Ray& ray : input.rays) targets.push_back(ray.target);
-    spans_ = ToDevice<RaySpan>(cpu.spans);
-    targets_ = ToDevice<RayTarget>(targets);
-    results_ = ToDevice<RayResult>(std::vector<RayResult>(targets.size(), RayResult{}));
+  StepOnDevice(const FieldModel& field, const StepInput& input)
+      : input_(input), layout_(field.layout), hidden_(field.mlp.hidden), density_bias_(field.density_bias) {
+    SliceState slice{.next = 0, .running = 77, .first_step = 0, .extent = {}, .grid = input.grid};
+    std::ranges::copy(input.extent, slice.extent);
+    slice_ = ToDevice<SliceState>(std::vector<SliceState>{slice});
+    counters_ = ToDevice<StepCounters>(std::vector<StepCounters>{{0, 0, 0}});
+    rays_ = ToDevice<Ray>(input.rays);
+    // Uninitialised, which on the host means NaN: what a kernel reads, a kernel before it must have written.
+    color_loss = DeviceArray<float>::Allocate(input.rays.size()).value();
+    occupied_bits_ = ToDevice<uint32_t>(input.occupied_bits);
+    cell_visits = Zeros<uint32_t>(kCells);
+    cell_weight = Zeros<uint32_t>(kCells);
+    layer_weight = Zeros<unsigned long long>(kLayers);
     table_ = ToDevice<float>(field.table.span());
     mlp_ = ToDevice<float>(field.mlp.parameters.span());
-    for (DeviceArray<float>* a : {&table_gradient, &table_first_, &table_second_}) *a = Zeros(table_.size());
-    for (DeviceArray<float>* a : {&mlp_gradient, &mlp_first_, &mlp_second_}) *a = Zeros(mlp_.size());
+    table_gradient = Zeros(table_.size());
+    step_blocks_ = StepBlocks(static_cast<int>(input.rays.size()), input.budget.most);
+    mlp_partial_ = DeviceArray<float>::Allocate(mlp_.size() * static_cast<size_t>(step_blocks_)).value();
   }
 
-  void ComputeGradients() {
-    const FieldView field{grid_, table_.data(), mlp_.data(), hidden_, density_bias_};
-    auto& in = inputs_;
-    auto& out = scratch_;
-    const SampleView samples{count_,        in[0].data(),  in[1].data(),  in[2].data(),  in[3].data(),  in[4].data(),
-                             out[0].data(), out[1].data(), out[2].data(), out[3].data(), out[4].data(), out[5].data(),
-                             out[6].data(), out[7].data(), out[8].data(), out[9].data(), out[10].data()};
-    const CompositeParams composite{samples,         static_cast<int>(spans_.size()),
-                                    spans_.data(),   targets_.data(),
-                                    loss_weights_,   gradient_cut_,
-                                    gradient_scale_, results_.data()};
-    ASSERT_EQ(LaunchGradients({field, composite, table_gradient.data(), mlp_gradient.data()}, nullptr), cudaSuccess);
+  StepParams Params() {
+    return {.field = {layout_, table_.data(), mlp_.data(), hidden_, density_bias_},
+            .slice = slice_.data(),
+            .counters = counters_.data(),
+            .rays = rays_.data(),
+            .color_loss = color_loss.data(),
+            .rays_per_step = static_cast<int>(input_.rays.size()),
+            .budget = input_.budget,
+            .loss_weights = input_.loss_weights,
+            .gradient_cut = input_.gradient_cut,
+            .occupied_bits = occupied_bits_.data(),
+            .cell_visits = cell_visits.data(),
+            .cell_weight = cell_weight.data(),
+            .layer_weight = layer_weight.data(),
+            .table_gradient = table_gradient.data(),
+            .mlp_partial = mlp_partial_.data()};
+  }
+
+  void ComputeGradients(MlpPath path) {
+    ASSERT_EQ(PrepareStep(Params(), path), cudaSuccess);
+    ASSERT_EQ(LaunchGradients(Params(), path, nullptr), cudaSuccess);
     ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
   }
 
-  void Optimise(const AdamRates& rates) {
-    const AdamParams table{
-        rates, table_.size(), table_.data(), table_first_.data(), table_second_.data(), table_gradient.data()};
-    const AdamParams mlp{rates, mlp_.size(), mlp_.data(), mlp_first_.data(), mlp_second_.data(), mlp_gradient.data()};
-    ASSERT_EQ(LaunchAdam(table, nullptr), cudaSuccess);
-    ASSERT_EQ(LaunchAdam(mlp, nullptr), cudaSuccess);
+  // Summed over blocks.
+  std::vector<float> MlpGradient() const {
+    const std::vector<float> partial = FromDevice(mlp_partial_);
+    const size_t blocks = static_cast<size_t>(step_blocks_);
+    std::vector<float> sums;
+    for (size_t w = 0; w < mlp_.size(); ++w) {
+      double sum = 0;
+      for (size_t b = 0; b < blocks; ++b) sum += partial[w * blocks + b];
+      sums.push_back(static_cast<float>(sum));
+    }
+    return sums;
   }
 
-  std::vector<RayResult> Results() const { return FromDevice(results_); }
-  std::vector<float> Weights() const { return FromDevice(scratch_[7]); }
+  StepCounters Counters() const { return FromDevice(counters_)[0]; }
+  SliceState Slice() const { return FromDevice(slice_)[0]; }
 
-  DeviceArray<float> table_gradient, mlp_gradient;
+  DeviceArray<float> table_gradient, color_loss;
+  DeviceArray<uint32_t> cell_visits, cell_weight;
+  DeviceArray<unsigned long long> layer_weight;
 
  private:
-  GridLayout grid_;
+  StepInput input_;
+  GridLayout layout_;
   int hidden_;
   float density_bias_;
-  int count_;
-  LossWeights loss_weights_;
-  float gradient_cut_, gradient_scale_;
-  std::vector<DeviceArray<float>> inputs_, scratch_;  // in the order of SampleView
-  DeviceArray<RaySpan> spans_;
-  DeviceArray<RayTarget> targets_;
-  DeviceArray<RayResult> results_;
-  DeviceArray<float> table_, mlp_, table_first_, table_second_, mlp_first_, mlp_second_;
+  int step_blocks_ = 0;
+  DeviceArray<SliceState> slice_;
+  DeviceArray<StepCounters> counters_;
+  DeviceArray<Ray> rays_;
+  DeviceArray<uint32_t> occupied_bits_;
+  DeviceArray<float> table_, mlp_, mlp_partial_;
 };
 
 }  // namespace romap::nerf::cuda

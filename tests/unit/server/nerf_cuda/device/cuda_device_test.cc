@@ -3,14 +3,14 @@
 
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/cuda/cuda_field.h"
+#include "server/nerf/cuda/device_health.h"
 #include "tests/unit/server/nerf_cuda/step_on_cpu.h"
 
 namespace romap::nerf::cuda {
 namespace {
 
 TEST(CudaDeviceTest, FieldOnTheDeviceHasTheValuesOfTheCpu) {
-  const auto devices = ProbeDevices();
-  if (!devices.ok()) GTEST_SKIP() << Message(devices.status());
+  if (!DeviceStatus().ok()) GTEST_SKIP() << Message(DeviceStatus());
   constexpr size_t kPoints = 301;
   const FieldModel field = NoisyField(8, 32);
   SampleChunk c(kPoints, field.layout.features, field.mlp.hidden);
@@ -34,11 +34,11 @@ TEST(CudaDeviceTest, FieldOnTheDeviceHasTheValuesOfTheCpu) {
 }
 
 TEST(CudaDeviceTest, NoDeviceIsSaidInOneLine) {
-  const auto devices = ProbeDevices();
-  if (devices.ok()) GTEST_SKIP() << "there is a device";
-  EXPECT_EQ(devices.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_TRUE(Message(devices.status()).starts_with("CUDA: ")) << devices.status();
-  EXPECT_EQ(Message(devices.status()).find('\n'), std::string::npos) << devices.status();
+  const absl::Status status = DeviceStatus();
+  if (status.ok()) GTEST_SKIP() << "there is a device";
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
+  EXPECT_TRUE(Message(status).starts_with("CUDA: ")) << status;
+  EXPECT_EQ(Message(status).find('\n'), std::string::npos) << status;
   EXPECT_EQ(CudaField::Create(NoisyField(2, 16)).status().code(), absl::StatusCode::kUnavailable);
 }
 
