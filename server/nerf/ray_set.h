@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -8,46 +7,42 @@
 #include "common/messages.h"
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/nerf_config.h"
+#include "server/nerf/pixel_sampler.h"
 #include "server/nerf/training_box.h"
 
 namespace romap {
 
-// The pixels an object is trained on, shuffled once and then read in order (random access to the images would cost more
-// than the rays themselves). Background pixels come from a band around the mask, where they say most about the shape.
-// Pixels of occluders are left out.
+// The rays an object is trained on: through the pixels that a PixelSampler chooses.
 class RaySet {
  public:
-  RaySet(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed) {}
+  RaySet(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed), sampler_(config, seed) {}
 
-  // Replaces all pixels. Keeps no reference to the views.
+  // Replaces all rays. Keeps no reference to the views.
   void Build(std::span<const ObjectView> views, const TrainingBox& box);
-  bool empty() const { return object_.empty(); }
+  bool empty() const { return sampler_.empty(); }
+
+  // See PixelSampler.
+  void Weigh(std::span<const float> views, std::span<const float> tiles) { sampler_.Weigh(views, tiles); }
+  const PixelSampler& sampler() const { return sampler_; }
 
   // Ray `index` (0 .. rays_per_step - 1) of `step`, in Unit space. Thread-safe.
   nerf::Ray Get(uint64_t step, int index) const;
 
+  // The ray through any of the sampler's pixels, `jitter` 0..1 telling where in their strata its samples lie.
+  nerf::Ray Through(const TrainingPixel& pixel, bool is_object, float jitter) const;
+
  private:
-  struct Pixel {
-    uint16_t view, u_px, v_px;
-    std::array<uint8_t, 3> rgb;
-    float z_mu;  // <= 0: unknown
-  };
   struct ViewCamera {
     Eigen::Vector3f origin_unit;
     Eigen::Matrix3f R_object_camera;
     float fx_px, fy_px, cx_px, cy_px;
   };
 
-  void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share);
-  void Shuffle(std::vector<Pixel>& pixels, uint64_t salt) const;
-
   NerfConfig config_;
   uint64_t seed_;
   float unit_mu_ = 1;
-  int background_rays_ = 0;  // per step
-  int sparse_rays_ = 0;
   std::vector<ViewCamera> cameras_;
-  std::vector<Pixel> object_, background_, sparse_;
+  PixelSampler sampler_;
 };
 
 }  // namespace romap

@@ -1,0 +1,167 @@
+#include "server/nerf/pixel_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "server/nerf/math/random.h"
+
+namespace romap {
+namespace {
+
+// A full training reads about 150 000 object rays; more pixels than this are thinned out evenly.
+constexpr double kMostObjectPixels = 1 << 18;
+constexpr int kBorder_px = 2;  // object pixels so near to another kind lie at the border
+
+cv::Mat KindMask(const ObjectView& view, RayKind kind) { return view.ray_kind == static_cast<int>(kind); }
+
+cv::Mat Square(int reach_px) { return cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px + 1, 2 * reach_px + 1}); }
+
+TrainingPixel PixelAt(const ObjectView& view, uint16_t view_index, int x, int y, float z_mu) {
+  const cv::Vec3b& bgr = view.color_bgr.at<cv::Vec3b>(y, x);
+  return {view_index,
+          static_cast<uint16_t>(x + view.roi_px.x),
+          static_cast<uint16_t>(y + view.roi_px.y),
+          {bgr[2], bgr[1], bgr[0]},
+          std::isfinite(z_mu) ? z_mu : 0.0f};
+}
+
+}  // namespace
+
+PixelSampler::PixelSampler(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed) {
+  object_.salt = 1;
+  background_.salt = 2;
+  sparse_.salt = 3;
+}
+
+void PixelSampler::Build(std::span<const ObjectView> views) {
+  for (Line* line : {&object_, &background_, &sparse_}) {
+    line->pixels.clear();
+    line->first_of_group.assign(1, 0);
+  }
+  double object_pixels = 0;
+  for (const ObjectView& view : views) object_pixels += cv::countNonZero(KindMask(view, RayKind::kObject));
+  const double keep_share = std::min(1.0, kMostObjectPixels / std::max(1.0, object_pixels));
+  for (size_t i = 0; i < views.size(); ++i) {
+    CollectPixels(views[i], static_cast<uint16_t>(i), keep_share);
+    CollectMapPoints(views[i], static_cast<uint16_t>(i));
+  }
+  const int rays = config_.rays_per_step;
+  const int background = background_.pixels.empty() ? 0 : static_cast<int>(rays * config_.background_share);
+  // A map point is seen again and again, so their share is bounded by how many there are.
+  const int sparse =
+      std::min(static_cast<int>(rays * config_.sparse_depth_share), static_cast<int>(sparse_.pixels.size() / 8));
+  background_.SetRays(background, seed_);
+  sparse_.SetRays(sparse, seed_);
+  object_.SetRays(rays - background - sparse, seed_);
+  Weigh(std::vector<float>(views.size(), 1.0f), std::vector<float>(views.size() * kTiles, 1.0f));
+}
+
+void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share) {
+  const cv::Mat is_object = KindMask(view, RayKind::kObject);
+  const cv::Rect bounds = cv::boundingRect(is_object);
+  cv::Mat near_object, inside;
+  cv::dilate(is_object, near_object, Square(config_.background_band_px));
+  cv::erode(is_object, inside, Square(kBorder_px), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  std::array<std::vector<TrainingPixel>, kTiles> tiles;
+  for (int y = 0; y < view.roi_px.height; ++y) {
+    for (int x = 0; x < view.roi_px.width; ++x) {
+      const bool object = is_object.at<uint8_t>(y, x) != 0;
+      const bool band = near_object.at<uint8_t>(y, x) != 0 &&
+                        view.ray_kind.at<uint8_t>(y, x) == static_cast<uint8_t>(RayKind::kBackground);
+      if (!object && !band) continue;
+      const uint64_t key = view.keyframe.value * 0x100000000ull + static_cast<uint64_t>(y) * 0x10000ull + x;
+      if (nerf::RandomUniform(seed_, 4, key) >= keep_share) continue;
+      if (band) {
+        background_.pixels.push_back(PixelAt(view, view_index, x, y, 0));
+        continue;
+      }
+      const int column = (x - bounds.x) * kTilesPerSide / bounds.width;
+      const int row = (y - bounds.y) * kTilesPerSide / bounds.height;
+      const int tile = inside.at<uint8_t>(y, x) != 0 ? row * kTilesPerSide + column : kBorderTile;
+      const float z_mu = view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(y, x);
+      tiles[static_cast<size_t>(tile)].push_back(PixelAt(view, view_index, x, y, z_mu));
+    }
+  }
+  for (const std::vector<TrainingPixel>& tile : tiles) {
+    object_.pixels.insert(object_.pixels.end(), tile.begin(), tile.end());
+    object_.CloseGroup();
+  }
+  background_.CloseGroup();
+}
+
+void PixelSampler::CollectMapPoints(const ObjectView& view, uint16_t view_index) {
+  const cv::Rect crop({0, 0}, view.roi_px.size());
+  for (const Eigen::Vector3f& point : view.sparse_depth) {
+    if (!point.allFinite() || point.z() <= 0) continue;
+    const cv::Point at(cvRound(point.x()) - view.roi_px.x, cvRound(point.y()) - view.roi_px.y);
+    if (!crop.contains(at)) continue;
+    if (view.ray_kind.at<uint8_t>(at) != static_cast<uint8_t>(RayKind::kObject)) continue;
+    sparse_.pixels.push_back(PixelAt(view, view_index, at.x, at.y, point.z()));
+  }
+  sparse_.CloseGroup();
+}
+
+void PixelSampler::Weigh(std::span<const float> views, std::span<const float> tiles) {
+  std::vector<float> both(tiles.begin(), tiles.end());
+  for (size_t i = 0; i < both.size(); ++i) both[i] *= views[i / kTiles];
+  object_.Divide(both);
+  background_.Divide(views);
+  sparse_.Divide(views);
+}
+
+void PixelSampler::Line::SetRays(int rays, uint64_t seed) {
+  slots.resize(static_cast<size_t>(rays));
+  for (size_t i = 0; i < slots.size(); ++i) slots[i] = {nerf::RandomBits(seed, 16 + salt, i), 0};
+}
+
+void PixelSampler::Line::Divide(std::span<const float> group_weights) {
+  pieces.clear();
+  double whole = 0;
+  for (size_t group = 0; group < group_weights.size(); ++group) {
+    const uint32_t first = first_of_group[group], end = first_of_group[group + 1];
+    const double weight = group_weights[group];
+    if (first == end || weight <= 0) continue;
+    const double until = whole + (end - first) * weight;
+    pieces.push_back({whole, until, 1 / weight, first, end - 1});
+    whole = until;
+  }
+  if (pieces.empty() && !pixels.empty()) return Divide(std::vector<float>(group_weights.size(), 1.0f));
+  for (Piece& piece : pieces) {
+    piece.from /= whole;
+    piece.until /= whole;
+    piece.pixels_per_room *= whole;
+  }
+  uint32_t at = 0;
+  for (size_t slot = 0; slot < slots.size(); ++slot) {
+    while (at + 1 < pieces.size() && pieces[at].until <= static_cast<double>(slot) / rays()) ++at;
+    slots[slot].piece = at;
+  }
+}
+
+const TrainingPixel& PixelSampler::Line::At(uint64_t step, int index) const {
+  constexpr uint64_t kGoldenRatio = 0x9e3779b97f4a7c15ull;  // its fraction, in 2^-64
+  const Slot& slot = slots[static_cast<size_t>(index)];
+  const double place = (index + static_cast<double>((slot.phase + step * kGoldenRatio) >> 11) * 0x1p-53) / rays();
+  size_t at = slot.piece;
+  while (at + 1 < pieces.size() && pieces[at].until <= place) ++at;
+  const Piece& piece = pieces[at];
+  const double pixel = std::max(0.0, place - piece.from) * piece.pixels_per_room;
+  return pixels[std::min(piece.last, piece.first + static_cast<uint32_t>(pixel))];
+}
+
+std::vector<const TrainingPixel*> PixelSampler::Line::Spread(size_t group, size_t most) const {
+  std::vector<const TrainingPixel*> spread;
+  const size_t first = first_of_group[group], count = first_of_group[group + 1] - first, taken = std::min(most, count);
+  for (size_t i = 0; i < taken; ++i) spread.push_back(&pixels[first + (2 * i + 1) * count / (2 * taken)]);
+  return spread;
+}
+
+PixelSampler::Choice PixelSampler::At(uint64_t step, int index) const {
+  if (index < background_.rays()) return {&background_.At(step, index), false};
+  index -= background_.rays();
+  if (index < sparse_.rays()) return {&sparse_.At(step, index), true};
+  return {&object_.At(step, index - sparse_.rays()), true};
+}
+
+}  // namespace romap
