@@ -265,6 +265,7 @@ struct FieldSnapshot {
   // from it how to move what is made of this snapshot.
   Sim3<World, World> S_new_first;
   bool converged = false;  // the pool will not train it further unless a new view comes
+  std::string concern;     // for people: what is wrong with what the object was given; empty = nothing
   SE3<World, Object> T_world_object;
   Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units
   float surface_level = 0;

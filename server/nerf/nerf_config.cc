@@ -108,6 +108,20 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "steps", .min = 1, .max = 100000, .help = "A snapshot is sent after this many steps"});
   fields.Add("snapshot_interval_s", &c.snapshot_interval_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "or after this time, whichever comes first"});
+  fields.Add("probe_interval_steps", &c.probe_interval_steps,
+             {.unit = "steps", .min = 10, .max = 10000, .help = "Steps between looks at how well each view is met"});
+  fields.Add(
+      "least_loss_fall", &c.least_loss_fall,
+      {.min = 0, .max = 1, .help = "Beyond the plan training goes on while 100 steps lower the loss by this share"});
+  fields.Add(
+      "max_extra_steps", &c.max_extra_steps,
+      {.unit = "steps", .min = 0, .max = 100000, .help = "Most such steps since the last view or box; 0 = none"});
+  fields.Add("most_time_s", &c.most_time_s,
+             {.unit = "s", .min = 0, .max = 86400, .help = "Longest training of an object, summed over its workers"});
+  fields.Add("most_time_per_view_s", &c.most_time_per_view_s,
+             {.unit = "s", .min = 0, .max = 3600, .help = "and so much more for each of its views"});
+  fields.Add("need_floor", &c.need_floor, {.min = 0, .max = 1, .help = "x"});
+  fields.Add("border_weight", &c.border_weight, {.min = 0, .max = 10, .help = "x"});
   fields.Add("settle_time_s", &c.settle_time_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Without a new view for this long, training is completed"});
 }

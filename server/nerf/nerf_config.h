@@ -68,6 +68,13 @@ struct NerfConfig {
   int snapshot_interval_steps = 40;
   double snapshot_interval_s = 1.0;
   double settle_time_s = 1.0;
+  int probe_interval_steps = 25;
+  double least_loss_fall = 0.05;
+  int max_extra_steps = 200;
+  double most_time_s = 8.0;
+  double most_time_per_view_s = 0.3;
+  double need_floor = 1.0;
+  double border_weight = 1.0;
 
   double surface_level = 3.0;
   double connect_margin = 2.0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "common/map_motion.h"
@@ -17,6 +18,7 @@ namespace romap {
 namespace {
 
 constexpr int kMostDivergences = 3;
+constexpr double kLeastNewShift = 0.01;  // of the box's side: a view that moved so far is judged anew
 
 // Limits of carrying a field over to another box; beyond them a new training costs no more.
 constexpr double kMostUnknownShare = 0.8;    // of the new box, that lies outside the old one
@@ -26,6 +28,25 @@ constexpr double kMostGrowth = 2.5;          // of the longest side since the ha
 NerfConfig WithWholeWidths(NerfConfig config) {
   config.hidden_width = (config.hidden_width + 15) / 16 * 16;
   return config;
+}
+
+constexpr double kBlack = 4;  // mean 8-bit value of an object's pixels
+
+bool IsBlack(const ObjectView& view) {
+  const cv::Scalar mean = cv::mean(view.color_bgr, view.ray_kind == static_cast<int>(RayKind::kObject));
+  return mean[0] + mean[1] + mean[2] < 3 * kBlack;
+}
+
+// Of two runs one after the other; the loss is that of the later one.
+void Add(const TrainStats& more, TrainStats& total) {
+  total.steps += more.steps;
+  total.rays += more.rays;
+  total.samples += more.samples;
+  total.active_samples += more.active_samples;
+  total.color_loss = more.color_loss;
+  total.wall_s += more.wall_s;
+  total.restarted |= more.restarted;
+  for (size_t p = 0; p < total.phase_cpu_s.size(); ++p) total.phase_cpu_s[p] += more.phase_cpu_s[p];
 }
 
 }  // namespace
@@ -41,6 +62,12 @@ ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
       trainer_(nerf::MakeTrainer(config_, seed)) {}
 
 absl::Status ObjectField::SetBox(const Cuboid& cuboid_new) {
+  const absl::Status status = FitBox(cuboid_new);
+  box_fault_ = Message(status);
+  return status;
+}
+
+absl::Status ObjectField::FitBox(const Cuboid& cuboid_new) {
   ROMAP_RETURN_IF_ERROR(ValidateCuboid(cuboid_new));
   const Cuboid cuboid = Moved(S_new_first_.Inverse(), cuboid_new);
   if (has_box_ && box_.StillFits(cuboid)) return absl::OkStatus();
@@ -51,9 +78,7 @@ absl::Status ObjectField::SetBox(const Cuboid& cuboid_new) {
   has_box_ = true;
   divergences_ = 0;
   views_changed_ = !views_.empty();
-  hull_.Reset(box_);
-  for (const ObjectView& view : views_) hull_.Add(view);
-  occupancy_.SetHull(hull_.Carve());
+  RebuildHull();
   return absl::OkStatus();
 }
 
@@ -78,12 +103,16 @@ absl::Status ObjectField::AddView(ObjectView view) {
   if (view.object != id_) {
     return FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString());
   }
-  ROMAP_RETURN_IF_ERROR(TakeView(Moved(S_new_first_.Inverse(), std::move(view))));
+  view = Moved(S_new_first_.Inverse(), std::move(view));
+  ROMAP_RETURN_IF_ERROR(Check(view));
+  TakeView(std::move(view), false);
   plan_.OnNewView(steps());
   return absl::OkStatus();
 }
 
-void ObjectField::Move(const Sim3<World, World>& S_new_old) { S_new_first_ = S_new_old * S_new_first_; }
+void ObjectField::Move(const Sim3<World, World>& S_new_old) {
+  if (S_new_old.IsFinite()) S_new_first_ = S_new_old * S_new_first_;
+}
 
 absl::Status ObjectField::CorrectView(const ViewPose& pose) {
   const auto known = std::ranges::find(views_, pose.keyframe, &ObjectView::keyframe);
@@ -91,28 +120,38 @@ absl::Status ObjectField::CorrectView(const ViewPose& pose) {
   ObjectView corrected = *known;
   corrected.T_world_camera = S_new_first_.Inverse().Moved(pose.T_world_camera);
   const double shift_share = ShiftShare(known->T_world_camera, corrected.T_world_camera);
-  ROMAP_RETURN_IF_ERROR(TakeView(std::move(corrected)));
+  ROMAP_RETURN_IF_ERROR(Check(corrected));
+  TakeView(std::move(corrected), shift_share < kLeastNewShift);
   plan_.OnCorrectedView(steps(), shift_share);
   return absl::OkStatus();
 }
 
+absl::Status ObjectField::Check(const ObjectView& view) {
+  const absl::Status status = ValidateView(view, box_);
+  if (!status.ok()) {
+    ++refused_views_;
+    view_fault_ = Message(status);
+  }
+  return status;
+}
+
 // The view is in the first world.
-absl::Status ObjectField::TakeView(ObjectView view) {
-  ROMAP_RETURN_IF_ERROR(ValidateView(view, box_));
+void ObjectField::TakeView(ObjectView view, bool keep_verdict) {
   divergences_ = 0;
   views_changed_ = true;
   auto same = std::ranges::find(views_, view.keyframe, &ObjectView::keyframe);
   if (same == views_.end() && views() >= config_.max_views) {
     same = views_.begin() + static_cast<std::ptrdiff_t>(MostRedundantView(view));
   }
-  hull_.Add(view);
+  const auto index = static_cast<size_t>(same - views_.begin());
   if (same != views_.end()) {
-    hull_.Remove(*same);
+    if (trust_.trusted(index)) hull_.Remove(*same);
     *same = std::move(view);
   } else {
     views_.push_back(std::move(view));
   }
-  return absl::OkStatus();
+  if (!keep_verdict) trust_.OnView(index, steps());
+  if (trust_.trusted(index)) hull_.Add(views_[index]);
 }
 
 // How far a view moved against the box, in sides of the box: by the corner that moved most in the camera's frame.
@@ -148,8 +187,15 @@ size_t ObjectField::MostRedundantView(const ObjectView& view) const {
 void ObjectField::PrepareViews() {
   if (!views_changed_) return;
   rays_.Build(views_, box_);
+  need_.assign(views_.size() * PixelSampler::kTiles, 1.0f);
+  WeighRays();
+  black_views_ = static_cast<int>(std::ranges::count_if(views_, IsBlack));
+  share_in_box_ = probe_.ShareMeeting(Space().extent);
+  probe_.Build(rays_, views_.size());
   occupancy_.SetHull(hull_.Carve());
   views_changed_ = false;
+  gain_.Restart();
+  gain_.Record(steps(), probe_.Look(trainer_->model(), config_, Space()).Loss(trust_.Weights()));
 }
 
 void ObjectField::Restart() {
@@ -157,7 +203,10 @@ void ObjectField::Restart() {
   trainer_ = nerf::MakeTrainer(config_, nerf::RandomBits(seed_, 5, restarts_));
   occupancy_.Reset();
   plan_.Restart();
+  trust_.Restart();
+  if (has_box_) RebuildHull();
   loosened_ = 1;
+  gain_.Restart();
   loss_ = 0;
 }
 
@@ -165,15 +214,33 @@ TrainStats ObjectField::Train(int steps, int threads) {
   if (!has_box_ || views_.empty()) return {};
   PrepareViews();
   if (rays_.empty()) return {};
-  const Eigen::Vector3f extent = box_.ExtentUnit();
+  TrainStats total;
+  while (total.steps < steps && !total.restarted) {
+    const uint64_t until_look = StepsUntilLook();
+    const uint64_t run = std::min(static_cast<uint64_t>(steps - total.steps), until_look);
+    Add(RunSteps(static_cast<int>(run), threads), total);
+    if (!total.restarted && run == until_look) Look();
+  }
+  train_seconds_ += total.wall_s;
+  loss_ = total.color_loss;
+  return total;
+}
+
+// It looks at every so many steps and at the end of the plan, however training is cut into slices.
+uint64_t ObjectField::StepsUntilLook() const {
+  const auto interval = static_cast<uint64_t>(config_.probe_interval_steps);
+  const uint64_t until_look = interval - steps() % interval, planned = plan_.AllowedSteps(views(), true);
+  return planned > steps() ? std::min(until_look, planned - steps()) : until_look;
+}
+
+TrainStats ObjectField::RunSteps(int steps, int threads) {
+  const nerf::RenderSpace space = Space();
   const nerf::StepSource source{
       .ray = [this](uint64_t step, int index) { return rays_.Get(step, index); },
       .learning_rate = [this](uint64_t step) { return static_cast<float>(plan_.LearningRate(step)); },
-      .extent = {extent.x(), extent.y(), extent.z()},
-      .grid = box_.GridPose()};
+      .extent = space.extent,
+      .grid = space.grid};
   TrainStats stats = trainer_->Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
-  train_seconds_ += stats.wall_s;
-  loss_ = stats.color_loss;
   if (!trainer_->model().IsFinite()) {
     spdlog::warn("{}: training diverged after {} steps with {} views; starting anew", id_.ToString(),
                  trainer_->steps_done(), views());
@@ -184,8 +251,10 @@ TrainStats ObjectField::Train(int steps, int threads) {
   return stats;
 }
 
+bool ObjectField::CanTrain() const { return divergences_ < kMostDivergences; }
+
 uint64_t ObjectField::AllowedSteps(bool complete) const {
-  return divergences_ < kMostDivergences ? plan_.AllowedSteps(views(), complete) : 0;
+  return CanTrain() ? plan_.AllowedSteps(views(), complete) : 0;
 }
 
 FieldSnapshot ObjectField::Snapshot() const {
@@ -195,6 +264,7 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.train_seconds = train_seconds_;
   snapshot.loss = loss_;
   snapshot.views = views();
+  snapshot.concern = Concern();
   const TrainingBox box = box_.Moved(S_new_first_);
   snapshot.S_new_first = S_new_first_;
   snapshot.T_world_object = box.T_world_object;
@@ -203,8 +273,9 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
   snapshot.hull = {nerf::kOccupancyResolution, occupancy_.TrimmedHull(config_.hull_trim_share)};
   const SE3<Object, World> T_object_world = box_.T_world_object.Inverse();
-  for (const ObjectView& view : views_) {
-    const Eigen::Vector3d center_object = T_object_world * view.T_world_camera.translation();
+  for (size_t i = 0; i < views_.size(); ++i) {
+    if (!trust_.trusted(i)) continue;
+    const Eigen::Vector3d center_object = T_object_world * views_[i].T_world_camera.translation();
     snapshot.view_centers_object.push_back((S_new_first_.scale() * center_object).cast<float>());
   }
   snapshot.field = std::make_shared<TrainedField>(trainer_->model().Clone(), box);

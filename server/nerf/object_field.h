@@ -4,16 +4,21 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/messages.h"
 #include "server/nerf/cpu/occupancy.h"
+#include "server/nerf/field_probe.h"
+#include "server/nerf/gain_meter.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/train_stats.h"
 #include "server/nerf/trainer.h"
 #include "server/nerf/training_box.h"
 #include "server/nerf/training_plan.h"
+#include "server/nerf/view_trust.h"
 #include "server/nerf/visual_hull.h"
 
 namespace romap {
@@ -36,13 +41,18 @@ class ObjectField {
   absl::Status AddView(ObjectView view);
 
   // The map was corrected: the object's space underwent `S_new_old`, and boxes and views come in the new world from now
-  // on. What is learned is relative to the box, which goes along with all views, so nothing is trained anew.
+  // on. What is learned is relative to the box, which goes along with all views, so nothing is trained anew. A motion
+  // that is not finite is passed over.
   void Move(const Sim3<World, World>& S_new_old);
 
   // The corrected pose, in the new world, of a view that is there; one that is not (any more) is passed over. Training
   // goes on from what is learned, the longer the more changed. INVALID_ARGUMENT: see ValidateView; then the view stays
   // as it was.
   absl::Status CorrectView(const ViewPose& pose);
+
+  // What is wrong with what the object was given, for people: views that were refused or that contradict the others, a
+  // box that misses what the masks show, and the like. Empty: nothing is known to be wrong.
+  std::string Concern() const;
 
   // `steps` steps of optimisation on `threads` (1..64) threads. Nothing happens without box and views.
   TrainStats Train(int steps, int threads);
@@ -56,16 +66,28 @@ class ObjectField {
   ObjectId id() const { return id_; }
   int views() const { return static_cast<int>(views_.size()); }
   uint64_t steps() const { return trainer_->steps_done(); }
+  // Share of the loss that 100 steps take away at present; nothing while that is not known.
+  std::optional<double> LossFall() const { return gain_.FallPer100Steps(); }
   // Steps the training plan allows now; `complete`: no more views are expected. 0 once training has diverged again and
   // again with the views there are.
   uint64_t AllowedSteps(bool complete) const;
 
  private:
-  absl::Status TakeView(ObjectView view);
+  absl::Status FitBox(const Cuboid& cuboid);
+  absl::Status Check(const ObjectView& view);
+  void TakeView(ObjectView view, bool keep_verdict);
   double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
   bool CarryOverTo(const TrainingBox& box);
   void Restart();
   void PrepareViews();
+  uint64_t StepsUntilLook() const;
+  TrainStats RunSteps(int steps, int threads);
+  void JudgeDepths();
+  void Look();
+  void WeighRays();
+  void RebuildHull();
+  bool CanTrain() const;
+  nerf::RenderSpace Space() const;
   size_t MostRedundantView(const ObjectView& view) const;
 
   NerfConfig config_;
@@ -83,6 +105,15 @@ class ObjectField {
   std::vector<ObjectView> views_;
   VisualHull hull_;
   RaySet rays_;
+  FieldProbe probe_;
+  ViewTrust trust_;
+  GainMeter gain_;
+  std::vector<float> need_;             // [views][PixelSampler::kTiles]
+  std::string box_fault_, view_fault_;  // of the last box or view that was refused
+  int refused_views_ = 0;
+  int black_views_ = 0;
+  bool depths_fit_ = true;
+  double share_in_box_ = 1;  // of the rays through its masks
   nerf::Occupancy occupancy_;
   TrainingPlan plan_;
   std::unique_ptr<nerf::Trainer> trainer_;

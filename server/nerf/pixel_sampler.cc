@@ -34,7 +34,7 @@ PixelSampler::PixelSampler(const NerfConfig& config, uint64_t seed) : config_(co
   sparse_.salt = 3;
 }
 
-void PixelSampler::Build(std::span<const ObjectView> views) {
+void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
   for (Line* line : {&object_, &background_, &sparse_}) {
     line->pixels.clear();
     line->first_of_group.assign(1, 0);
@@ -43,7 +43,7 @@ void PixelSampler::Build(std::span<const ObjectView> views) {
   for (const ObjectView& view : views) object_pixels += cv::countNonZero(KindMask(view, RayKind::kObject));
   const double keep_share = std::min(1.0, kMostObjectPixels / std::max(1.0, object_pixels));
   for (size_t i = 0; i < views.size(); ++i) {
-    CollectPixels(views[i], static_cast<uint16_t>(i), keep_share);
+    CollectPixels(views[i], static_cast<uint16_t>(i), keep_share, use_depth);
     CollectMapPoints(views[i], static_cast<uint16_t>(i));
   }
   const int rays = config_.rays_per_step;
@@ -57,7 +57,7 @@ void PixelSampler::Build(std::span<const ObjectView> views) {
   Weigh(std::vector<float>(views.size(), 1.0f), std::vector<float>(views.size() * kTiles, 1.0f));
 }
 
-void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share) {
+void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth) {
   const cv::Mat is_object = KindMask(view, RayKind::kObject);
   const cv::Rect bounds = cv::boundingRect(is_object);
   cv::Mat near_object, inside;
@@ -79,7 +79,7 @@ void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, do
       const int column = (x - bounds.x) * kTilesPerSide / bounds.width;
       const int row = (y - bounds.y) * kTilesPerSide / bounds.height;
       const int tile = inside.at<uint8_t>(y, x) != 0 ? row * kTilesPerSide + column : kBorderTile;
-      const float z_mu = view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(y, x);
+      const float z_mu = !use_depth || view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(y, x);
       tiles[static_cast<size_t>(tile)].push_back(PixelAt(view, view_index, x, y, z_mu));
     }
   }

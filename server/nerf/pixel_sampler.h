@@ -40,8 +40,9 @@ class PixelSampler {
 
   PixelSampler(const NerfConfig& config, uint64_t seed);
 
-  // Replaces all pixels; everything weighs 1. Keeps no reference to the views.
-  void Build(std::span<const ObjectView> views);
+  // Replaces all pixels; everything weighs 1. `use_depth`: object pixels get the dense depth. Keeps no reference to the
+  // views.
+  void Build(std::span<const ObjectView> views, bool use_depth = true);
   // Weights >= 0, how often pixels are chosen, relative to the others: `views`, one per view, of all its pixels, and
   // `tiles`, [views][kTiles], of its object pixels besides. Where all weights are 0 they are taken for 1.
   void Weigh(std::span<const float> views, std::span<const float> tiles);
@@ -87,7 +88,7 @@ class PixelSampler {
     std::vector<const TrainingPixel*> Spread(size_t group, size_t most) const;
   };
 
-  void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share);
+  void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth);
   void CollectMapPoints(const ObjectView& view, uint16_t view_index);
 
   NerfConfig config_;

@@ -4,8 +4,8 @@
 
 namespace romap {
 
-void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box) {
-  sampler_.Build(views);
+void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth) {
+  sampler_.Build(views, use_depth);
   cameras_.clear();
   unit_mu_ = static_cast<float>(box.unit_mu);
   const SE3<Object, World> T_object_world = box.T_world_object.Inverse();

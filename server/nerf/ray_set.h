@@ -17,8 +17,9 @@ class RaySet {
  public:
   RaySet(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed), sampler_(config, seed) {}
 
-  // Replaces all rays. Keeps no reference to the views.
-  void Build(std::span<const ObjectView> views, const TrainingBox& box);
+  // Replaces all rays. `use_depth`: rays through pixels with dense depth are told of it. Keeps no reference to the
+  // views.
+  void Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth = true);
   bool empty() const { return sampler_.empty(); }
 
   // See PixelSampler.

@@ -4,8 +4,28 @@
 #include <cmath>
 
 namespace romap {
+namespace {
+
+constexpr double kLeastOfNewBox = 0.2;  // of a whole training
+
+}  // namespace
+
+void TrainingPlan::Restart() {
+  planned_steps_ = static_cast<uint64_t>(config_.full_budget_steps);
+  extra_steps_ = 0;
+}
+
+void TrainingPlan::OnFulfilled(uint64_t steps_done, std::optional<double> loss_fall) {
+  constexpr uint64_t kPortion_steps = 50;
+  if (steps_done < planned_steps_ || loss_fall.value_or(0) < config_.least_loss_fall) return;
+  const uint64_t most = static_cast<uint64_t>(config_.max_extra_steps);
+  const uint64_t portion = std::min(kPortion_steps, most - std::min(most, extra_steps_));
+  planned_steps_ += portion;
+  extra_steps_ += portion;
+}
 
 void TrainingPlan::OnNewView(uint64_t steps_done) {
+  extra_steps_ = 0;
   const uint64_t full = static_cast<uint64_t>(config_.full_budget_steps);
   if (steps_done < full) return;  // the plan still has room for it
   const uint64_t extended = std::max(planned_steps_, steps_done) + static_cast<uint64_t>(config_.refine_steps_per_view);
@@ -13,6 +33,7 @@ void TrainingPlan::OnNewView(uint64_t steps_done) {
 }
 
 void TrainingPlan::OnCorrectedView(uint64_t steps_done, double shift_share) {
+  extra_steps_ = 0;
   constexpr double kShiftOfOneView = 0.004;  // weighs as much as a new view
   const double weight = std::clamp(shift_share / kShiftOfOneView, 1.0, 100.0);
   const uint64_t extended = planned_steps_ + static_cast<uint64_t>(weight * config_.refine_steps_per_view);
@@ -21,7 +42,8 @@ void TrainingPlan::OnCorrectedView(uint64_t steps_done, double shift_share) {
 }
 
 void TrainingPlan::OnNewBox(uint64_t steps_done, double unknown_share) {
-  const double share = std::clamp(2 * unknown_share, 0.2, 1.0);  // of a whole training
+  extra_steps_ = 0;
+  const double share = std::clamp(2 * unknown_share, kLeastOfNewBox, 1.0);  // of a whole training
   const uint64_t wanted = steps_done + static_cast<uint64_t>(share * config_.full_budget_steps);
   planned_steps_ = std::max(planned_steps_, wanted);
 }

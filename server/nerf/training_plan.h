@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "server/nerf/nerf_config.h"
 
@@ -9,13 +10,13 @@ namespace romap {
 // How long an object is trained and how fast it learns, as views arrive one by one.
 //
 // The learning rate falls exponentially over the planned steps. It is a function of the steps that are left, so a view
-// that comes after the plan is fulfilled extends the plan and thereby warms the rate up a little. Training far beyond
-// the plan would make density drift behind textureless surfaces, hence `max_steps`.
+// that comes after the plan is fulfilled extends the plan and thereby warms the rate up a little. What comes beyond the
+// plan is earned by the loss, step by step: see OnFulfilled.
 class TrainingPlan {
  public:
   explicit TrainingPlan(const NerfConfig& config) : config_(config) { Restart(); }
 
-  void Restart() { planned_steps_ = static_cast<uint64_t>(config_.full_budget_steps); }
+  void Restart();
   // A new view came when `steps_done` steps were done.
   void OnNewView(uint64_t steps_done);
   // The pose of a view was corrected; `shift_share` is how far it moved against the box, in sides of the box. Density
@@ -27,6 +28,10 @@ class TrainingPlan {
   // in proportion, between a fifth of a new training and the whole.
   void OnNewBox(uint64_t steps_done, double unknown_share);
 
+  // The plan is fulfilled, and the loss of `loss_fall`, a share, in 100 steps: as long as that is worth it, a few steps
+  // at the final rate are added, up to `max_extra_steps` since the last view, correction or box.
+  void OnFulfilled(uint64_t steps_done, std::optional<double> loss_fall);
+
   // Steps allowed so far. `complete`: no more views are expected, so train to the end of the plan.
   uint64_t AllowedSteps(int views, bool complete) const;
   double LearningRate(uint64_t step) const;
@@ -34,6 +39,7 @@ class TrainingPlan {
  private:
   NerfConfig config_;
   uint64_t planned_steps_ = 0;
+  uint64_t extra_steps_ = 0;  // of these, those that the falling loss has earned since something was new
 };
 
 }  // namespace romap

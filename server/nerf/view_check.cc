@@ -10,6 +10,8 @@
 namespace romap {
 namespace {
 
+constexpr int kFewestObjectPixels = 16;
+
 // Empty when `image` is what a crop of `size` needs, else what is wrong.
 std::string ImageFault(const char* name, const cv::Mat& image, cv::Size size, int type, const char* type_name) {
   if (image.size() != size) {
@@ -40,7 +42,9 @@ std::string ViewFault(const ObjectView& view, const TrainingBox& box) {
     std::string fault = ImageFault("depth_mu", view.depth_mu, size, CV_32FC1, "CV_32FC1");
     if (!fault.empty()) return fault;
   }
-  if (cv::countNonZero(view.ray_kind == static_cast<int>(RayKind::kObject)) == 0) return "its mask is empty";
+  const int object_pixels = cv::countNonZero(view.ray_kind == static_cast<int>(RayKind::kObject));
+  if (object_pixels == 0) return "its mask is empty";
+  if (object_pixels < kFewestObjectPixels) return fmt::format("its mask has only {} px", object_pixels);
   const Eigen::Vector3d center_camera = view.T_world_camera.Inverse() * box.T_world_object.translation();
   if (center_camera.z() <= 0) return "the object's box lies behind the camera";
   return {};

@@ -8,8 +8,8 @@
 namespace romap {
 
 // INVALID_ARGUMENT, naming object, keyframe and fault, for a view that cannot be trained on: no keyframe, bad camera or
-// a distorted one, pose not finite, crop outside the image, an image of another size or type than the crop needs, no
-// object pixel, or a box that lies behind the camera.
+// a distorted one, pose not finite, crop outside the image, an image of another size or type than the crop needs, fewer
+// than a few object pixels, or a box that lies behind the camera.
 absl::Status ValidateView(const ObjectView& view, const TrainingBox& box);
 
 }  // namespace romap

@@ -10,7 +10,9 @@ namespace romap {
 namespace {
 
 constexpr int kCells = nerf::kOccupancyResolution;
-constexpr int kBlock = 8;  // cells per side of a block that is tested as a whole first
+constexpr double kDepthNoise = 0.01;  // of the depth: nearer to what was measured than this is not called empty
+constexpr int kMostReach_px = 30;     // a camera so near tells too little of a cell
+constexpr int kBlock = 8;             // cells per side of a block that is tested as a whole first
 
 size_t CellIndexOf(int x, int y, int z) { return (static_cast<size_t>(z) * kCells + y) * kCells + x; }
 
@@ -24,11 +26,35 @@ struct VisualHull::Footprints {
   CameraModel camera;
   cv::Rect roi_px;
   cv::Mat occupied_sum;  // integral image of "not background"
+  cv::Mat nearest_mu;    // least depth under a cell's footprint, 0 where one is unknown; empty without depth
 
-  Footprints(const ObjectView& view, const TrainingBox& box)
+  Footprints(const ObjectView& view, const TrainingBox& box, bool use_depth, double cell_radius_mu)
       : T_camera_object(view.T_world_camera.Inverse() * box.T_world_object), camera(view.camera), roi_px(view.roi_px) {
     const cv::Mat occupied = (view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255;
     cv::integral(occupied, occupied_sum, CV_32S);
+    if (!use_depth || view.depth_mu.empty()) return;
+    const double least_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
+    if (least_z_mu <= 0) return;  // some cells' footprints have no bound
+    const int reach_px = 1 + static_cast<int>(cell_radius_mu * std::max(camera.fx_px, camera.fy_px) / least_z_mu);
+    if (reach_px > kMostReach_px) return;
+    cv::Mat known;
+    cv::compare(view.depth_mu, 0, known, cv::CMP_GT);  // false for no number too
+    cv::Mat depth_mu = cv::Mat::zeros(view.depth_mu.size(), CV_32FC1);
+    view.depth_mu.copyTo(depth_mu, known);
+    const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px + 1, 2 * reach_px + 1});
+    cv::erode(depth_mu, nearest_mu, square);
+  }
+
+  // Whether all that was measured under a ball lies behind it.
+  bool IsBeforeAll(const Eigen::Vector3d& center_object, double radius_mu) const {
+    if (nearest_mu.empty()) return false;
+    const Eigen::Vector3d p = T_camera_object * center_object;
+    const Eigen::Vector2d pixel = camera.Project(p);
+    const int x = static_cast<int>(std::lround(pixel.x())) - roi_px.x;
+    const int y = static_cast<int>(std::lround(pixel.y())) - roi_px.y;
+    if (x < 0 || y < 0 || x >= roi_px.width || y >= roi_px.height) return false;
+    const double nearest = nearest_mu.at<float>(y, x);
+    return nearest * (1 - kDepthNoise) > p.z() + radius_mu;
   }
 
   // The mask under a ball's footprint, taken as a square of its radius.
@@ -52,14 +78,17 @@ struct VisualHull::Footprints {
 VisualHull::VisualHull(const NerfConfig& config)
     : margin_(config.hull_margin), min_votes_(config.hull_min_votes), vote_share_(config.hull_vote_share) {}
 
-void VisualHull::Reset(const TrainingBox& box) {
+void VisualHull::Reset(const TrainingBox& box, bool use_depth) {
   box_ = box;
+  use_depth_ = use_depth;
   seen_.assign(CellIndexOf(0, 0, kCells), 0);
   against_.assign(seen_.size(), 0);
 }
 
+double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kCells * margin_; }
+
 void VisualHull::Vote(const ObjectView& view, int sign) {
-  const Footprints footprints(view, box_);
+  const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
   for (int z = 0; z < kCells; z += kBlock) {
     for (int y = 0; y < kCells; y += kBlock) {
       for (int x = 0; x < kCells; x += kBlock) VoteBlock(footprints, x, y, z, sign);
@@ -72,14 +101,15 @@ void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz,
   const auto center = [&](int x, int y, int z, double half) -> Eigen::Vector3d {
     return Eigen::Vector3d(x + half, y + half, z + half).cwiseProduct(cell) - box_.half_extents;
   };
-  const double cell_radius_mu = 0.5 * cell.norm() * margin_;
+  const double cell_radius_mu = CellRadius_mu();
   const Verdict block = footprints.Ask(center(bx, by, bz, 0.5 * kBlock), 0.5 * kBlock * cell.norm());
   const bool decided = block == Verdict::kEmpty || block == Verdict::kFull;
   for (int z = bz; z < bz + kBlock; ++z) {
     for (int y = by; y < by + kBlock; ++y) {
       for (int x = bx; x < bx + kBlock; ++x) {
-        const Verdict verdict = decided ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
+        Verdict verdict = decided ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
         if (verdict == Verdict::kUnknown) continue;
+        if (footprints.IsBeforeAll(center(x, y, z, 0.5), cell_radius_mu)) verdict = Verdict::kEmpty;
         const size_t i = CellIndexOf(x, y, z);
         seen_[i] = static_cast<uint8_t>(seen_[i] + sign);
         if (verdict == Verdict::kEmpty) against_[i] = static_cast<uint8_t>(against_[i] + sign);

@@ -11,13 +11,14 @@ namespace romap {
 
 // The cells of the training box that the masks leave possible (Laurentini, 1994). A view votes against a cell when the
 // cell's whole footprint is background in it. A cell outside the crop, or before which an occluder stands, is unknown
-// to the view. Votes instead of a plain intersection, because one bad mask would cut the object for good.
+// to the view. Votes instead of a plain intersection, because one bad mask would cut the object for good. Dense depth
+// votes too, whatever a pixel shows: before what was measured there is nothing.
 class VisualHull {
  public:
   explicit VisualHull(const NerfConfig& config);
 
-  // Forgets all votes; the hull is the whole box.
-  void Reset(const TrainingBox& box);
+  // Forgets all votes; the hull is the whole box. `use_depth`: dense depth may vote, if it can be believed.
+  void Reset(const TrainingBox& box, bool use_depth = true);
   // A view must be removed with the values with which it was added.
   void Add(const ObjectView& view) { Vote(view, 1); }
   void Remove(const ObjectView& view) { Vote(view, -1); }
@@ -26,10 +27,12 @@ class VisualHull {
 
  private:
   struct Footprints;
+  double CellRadius_mu() const;  // of a footprint
   void Vote(const ObjectView& view, int sign);
   void VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign);
 
   TrainingBox box_;
+  bool use_depth_ = true;
   double margin_;
   int min_votes_;
   double vote_share_;

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+
+#include "common/messages.h"
+
+namespace romap {
+
+// The share of the dense depths, each multiplied by `scale`, that other views contradict: put into space, the point is
+// seen as background by at least one of them. Looks at a sample of the object's pixels. 0 without dense depth.
+double MisplacedShare(std::span<const ObjectView> views, double scale);
+
+// Whether the dense depths belong to these views: no other scale makes clearly more of them agree with the masks, and
+// most of them do. Holes and outliers are no misfit. True without dense depth.
+bool DepthsFit(std::span<const ObjectView> views);
+
+}  // namespace romap

@@ -1,0 +1,175 @@
+// What becomes of fields whose input is not as it should be: trains the objects of a sequence with true cuboids, poses
+// and masks, but for what a scenario spoils, and writes the meshes for an evaluator (romap eval objects):
+//   field_life_bench SEQUENCE OUT [--scenario NAME ..] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0]
+//                    [--seed 1] [--threads 2] [--depth]
+// Meshes go to OUT/<scenario>/objects. Scenarios: clean; pose (one view turned by 5 degrees about its vertical axis);
+// mask (one view has the mask of another object); black (one view is black); depth_scale (depths 20 % too large);
+// depth_noise (a third of the depths lost, a tenth anything at all); arrivals (views come one by one while training).
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "client/files/ply.h"
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "common/status.h"
+#include "server/mesh/extract_mesh.h"
+#include "server/nerf/object_field.h"
+#include "tests/bench/true_views.h"
+
+namespace romap {
+namespace {
+
+struct Options {
+  std::string sequence, out;
+  std::vector<std::string> assignments, scenarios;
+  int every = 4, offset = 0, seed = 1, threads = 2;
+  bool depth = false;
+  NerfConfig nerf;
+  MeshConfig mesh;
+};
+
+using Views = std::vector<ObjectView>;
+// Spoils the views of one object; `other` are those of another one.
+using Spoiler = std::function<void(Views& views, const Views& other)>;
+
+void TurnOne(Views& views, const Views&) {
+  ObjectView& view = views[views.size() / 2];
+  const Eigen::AngleAxisd turn(5 * M_PI / 180, Eigen::Vector3d::UnitY());
+  view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
+}
+
+void SwapMaskOfOne(Views& views, const Views& other) {
+  ObjectView& view = views[views.size() / 2];
+  for (const ObjectView& wrong : other) {
+    if (wrong.keyframe != view.keyframe) continue;
+    const ObjectId object = view.object;
+    view = wrong;
+    view.object = object;
+  }
+}
+
+void BlackenOne(Views& views, const Views&) {
+  ObjectView& view = views[views.size() / 2];
+  view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
+}
+
+void ScaleDepth(Views& views, const Views&) {
+  for (ObjectView& view : views) {
+    if (!view.depth_mu.empty()) view.depth_mu = view.depth_mu * 1.2;
+  }
+}
+
+void SpoilDepth(Views& views, const Views&) {
+  cv::RNG random(1);
+  for (ObjectView& view : views) {
+    for (int y = 0; y < view.depth_mu.rows; ++y) {
+      for (int x = 0; x < view.depth_mu.cols; ++x) {
+        float& z_mu = view.depth_mu.at<float>(y, x);
+        const float dice = random.uniform(0.0f, 1.0f);
+        if (dice < 0.33f) z_mu = dice < 0.1f ? NAN : 0;
+        if (dice > 0.9f) z_mu *= random.uniform(0.3f, 3.0f);
+      }
+    }
+  }
+}
+
+const std::map<std::string, Spoiler> kSpoilers = {{"clean", [](Views&, const Views&) {}},
+                                                  {"pose", TurnOne},
+                                                  {"mask", SwapMaskOfOne},
+                                                  {"black", BlackenOne},
+                                                  {"depth_scale", ScaleDepth},
+                                                  {"depth_noise", SpoilDepth},
+                                                  {"arrivals", [](Views&, const Views&) {}}};
+
+absl::Status WriteMesh(const FieldSnapshot& snapshot, const ObjectRecord& object, const std::string& dir,
+                       const MeshConfig& config) {
+  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ExtractMesh(snapshot, config));
+  for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& n : mesh.normals) n = (snapshot.T_world_object.rotation() * n.cast<double>()).cast<float>();
+  std::filesystem::create_directories(dir);
+  return WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
+}
+
+// Gives the field all it is allowed, as the pool does.
+void TrainAllowed(ObjectField& field, bool complete, const Options& options) {
+  while (field.AllowedSteps(complete) > field.steps()) {
+    const uint64_t left = field.AllowedSteps(complete) - field.steps();
+    field.Train(static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(options.nerf.slice_steps))),
+                options.threads);
+  }
+}
+
+absl::Status TrainObject(const ObjectRecord& object, const Views& views, const std::string& scenario,
+                         const Options& options) {
+  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
+  ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
+  for (const ObjectView& view : views) {
+    if (const absl::Status status = field.AddView(view); !status.ok()) std::printf("%s\n", Message(status).c_str());
+    if (scenario == "arrivals") TrainAllowed(field, false, options);
+  }
+  TrainAllowed(field, true, options);
+  const FieldSnapshot snapshot = field.Snapshot();
+  std::printf("%-12s %-10s %5d views %6llu steps %7.3f s  loss %.4f\n", scenario.c_str(), object.name.c_str(),
+              field.views(), static_cast<unsigned long long>(field.steps()), snapshot.train_seconds, snapshot.loss);
+  std::fflush(stdout);
+  return WriteMesh(snapshot, object, options.out + "/" + scenario + "/objects", options.mesh);
+}
+
+absl::Status Run(const Options& options) {
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, {.use_depth = options.depth}));
+  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence);
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TrueFrame> frames, LoadTrueFrames(sequence, options.offset, options.every));
+  const std::vector<ObjectRecord>& objects = sequence.objects()->objects;
+  for (const std::string& scenario : options.scenarios) {
+    for (size_t i = 0; i < objects.size(); ++i) {
+      const auto views_of = [&](const ObjectRecord& object) {
+        Views views;
+        for (const TrueFrame& frame : frames) {
+          if (auto view = MakeTrueView(frame, object)) views.push_back(std::move(*view));
+        }
+        return views;
+      };
+      Views views = views_of(objects[i]);
+      if (views.empty()) continue;
+      kSpoilers.at(scenario)(views, views_of(objects[(i + 1) % objects.size()]));
+      ROMAP_RETURN_IF_ERROR(TrainObject(objects[i], views, scenario, options));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) {
+  romap::Options options;
+  CLI::App app("Trains fields on input that is not as it should be");
+  std::vector<std::string> names;
+  for (const auto& [name, spoiler] : romap::kSpoilers) names.push_back(name);
+  options.scenarios = names;
+  app.add_option("sequence", options.sequence)->required();
+  app.add_option("out", options.out)->required();
+  app.add_option("--scenario", options.scenarios)->check(CLI::IsMember(names));
+  app.add_option("--set", options.assignments)->allow_extra_args(false);
+  app.add_option("--every", options.every)->check(CLI::PositiveNumber);
+  app.add_option("--offset", options.offset)->check(CLI::NonNegativeNumber);
+  app.add_option("--threads", options.threads);
+  app.add_option("--seed", options.seed);
+  app.add_flag("--depth", options.depth);
+  CLI11_PARSE(app, argc, argv);
+  romap::ConfigFields fields;
+  fields.Section("nerf");
+  options.nerf.Fields(fields);
+  fields.Section("mesh");
+  options.mesh.Fields(fields);
+  absl::Status status = fields.Set(options.assignments);
+  if (status.ok()) status = romap::Run(options);
+  if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
+  return status.ok() ? 0 : 1;
+}
