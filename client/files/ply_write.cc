@@ -33,6 +33,7 @@ std::string Header(const Mesh& mesh, const std::map<std::string, std::vector<dou
       mesh.vertices.size());
   if (!mesh.normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!mesh.colors.empty()) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (!mesh.confidence.empty()) header += "property float confidence\n";
   for (const auto& [name, values] : scalars) {
     header += fmt::format("property {} {}\n", FitsBytes(values) ? "uchar" : "float", name);
   }
@@ -55,16 +56,20 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
       return InvalidArgument("{}: {} values of '{}' for {} vertices", path, values.size(), name, count);
     columns.push_back({&values, FitsBytes(values)});
   }
-  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size())) {
-    return InvalidArgument("{}: {} normals and {} colours for {} vertices", path, mesh.normals.size(),
-                           mesh.colors.size(), count);
+  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size()) || !fits(mesh.confidence.size())) {
+    return InvalidArgument("{}: {} normals, {} confidences and {} colours for {} vertices", path, mesh.normals.size(),
+                           mesh.confidence.size(), mesh.colors.size(), count);
+  }
+  if (!mesh.confidence.empty() && scalars.contains("confidence")) {
+    return InvalidArgument("{}: confidence both of the mesh and among the scalars", path);
   }
   std::string bytes = Header(mesh, scalars);
-  bytes.reserve(bytes.size() + 32 * count + 13 * mesh.triangles.size());
+  bytes.reserve(bytes.size() + 36 * count + 13 * mesh.triangles.size());
   for (size_t k = 0; k < count; ++k) {
     Append(mesh.vertices[k], &bytes);
     if (!mesh.normals.empty()) Append(mesh.normals[k], &bytes);
     if (!mesh.colors.empty()) Append(mesh.colors[k], &bytes);
+    if (!mesh.confidence.empty()) Append(mesh.confidence[k], &bytes);
     for (const Column& column : columns) {
       const double value = (*column.values)[k];
       column.as_bytes ? Append(static_cast<uint8_t>(value), &bytes) : Append(static_cast<float>(value), &bytes);

@@ -53,6 +53,24 @@ TEST(Ply, WhatIsWrittenIsReadBack) {
   EXPECT_THAT(file->scalars.at("weight"), ElementsAre(0.5, -1, 1e3, 2));
 }
 
+TEST(Ply, ConfidenceIsAFloatOfItsOwnWhereTheMeshHasIt) {
+  Mesh mesh = Tetrahedron();
+  mesh.confidence = {0, 0.25f, 1, 0.5f};
+  const std::string path = TempPath("confident.ply");
+  ASSERT_TRUE(WritePly(path, mesh, {{"seen", {0, 1, 1, 0}}}).ok());
+  const auto bytes = ReadFile(path);
+  EXPECT_THAT(*bytes, HasSubstr("property float confidence\n"));
+  const auto file = ReadPly(path);
+  ASSERT_TRUE(file.ok()) << file.status();
+  EXPECT_THAT(file->scalars.at("confidence"), ElementsAre(0, 0.25, 1, 0.5));
+  EXPECT_THAT(file->scalars.at("seen"), ElementsAre(0, 1, 1, 0));
+  EXPECT_EQ(file->mesh.colors, mesh.colors);
+  EXPECT_THAT(ErrorOf(WritePly(path, mesh, {{"confidence", {0, 1, 1, 0}}})), HasSubstr("confidence both of the mesh"));
+  mesh.confidence.pop_back();
+  EXPECT_THAT(ErrorOf(WritePly(path, mesh)), HasSubstr("3 confidences"));
+  std::filesystem::remove(path);
+}
+
 TEST(Ply, ReadsAsciiWithPolygonsInAnyOrderOfProperties) {
   const auto file = ParsePly(
       "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement vertex 5\r\nproperty uchar seen\r\nproperty double z\r\n"
