@@ -242,10 +242,29 @@ struct ObjectViews {
 class FieldSampler {
  public:
   virtual ~FieldSampler() = default;
-  // raw[i] = pre-activation density at p_object[i] (Object frame, map units); the surface is where raw crosses
-  // FieldSnapshot::surface_level, larger = inside. Points outside the box get -inf-like -1e4. rgb may be empty (not
-  // asked for) or as long as p_object.
+  // raw[i] = how much p_object[i] (Object frame, map units) is inside, in the field's own unit (a log density, a signed
+  // distance ..): it grows inwards, and the surface is where it crosses FieldSnapshot::surface_level. What else it
+  // means is for SurfaceOptics to say. Points outside the box get -inf-like -1e4. rgb may be empty (not asked for) or
+  // as long as p_object.
   virtual void Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const = 0;
+};
+
+// What raw values mean to light. On the outer side of the surface and close to it the density (optical depth per map
+// unit) is
+//   density(raw) = surface_density_per_mu * exp((raw - surface_level) / raw_per_efold).
+// For a field of log density this is exact with raw_per_efold 1; for a signed distance whose density is a Laplace or
+// logistic distribution's (Yariv et al. 2021, Wang et al. 2021) raw_per_efold is that distribution's scale.
+struct SurfaceOptics {
+  float surface_density_per_mu = 0;  // > 0
+  float raw_per_efold = 1;           // > 0
+};
+
+// One training view, for those who ask what it saw of the object.
+struct FieldView {
+  SE3<Camera, Object> T_camera_object;  // map units
+  CameraModel camera;                   // of the full image, no distortion
+  cv::Rect roi_px;                      // the crop in the full image; the view knows nothing of pixels outside it
+  cv::Mat ray_kind;                     // CV_8UC1 of RayKind, size of roi
 };
 
 // Bits over a regular grid of the box: cell (x, y, z) at index (z * resolution + y) * resolution + x covers the box
@@ -268,11 +287,12 @@ struct FieldSnapshot {
   std::string concern;     // for people: what is wrong with what the object was given; empty = nothing
   SE3<World, Object> T_world_object;
   Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units
-  float surface_level = 0;
+  float surface_level = 0;                                     // of raw, see FieldSampler
+  SurfaceOptics optics;
   // A component of inside cells that hangs together through values above this lower level is one piece (thin parts).
   float connect_level = 0;
-  OccupancyBits hull;                                // visual hull of the masks: outside it nothing can be
-  std::vector<Eigen::Vector3f> view_centers_object;  // camera centres of the training views, Object frame
+  OccupancyBits hull;              // visual hull of the masks: outside it nothing can be
+  std::vector<FieldView> cameras;  // the training views
   std::shared_ptr<const FieldSampler> field;
 };
 

@@ -2,16 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <ctime>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/status.h"
-#include "server/mesh/field_grid.h"
+#include "server/mesh/confidence.h"
+#include "server/mesh/field_probe.h"
 #include "server/mesh/floaters.h"
+#include "server/mesh/grid_nodes.h"
 #include "server/mesh/hidden_space.h"
 #include "server/mesh/marching_cubes.h"
+#include "server/mesh/refine_vertices.h"
+#include "server/mesh/sample_field.h"
 #include "server/mesh/support_height.h"
+#include "server/mesh/vertex_normals.h"
 
 namespace romap {
 namespace {
@@ -28,6 +34,11 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
     return InvalidArgument("{}: surface level {} and connect level {} must be finite", object, snapshot.surface_level,
                            snapshot.connect_level);
   }
+  const auto& [density, per_efold] = snapshot.optics;
+  if (!std::isfinite(density) || !std::isfinite(per_efold) || !(density > 0) || !(per_efold > 0)) {
+    return InvalidArgument("{}: surface density {} and raw per e-fold {} must be finite and positive", object, density,
+                           per_efold);
+  }
   const size_t side = std::max(snapshot.hull.resolution, 0);
   if (snapshot.hull.bits.size() != side * side * side) {
     return InvalidArgument("{}: hull has {} bits, want {}^3", object, snapshot.hull.bits.size(), side);
@@ -36,33 +47,85 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   return absl::OkStatus();
 }
 
-void ColorVertices(const FieldSampler& field, Mesh& mesh) {
-  std::vector<float> raw(mesh.vertices.size());
+double ThreadCpuSeconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// Books the time since the last booking on one phase after the other.
+class PhaseClock {
+ public:
+  explicit PhaseClock(MeshStats& stats) : stats_(stats), last_s_(ThreadCpuSeconds()) {}
+  void EndPhase() {
+    const double now_s = ThreadCpuSeconds();
+    stats_.phase_cpu_s[phase_++] += now_s - last_s_;
+    last_s_ = now_s;
+  }
+
+ private:
+  MeshStats& stats_;
+  double last_s_;
+  size_t phase_ = 0;
+};
+
+SightLimits SightOf(const FieldSnapshot& snapshot, const MeshConfig& config) {
+  SightLimits limits{.view_centers = {},
+                     .surface_density_per_mu = snapshot.optics.surface_density_per_mu,
+                     .max_optical_depth = static_cast<float>(config.unseen_optical_depth)};
+  for (const FieldView& view : snapshot.cameras) {
+    limits.view_centers.push_back(view.T_camera_object.Inverse().translation().cast<float>());
+  }
+  return limits;
+}
+
+void ColorVertices(const FieldProbe& probe, Mesh& mesh) {
+  std::vector<float> values(mesh.vertices.size());
   mesh.colors.resize(mesh.vertices.size());
-  field.Sample(mesh.vertices, raw, mesh.colors);
+  probe.Sample(mesh.vertices, values, mesh.colors);
 }
 
 }  // namespace
 
-absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig& config) {
+absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig& config, MeshStats* stats) {
   ROMAP_RETURN_IF_ERROR(Validate(snapshot, config));
-  const float level = snapshot.surface_level;
-  const float connect_level = std::min(snapshot.connect_level, level);
+  MeshStats own_stats;
+  PhaseClock clock(stats != nullptr ? *stats : own_stats);
+  const FieldProbe probe(snapshot);
+  const Eigen::Vector3i nodes = ChooseNodes(snapshot, config);
+  auto [grid, asked_nodes] = SampleField(snapshot, probe, nodes);
+  clock.EndPhase();
 
-  FieldGrid grid = SampleField(snapshot, config.resolution);
-  std::span<const Eigen::Vector3f> views;
-  if (config.fill_unseen) views = snapshot.view_centers_object;
-  FillHiddenSpace(grid, level, views, config.unseen_optical_depth);
+  const SightLimits sight = SightOf(snapshot, config);
+  FillHiddenSpace(grid, config.fill_unseen ? sight : SightLimits{});
+  clock.EndPhase();
   if (config.cut_below_support) {
-    const auto height = FindSupportHeight(grid, level, snapshot.view_centers_object, config.unseen_optical_depth);
-    if (height) CutBelow(grid, level, *height);
+    const auto height = FindSupportHeight(grid, sight);
+    if (height) CutBelow(grid, *height);
   }
-  if (RemoveFloaters(grid, level, connect_level, config.min_component_share) == 0) {
+  clock.EndPhase();
+  if (RemoveFloaters(grid, probe.connect_value(), config.min_component_share) == 0) {
     return FailedPrecondition("{}: no surface at this level", snapshot.object.ToString());
   }
-  Mesh mesh = MarchingCubes(grid, level);
-  ComputeVertexNormals(mesh);
-  ColorVertices(*snapshot.field, mesh);
+  clock.EndPhase();
+
+  GridSurface surface = MarchingCubes(grid);
+  clock.EndPhase();
+  RefineVertices(grid, probe, surface);
+  clock.EndPhase();
+  SetFieldNormals(grid, probe, surface);
+  clock.EndPhase();
+  Mesh mesh = std::move(surface.mesh);
+  ColorVertices(probe, mesh);
+  clock.EndPhase();
+  SetConfidence(snapshot.cameras, snapshot.box_half_extents, grid.spacing.maxCoeff(), mesh);
+  if (config.trim_unseen) TrimUnseen(static_cast<float>(config.trim_confidence), mesh);
+  clock.EndPhase();
+  if (stats != nullptr) {
+    stats->nodes = nodes;
+    stats->asked_nodes = asked_nodes;
+  }
+  if (mesh.triangles.empty()) return FailedPrecondition("{}: no view saw its surface", snapshot.object.ToString());
   return mesh;
 }
 

@@ -2,32 +2,34 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
-
-#include "common/messages.h"
 
 namespace romap {
 
 // A node that holds nothing for sure: outside the hull, outside the box, or where the field has no finite answer.
-inline constexpr float kEmptyRaw = -1e4f;
+inline constexpr float kEmpty = -1e4f;
 // A node of the ring around the box: whatever the field says inside, the surface closes at the box.
-inline constexpr float kBeyondBoxRaw = -1e30f;
-// How far above the surface level a node is set that is declared solid without the field saying so.
-inline constexpr float kSolidMargin = 2.0f;
+inline constexpr float kBeyondBox = -1e30f;
+// The value of a node that is declared solid without the field saying so.
+inline constexpr float kSolid = 2.0f;
 
-// Raw field values on a regular grid over the box, with one ring of kBeyondBoxRaw nodes around it so that every surface
-// closes and every sampled node has all its neighbours. Node (x, y, z) is raw[Index(x, y, z)], x fastest; nodes 1 to
-// nodes_per_side - 2 of each axis span the box from face to face.
+// The field on a regular grid over the box, with one ring of kBeyondBox nodes around it so that every surface closes
+// and every other node has all its neighbours. A value is the logarithm of the density over that at the surface: 0 on
+// the surface, > 0 inside. Node (x, y, z) is value[Index(x, y, z)], x fastest; nodes 1 to nodes - 2 of each axis span
+// the box from face to face.
 struct FieldGrid {
-  int nodes_per_side = 0;     // with the ring
-  Eigen::Vector3f origin;     // of node (0, 0, 0), Object frame, map units
-  Eigen::Vector3f spacing;    // between nodes, map units
-  float longest_side_mu = 0;  // of the box
-  std::vector<float> raw;
+  Eigen::Vector3i nodes = Eigen::Vector3i::Zero();  // per axis, with the ring
+  Eigen::Vector3f origin;                           // of node (0, 0, 0), Object frame, map units
+  Eigen::Vector3f spacing;                          // between nodes, map units
+  std::vector<float> value;
+  std::vector<uint8_t> edited;  // 1 = the value was decided by a rule against what the field says
 
-  size_t StrideY() const { return nodes_per_side; }
-  size_t StrideZ() const { return StrideY() * nodes_per_side; }
-  size_t Index(int x, int y, int z) const { return z * StrideZ() + y * StrideY() + x; }
+  size_t StrideY() const { return static_cast<size_t>(nodes.x()); }
+  size_t StrideZ() const { return StrideY() * static_cast<size_t>(nodes.y()); }
+  size_t Index(int x, int y, int z) const {
+    return static_cast<size_t>(z) * StrideZ() + static_cast<size_t>(y) * StrideY() + static_cast<size_t>(x);
+  }
   // The (x, y, z) of a node, as the inverse of Index().
   Eigen::Vector3f NodeAt(size_t index) const {
     return {static_cast<float>(index % StrideY()), static_cast<float>(index % StrideZ() / StrideY()),
@@ -36,13 +38,14 @@ struct FieldGrid {
   Eigen::Vector3f Position(const Eigen::Vector3f& node) const { return origin + node.cwiseProduct(spacing); }
   // Inverse of Position(): node coordinates of a point of the Object frame.
   Eigen::Vector3f ToNode(const Eigen::Vector3f& p_object) const { return (p_object - origin).cwiseQuotient(spacing); }
+
+  void Edit(size_t index, float new_value) {
+    value[index] = new_value;
+    edited[index] = 1;
+  }
 };
 
-// A grid of `resolution`^3 empty nodes over the box |p| <= half_extents, and the ring.
-FieldGrid MakeEmptyGrid(int resolution, const Eigen::Vector3f& half_extents);
-
-// Asks the field at all nodes inside the hull (everywhere when the hull has resolution 0). Values that are not a number
-// count as empty. The snapshot must have a field, and a hull of resolution^3 bits.
-FieldGrid SampleField(const FieldSnapshot& snapshot, int resolution);
+// A grid of `box_nodes` (each >= 2) empty nodes over the box |p| <= half_extents, and the ring.
+FieldGrid MakeEmptyGrid(const Eigen::Vector3i& box_nodes, const Eigen::Vector3f& half_extents);
 
 }  // namespace romap

@@ -6,10 +6,9 @@
 
 namespace romap {
 
-// Empties all nodes above `level` but those of the largest piece, and of pieces with at least `min_share` of its nodes.
-// What hangs together through nodes above `connect_level` (<= level; six neighbours) is one piece, so that a thin stem
-// that dips below the level still holds both its ends. Size counts nodes above `level`. Returns the number of nodes
-// above `level` that remain.
-size_t RemoveFloaters(FieldGrid& grid, float level, float connect_level, double min_share);
+// Empties all matter but that of the largest piece, and of pieces with at least `min_share` of its nodes. What hangs
+// together through nodes above `connect_value` (<= 0; six neighbours) is one piece, so that a thin stem that dips below
+// the surface's value still holds both its ends. Size counts nodes inside the surface. Returns how many of them remain.
+size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share);
 
 }  // namespace romap

@@ -1,43 +1,74 @@
 #include "server/mesh/hidden_space.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
 #include "server/mesh/grid_flood.h"
-#include "server/mesh/sight_tester.h"
 
 namespace romap {
+namespace {
 
-void FillHiddenSpace(FieldGrid& grid, float level, std::span<const Eigen::Vector3f> view_centers,
-                     double max_optical_depth) {
-  // Only nodes next to open space are tested for sight: the surface lies there, and tests are what takes the time.
-  SightTester sight(grid, level, view_centers, static_cast<float>(max_optical_depth));
-  enum State : uint8_t { kUntouched, kOpen, kClosed };
-  std::vector<uint8_t> state(grid.raw.size(), kUntouched);
-  const auto enter = [&](size_t index) {
-    const float raw = grid.raw[index];
-    if (state[index] != kUntouched || raw > level || raw == kBeyondBoxRaw) return false;
-    const bool open = raw == kEmptyRaw || !sight.has_views() || sight.IsSeen(grid.NodeAt(index));
-    state[index] = open ? kOpen : kClosed;
-    return open;
-  };
+enum State : uint8_t { kUntouched, kOpen, kClosed };
 
-  std::vector<size_t> open_on_box;
-  const int last = grid.nodes_per_side - 2;
-  for (int z = 1; z <= last; ++z) {
-    for (int y = 1; y <= last; ++y) {
-      const bool whole_row = z == 1 || z == last || y == 1 || y == last;
-      for (int x = 1; x <= last; x += whole_row ? 1 : last - 1) {
-        if (enter(grid.Index(x, y, z))) open_on_box.push_back(grid.Index(x, y, z));
-      }
+class HiddenSpace {
+ public:
+  HiddenSpace(FieldGrid& grid, const SightLimits& limits)
+      : grid_(grid), sight_(grid, limits), state_(grid.value.size(), kUntouched) {}
+
+  void Fill() {
+    if (sight_.has_views()) LookAtSurface();
+    Flood(grid_, OpenNodesOnBox(), [this](size_t node) { return Enter(node); });
+    for (size_t i = 0; i < state_.size(); ++i) {
+      if (state_[i] != kOpen && IsSpace(i)) grid_.Edit(i, kSolid);
     }
   }
-  Flood(grid, std::move(open_on_box), enter);
-  for (size_t i = 0; i < state.size(); ++i) {
-    if (state[i] != kOpen && !(grid.raw[i] > level) && grid.raw[i] != kBeyondBoxRaw) grid.raw[i] = level + kSolidMargin;
+
+ private:
+  bool IsSpace(size_t node) const { return !(grid_.value[node] > 0) && grid_.value[node] != kBeyondBox; }
+
+  // Tests the space next to matter first: what is seen there shows whole rays to be open, which spares the tests of all
+  // the space before it.
+  void LookAtSurface() {
+    const std::array<ptrdiff_t, 6> steps = NeighbourSteps(grid_);
+    for (size_t i = 0; i < state_.size(); ++i) {
+      if (!IsSpace(i) || grid_.value[i] == kEmpty) continue;
+      const bool at_surface =
+          std::any_of(steps.begin(), steps.end(), [&](ptrdiff_t step) { return grid_.value[i + step] > 0; });
+      if (at_surface && !sight_.IsSeen(i)) state_[i] = kClosed;
+    }
   }
-}
+
+  bool Enter(size_t node) {
+    if (state_[node] != kUntouched || !IsSpace(node)) return false;
+    const bool open = grid_.value[node] == kEmpty || !sight_.has_views() || sight_.IsSeen(node);
+    state_[node] = open ? kOpen : kClosed;
+    return open;
+  }
+
+  std::vector<size_t> OpenNodesOnBox() {
+    std::vector<size_t> open;
+    const Eigen::Vector3i last = grid_.nodes.array() - 2;
+    for (int z = 1; z <= last.z(); ++z) {
+      for (int y = 1; y <= last.y(); ++y) {
+        const bool whole_row = z == 1 || z == last.z() || y == 1 || y == last.y();
+        for (int x = 1; x <= last.x(); x += whole_row ? 1 : last.x() - 1) {
+          if (Enter(grid_.Index(x, y, z))) open.push_back(grid_.Index(x, y, z));
+        }
+      }
+    }
+    return open;
+  }
+
+  FieldGrid& grid_;
+  SightTester sight_;
+  std::vector<uint8_t> state_;
+};
+
+}  // namespace
+
+void FillHiddenSpace(FieldGrid& grid, const SightLimits& limits) { HiddenSpace(grid, limits).Fill(); }
 
 }  // namespace romap

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -9,30 +10,39 @@
 
 namespace romap {
 
+// Where to look from and how far sight reaches.
+struct SightLimits {
+  std::vector<Eigen::Vector3f> view_centers;  // Object frame, map units; those that are not finite are left out
+  float surface_density_per_mu = 0;           // see SurfaceOptics
+  float max_optical_depth = 0;                // beyond it a view sees nothing
+};
+
 // Answers whether a place in the grid can be seen from the training views: the optical depth on the straight way to a
-// view is at most `max_optical_depth`. Nodes above `level` block all sight; below, the density is exp(raw) per longest
-// box side. Rays advance by the smallest node spacing, and the node nearest to each step speaks for it. The values are
-// copied: later changes of the grid do not matter.
+// view is within the limit. Nodes above the surface's value block all sight. Rays advance by the smallest node spacing,
+// and the node nearest to each step speaks for it. The values are copied: later changes of the grid do not matter.
 class SightTester {
  public:
-  // View centres in the Object frame, map units; those that are not finite are left out.
-  SightTester(const FieldGrid& grid, float level, std::span<const Eigen::Vector3f> view_centers,
-              float max_optical_depth);
+  SightTester(const FieldGrid& grid, const SightLimits& limits);
 
   bool has_views() const { return !views_.empty(); }
 
-  // Places below are in node coordinates, within the ring.
-
-  bool IsSeen(const Eigen::Vector3f& place);
-  // As IsSeen, but only views that look at the surface with this outward normal (Object frame, unit length) from the
-  // front count: the cosine between normal and direction to the view is at least `min_cosine`.
+  // Whether some view sees the node. All nodes on the way to that view are seen as well and will be known to be.
+  bool IsSeen(size_t node);
+  // Whether some view sees a place (node coordinates, within the ring) of a surface with this outward normal (Object
+  // frame, unit length) from the front: the cosine between normal and direction to the view is at least `min_cosine`.
   bool IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float min_cosine);
 
  private:
-  bool Sees(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const;
-  int StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vector3f& step, float way_mu) const;
+  struct Way {  // from a place towards a view
+    Eigen::Vector3f step;
+    int steps = 0;  // that stay among the grid's nodes and do not pass the view
+  };
+  Way WayTo(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const;
+  bool IsClear(const Eigen::Vector3f& place, const Way& way) const;
+  void MarkSeen(const Eigen::Vector3f& place, const Way& way);
+  size_t NodeNear(const Eigen::Vector3f& shifted) const;
 
-  const int nodes_per_side_;
+  const Eigen::Vector3i nodes_;
   const size_t stride_y_;
   const size_t stride_z_;
   const Eigen::Vector3f spacing_;
@@ -40,6 +50,7 @@ class SightTester {
   const float max_optical_depth_;
   std::vector<Eigen::Vector3f> views_;  // in node coordinates
   std::vector<float> optical_depth_;    // of one step, by node
+  std::vector<uint8_t> seen_;           // by node: 1 = some view sees it
   size_t last_view_ = 0;                // that saw something
 };
 

@@ -2,44 +2,71 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "common/mesh.h"
 #include "server/mesh/marching_cubes.h"
-#include "server/mesh/sight_tester.h"
 
 namespace romap {
 namespace {
 
-// The walls of hidden space below an object run along the flattest lines of sight, so that a view may graze them; a
-// surface counts as seen only by views within 60 degrees of its normal.
-constexpr float kMinCosine = 0.5f;
+// Surface that is grazed more flatly than this does not count as seen: walls of what no view reached run along the
+// flattest lines of sight.
+constexpr float kMinCosine = 0.2f;
 // Of the visible area; what is noise at the rim of the hull.
 constexpr double kShareBelow = 0.02;
 // Walls have normals within 30 degrees of the horizontal. Where views see hardly any, as from straight above, the
 // lowest visible height says nothing.
 constexpr float kMaxWallNormalZ = 0.5f;
 constexpr double kMinWallShare = 0.05;  // of the visible area
-// Raw units per node spacing with which matter fades below the cut.
+// Value per node spacing with which matter fades below the cut.
 constexpr float kCutSlope = 4.0f;
+// So many triangles tell the height as well as all do.
+constexpr size_t kEnoughTriangles = 6000;
 
 struct SurfacePatch {
   float height;  // z, map units
   double area;   // any unit
 };
 
+// The height below which lies `kShareBelow` of the area. A histogram, finer than any grid, spares the sorting.
+float LowHeight(const FieldGrid& grid, const std::vector<SurfacePatch>& patches, double total_area) {
+  constexpr int kBinsPerNode = 16;
+  const float bin_mu = grid.spacing.z() / kBinsPerNode;
+  std::vector<double> area(static_cast<size_t>(kBinsPerNode * grid.nodes.z()), 0.0);
+  for (const SurfacePatch& patch : patches) {
+    const int bin = static_cast<int>((patch.height - grid.origin.z()) / bin_mu);
+    area[static_cast<size_t>(std::clamp(bin, 0, static_cast<int>(area.size()) - 1))] += patch.area;
+  }
+  double below = 0;
+  size_t bin = 0;
+  while (bin + 1 < area.size() && (below += area[bin]) < kShareBelow * total_area) ++bin;
+  return grid.origin.z() + (static_cast<float>(bin) + 0.5f) * bin_mu;
+}
+
+// Whether a vertex lies between two nodes that hold what the field itself says.
+bool IsOfTheField(const FieldGrid& grid, const GridSurface& surface, uint32_t vertex) {
+  const std::array<size_t, 3> stride = {1, grid.StrideY(), grid.StrideZ()};
+  const size_t low = surface.grid_edges[vertex] / 3;
+  return grid.edited[low] == 0 && grid.edited[low + stride[surface.grid_edges[vertex] % 3]] == 0;
+}
+
 }  // namespace
 
-std::optional<float> FindSupportHeight(const FieldGrid& grid, float level,
-                                       std::span<const Eigen::Vector3f> view_centers, double max_optical_depth) {
-  SightTester sight(grid, level, view_centers, static_cast<float>(max_optical_depth));
-  const Mesh mesh = MarchingCubes(grid, level);
+std::optional<float> FindSupportHeight(const FieldGrid& grid, const SightLimits& limits) {
+  SightTester sight(grid, limits);
+  if (!sight.has_views()) return std::nullopt;
+  const GridSurface surface = MarchingCubes(grid);
+  const Mesh& mesh = surface.mesh;
   std::vector<SurfacePatch> visible;
   double visible_area = 0;
   double wall_area = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
+  const size_t stride = 1 + mesh.triangles.size() / kEnoughTriangles;
+  for (size_t i = 0; i < mesh.triangles.size(); i += stride) {
+    const auto& [a, b, c] = mesh.triangles[i];
+    if (!IsOfTheField(grid, surface, a) || !IsOfTheField(grid, surface, b) || !IsOfTheField(grid, surface, c)) continue;
     const Eigen::Vector3f& p = mesh.vertices[a];
     const Eigen::Vector3f cross = (mesh.vertices[b] - p).cross(mesh.vertices[c] - p);
     const float area = cross.norm();
@@ -53,24 +80,18 @@ std::optional<float> FindSupportHeight(const FieldGrid& grid, float level,
     if (std::abs(normal.z()) < kMaxWallNormalZ) wall_area += area;
   }
   if (visible.empty() || wall_area < kMinWallShare * visible_area) return std::nullopt;
-  std::sort(visible.begin(), visible.end(),
-            [](const SurfacePatch& a, const SurfacePatch& b) { return a.height < b.height; });
-  double below = 0;
-  for (const SurfacePatch& patch : visible) {
-    below += patch.area;
-    if (below >= kShareBelow * visible_area) return patch.height;
-  }
-  return visible.back().height;
+  return LowHeight(grid, visible, visible_area);
 }
 
-void CutBelow(FieldGrid& grid, float level, float height) {
+void CutBelow(FieldGrid& grid, float height) {
   const float cut = (height - grid.origin.z()) / grid.spacing.z();  // in node coordinates
-  const int last = grid.nodes_per_side - 2;
-  for (int z = 1; z <= last; ++z) {
-    const float most = level + kCutSlope * (static_cast<float>(z) - cut);
-    for (int y = 1; y <= last; ++y) {
-      float* row = &grid.raw[grid.Index(0, y, z)];
-      for (int x = 1; x <= last; ++x) row[x] = std::min(row[x], std::max(most, kEmptyRaw));
+  const Eigen::Vector3i last = grid.nodes.array() - 2;
+  for (int z = 1; z <= last.z(); ++z) {
+    const float most = std::max(kCutSlope * (static_cast<float>(z) - cut), kEmpty);
+    for (int y = 1; y <= last.y(); ++y) {
+      for (size_t node = grid.Index(1, y, z), end = node + static_cast<size_t>(last.x()); node < end; ++node) {
+        if (grid.value[node] > most) grid.Edit(node, most);
+      }
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <utility>
@@ -270,13 +271,18 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.T_world_object = box.T_world_object;
   snapshot.box_half_extents = box.half_extents.cast<float>();
   snapshot.surface_level = static_cast<float>(config_.surface_level);
+  // Training measures density per unit of the box's Unit space.
+  snapshot.optics.surface_density_per_mu = static_cast<float>(std::exp(config_.surface_level) / box.unit_mu);
   snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
   snapshot.hull = {nerf::kOccupancyResolution, occupancy_.TrimmedHull(config_.hull_trim_share)};
-  const SE3<Object, World> T_object_world = box_.T_world_object.Inverse();
   for (size_t i = 0; i < views_.size(); ++i) {
     if (!trust_.trusted(i)) continue;
-    const Eigen::Vector3d center_object = T_object_world * views_[i].T_world_camera.translation();
-    snapshot.view_centers_object.push_back((S_new_first_.scale() * center_object).cast<float>());
+    const ObjectView& view = views_[i];
+    const SE3<Camera, Object> T_camera_object = view.T_world_camera.Inverse() * box_.T_world_object;
+    snapshot.cameras.push_back({{T_camera_object.rotation(), S_new_first_.scale() * T_camera_object.translation()},
+                                view.camera,
+                                view.roi_px,
+                                view.ray_kind});
   }
   snapshot.field = std::make_shared<TrainedField>(trainer_->model().Clone(), box);
   return snapshot;

@@ -153,7 +153,7 @@ TEST(ExtractMesh, SpaceThatNoViewSeesBecomesSolid) {
   FieldSnapshot snapshot = SnapshotOf(bowl);
   const double hollow_volume = Volume(Extract(snapshot));
   for (int i = 0; i < 8; ++i) {
-    snapshot.view_centers_object.emplace_back(4 * std::cos(i * kPi / 4), 4 * std::sin(i * kPi / 4), 3.0);
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 4), 4 * std::sin(i * kPi / 4), 3.0}));
   }
   // What the hull keeps: only what lies above the rim.
   snapshot.hull.resolution = 40;
@@ -177,7 +177,7 @@ TEST(ExtractMesh, EndsWhereTheVisibleSurfaceEnds) {
   };
   FieldSnapshot snapshot = SnapshotOf(column);
   for (int i = 0; i < 24; ++i) {
-    snapshot.view_centers_object.emplace_back(4 * std::cos(i * kPi / 12), 4 * std::sin(i * kPi / 12), 2.0);
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 12), 4 * std::sin(i * kPi / 12), 2.0}));
   }
   const auto lowest = [](const Mesh& mesh) {
     float z = 1e9f;
@@ -198,14 +198,14 @@ TEST(ExtractMesh, UndersideThatAViewSeesIsNotCut) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));
   const double whole = Volume(Extract(snapshot));
   for (int i = 0; i < 6; ++i) {
-    snapshot.view_centers_object.emplace_back(4 * std::cos(i * kPi / 3), 4 * std::sin(i * kPi / 3), i % 2 ? 3.0 : -3.0);
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 3), 4 * std::sin(i * kPi / 3), i % 2 ? 3.0 : -3.0}));
   }
   EXPECT_NEAR(Volume(Extract(snapshot)), whole, 0.01 * whole);
 }
 
 TEST(ExtractMesh, SeenFromStraightAboveNothingIsCut) {
   FieldSnapshot snapshot = SnapshotOf([](const Eigen::Vector3f& p) { return 0.5f - p.cwiseAbs().maxCoeff(); });
-  snapshot.view_centers_object = {{0.1f, 0, 6}, {0, 0.1f, 6}, {-0.1f, 0, 6}};
+  snapshot.cameras = {ViewFrom({0.1, 0, 6}), ViewFrom({0, 0.1, 6}), ViewFrom({-0.1, 0, 6})};
   EXPECT_GT(Volume(Extract(snapshot)), 1.0);
 }
 
@@ -216,11 +216,11 @@ TEST(ExtractMesh, SpaceThatSomeViewSeesStaysEmpty) {
   };
   FieldSnapshot snapshot = SnapshotOf(bowl);
   const double hollow_volume = Volume(Extract(snapshot));
-  snapshot.view_centers_object.emplace_back(0.3f, 0.2f, 5.0f);
+  snapshot.cameras.push_back(ViewFrom({0.3f, 0.2f, 5.0f}));
   for (int i = 0; i < 8; ++i) {
-    snapshot.view_centers_object.emplace_back(4 * std::cos(i * kPi / 4), 4 * std::sin(i * kPi / 4), 0.0);
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 4), 4 * std::sin(i * kPi / 4), 0.0}));
   }
-  snapshot.view_centers_object.emplace_back(0.0f, 0.0f, -4.0f);
+  snapshot.cameras.push_back(ViewFrom({0.0f, 0.0f, -4.0f}));
   EXPECT_NEAR(Volume(Extract(snapshot)), hollow_volume, 0.04 * hollow_volume);
 }
 
@@ -231,7 +231,7 @@ TEST(ExtractMesh, ValuesThatAreNotANumberCountAsEmpty) {
     return 0.6f - p.norm();
   };
   FieldSnapshot snapshot = SnapshotOf(half_nan);
-  snapshot.view_centers_object = {{0, 0, 5}, {std::numeric_limits<float>::quiet_NaN(), 0, 0}};
+  snapshot.cameras = {ViewFrom({0, 0, 5}), ViewFrom({std::numeric_limits<double>::quiet_NaN(), 0, 0})};
   const Mesh mesh = Extract(snapshot);
   EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
   for (const Eigen::Vector3f& p : mesh.vertices) ASSERT_TRUE(p.allFinite());

@@ -44,6 +44,17 @@ class DistanceField : public FieldSampler {
 
 inline constexpr float kTestLevel = 3.0f;
 
+// A view from `center` (Object frame) towards the origin that sees nothing but the object, 400 x 400 px large.
+inline FieldView ViewFrom(const Eigen::Vector3d& center) {
+  FieldView view;
+  const Eigen::Quaterniond turn = ShortestRotation(-center, Eigen::Vector3d::UnitZ());
+  view.T_camera_object = {turn, -(turn * center)};
+  view.camera = {.width_px = 400, .height_px = 400, .fx_px = 400, .fy_px = 400, .cx_px = 199.5, .cy_px = 199.5};
+  view.roi_px = {0, 0, 400, 400};
+  view.ray_kind = cv::Mat(400, 400, CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kObject)));
+  return view;
+}
+
 // A snapshot of object/3 over the box, seen by nobody, without a hull. Raw changes by 60 over the longest half extent,
 // as a trained field's does or faster.
 inline FieldSnapshot SnapshotOf(InsideDistance distance,
@@ -53,6 +64,7 @@ inline FieldSnapshot SnapshotOf(InsideDistance distance,
   snapshot.box_half_extents = box_half_extents;
   snapshot.surface_level = kTestLevel;
   snapshot.connect_level = kTestLevel - 2.0f;
+  snapshot.optics = {std::exp(kTestLevel) / (2.0f * box_half_extents.maxCoeff()), 1.0f};
   snapshot.field = std::make_shared<DistanceField>(std::move(distance), kTestLevel, 60.0f / box_half_extents.maxCoeff(),
                                                    box_half_extents);
   return snapshot;

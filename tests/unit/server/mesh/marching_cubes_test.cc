@@ -13,10 +13,10 @@ namespace {
 
 template <class Value>
 FieldGrid GridOf(int resolution, Value value) {
-  FieldGrid grid = MakeEmptyGrid(resolution, Eigen::Vector3f::Ones());
+  FieldGrid grid = MakeEmptyGrid(Eigen::Vector3i::Constant(resolution), Eigen::Vector3f::Ones());
   for (int z = 1; z <= resolution; ++z) {
     for (int y = 1; y <= resolution; ++y) {
-      for (int x = 1; x <= resolution; ++x) grid.raw[grid.Index(x, y, z)] = value(x, y, z);
+      for (int x = 1; x <= resolution; ++x) grid.value[grid.Index(x, y, z)] = value(x, y, z);
     }
   }
   return grid;
@@ -68,14 +68,14 @@ TEST(MarchingCubesTable, OneInsideCornerIsCutOffByOneTriangleThatFacesAway) {
 TEST(MarchingCubes, RandomGridsGiveClosedManifolds) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(-4.0f, 4.0f);
-  for (const float level : {0.0f, -2.5f, 3.0f}) {
+  for (const float shift : {0.0f, 2.5f, -3.0f}) {
     for (int round = 0; round < 6; ++round) {
-      const FieldGrid grid = GridOf(14, [&](int, int, int) { return uniform(random); });
-      const Mesh mesh = MarchingCubes(grid, level);
+      const FieldGrid grid = GridOf(14, [&](int, int, int) { return uniform(random) + shift; });
+      const Mesh mesh = MarchingCubes(grid).mesh;
       const Topology topology = CheckTopology(mesh);
       EXPECT_GT(mesh.triangles.size(), 500u);
-      EXPECT_EQ(topology.bad_edges, 0u) << "level " << level << " round " << round;
-      EXPECT_EQ(topology.bad_vertices, 0u) << "level " << level << " round " << round;
+      EXPECT_EQ(topology.bad_edges, 0u) << "shift " << shift << " round " << round;
+      EXPECT_EQ(topology.bad_vertices, 0u) << "shift " << shift << " round " << round;
       EXPECT_GT(Volume(mesh), 0);
       EXPECT_GT(ShortestSide(mesh), 0);
     }
@@ -86,7 +86,7 @@ TEST(MarchingCubes, RandomGridsGiveClosedManifolds) {
 TEST(MarchingCubes, CheckerboardsGiveClosedManifolds) {
   for (const int odd : {0, 1}) {
     const FieldGrid grid = GridOf(9, [&](int x, int y, int z) { return (x + y + z) % 2 == odd ? 1.0f : -1.0f; });
-    const Mesh mesh = MarchingCubes(grid, 0.0f);
+    const Mesh mesh = MarchingCubes(grid).mesh;
     EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
     EXPECT_EQ(CheckTopology(mesh).components, odd ? 365u : 364u);  // inside corners are kept apart: one blob each
   }
@@ -94,9 +94,9 @@ TEST(MarchingCubes, CheckerboardsGiveClosedManifolds) {
 
 TEST(MarchingCubes, ValuesAtAndFarFromTheLevelGiveNoDegenerateTriangles) {
   std::mt19937 random(11);
-  const float values[] = {0.0f, 1e-30f, -1e-30f, 1e4f, kEmptyRaw, 1e-3f};
+  const float values[] = {0.0f, 1e-30f, -1e-30f, 1e4f, kEmpty, 1e-3f};
   const FieldGrid grid = GridOf(14, [&](int, int, int) { return values[random() % 6]; });
-  const Mesh mesh = MarchingCubes(grid, 0.0f);
+  const Mesh mesh = MarchingCubes(grid).mesh;
   EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
   EXPECT_GT(ShortestSide(mesh), 1e-4 * grid.spacing.x());
   for (const Eigen::Vector3f& p : mesh.vertices) ASSERT_TRUE(p.allFinite());
@@ -105,10 +105,10 @@ TEST(MarchingCubes, ValuesAtAndFarFromTheLevelGiveNoDegenerateTriangles) {
 TEST(MarchingCubes, PlacesVerticesOfALinearFieldExactly) {
   const Eigen::Vector3f normal = Eigen::Vector3f(1, 2, -0.5f).normalized();
   const FieldGrid grid = [&] {
-    FieldGrid g = MakeEmptyGrid(16, Eigen::Vector3f::Ones());
+    FieldGrid g = MakeEmptyGrid({16, 16, 16}, Eigen::Vector3f::Ones());
     return GridOf(16, [&](int x, int y, int z) { return -normal.dot(g.Position(Eigen::Vector3f(x, y, z))) - 0.03f; });
   }();
-  const Mesh mesh = MarchingCubes(grid, 0.0f);
+  const Mesh mesh = MarchingCubes(grid).mesh;
   size_t inner = 0;
   for (const Eigen::Vector3f& p : mesh.vertices) {
     if (p.cwiseAbs().maxCoeff() > 1.0f) continue;  // on the cap outside the box
@@ -120,7 +120,7 @@ TEST(MarchingCubes, PlacesVerticesOfALinearFieldExactly) {
 
 TEST(MarchingCubes, ClosesWithinAHairOfTheBoxWhenAllIsInside) {
   const FieldGrid grid = GridOf(8, [](int, int, int) { return 5.0f; });
-  const Mesh mesh = MarchingCubes(grid, 3.0f);
+  const Mesh mesh = MarchingCubes(grid).mesh;
   const Topology topology = CheckTopology(mesh);
   EXPECT_TRUE(topology.IsClosedManifold());
   EXPECT_EQ(topology.euler_characteristic, 2);
@@ -129,7 +129,7 @@ TEST(MarchingCubes, ClosesWithinAHairOfTheBoxWhenAllIsInside) {
 }
 
 TEST(MarchingCubes, EmptyGridGivesEmptyMesh) {
-  const Mesh mesh = MarchingCubes(MakeEmptyGrid(8, Eigen::Vector3f::Ones()), 0.0f);
+  const Mesh mesh = MarchingCubes(MakeEmptyGrid({8, 8, 8}, Eigen::Vector3f::Ones())).mesh;
   EXPECT_TRUE(mesh.vertices.empty());
   EXPECT_TRUE(mesh.triangles.empty());
 }

@@ -54,9 +54,12 @@ TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
   EXPECT_TRUE(
       after.S_new_first.Moved(SE3<World, Object>()).Matrix().isApprox(S.Moved(SE3<World, Object>()).Matrix(), 1e-9));
   EXPECT_EQ(after.hull.bits, before.hull.bits);
-  ASSERT_EQ(after.view_centers_object.size(), before.view_centers_object.size());
-  for (size_t i = 0; i < after.view_centers_object.size(); ++i) {
-    EXPECT_TRUE(after.view_centers_object[i].isApprox(1.3f * before.view_centers_object[i], 1e-5f));
+  EXPECT_NEAR(1.3f * after.optics.surface_density_per_mu, before.optics.surface_density_per_mu, 1e-4f);
+  ASSERT_EQ(after.cameras.size(), before.cameras.size());
+  for (size_t i = 0; i < after.cameras.size(); ++i) {
+    const SE3<Camera, Object>& T_before = before.cameras[i].T_camera_object;
+    const SE3<Camera, Object> T_scaled(T_before.rotation(), 1.3 * T_before.translation());
+    EXPECT_TRUE(after.cameras[i].T_camera_object.Matrix().isApprox(T_scaled.Matrix(), 1e-5));
   }
   const std::vector<float> raw_before = RawOnGrid(before, 0.98F), raw_after = RawOnGrid(after, 0.98F);
   for (size_t i = 0; i < raw_before.size(); ++i) EXPECT_NEAR(raw_before[i], raw_after[i], 0.02) << i;

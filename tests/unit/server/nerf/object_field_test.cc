@@ -49,7 +49,8 @@ TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {
   // Every view's central pixel shows the surface point towards it.
   for (int i = 0; i < scene.views; ++i) {
     const ObjectView view = scene.View(i);
-    const Eigen::Vector3f toward = snapshot.view_centers_object[static_cast<size_t>(i)].normalized();
+    const Eigen::Vector3f toward =
+        snapshot.cameras[static_cast<size_t>(i)].T_camera_object.Inverse().translation().cast<float>().normalized();
     const std::vector<Eigen::Vector3f> point = {toward * static_cast<float>(0.95 * scene.radius_mu)};
     std::vector<float> raw(1);
     std::vector<Rgb8> rgb(1);

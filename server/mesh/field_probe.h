@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "common/messages.h"
+
+namespace romap {
+
+// Asks a snapshot's field in the terms of this folder: the logarithm of the density over that at the surface. The only
+// place that knows raw values. The snapshot must have a field and outlive the probe.
+class FieldProbe {
+ public:
+  explicit FieldProbe(const FieldSnapshot& snapshot);
+
+  // values[i] at points[i] (Object frame, map units): 0 on the surface, > 0 inside, always finite; what is not a number
+  // counts as kEmpty. `colors` is empty (not asked for) or as long as `points`.
+  void Sample(std::span<const Eigen::Vector3f> points, std::span<float> values, std::span<Rgb8> colors = {}) const;
+
+  // The value above which parts hang together (FieldSnapshot::connect_level), <= 0.
+  float connect_value() const { return connect_value_; }
+
+ private:
+  const FieldSampler& field_;
+  float level_;
+  float per_raw_;
+  float connect_value_;
+};
+
+}  // namespace romap

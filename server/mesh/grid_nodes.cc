@@ -1,0 +1,45 @@
+#include "server/mesh/grid_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace romap {
+namespace {
+
+// The sharpest views are few and the farthest tell nothing new: three quarters of the views are no better than this.
+constexpr double kGoodViewShare = 0.75;
+
+// How long the box's longest side would be in a good view if it faced it, in pixels; 0 without views.
+double LongestSide_px(const FieldSnapshot& snapshot) {
+  std::vector<double> sides_px;
+  for (const FieldView& view : snapshot.cameras) {
+    const double distance_mu = view.T_camera_object.translation().norm();
+    const double side_px = 2.0 * snapshot.box_half_extents.maxCoeff() * view.camera.fx_px / distance_mu;
+    if (std::isfinite(side_px) && side_px > 0) sides_px.push_back(side_px);
+  }
+  if (sides_px.empty()) return 0;
+  const auto good = sides_px.begin() + static_cast<std::ptrdiff_t>(kGoodViewShare * (sides_px.size() - 1));
+  std::nth_element(sides_px.begin(), good, sides_px.end());
+  return *good;
+}
+
+}  // namespace
+
+Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& config) {
+  double longest = config.resolution;
+  if (config.adapt_resolution) {
+    const double side_px = LongestSide_px(snapshot);
+    if (side_px > 0) longest = std::clamp(side_px / config.pixels_per_node, 0.5 * longest, 2.0 * longest);
+  }
+  const int most = std::max(2, static_cast<int>(std::lround(longest)));
+  const int least = std::clamp(config.min_side_nodes, 2, most);
+  const Eigen::Vector3d share = (snapshot.box_half_extents / snapshot.box_half_extents.maxCoeff()).cast<double>();
+  Eigen::Vector3i nodes;
+  for (int axis = 0; axis < 3; ++axis) {
+    nodes[axis] = std::clamp(1 + static_cast<int>(std::lround(share[axis] * (most - 1))), least, most);
+  }
+  return nodes;
+}
+
+}  // namespace romap

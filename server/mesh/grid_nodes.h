@@ -1,0 +1,16 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/messages.h"
+#include "server/mesh/mesh_config.h"
+
+namespace romap {
+
+// How many nodes the grid over a snapshot's box gets along each axis, each >= 2. The longest side gets
+// config.resolution, or when that adapts, half to twice as many: one for each config.pixels_per_node that the side is
+// long in a good view, because what a view cannot resolve the field cannot know. Shorter sides get so many that cells
+// are cubes, but at least config.min_side_nodes.
+Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& config);
+
+}  // namespace romap

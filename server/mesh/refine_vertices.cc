@@ -1,0 +1,79 @@
+#include "server/mesh/refine_vertices.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+namespace romap {
+namespace {
+
+constexpr int kSteps = 2;
+// Far from the surface the size of a value says little about where the surface is.
+constexpr float kMostValue = 6.0f;
+
+// One vertex between the two ends of what is left of its edge, `at` in shares of the whole edge.
+struct Bracket {
+  uint32_t vertex;
+  int axis;
+  float node_at_mu;  // of the edge's lower node, along the axis
+  std::array<float, 2> at = {0.0f, 1.0f};
+  std::array<float, 2> value;
+  int kept = -1;  // the end that the last step did not move
+
+  float Middle() const {
+    const float clear = kNodeClearance;
+    const float share = at[0] + (at[1] - at[0]) * value[0] / (value[0] - value[1]);
+    return std::clamp(share, clear, 1.0f - clear);
+  }
+
+  void Narrow(float middle, float middle_value) {
+    const int moved = (middle_value > 0) == (value[0] > 0) ? 0 : 1;
+    at[moved] = middle;
+    value[moved] = std::clamp(middle_value, -kMostValue, kMostValue);
+    // An end that stays time and again holds the others back; counting it half pulls them over.
+    if (kept == 1 - moved) value[kept] *= 0.5f;
+    kept = 1 - moved;
+  }
+};
+
+std::vector<Bracket> BracketsOf(const FieldGrid& grid, const GridSurface& surface) {
+  const std::array<size_t, 3> stride = {1, grid.StrideY(), grid.StrideZ()};
+  std::vector<Bracket> brackets;
+  brackets.reserve(surface.grid_edges.size());
+  for (size_t vertex = 0; vertex < surface.grid_edges.size(); ++vertex) {
+    const int axis = static_cast<int>(surface.grid_edges[vertex] % 3);
+    const size_t low = surface.grid_edges[vertex] / 3;
+    const size_t high = low + stride[axis];
+    if (grid.edited[low] != 0 || grid.edited[high] != 0) continue;
+    if (grid.value[low] == kBeyondBox || grid.value[high] == kBeyondBox) continue;
+    brackets.push_back({.vertex = static_cast<uint32_t>(vertex),
+                        .axis = axis,
+                        .node_at_mu = grid.Position(grid.NodeAt(low))[axis],
+                        .value = {std::clamp(grid.value[low], -kMostValue, kMostValue),
+                                  std::clamp(grid.value[high], -kMostValue, kMostValue)}});
+  }
+  return brackets;
+}
+
+}  // namespace
+
+void RefineVertices(const FieldGrid& grid, const FieldProbe& probe, GridSurface& surface) {
+  std::vector<Bracket> brackets = BracketsOf(grid, surface);
+  std::vector<Eigen::Vector3f> points(brackets.size());
+  std::vector<float> values(brackets.size());
+  std::vector<float> middles(brackets.size());
+  for (int step = 0; step <= kSteps; ++step) {
+    for (size_t i = 0; i < brackets.size(); ++i) {
+      const Bracket& bracket = brackets[i];
+      middles[i] = bracket.Middle();
+      points[i] = surface.mesh.vertices[bracket.vertex];
+      points[i][bracket.axis] = bracket.node_at_mu + middles[i] * grid.spacing[bracket.axis];
+    }
+    if (step == kSteps) break;
+    probe.Sample(points, values);
+    for (size_t i = 0; i < brackets.size(); ++i) brackets[i].Narrow(middles[i], values[i]);
+  }
+  for (size_t i = 0; i < brackets.size(); ++i) surface.mesh.vertices[brackets[i].vertex] = points[i];
+}
+
+}  // namespace romap

@@ -1,0 +1,164 @@
+#include "server/mesh/sample_field.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "server/mesh/grid_flood.h"
+
+namespace romap {
+namespace {
+
+// Large enough for the sampler's SIMD loops, small enough to stay in the cache.
+constexpr size_t kBatchPoints = 8192;
+// Around a value below, no surface is near: e^-6 of the surface's density.
+constexpr float kClearlyEmpty = -6.0f;
+// Around a value above, no view will look for a hole.
+constexpr float kClearlyFull = 1.5f;
+// A mean over hull and box counts those as this: empty, but finite.
+constexpr float kLeastForMean = -16.0f;
+
+enum State : uint8_t { kDecided, kUnknown, kGuessed, kAsked };
+
+// Which hull cell the nodes 1..nodes of one axis lie in. A node between two cells belongs to the upper one.
+std::vector<int> HullCellOfNode(int nodes, int hull_resolution) {
+  std::vector<int> cell(static_cast<size_t>(nodes) + 1, 0);
+  for (int node = 1; node <= nodes; ++node) {
+    const int64_t scaled = static_cast<int64_t>(node - 1) * hull_resolution / (nodes - 1);
+    cell[static_cast<size_t>(node)] = std::min<int>(static_cast<int>(scaled), hull_resolution - 1);
+  }
+  return cell;
+}
+
+class Sampling {
+ public:
+  Sampling(const FieldSnapshot& snapshot, const FieldProbe& probe, const Eigen::Vector3i& box_nodes)
+      : probe_(probe), grid_(MakeEmptyGrid(box_nodes, snapshot.box_half_extents)), steps_(NeighbourSteps(grid_)) {
+    MarkHull(snapshot.hull);
+  }
+
+  SampledField Run() && {
+    Ask(LatticeNodes());
+    std::vector<size_t> front = GuessBetweenLattice();
+    while (!front.empty()) {
+      Ask(front);
+      front = DoubtfulNeighbours(front);
+    }
+    return {std::move(grid_), asked_};
+  }
+
+ private:
+  void MarkHull(const OccupancyBits& hull) {
+    state_.assign(grid_.value.size(), kDecided);
+    const int side = hull.resolution;
+    std::array<std::vector<int>, 3> cell;
+    for (int axis = 0; axis < 3; ++axis) cell[axis] = HullCellOfNode(grid_.nodes[axis] - 2, std::max(side, 1));
+    for (int z = 1; z < grid_.nodes.z() - 1; ++z) {
+      for (int y = 1; y < grid_.nodes.y() - 1; ++y) {
+        const size_t row = (static_cast<size_t>(cell[2][z]) * side + cell[1][y]) * side;
+        uint8_t* state = &state_[grid_.Index(0, y, z)];
+        for (int x = 1; x < grid_.nodes.x() - 1; ++x) {
+          if (side == 0 || hull.bits[row + cell[0][x]] != 0) state[x] = kUnknown;
+        }
+      }
+    }
+  }
+
+  template <class Visit>
+  void ForEachUnknown(Visit visit) {
+    for (int z = 1; z < grid_.nodes.z() - 1; ++z) {
+      for (int y = 1; y < grid_.nodes.y() - 1; ++y) {
+        const size_t row = grid_.Index(0, y, z);
+        for (int x = 1; x < grid_.nodes.x() - 1; ++x) {
+          if (state_[row + x] == kUnknown) visit(x, y, z, row + x);
+        }
+      }
+    }
+  }
+
+  std::vector<size_t> LatticeNodes() {
+    std::vector<size_t> nodes;
+    ForEachUnknown([&](int x, int y, int z, size_t node) {
+      if ((x & 1) == (y & 1) && (y & 1) == (z & 1)) nodes.push_back(node);
+    });
+    return nodes;
+  }
+
+  // Guesses the nodes between lattice nodes that agree; returns the others.
+  std::vector<size_t> GuessBetweenLattice() {
+    const ptrdiff_t dy = static_cast<ptrdiff_t>(grid_.StrideY()), dz = static_cast<ptrdiff_t>(grid_.StrideZ());
+    // By the axis whose coordinate is the odd one out: the lattice nodes around.
+    const std::array<std::array<ptrdiff_t, 6>, 3> around = {{
+        {-1, 1, -dy - dz, dy - dz, dz - dy, dy + dz},
+        {-dy, dy, -1 - dz, 1 - dz, dz - 1, 1 + dz},
+        {-dz, dz, -1 - dy, 1 - dy, dy - 1, 1 + dy},
+    }};
+    std::vector<size_t> doubtful;
+    ForEachUnknown([&](int x, int y, int z, size_t node) {
+      const int axis = (y & 1) == (z & 1) ? 0 : (x & 1) == (z & 1) ? 1 : 2;
+      float least = grid_.value[node + around[axis][0]], most = least, sum = 0;
+      for (const ptrdiff_t step : around[axis]) {
+        const float value = grid_.value[node + step];
+        least = std::min(least, value);
+        most = std::max(most, value);
+        sum += std::max(value, kLeastForMean);
+      }
+      if (most < kClearlyEmpty || least > kClearlyFull) {
+        grid_.value[node] = sum / 6.0f;
+        state_[node] = kGuessed;
+      } else {
+        doubtful.push_back(node);
+      }
+    });
+    return doubtful;
+  }
+
+  // Neighbours of nodes that were just asked which may have been guessed wrongly.
+  std::vector<size_t> DoubtfulNeighbours(const std::vector<size_t>& asked) {
+    std::vector<size_t> doubtful;
+    for (const size_t node : asked) {
+      const bool near_matter = grid_.value[node] > kClearlyEmpty;
+      const bool near_space = grid_.value[node] <= kClearlyFull;
+      for (const ptrdiff_t step : steps_) {
+        const size_t neighbour = node + step;
+        if (state_[neighbour] != kGuessed) continue;
+        if (grid_.value[neighbour] > 0 ? !near_space : !near_matter) continue;
+        state_[neighbour] = kUnknown;
+        doubtful.push_back(neighbour);
+      }
+    }
+    return doubtful;
+  }
+
+  void Ask(const std::vector<size_t>& nodes) {
+    std::vector<Eigen::Vector3f> points(std::min(nodes.size(), kBatchPoints));
+    std::vector<float> values(points.size());
+    for (size_t begin = 0; begin < nodes.size(); begin += kBatchPoints) {
+      const size_t count = std::min(kBatchPoints, nodes.size() - begin);
+      for (size_t i = 0; i < count; ++i) points[i] = grid_.Position(grid_.NodeAt(nodes[begin + i]));
+      probe_.Sample(std::span(points).first(count), std::span(values).first(count));
+      for (size_t i = 0; i < count; ++i) {
+        grid_.value[nodes[begin + i]] = values[i];
+        state_[nodes[begin + i]] = kAsked;
+      }
+    }
+    asked_ += nodes.size();
+  }
+
+  const FieldProbe& probe_;
+  FieldGrid grid_;
+  const std::array<ptrdiff_t, 6> steps_;
+  std::vector<uint8_t> state_;
+  size_t asked_ = 0;
+};
+
+}  // namespace
+
+SampledField SampleField(const FieldSnapshot& snapshot, const FieldProbe& probe, const Eigen::Vector3i& box_nodes) {
+  return Sampling(snapshot, probe, box_nodes).Run();
+}
+
+}  // namespace romap
