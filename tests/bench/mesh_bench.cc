@@ -1,0 +1,178 @@
+// What it costs to make a mesh of a trained field, phase by phase:
+//   mesh_bench [SEQUENCE] [--set nerf.FIELD=VALUE --set mesh.FIELD=VALUE ..] [--steps 200] [--repeats 7]
+// Trains each object of SEQUENCE (true cuboids, poses, masks; every fourth frame) or, without one, of a synthetic
+// world, then meshes it `repeats` times on one thread; the fastest run counts. "all nodes" is the time to ask the field
+// at every node of a cube of mesh.resolution^3 nodes, which is what extraction would cost at least if it looked
+// everywhere; the ratio to it is what may be compared between machines and runs. "signs" is the share of nodes, of
+// those the hull leaves, whose side of the surface the sampling guessed wrongly.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "client/files/sequence.h"
+#include "common/config.h"
+#include "common/status.h"
+#include "server/mesh/extract_mesh.h"
+#include "server/mesh/field_probe.h"
+#include "server/mesh/sample_field.h"
+#include "server/nerf/object_field.h"
+#include "tests/bench/true_views.h"
+#include "tests/support/synthetic_world.h"
+
+namespace romap {
+namespace {
+
+constexpr int kViews = 25;
+
+struct Options {
+  std::string sequence;
+  std::vector<std::string> assignments;
+  int steps = 200;
+  int repeats = 7;
+  NerfConfig nerf;
+  MeshConfig mesh;
+};
+
+struct Scene {
+  std::vector<TrueFrame> frames;
+  std::vector<ObjectRecord> objects;
+};
+
+Scene SyntheticScene() {
+  SyntheticWorldOptions options;
+  options.width_px = 640;
+  options.height_px = 480;
+  options.focal_px = 800;
+  options.frames = kViews;
+  options.permute_labels = false;
+  const SyntheticWorld world(options);
+  Scene scene;
+  for (int i = 0; i < world.frame_count(); ++i) {
+    const TrackedFrame tracked = world.MakeFrame(i);
+    scene.frames.push_back({KeyframeId{static_cast<uint64_t>(i) + 1}, world.camera(), tracked.T_world_camera,
+                            tracked.frame->image_bgr, tracked.frame->labels, cv::Mat()});
+  }
+  for (size_t i = 0; i < world.objects().size(); ++i) {
+    const Cuboid cuboid = world.TrueCuboid(static_cast<int>(i));
+    ObjectRecord record;
+    record.id = static_cast<int64_t>(i) + 1;
+    record.name = world.objects()[i].class_name;
+    record.T_world_object = cuboid.T_world_object;
+    record.half_extents = cuboid.half_extents;
+    scene.objects.push_back(record);
+  }
+  return scene;
+}
+
+absl::StatusOr<Scene> LoadScene(const std::string& path) {
+  if (path.empty()) return SyntheticScene();
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(path, {}));
+  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", path);
+  ROMAP_ASSIGN_OR_RETURN(std::vector<TrueFrame> frames, LoadTrueFrames(sequence, 0, 4));
+  return Scene{std::move(frames), sequence.objects()->objects};
+}
+
+double Milliseconds(std::chrono::steady_clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// Time to ask the field at all nodes of a cube of nodes.
+double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
+  const FieldGrid grid = MakeEmptyGrid(Eigen::Vector3i::Constant(resolution), snapshot.box_half_extents);
+  std::vector<Eigen::Vector3f> points;
+  for (int z = 1; z <= resolution; ++z) {
+    for (int y = 1; y <= resolution; ++y) {
+      for (int x = 1; x <= resolution; ++x) points.push_back(grid.Position(Eigen::Vector3i(x, y, z).cast<float>()));
+    }
+  }
+  std::vector<float> raw(points.size());
+  const auto start = std::chrono::steady_clock::now();
+  snapshot.field->Sample(points, raw, {});
+  return Milliseconds(std::chrono::steady_clock::now() - start);
+}
+
+// Share of the nodes within the hull that sampling put on the wrong side of the surface.
+double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
+  const FieldProbe probe(snapshot);
+  const FieldGrid grid = SampleField(snapshot, probe, nodes).grid;
+  std::vector<Eigen::Vector3f> points;
+  std::vector<bool> inside;
+  for (size_t node = 0; node < grid.value.size(); ++node) {
+    if (grid.value[node] <= kEmpty) continue;
+    points.push_back(grid.Position(grid.NodeAt(node)));
+    inside.push_back(grid.value[node] > 0);
+  }
+  std::vector<float> values(points.size());
+  probe.Sample(points, values);
+  size_t wrong = 0;
+  for (size_t i = 0; i < values.size(); ++i) wrong += inside[i] != (values[i] > 0);
+  return static_cast<double>(wrong) / static_cast<double>(std::max<size_t>(1, values.size()));
+}
+
+absl::Status BenchObject(const Scene& scene, const ObjectRecord& object, const Options& options) {
+  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, 1);
+  ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
+  for (const TrueFrame& frame : scene.frames) {
+    std::optional<ObjectView> view = MakeTrueView(frame, object);
+    if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
+  }
+  if (field.views() == 0) return absl::OkStatus();
+  field.Train(options.steps, 2);
+  const FieldSnapshot snapshot = field.Snapshot();
+
+  MeshStats best;
+  double best_s = std::numeric_limits<double>::infinity();
+  double all_nodes_ms = best_s;
+  Mesh mesh;
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    MeshStats stats;
+    ROMAP_ASSIGN_OR_RETURN(mesh, ExtractMesh(snapshot, options.mesh, &stats));
+    const double total_s = std::accumulate(stats.phase_cpu_s.begin(), stats.phase_cpu_s.end(), 0.0);
+    if (total_s < best_s) best = stats;
+    best_s = std::min(best_s, total_s);
+    all_nodes_ms = std::min(all_nodes_ms, AllNodesMilliseconds(snapshot, options.mesh.resolution));
+  }
+  const Eigen::Vector3i& nodes = best.nodes;
+  std::printf("%-10s %3dx%3dx%3d %8zu %8zu %6.3f%% |", object.name.c_str(), nodes.x(), nodes.y(), nodes.z(),
+              best.asked_nodes, mesh.vertices.size(), 100 * WrongSigns(snapshot, nodes));
+  for (const double phase_s : best.phase_cpu_s) std::printf(" %10.2f", 1e3 * phase_s);
+  std::printf(" | %7.2f %9.2f %6.2f\n", 1e3 * best_s, all_nodes_ms, 1e3 * best_s / all_nodes_ms);
+  std::fflush(stdout);
+  return absl::OkStatus();
+}
+
+absl::Status Run(const Options& options) {
+  ROMAP_ASSIGN_OR_RETURN(const Scene scene, LoadScene(options.sequence));
+  std::printf("%-10s %11s %8s %8s %7s |", "object", "nodes", "asked", "vertices", "signs");
+  for (const char* name : kMeshPhaseNames) std::printf(" %10s", name);
+  std::printf(" | %7s %9s %6s  [ms]\n", "sum", "all nodes", "ratio");
+  for (const ObjectRecord& object : scene.objects) ROMAP_RETURN_IF_ERROR(BenchObject(scene, object, options));
+  return absl::OkStatus();
+}
+
+}  // namespace
+}  // namespace romap
+
+int main(int argc, char** argv) {
+  romap::Options options;
+  CLI::App app("Meshes trained fields and reports cost");
+  app.add_option("sequence", options.sequence);
+  app.add_option("--set", options.assignments)->allow_extra_args(false);
+  app.add_option("--steps", options.steps)->check(CLI::PositiveNumber);
+  app.add_option("--repeats", options.repeats)->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  romap::ConfigFields fields;
+  fields.Section("nerf");
+  options.nerf.Fields(fields);
+  fields.Section("mesh");
+  options.mesh.Fields(fields);
+  absl::Status status = fields.Set(options.assignments);
+  if (status.ok()) status = romap::Run(options);
+  if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
+  return status.ok() ? 0 : 1;
+}
