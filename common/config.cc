@@ -87,6 +87,7 @@ std::string Store(const ConfigField& field, const std::string& text) {
         return fmt::format("{}: '{}' is not {}", field.name, text, RangeText(field.info));
       }
       *target = text;
+      if (field.info.on_set) field.info.on_set(text);
       return "";
     }
   };
@@ -105,6 +106,25 @@ std::string ValueText(const FieldPointer& pointer) {
     }
   };
   return std::visit([](auto* v) { return Visitor{}(v); }, pointer);
+}
+
+// Reads the entries of a section whose fields set others, or those whose do not.
+void LoadEntries(const std::string& section, const YAML::Node& entries, const std::string& origin, bool setters,
+                 const std::vector<ConfigField>& fields, std::vector<std::string>& faults) {
+  for (const auto& entry : entries) {
+    const std::string name = section + "." + entry.first.as<std::string>("");
+    const int line = entry.first.Mark().line + 1;
+    const ConfigField* field = Find(name, fields);
+    if ((field != nullptr && field->info.on_set) != setters) continue;
+    if (field == nullptr) {
+      faults.push_back(
+          fmt::format("{}:{}: unknown key '{}', did you mean '{}'?", origin, line, name, Nearest(name, fields)));
+    } else if (!entry.second.IsScalar()) {
+      faults.push_back(fmt::format("{}:{}: {} must be a single value", origin, line, name));
+    } else if (const std::string fault = Store(*field, entry.second.Scalar()); !fault.empty()) {
+      faults.push_back(fmt::format("{}:{}: {}", origin, line, fault));
+    }
+  }
 }
 
 absl::Status FromFaults(const std::vector<std::string>& faults) {
@@ -138,19 +158,8 @@ absl::Status ConfigFields::LoadYaml(const std::string& text, const std::string& 
           fmt::format("{}:{}: '{}' must be a section with fields below it", origin, section_line, section_name));
       continue;
     }
-    for (const auto& entry : section.second) {
-      const std::string name = section_name + "." + entry.first.as<std::string>("");
-      const int line = entry.first.Mark().line + 1;
-      const ConfigField* field = Find(name, fields_);
-      if (field == nullptr) {
-        faults.push_back(
-            fmt::format("{}:{}: unknown key '{}', did you mean '{}'?", origin, line, name, Nearest(name, fields_)));
-      } else if (!entry.second.IsScalar()) {
-        faults.push_back(fmt::format("{}:{}: {} must be a single value", origin, line, name));
-      } else if (const std::string fault = Store(*field, entry.second.Scalar()); !fault.empty()) {
-        faults.push_back(fmt::format("{}:{}: {}", origin, line, fault));
-      }
-    }
+    for (const bool setters : {true, false})
+      LoadEntries(section_name, section.second, origin, setters, fields_, faults);
   }
   return FromFaults(faults);
 }

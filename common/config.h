@@ -25,6 +25,8 @@ struct FieldInfo {
   double max = 1e300;
   std::vector<std::string> choices = {};  // for strings; empty = any
   std::string help = {};
+  // For strings that stand for values of other fields: called with the value once it is stored.
+  std::function<void(const std::string& value)> on_set = {};
 };
 
 using FieldPointer = std::variant<bool*, int*, double*, std::string*>;
@@ -43,9 +45,10 @@ class ConfigFields {
   void Add(const std::string& name, FieldPointer value, FieldInfo info);
 
   // Reads YAML of the form `section: {field: value}` into the fields. All faults are reported together, each with
-  // `origin` and line: unknown key (with the nearest known one), wrong type, out of range.
+  // `origin` and line: unknown key (with the nearest known one), wrong type, out of range. A field that sets others
+  // goes before the other fields of its section, wherever it stands: what is given explicitly holds.
   absl::Status LoadYaml(const std::string& text, const std::string& origin);
-  // Applies assignments of the form "mesh.resolution=96"; all faults together.
+  // Applies assignments of the form "mesh.resolution=96" in their order; all faults together.
   absl::Status Set(std::span<const std::string> assignments);
   // The effective configuration as YAML, each field with its unit, range and help as a comment.
   std::string DumpYaml() const;

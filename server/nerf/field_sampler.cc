@@ -16,7 +16,7 @@ uint8_t ToByte(float color) { return static_cast<uint8_t>(std::lround(255.0f * s
 }  // namespace
 
 void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const {
-  const nerf::KernelTable& kernels = nerf::SimdKernels();
+  const nerf::KernelTable& kernels = nerf::SimdKernels().For(model_);
   nerf::SampleChunk chunk(kBatch, model_.layout.features, model_.mlp.hidden);
   std::array<size_t, kBatch> source;
   const Eigen::Vector3f half = box_.half_extents.cast<float>();

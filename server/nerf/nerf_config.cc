@@ -1,11 +1,19 @@
 #include "server/nerf/nerf_config.h"
 
+#include "server/nerf/presets.h"
+
 namespace romap {
 namespace {
 
 void FieldFields(NerfConfig& c, ConfigFields& fields) {
+  fields.Add("preset", &c.preset,
+             {.choices = NerfPresetNames(),
+              .help = "Sets all fields below it that are not given: the fast recipe, or the paper's own",
+              .on_set = [&c](const std::string& name) { c = *NerfPreset(name); }});
+  fields.Add("encoding", &c.encoding,
+             {.choices = {"hash", "frequency"}, .help = "Of positions: hash grid, or sines and cosines (baselines)"});
   fields.Add("levels", &c.levels,
-             {.min = 1, .max = 16, .help = "Levels of the hash grid, two features each (paper 16)"});
+             {.min = 1, .max = 16, .help = "Levels of the hash grid, two features each (paper 16); or octaves"});
   fields.Add("log2_table_entries", &c.log2_table_entries,
              {.min = 8, .max = 22, .help = "log2 of the hash table's entries per level (paper 16)"});
   fields.Add("base_resolution", &c.base_resolution,
@@ -13,7 +21,8 @@ void FieldFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("finest_resolution", &c.finest_resolution,
              {.unit = "cells", .min = 2, .max = 16384, .help = "Finest level, cells per box side (paper 2048)"});
   fields.Add("hidden_width", &c.hidden_width,
-             {.min = 16, .max = 128, .help = "Neurons of the hidden layer, rounded up to a multiple of 16 (paper 64)"});
+             {.min = 16, .max = 256, .help = "Neurons of a hidden layer, rounded up to a multiple of 16 (paper 64)"});
+  fields.Add("hidden_layers", &c.hidden_layers, {.min = 1, .max = 6, .help = "Hidden layers of the MLP (paper 1)"});
   fields.Add("density_bias", &c.density_bias,
              {.min = -10, .max = 10, .help = "Added to the raw density: how full space is before it is learned"});
   fields.Add("surface_level", &c.surface_level,
@@ -27,6 +36,7 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
              {.min = 0, .max = 2, .help = "The training box is the cuboid enlarged by this share"});
   fields.Add("hull_margin", &c.hull_margin,
              {.min = 0, .max = 4, .help = "Footprint of a hull cell as a share of its circumscribed sphere"});
+  fields.Add("carve_hull", &c.carve_hull, {.help = "Cells that the masks call empty are empty from the start"});
   fields.Add("hull_min_votes", &c.hull_min_votes,
              {.unit = "views", .min = 1, .max = 100, .help = "Fewest views that must call a hull cell empty"});
   fields.Add("hull_vote_share", &c.hull_vote_share,

@@ -9,17 +9,22 @@ namespace romap {
 // One object's field and its training. The defaults are the fast recipe measured on two CPU cores; where the paper
 // gives a number of its own, `help` names it.
 struct NerfConfig {
-  // Field: hash grid and MLP.
+  std::string preset = "fast";  // see presets.h
+
+  // Field: encoding and MLP.
+  std::string encoding = "hash";
   int levels = 8;
   int log2_table_entries = 14;
   int base_resolution = 16;
   int finest_resolution = 1024;
   int hidden_width = 32;
+  int hidden_layers = 1;
   double density_bias = 2.0;
 
   // Box, hull and occupancy.
   double box_enlargement = 0.1;
   double hull_margin = 0.8;
+  bool carve_hull = true;
   int hull_min_votes = 1;
   double hull_vote_share = 0.08;
   double hull_trim_share = 0.002;

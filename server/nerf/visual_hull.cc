@@ -76,7 +76,10 @@ struct VisualHull::Footprints {
 };
 
 VisualHull::VisualHull(const NerfConfig& config)
-    : margin_(config.hull_margin), min_votes_(config.hull_min_votes), vote_share_(config.hull_vote_share) {}
+    : carve_(config.carve_hull),
+      margin_(config.hull_margin),
+      min_votes_(config.hull_min_votes),
+      vote_share_(config.hull_vote_share) {}
 
 void VisualHull::Reset(const TrainingBox& box, bool use_depth) {
   box_ = box;
@@ -119,6 +122,7 @@ void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz,
 }
 
 std::vector<uint8_t> VisualHull::Carve() const {
+  if (!carve_) return std::vector<uint8_t>(seen_.size(), 1);
   std::vector<uint8_t> cells(seen_.size());
   for (size_t i = 0; i < cells.size(); ++i) {
     const double needed = std::max<double>(min_votes_, vote_share_ * seen_[i]);

@@ -22,7 +22,7 @@ class VisualHull {
   // A view must be removed with the values with which it was added.
   void Add(const ObjectView& view) { Vote(view, 1); }
   void Remove(const ObjectView& view) { Vote(view, -1); }
-  // 1 = may hold matter, index as in OccupancyBits, kOccupancyResolution^3.
+  // 1 = may hold matter, index as in OccupancyBits, kOccupancyResolution^3. All of it where `carve_hull` is off.
   std::vector<uint8_t> Carve() const;
 
  private:
@@ -32,6 +32,7 @@ class VisualHull {
   void VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign);
 
   TrainingBox box_;
+  bool carve_;
   bool use_depth_ = true;
   double margin_;
   int min_votes_;

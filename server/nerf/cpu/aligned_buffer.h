@@ -15,7 +15,9 @@ template <class T>
 class AlignedBuffer {
  public:
   AlignedBuffer() = default;
-  explicit AlignedBuffer(size_t count) : data_(hwy::AllocateAligned<T>(count)), count_(count) {
+  explicit AlignedBuffer(size_t count) : count_(count) {
+    if (count == 0) return;  // which Highway's allocator takes for a mistake
+    data_ = hwy::AllocateAligned<T>(count);
     if (!data_) throw std::bad_alloc();
     std::uninitialized_value_construct_n(data(), count_);
   }

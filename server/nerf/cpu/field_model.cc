@@ -8,7 +8,24 @@
 
 namespace romap::nerf {
 
+namespace {
+
+// Inputs of the MLP that can be anything but 0.
+int UsedInputs(const GridLayout& layout) {
+  return layout.octaves > 0 ? 6 * layout.octaves + kFrequencyExtras : kFeaturesPerLevel * layout.levels;
+}
+
+GridLayout MakeFrequencyLayout(const NerfConfig& config) {
+  GridLayout layout;
+  layout.octaves = config.levels;
+  layout.features = (UsedInputs(layout) + 15) / 16 * 16;
+  return layout;
+}
+
+}  // namespace
+
 GridLayout MakeGridLayout(const NerfConfig& config) {
+  if (config.encoding == "frequency") return MakeFrequencyLayout(config);
   GridLayout layout;
   layout.levels = config.levels;
   layout.features = (kFeaturesPerLevel * config.levels + 15) / 16 * 16;
@@ -39,16 +56,25 @@ GridLayout MakeGridLayout(const NerfConfig& config) {
   return layout;
 }
 
-MlpWeights::MlpWeights(int inputs_, int hidden_)
+MlpWeights::MlpWeights(int inputs_, int hidden_, int layers_)
     : inputs(inputs_),
       hidden(hidden_),
-      parameters(static_cast<size_t>((inputs_ + kOutputs) * hidden_)),
+      layers(layers_),
+      parameters(static_cast<size_t>((inputs_ + (layers_ - 1) * hidden_ + kOutputs) * hidden_)),
       in_transposed(static_cast<size_t>(inputs_ * hidden_)),
+      hidden_transposed(static_cast<size_t>((layers_ - 1) * hidden_ * hidden_)),
       out_transposed(static_cast<size_t>(kOutputs * hidden_)) {}
 
 void MlpWeights::UpdateTransposed() {
   for (int i = 0; i < inputs; ++i) {
     for (int h = 0; h < hidden; ++h) in_transposed[h * inputs + i] = in_weights()[i * hidden + h];
+  }
+  for (int layer = 1; layer < layers; ++layer) {
+    const float* weights = hidden_weights(layer);
+    float* transposed = hidden_transposed.data() + (layer - 1) * hidden * hidden;
+    for (int i = 0; i < hidden; ++i) {
+      for (int h = 0; h < hidden; ++h) transposed[h * hidden + i] = weights[i * hidden + h];
+    }
   }
   for (int o = 0; o < kOutputs; ++o) {
     for (int h = 0; h < hidden; ++h) out_transposed[h * kOutputs + o] = out_weights()[o * hidden + h];
@@ -56,7 +82,7 @@ void MlpWeights::UpdateTransposed() {
 }
 
 MlpWeights MlpWeights::Clone() const {
-  MlpWeights copy(inputs, hidden);
+  MlpWeights copy(inputs, hidden, layers);
   copy.parameters = parameters.Clone();
   copy.UpdateTransposed();
   return copy;
@@ -65,16 +91,17 @@ MlpWeights MlpWeights::Clone() const {
 FieldModel::FieldModel(const NerfConfig& config, uint64_t seed)
     : layout(MakeGridLayout(config)),
       table(static_cast<size_t>(layout.entries) * kFeaturesPerLevel),
-      mlp(layout.features, config.hidden_width),
+      mlp(layout.features, config.hidden_width, config.hidden_layers),
       density_bias(static_cast<float>(config.density_bias)) {
   for (size_t i = 0; i < table.size(); ++i) table[i] = 1e-4f * (2.0f * RandomUniform(seed, 0, i) - 1.0f);
-  const int used_inputs = kFeaturesPerLevel * layout.levels;
+  const int used_inputs = UsedInputs(layout);
   const float in_bound = std::sqrt(6.0f / static_cast<float>(used_inputs + mlp.hidden));
+  const float hidden_bound = std::sqrt(6.0f / static_cast<float>(mlp.hidden));
   const float out_bound = std::sqrt(6.0f / static_cast<float>(mlp.hidden + kOutputs));
   const size_t in_used = static_cast<size_t>(used_inputs * mlp.hidden);
-  const size_t out_begin = static_cast<size_t>(mlp.inputs * mlp.hidden);
+  const size_t in_end = static_cast<size_t>(mlp.inputs * mlp.hidden), out_begin = static_cast<size_t>(mlp.OutOffset());
   for (size_t i = 0; i < mlp.parameters.size(); ++i) {
-    const float bound = i < in_used ? in_bound : i >= out_begin ? out_bound : 0.0f;
+    const float bound = i < in_used ? in_bound : i < in_end ? 0.0f : i < out_begin ? hidden_bound : out_bound;
     mlp.parameters[i] = bound * (2.0f * RandomUniform(seed, 1, i) - 1.0f);
   }
   mlp.UpdateTransposed();

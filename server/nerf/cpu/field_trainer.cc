@@ -101,8 +101,8 @@ struct FieldTrainer::StepShare {
 FieldTrainer::FieldTrainer(const NerfConfig& config, uint64_t seed, const KernelTable& kernels)
     : config_(config),
       loss_weights_(MakeLossWeights(config)),
-      kernels_(&kernels),
       model_(config, seed),
+      kernels_(&kernels.For(model_)),
       table_first_(model_.table.size()),
       table_second_(model_.table.size()),
       mlp_first_(model_.mlp.parameters.size()),
@@ -113,8 +113,9 @@ FieldTrainer::FieldTrainer(FieldTrainer&&) noexcept = default;
 FieldTrainer& FieldTrainer::operator=(FieldTrainer&&) noexcept = default;
 
 void FieldTrainer::Loosen(float share) {
+  if (model_.table.size() == 0) return;
   for (size_t i = 0; i < model_.table.size(); ++i) model_.table[i] *= share;
-  for (size_t i = static_cast<size_t>(model_.mlp.inputs * model_.mlp.hidden); i < model_.mlp.parameters.size(); ++i) {
+  for (size_t i = static_cast<size_t>(model_.mlp.OutOffset()); i < model_.mlp.parameters.size(); ++i) {
     model_.mlp.parameters[i] /= share;
   }
   model_.mlp.UpdateTransposed();

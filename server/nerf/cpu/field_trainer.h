@@ -44,7 +44,7 @@ class FieldTrainer : public Trainer {
   // (0..1] of what they are, and the weights that read them out grow to 1 / share. Hidden neurons are linear or zero,
   // so the outputs stay, but a step of Adam changes them so much more. Without this, features that grew large in the
   // first training hold on to their errors (the loss of plasticity of warm starts: J. Ash, R. Adams, "On Warm-Starting
-  // Neural Network Training", 2020).
+  // Neural Network Training", 2020). Without learned features (frequency encoding) nothing happens.
   void Loosen(float share) override;
 
   // Gives back the memory that only Run() needs; the next Run() takes it again.
@@ -75,8 +75,8 @@ class FieldTrainer : public Trainer {
 
   NerfConfig config_;
   LossWeights loss_weights_;
-  const KernelTable* kernels_;
   FieldModel model_;
+  const KernelTable* kernels_;
   AlignedBuffer<float> table_first_, table_second_, mlp_first_, mlp_second_;  // Adam's moments
   std::vector<std::unique_ptr<Worker>> workers_;
   uint64_t steps_done_ = 0;

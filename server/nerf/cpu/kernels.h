@@ -69,6 +69,12 @@ struct KernelTable {
   // Sums `gradient_count` gradient arrays, zeroes them, and updates parameters [begin, end), multiples of kMaxLanes.
   void (*adam)(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
                float* const* gradients, int gradient_count);
+
+  // The same for every encoding and depth of MLP; null where this is that table. `hidden` of its MLP kernels is unused.
+  const KernelTable* general = nullptr;
+
+  // The table that can run `model`.
+  const KernelTable& For(const FieldModel& model) const { return model.NeedsGeneralKernels() ? *general : *this; }
 };
 
 const KernelTable& PlainKernels();

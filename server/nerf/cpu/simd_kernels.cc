@@ -7,7 +7,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "server/nerf/cpu/kernels-inl.h"
+#include "server/nerf/cpu/general_kernels-inl.h"
 #if HWY_TARGET != HWY_SCALAR
 #include "server/nerf/cpu/vector_encode-inl.h"
 #include "server/nerf/cpu/vector_lane-inl.h"
@@ -19,7 +19,8 @@ namespace romap::nerf::HWY_NAMESPACE {
 
 const KernelTable& GetKernels() {
 #if HWY_TARGET == HWY_SCALAR
-  static const KernelTable table = MakeKernelTable<float, OutputByRows>("SCALAR");
+  static const KernelTable table =
+      WithGeneralKernels<float, OutputByRows, Encode, EncodeBackward>(MakeKernelTable<float, OutputByRows>("SCALAR"));
 #else
   using Wide = hn::VFromD<hn::CappedTag<float, kMaxLanes> >;
   using Narrow = hn::VFromD<hn::CappedTag<float, 8> >;
@@ -27,7 +28,8 @@ const KernelTable& GetKernels() {
     KernelTable made = MakeKernelTable<Wide, OutputAcrossLanes>(hwy::TargetName(HWY_TARGET));
     made.encode = EncodeLevels<Narrow, Wide>;
     made.encode_backward = EncodeLevelsBackward<Narrow, Wide>;
-    return made;
+    return WithGeneralKernels<Wide, OutputAcrossLanes, EncodeLevels<Narrow, Wide>, EncodeLevelsBackward<Narrow, Wide> >(
+        made);
   }();
 #endif
   return table;

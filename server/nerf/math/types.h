@@ -10,10 +10,18 @@ inline constexpr int kFeaturesPerLevel = 2;
 inline constexpr int kMaxLevels = 16;
 inline constexpr int kOutputs = 4;  // red, green, blue, density, before activation
 
+// Largest sizes of the frequency encoding and of deep MLPs.
+inline constexpr int kMaxOctaves = 16;
+inline constexpr int kFrequencyExtras = 4;  // x, y, z and 1 besides the waves
+inline constexpr int kMaxFrequencyFeatures = (6 * kMaxOctaves + kFrequencyExtras + 15) / 16 * 16;
+inline constexpr int kMaxHiddenLayers = 6;
+inline constexpr int kMaxDeepWidth = 256;
+
 // Where each level of the hash grid lies in the table; see hash_grid.h for the indexing.
 struct GridLayout {
   int levels = 0;
-  int features = 0;  // per point: 2 x levels, rounded up to 16; the rest stays 0
+  int features = 0;  // per point: what the encoding gives, rounded up to 16; the rest stays 0
+  int octaves = 0;   // > 0: the frequency encoding (frequency.h) takes the place of the grid
   uint32_t entries = 0;
   alignas(64) float scale[kMaxLevels] = {};  // cells per unit
   alignas(64) uint32_t stride_y[kMaxLevels] = {};
