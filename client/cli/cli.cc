@@ -43,6 +43,7 @@ int RunCli(int argc, const char* const* argv) {
   AddRunCommand(app, &chosen);
   AddReplayCommand(app, &chosen);
   AddEvalCommand(app, &chosen);
+  AddBenchCommand(app, &chosen);
   AddSynthCommand(app, &chosen);
   AddExportCommand(app, &chosen);
   AddSessionsCommand(app, &chosen);

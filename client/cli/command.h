@@ -14,6 +14,7 @@ namespace romap {
 using Command = std::function<absl::Status()>;
 
 void AddRunCommand(CLI::App& app, Command* chosen);
+void AddBenchCommand(CLI::App& app, Command* chosen);
 void AddEvalCommand(CLI::App& app, Command* chosen);
 void AddReplayCommand(CLI::App& app, Command* chosen);
 void AddSynthCommand(CLI::App& app, Command* chosen);

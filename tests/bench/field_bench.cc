@@ -10,15 +10,16 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "client/bench/true_views.h"
 #include "client/files/ply.h"
 #include "client/files/sequence.h"
 #include "common/config.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
-#include "tests/bench/true_views.h"
 
 namespace romap {
 namespace {
@@ -70,15 +71,14 @@ Cuboid FirstBox(const ObjectRecord& object, const Options& options) {
   return {object.T_world_object * T_object_first, half, 1.0};
 }
 
-absl::Status BenchObject(const std::vector<TrueFrame>& frames, ObjectRecord object, const Options& options) {
+absl::Status BenchObject(const TrueFrames& frames, ObjectRecord object, const Options& options) {
   object.half_extents *= 1.0 + options.loosen;
   ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
   const Cuboid right{object.T_world_object, object.half_extents, 1.0};
   ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : right));
   const auto start = std::chrono::steady_clock::now();
-  for (const TrueFrame& frame : frames) {
-    std::optional<ObjectView> view = MakeTrueView(frame, object);
-    if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
+  for (ObjectView& view : MakeTrueViews(frames, object, options.depth)) {
+    ROMAP_RETURN_IF_ERROR(field.AddView(std::move(view)));
   }
   if (field.views() == 0) return absl::OkStatus();
   double setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -98,8 +98,7 @@ absl::Status BenchObject(const std::vector<TrueFrame>& frames, ObjectRecord obje
 absl::Status Run(const Options& options) {
   SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
   ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, sequence_options));
-  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence);
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TrueFrame> frames, LoadTrueFrames(sequence, options.offset, options.every));
+  ROMAP_ASSIGN_OR_RETURN(const TrueFrames frames, LoadTrueFrames(sequence, options.every, options.offset));
   std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
               "Msam/s", "active", "loss");
   for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);

@@ -57,6 +57,8 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"client/synth/", {"client/synth/", "client/render/", "client/files/", "common/"}},
     {"client/pictures/", {"client/pictures/", "client/render/", "common/"}},
     {"client/sdk/", {"client/sdk/", "common/", "romap/v1/"}},
+    {"client/bench/",
+     {"client/bench/", "client/eval/", "client/files/", "server/session/", "server/nerf/", "server/mesh/", "common/"}},
     {"client/cli/", {"client/", "server/session/", "common/"}},
     {"tests/", {"common/", "server/", "client/", "tests/", "romap/v1/"}},
 };

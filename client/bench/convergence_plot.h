@@ -1,0 +1,14 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "client/bench/paper_results.h"
+
+namespace romap {
+
+// Accuracy and completion over training time as in the paper's Fig. 8, side by side: one line per method of
+// `results.curves`, both axes logarithmic, the paper's own end results as crosses at its 2 s. CV_8UC3; an empty frame
+// where there are no curves.
+cv::Mat DrawConvergence(const PaperResults& results);
+
+}  // namespace romap

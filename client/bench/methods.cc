@@ -1,0 +1,103 @@
+#include "client/bench/methods.h"
+
+#include <algorithm>
+#include <cctype>
+#include <sstream>
+#include <utility>
+
+#include "common/config.h"
+
+namespace romap {
+namespace {
+
+// A plain MLP on a frequency encoding, and rays through the whole box: what iMAP (Sucar et al., ICCV 2021) and vMAP
+// (Kong et al., CVPR 2023) train per scene or object, with Adam's rate of theirs.
+std::vector<std::string> FrequencyMlp(int hidden_width) {
+  return {"nerf.encoding=frequency",  "nerf.levels=10",
+          "nerf.hidden_layers=4",     fmt::format("nerf.hidden_width={}", hidden_width),
+          "nerf.learning_rate=0.001", "nerf.final_learning_rate=0.0002",
+          "nerf.adam_beta1=0.9",      "nerf.adam_beta2=0.999",
+          "nerf.carve_hull=false",    "nerf.hull_trim_share=0",
+          "nerf.sampling=uniform",    "nerf.max_samples_per_ray=32",
+          "nerf.density_weight=0",    "nerf.full_budget_steps=10000"};
+}
+
+}  // namespace
+
+absl::StatusOr<EngineConfig> Configure(const BenchMethod& method, const std::vector<std::string>& base) {
+  EngineConfig config;
+  ConfigFields fields;
+  fields.Section("nerf");
+  config.nerf.Fields(fields);
+  fields.Section("mesh");
+  config.mesh.Fields(fields);
+  ROMAP_RETURN_IF_ERROR(fields.Set(base));
+  ROMAP_RETURN_IF_ERROR(fields.Set(method.settings));
+  return config;
+}
+
+std::vector<BenchMethod> Table1Methods() {
+  return {
+      {.id = "fast", .title = "ours, fast"},
+      {.id = "sdf", .title = "ours, signed distances", .settings = {"nerf.field=sdf"}},
+      {.id = "paper", .title = "ours, the paper's configuration", .settings = {"nerf.preset=paper"}},
+      {.id = "offline", .title = "[33]*", .settings = {"nerf.preset=paper", "nerf.density_weight=0"}},
+      {.id = "offline-depth",
+       .title = "[33]* with true depth",
+       .settings = {"nerf.preset=paper", "nerf.density_weight=0"},
+       .with_depth = true},
+      {.id = "hull", .title = "visual hull, nothing learned", .trained = false},
+      {.id = "imap", .title = "iMAP-style MLP 4 x 256, with depth", .settings = FrequencyMlp(256), .with_depth = true},
+      {.id = "vmap", .title = "vMAP-style MLP 4 x 32, with depth", .settings = FrequencyMlp(32), .with_depth = true},
+  };
+}
+
+std::vector<BenchMethod> ModelSizeMethods() {
+  std::vector<BenchMethod> methods;
+  for (const auto& [log2_entries, layers] : {std::pair(14, 1), {16, 1}, {18, 1}, {20, 1}, {16, 2}, {16, 3}}) {
+    methods.push_back(
+        {.id = fmt::format("size-{}-{}", log2_entries, layers),
+         .title = fmt::format("2^{} entries, {} hidden layer{}", log2_entries, layers, layers > 1 ? "s" : ""),
+         .settings = {fmt::format("nerf.log2_table_entries={}", log2_entries),
+                      fmt::format("nerf.hidden_layers={}", layers)}});
+  }
+  return methods;
+}
+
+std::vector<BenchMethod> AblationMethods() {
+  return {
+      {.id = "all-parts", .title = "everything as it is"},
+      {.id = "no-hull", .title = "no visual hull", .settings = {"nerf.carve_hull=false", "nerf.hull_trim_share=0"}},
+      {.id = "no-opacity",
+       .title = "no opacity loss",
+       .settings = {"nerf.opacity_weight_object=0", "nerf.opacity_weight_background=0"}},
+      {.id = "no-density", .title = "no density loss", .settings = {"nerf.density_weight=0"}},
+      {.id = "no-background", .title = "no background rays", .settings = {"nerf.background_share=0"}},
+      {.id = "random-background",
+       .title = "random colour behind rays (L_rr)",
+       .settings = {"nerf.random_background=true"}},
+      {.id = "uniform", .title = "samples all through the box", .settings = {"nerf.sampling=uniform"}},
+      {.id = "all-pieces", .title = "floaters are kept", .settings = {"mesh.min_component_share=0"}},
+      {.id = "open-unseen", .title = "unseen space is not filled", .settings = {"mesh.fill_unseen=false"}},
+      {.id = "half-width", .title = "16 neurons", .settings = {"nerf.hidden_width=16"}},
+      {.id = "twice-rays", .title = "2048 rays a step", .settings = {"nerf.rays_per_step=2048"}},
+      {.id = "with-depth", .title = "with the true depth", .with_depth = true},
+  };
+}
+
+absl::StatusOr<BenchMethod> ParseMethod(const std::string& text) {
+  const auto colon = text.find(':');
+  const std::string id = text.substr(0, colon);
+  const bool good_id = !id.empty() && std::ranges::all_of(id, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-';
+  });
+  if (colon == std::string::npos || !good_id) {
+    return InvalidArgument("row '{}': expected 'NAME: nerf.field=value ..', NAME of letters, digits, - and _", text);
+  }
+  BenchMethod method{.id = id, .title = id};
+  std::istringstream settings(text.substr(colon + 1));
+  for (std::string setting; settings >> setting;) method.settings.push_back(setting);
+  return method;
+}
+
+}  // namespace romap

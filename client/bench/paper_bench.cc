@@ -1,0 +1,221 @@
+#include "client/bench/paper_bench.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <utility>
+
+#include "client/bench/convergence_plot.h"
+#include "client/bench/fma_peak.h"
+#include "client/bench/method_runner.h"
+#include "client/files/text_file.h"
+
+namespace romap {
+namespace {
+
+namespace fs = std::filesystem;
+
+absl::Status Validate(const PaperBenchOptions& options) {
+  if (options.seeds < 1) return InvalidArgument("{} seeds: there should be at least one", options.seeds);
+  if (options.every < 1) return InvalidArgument("every {}-th frame: should be at least 1", options.every);
+  if (options.subsets < 1 || options.subsets > options.every) {
+    return InvalidArgument("{} subsets of every {}. frame: should be 1 to {}", options.subsets, options.every,
+                           options.every);
+  }
+  if (options.threads < 1 || options.threads > 64) {
+    return InvalidArgument("{} threads: should be 1 to 64", options.threads);
+  }
+  if (!(options.cap_s > 0)) return InvalidArgument("cap {} s: should be positive", options.cap_s);
+  double before_s = 0;
+  for (const double time_s : options.times_s) {
+    if (!(time_s > before_s)) return InvalidArgument("time {} s: should be positive and ascending", time_s);
+    before_s = time_s;
+  }
+  return absl::OkStatus();
+}
+
+// The chosen tables with the chosen methods that this build can do; what it cannot do becomes a note.
+absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& options,
+                                                     std::vector<std::string>& notes) {
+  std::vector<BenchTable> tables = {{"1", Table1Methods()}, {"4", ModelSizeMethods()}, {"ablation", AblationMethods()}};
+  std::vector<BenchMethod>& first = tables.front().methods;
+  first.insert(first.end(), options.more_methods.begin(), options.more_methods.end());
+  std::vector<std::string> known;
+  for (const BenchTable& table : tables) {
+    for (const BenchMethod& method : table.methods) known.push_back(method.id);
+  }
+  for (const std::string& id : options.methods) {
+    if (std::ranges::find(known, id) == known.end()) {
+      return InvalidArgument("method '{}' is not one of {}", id, fmt::join(known, ", "));
+    }
+  }
+  std::erase_if(tables, [&](const BenchTable& table) {
+    return std::ranges::find(options.tables, table.id) == options.tables.end();
+  });
+  for (BenchTable& table : tables) {
+    std::erase_if(table.methods, [&](const BenchMethod& method) {
+      if (!options.methods.empty() && std::ranges::find(options.methods, method.id) == options.methods.end())
+        return true;
+      const bool own =
+          std::ranges::find(options.more_methods, method.id, &BenchMethod::id) != options.more_methods.end();
+      const absl::Status status = Configure(method, options.settings).status();
+      if (status.ok() || own) return false;
+      notes.push_back(fmt::format("{} is left out: {}", method.title, Message(status)));
+      return true;
+    });
+  }
+  std::erase_if(tables, [](const BenchTable& table) { return table.methods.empty(); });
+  if (tables.empty()) return InvalidArgument("no method is left to run");
+  return tables;
+}
+
+class PaperBench {
+ public:
+  PaperBench(const PaperBenchOptions& options, const Sequence& sequence,
+             const std::function<void(double, const std::string&)>& progress, const std::function<bool()>& stop)
+      : options_(options),
+        sequence_(sequence),
+        progress_(progress),
+        stop_(stop),
+        runner_(sequence, options.out_dir + "/scratch", options.threads, options.clock) {}
+
+  absl::StatusOr<PaperResults> Run() {
+    ROMAP_RETURN_IF_ERROR(Configure(BenchMethod(), options_.settings).status());
+    ROMAP_ASSIGN_OR_RETURN(results_.tables, ChooseTables(options_, results_.notes));
+    Prepare();
+    const absl::Status status = AllRuns();
+    std::error_code error;
+    fs::remove_all(options_.out_dir + "/scratch", error);
+    if (!status.ok() && !absl::IsCancelled(status)) return status;
+    if (!status.ok()) {
+      results_.notes.push_back("Stopped before the end: some rows lack runs.");
+      ROMAP_RETURN_IF_ERROR(WriteReport());
+    }
+    return std::move(results_);
+  }
+
+ private:
+  void Prepare() {
+    results_.sequence = fs::path(options_.sequence_dir).lexically_normal().filename().string();
+    results_.objects = sequence_.objects()->objects.size();
+    results_.threads = options_.threads;
+    results_.clock = options_.clock;
+    results_.cap_s = options_.cap_s;
+    results_.times_s = options_.times_s;
+    std::erase_if(results_.times_s, [&](double time_s) { return time_s >= options_.cap_s; });
+    results_.runs_planned = options_.seeds * options_.subsets;
+    for (const BenchTable& table : results_.tables) methods_ += table.methods.size();
+  }
+
+  // Every seed on every subset before the next seed, so that what is there at any time is a fair sample.
+  absl::Status AllRuns() {
+    for (int seed = 1; seed <= options_.seeds; ++seed) {
+      for (int subset = 0; subset < options_.subsets; ++subset) {
+        ROMAP_RETURN_IF_ERROR(OneRun(seed, subset));
+        ++results_.runs_done;
+        ROMAP_RETURN_IF_ERROR(WriteReport());
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status OneRun(int seed, int subset) {
+    ROMAP_ASSIGN_OR_RETURN(TrueFrames frames, LoadTrueFrames(sequence_, options_.every, subset));
+    results_.frames_per_subset = static_cast<int>(frames.size());
+    runner_.SetFrames(std::move(frames));
+    std::map<std::vector<std::string>, Evaluation> ends;  // of this run, by what decides them
+    for (const BenchTable& table : results_.tables) {
+      for (const BenchMethod& method : table.methods) {
+        if (stop_()) return absl::CancelledError("stopped");
+        ROMAP_RETURN_IF_ERROR(OneMethod(table, method, seed, subset, ends));
+        ++methods_done_;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status OneMethod(const BenchTable& table, const BenchMethod& method, int seed, int subset,
+                         std::map<std::vector<std::string>, Evaluation>& ends) {
+    if (!method.trained && seed > 1) return absl::OkStatus();  // the same for every seed
+    ROMAP_ASSIGN_OR_RETURN(const EngineConfig config, Configure(method, options_.settings));
+    const std::vector<std::string> key = KeyOf(method, config);
+    if (const auto known = ends.find(key); table.id != "1" && known != ends.end()) {
+      results_.evaluations.push_back(known->second);
+      results_.evaluations.back().method = method.id;
+      return absl::OkStatus();
+    }
+    results_.fma_peak_gflops.push_back(MeasureFmaPeakGflops(options_.threads));
+    const bool first = seed == 1 && subset == 0;
+    MethodRun run{.method = method, .config = config, .seed = seed, .subset = subset};
+    if (table.id == "1") run.limits_s = results_.times_s;
+    run.limits_s.push_back(options_.cap_s);
+    run.with_curve = first && table.id == "1" && method.trained;
+    if (first) run.keep_dir = options_.out_dir + "/meshes/" + method.id;
+    const double share =
+        static_cast<double>(methods_done_) / static_cast<double>(methods_ * static_cast<size_t>(results_.runs_planned));
+    const auto report = [&](const std::string& object) {
+      progress_(share, fmt::format("seed {}, subset {}: {}, {}", seed, subset, method.id, object));
+    };
+    ROMAP_ASSIGN_OR_RETURN(const MethodOutcome outcome, runner_.Run(run, report, stop_));
+    results_.evaluations.insert(results_.evaluations.end(), outcome.evaluations.begin(), outcome.evaluations.end());
+    results_.curves.insert(results_.curves.end(), outcome.curve.begin(), outcome.curve.end());
+    ends.insert_or_assign(key, outcome.evaluations.back());
+    return absl::OkStatus();
+  }
+
+  // Methods with the same key are the same under two names.
+  static std::vector<std::string> KeyOf(const BenchMethod& method, EngineConfig config) {
+    ConfigFields fields;
+    config.nerf.Fields(fields);
+    config.mesh.Fields(fields);
+    return {fields.DumpYaml(), method.with_depth ? "depth" : "", method.trained ? "trained" : ""};
+  }
+
+  absl::Status WriteReport() const {
+    ROMAP_RETURN_IF_ERROR(WriteFile(options_.out_dir + "/paper.md", ToMarkdown(results_)));
+    ROMAP_RETURN_IF_ERROR(WriteFile(options_.out_dir + "/paper.json", ToJsonText(results_)));
+    if (results_.curves.empty()) return absl::OkStatus();
+    std::vector<uint8_t> png;
+    cv::imencode(".png", DrawConvergence(results_), png);
+    return WriteFile(options_.out_dir + "/convergence.png",
+                     std::string_view(reinterpret_cast<const char*>(png.data()), png.size()));
+  }
+
+  const PaperBenchOptions& options_;
+  const Sequence& sequence_;
+  const std::function<void(double, const std::string&)>& progress_;
+  const std::function<bool()>& stop_;
+  MethodRunner runner_;
+  PaperResults results_;
+  size_t methods_ = 0;       // of one run
+  size_t methods_done_ = 0;  // of all runs
+};
+
+}  // namespace
+
+PaperBenchOptions Quick(PaperBenchOptions options) {
+  options.seeds = options.subsets = 1;
+  options.times_s = {1};
+  options.tables = {"1"};
+  if (options.methods.empty()) options.methods = {"fast", "hull"};
+  for (const BenchMethod& method : options.more_methods) options.methods.push_back(method.id);
+  return options;
+}
+
+absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
+                                           const std::function<void(double, const std::string&)>& progress,
+                                           const std::function<bool()>& stop) {
+  ROMAP_RETURN_IF_ERROR(Validate(options));
+  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence_dir, {.use_depth = true}));
+  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence_dir);
+  if (!fs::is_directory(options.sequence_dir + "/gt")) {
+    return NotFound("{}: no folder gt with true surfaces", options.sequence_dir);
+  }
+  std::error_code error;
+  fs::create_directories(options.out_dir, error);
+  if (error) return InvalidArgument("{} cannot be made: {}", options.out_dir, error.message());
+  return PaperBench(options, sequence, progress, stop).Run();
+}
+
+}  // namespace romap

@@ -1,0 +1,128 @@
+#include "client/bench/timed_training.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <utility>
+
+#include "server/nerf/object_field.h"
+
+namespace romap {
+namespace {
+
+constexpr double kProbe_s = 0.15;
+constexpr double kLongestSlice_s = 0.25;
+
+// Adds up time by a clock, and by the wall.
+class Stopwatch {
+ public:
+  Stopwatch(BenchClock clock, int threads) : clock_(clock), threads_(threads) {}
+
+  // Runs `work` and returns its result.
+  template <class Work>
+  auto Time(Work work) {
+    const double start_s = Now(), wall_start_s = Wall();
+    auto result = work();
+    total_s_ += Now() - start_s;
+    wall_s_ += Wall() - wall_start_s;
+    return result;
+  }
+
+  double total_s() const { return total_s_; }
+  double wall_s() const { return wall_s_; }
+
+ private:
+  static double Wall() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  }
+  double Now() const {
+    if (clock_ == BenchClock::kWall) return Wall();
+    timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec)) / threads_;
+  }
+
+  BenchClock clock_;
+  int threads_;
+  double total_s_ = 0, wall_s_ = 0;
+};
+
+absl::StatusOr<ObjectField> MakeField(const TrainingRequest& request, const NerfConfig& config) {
+  if (request.views->empty()) return FailedPrecondition("an object without views cannot be trained");
+  ObjectField field(config, request.views->front().object, request.seed);
+  ROMAP_RETURN_IF_ERROR(field.SetBox(request.cuboid));
+  for (const ObjectView& view : *request.views) ROMAP_RETURN_IF_ERROR(field.AddView(view));
+  return field;
+}
+
+void AddTo(TrainStats& sum, const TrainStats& slice) {
+  sum.steps += slice.steps;
+  sum.rays += slice.rays;
+  sum.samples += slice.samples;
+  sum.active_samples += slice.active_samples;
+  sum.wall_s += slice.wall_s;
+  sum.color_loss = slice.color_loss;
+  sum.restarted |= slice.restarted;
+  for (size_t p = 0; p < sum.phase_cpu_s.size(); ++p) sum.phase_cpu_s[p] += slice.phase_cpu_s[p];
+}
+
+absl::StatusOr<double> ProbeSecondsPerStep(const TrainingRequest& request) {
+  ROMAP_ASSIGN_OR_RETURN(ObjectField field, MakeField(request, request.config));
+  field.Train(1, request.threads);  // builds the ray lists
+  Stopwatch watch(request.clock, request.threads);
+  int steps = 0;
+  while (watch.total_s() < kProbe_s && steps < request.config.full_budget_steps) {
+    const TrainStats stats = watch.Time([&] { return field.Train(2, request.threads); });
+    if (stats.steps == 0) break;
+    steps += stats.steps;
+  }
+  return steps > 0 ? watch.total_s() / steps : 0.0;
+}
+
+int StepsUntil(double target_s, double now_s, double seconds_per_step) {
+  const double left_s = std::clamp(target_s - now_s, 0.0, kLongestSlice_s);
+  return std::max(1, static_cast<int>(left_s / std::max(seconds_per_step, 1e-7)));
+}
+
+}  // namespace
+
+absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double& seconds_per_step) {
+  if (seconds_per_step <= 0) {
+    ROMAP_ASSIGN_OR_RETURN(seconds_per_step, ProbeSecondsPerStep(request));
+  }
+  TimedTraining result;
+  NerfConfig config = request.config;
+  const double fitting = request.limit_s / std::max(seconds_per_step, 1e-7);
+  if (fitting < config.full_budget_steps) {
+    config.full_budget_steps = std::max(1, static_cast<int>(fitting));
+    result.limited = true;
+  }
+  Stopwatch setup(request.clock, request.threads), training(request.clock, request.threads);
+  ROMAP_ASSIGN_OR_RETURN(ObjectField field, setup.Time([&] { return MakeField(request, config); }));
+  const auto marked = [&] { return result.at_marks.size() < request.marks_s.size(); };
+  while (field.steps() < field.AllowedSteps(/*complete=*/true) && training.total_s() < request.limit_s) {
+    if (request.stop && request.stop()) return absl::CancelledError("stopped");
+    const double target_s =
+        marked() ? std::min(request.limit_s, request.marks_s[result.at_marks.size()]) : request.limit_s;
+    const uint64_t left = field.AllowedSteps(true) - field.steps();
+    const int steps = StepsUntil(target_s, training.total_s(), seconds_per_step);
+    const int slice = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(steps)));
+    const TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
+    if (stats.steps == 0) break;  // no pixel to learn from
+    AddTo(result.stats, stats);
+    while (marked() && training.total_s() >= request.marks_s[result.at_marks.size()]) {
+      result.at_marks.push_back(field.Snapshot());
+    }
+  }
+  result.limited |= field.steps() < field.AllowedSteps(true) && training.total_s() >= request.limit_s;
+  if (result.stats.steps > 0) seconds_per_step = training.total_s() / result.stats.steps;
+  result.snapshot = field.Snapshot();
+  result.train_s = training.total_s();
+  result.wall_s = training.wall_s();
+  result.setup_s = setup.total_s();
+  return result;
+}
+
+}  // namespace romap
