@@ -61,17 +61,18 @@ FieldSnapshot MakeHullSnapshot(const NerfConfig& config, const Cuboid& cuboid, c
   VisualHull hull(config);
   hull.Reset(box);
   FieldSnapshot snapshot;
-  const SE3<Object, World> T_object_world = box.T_world_object.Inverse();
   for (const ObjectView& view : views) {
     hull.Add(view);
     snapshot.object = view.object;
-    snapshot.view_centers_object.push_back((T_object_world * view.T_world_camera.translation()).cast<float>());
+    snapshot.cameras.push_back(
+        {view.T_world_camera.Inverse() * box.T_world_object, view.camera, view.roi_px, view.ray_kind});
   }
   snapshot.views = static_cast<int>(views.size());
   snapshot.converged = true;
   snapshot.T_world_object = box.T_world_object;
   snapshot.box_half_extents = box.half_extents.cast<float>();
   snapshot.surface_level = snapshot.connect_level = 0.0f;
+  snapshot.optics.surface_density_per_mu = static_cast<float>(std::exp(config.surface_level) / box.unit_mu);
   snapshot.field =
       std::make_shared<HullField>(OccupancyBits{nerf::kOccupancyResolution, hull.Carve()}, snapshot.box_half_extents);
   return snapshot;

@@ -9,7 +9,7 @@
 
 #include "common/status.h"
 #include "server/mesh/confidence.h"
-#include "server/mesh/field_probe.h"
+#include "server/mesh/surface_probe.h"
 #include "server/mesh/floaters.h"
 #include "server/mesh/grid_nodes.h"
 #include "server/mesh/hidden_space.h"
@@ -79,7 +79,7 @@ SightLimits SightOf(const FieldSnapshot& snapshot, const MeshConfig& config) {
   return limits;
 }
 
-void ColorVertices(const FieldProbe& probe, Mesh& mesh) {
+void ColorVertices(const SurfaceProbe& probe, Mesh& mesh) {
   std::vector<float> values(mesh.vertices.size());
   mesh.colors.resize(mesh.vertices.size());
   probe.Sample(mesh.vertices, values, mesh.colors);
@@ -91,7 +91,7 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   ROMAP_RETURN_IF_ERROR(Validate(snapshot, config));
   MeshStats own_stats;
   PhaseClock clock(stats != nullptr ? *stats : own_stats);
-  const FieldProbe probe(snapshot);
+  const SurfaceProbe probe(snapshot);
   const Eigen::Vector3i nodes = ChooseNodes(snapshot, config);
   auto [grid, asked_nodes] = SampleField(snapshot, probe, nodes);
   clock.EndPhase();

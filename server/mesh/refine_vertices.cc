@@ -57,7 +57,7 @@ std::vector<Bracket> BracketsOf(const FieldGrid& grid, const GridSurface& surfac
 
 }  // namespace
 
-void RefineVertices(const FieldGrid& grid, const FieldProbe& probe, GridSurface& surface) {
+void RefineVertices(const FieldGrid& grid, const SurfaceProbe& probe, GridSurface& surface) {
   std::vector<Bracket> brackets = BracketsOf(grid, surface);
   std::vector<Eigen::Vector3f> points(brackets.size());
   std::vector<float> values(brackets.size());

@@ -35,7 +35,7 @@ std::vector<int> HullCellOfNode(int nodes, int hull_resolution) {
 
 class Sampling {
  public:
-  Sampling(const FieldSnapshot& snapshot, const FieldProbe& probe, const Eigen::Vector3i& box_nodes)
+  Sampling(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes)
       : probe_(probe), grid_(MakeEmptyGrid(box_nodes, snapshot.box_half_extents)), steps_(NeighbourSteps(grid_)) {
     MarkHull(snapshot.hull);
   }
@@ -148,7 +148,7 @@ class Sampling {
     asked_ += nodes.size();
   }
 
-  const FieldProbe& probe_;
+  const SurfaceProbe& probe_;
   FieldGrid grid_;
   const std::array<ptrdiff_t, 6> steps_;
   std::vector<uint8_t> state_;
@@ -157,7 +157,7 @@ class Sampling {
 
 }  // namespace
 
-SampledField SampleField(const FieldSnapshot& snapshot, const FieldProbe& probe, const Eigen::Vector3i& box_nodes) {
+SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes) {
   return Sampling(snapshot, probe, box_nodes).Run();
 }
 

@@ -5,7 +5,7 @@
 
 #include "common/messages.h"
 #include "server/mesh/field_grid.h"
-#include "server/mesh/field_probe.h"
+#include "server/mesh/surface_probe.h"
 
 namespace romap {
 
@@ -20,6 +20,6 @@ struct SampledField {
 // node all say clearly empty, or clearly full, that node gets their mean; else the field is asked. From there the
 // surface is followed: a node next to matter, or nearly matter, is never guessed to be empty. What is thinner than the
 // lattice is thus found where it fades into its surroundings, and to its end where any of it was found.
-SampledField SampleField(const FieldSnapshot& snapshot, const FieldProbe& probe, const Eigen::Vector3i& box_nodes);
+SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes);
 
 }  // namespace romap

@@ -47,7 +47,7 @@ void SetAreaNormals(Mesh& mesh) {
   }
 }
 
-void SetFieldNormals(const FieldGrid& grid, const FieldProbe& probe, GridSurface& surface) {
+void SetFieldNormals(const FieldGrid& grid, const SurfaceProbe& probe, GridSurface& surface) {
   Mesh& mesh = surface.mesh;
   SetAreaNormals(mesh);
   const std::vector<uint32_t> vertices = VerticesOfTheField(grid, surface);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/mesh/field_probe.h"
+#include "server/mesh/surface_probe.h"
 #include "server/mesh/marching_cubes.h"
 
 namespace romap {
@@ -11,6 +11,6 @@ void SetAreaNormals(Mesh& mesh);
 // Sets unit normals against the gradient of the field around each vertex, from differences over about a grid cell that
 // are exact for fields of second degree. Where the field has nothing to say (edited nodes, the box's and the hull's
 // faces) or contradicts the triangles by more than 60 degrees, the triangles' mean counts (see SetAreaNormals).
-void SetFieldNormals(const FieldGrid& grid, const FieldProbe& probe, GridSurface& surface);
+void SetFieldNormals(const FieldGrid& grid, const SurfaceProbe& probe, GridSurface& surface);
 
 }  // namespace romap

@@ -20,7 +20,7 @@
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
-#include "tests/bench/true_views.h"
+#include "client/bench/true_views.h"
 
 namespace romap {
 namespace {
@@ -123,18 +123,11 @@ absl::Status TrainObject(const ObjectRecord& object, const Views& views, const s
 
 absl::Status Run(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, {.use_depth = options.depth}));
-  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence);
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TrueFrame> frames, LoadTrueFrames(sequence, options.offset, options.every));
+  ROMAP_ASSIGN_OR_RETURN(const TrueFrames frames, LoadTrueFrames(sequence, options.every, options.offset));
   const std::vector<ObjectRecord>& objects = sequence.objects()->objects;
   for (const std::string& scenario : options.scenarios) {
     for (size_t i = 0; i < objects.size(); ++i) {
-      const auto views_of = [&](const ObjectRecord& object) {
-        Views views;
-        for (const TrueFrame& frame : frames) {
-          if (auto view = MakeTrueView(frame, object)) views.push_back(std::move(*view));
-        }
-        return views;
-      };
+      const auto views_of = [&](const ObjectRecord& object) { return MakeTrueViews(frames, object, options.depth); };
       Views views = views_of(objects[i]);
       if (views.empty()) continue;
       kSpoilers.at(scenario)(views, views_of(objects[(i + 1) % objects.size()]));

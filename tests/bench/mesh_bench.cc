@@ -18,16 +18,14 @@
 #include "common/config.h"
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
-#include "server/mesh/field_probe.h"
+#include "server/mesh/surface_probe.h"
 #include "server/mesh/sample_field.h"
 #include "server/nerf/object_field.h"
-#include "tests/bench/true_views.h"
-#include "tests/support/synthetic_world.h"
+#include "tests/bench/training_scene.h"
 
 namespace romap {
 namespace {
 
-constexpr int kViews = 25;
 
 struct Options {
   std::string sequence;
@@ -37,45 +35,6 @@ struct Options {
   NerfConfig nerf;
   MeshConfig mesh;
 };
-
-struct Scene {
-  std::vector<TrueFrame> frames;
-  std::vector<ObjectRecord> objects;
-};
-
-Scene SyntheticScene() {
-  SyntheticWorldOptions options;
-  options.width_px = 640;
-  options.height_px = 480;
-  options.focal_px = 800;
-  options.frames = kViews;
-  options.permute_labels = false;
-  const SyntheticWorld world(options);
-  Scene scene;
-  for (int i = 0; i < world.frame_count(); ++i) {
-    const TrackedFrame tracked = world.MakeFrame(i);
-    scene.frames.push_back({KeyframeId{static_cast<uint64_t>(i) + 1}, world.camera(), tracked.T_world_camera,
-                            tracked.frame->image_bgr, tracked.frame->labels, cv::Mat()});
-  }
-  for (size_t i = 0; i < world.objects().size(); ++i) {
-    const Cuboid cuboid = world.TrueCuboid(static_cast<int>(i));
-    ObjectRecord record;
-    record.id = static_cast<int64_t>(i) + 1;
-    record.name = world.objects()[i].class_name;
-    record.T_world_object = cuboid.T_world_object;
-    record.half_extents = cuboid.half_extents;
-    scene.objects.push_back(record);
-  }
-  return scene;
-}
-
-absl::StatusOr<Scene> LoadScene(const std::string& path) {
-  if (path.empty()) return SyntheticScene();
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(path, {}));
-  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", path);
-  ROMAP_ASSIGN_OR_RETURN(std::vector<TrueFrame> frames, LoadTrueFrames(sequence, 0, 4));
-  return Scene{std::move(frames), sequence.objects()->objects};
-}
 
 double Milliseconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -98,7 +57,7 @@ double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
 
 // Share of the nodes within the hull that sampling put on the wrong side of the surface.
 double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
-  const FieldProbe probe(snapshot);
+  const SurfaceProbe probe(snapshot);
   const FieldGrid grid = SampleField(snapshot, probe, nodes).grid;
   std::vector<Eigen::Vector3f> points;
   std::vector<bool> inside;
@@ -114,12 +73,11 @@ double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
   return static_cast<double>(wrong) / static_cast<double>(std::max<size_t>(1, values.size()));
 }
 
-absl::Status BenchObject(const Scene& scene, const ObjectRecord& object, const Options& options) {
+absl::Status BenchObject(const TrainingScene& scene, const ObjectRecord& object, const Options& options) {
   ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, 1);
   ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
-  for (const TrueFrame& frame : scene.frames) {
-    std::optional<ObjectView> view = MakeTrueView(frame, object);
-    if (view) ROMAP_RETURN_IF_ERROR(field.AddView(std::move(*view)));
+  for (ObjectView& view : MakeTrueViews(scene.frames, object, /*with_depth=*/false)) {
+    ROMAP_RETURN_IF_ERROR(field.AddView(std::move(view)));
   }
   if (field.views() == 0) return absl::OkStatus();
   field.Train(options.steps, 2);
@@ -147,7 +105,7 @@ absl::Status BenchObject(const Scene& scene, const ObjectRecord& object, const O
 }
 
 absl::Status Run(const Options& options) {
-  ROMAP_ASSIGN_OR_RETURN(const Scene scene, LoadScene(options.sequence));
+  ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(options.sequence));
   std::printf("%-10s %11s %8s %8s %7s |", "object", "nodes", "asked", "vertices", "signs");
   for (const char* name : kMeshPhaseNames) std::printf(" %10s", name);
   std::printf(" | %7s %9s %6s  [ms]\n", "sum", "all nodes", "ratio");

@@ -23,14 +23,12 @@
 #include "server/nerf/ray_set.h"
 #include "server/nerf/visual_hull.h"
 #include "tests/bench/machine_limits.h"
-#include "tests/bench/true_views.h"
-#include "tests/support/synthetic_world.h"
+#include "tests/bench/training_scene.h"
 
 namespace romap {
 namespace {
 
 constexpr int kPhases = static_cast<int>(TrainPhase::kCount);
-constexpr int kViews = 25;
 
 struct Options {
   std::string sequence;
@@ -60,56 +58,16 @@ NerfConfig PaperConfig() {
   return config;
 }
 
-std::vector<Subject> MakeSubjects(const std::vector<TrueFrame>& frames, const std::vector<ObjectRecord>& objects) {
+absl::StatusOr<std::vector<Subject>> LoadSubjects(const std::string& path) {
+  ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(path));
   std::vector<Subject> subjects;
-  for (const ObjectRecord& object : objects) {
+  for (const ObjectRecord& object : scene.objects) {
     Subject subject;
     subject.box = TrainingBox::Around({object.T_world_object, object.half_extents, 1.0}, NerfConfig().box_enlargement);
-    for (const TrueFrame& frame : frames) {
-      if (std::optional<ObjectView> view = MakeTrueView(frame, object)) subject.views.push_back(std::move(*view));
-    }
+    subject.views = MakeTrueViews(scene.frames, object, /*with_depth=*/false);
     if (!subject.views.empty()) subjects.push_back(std::move(subject));
   }
   return subjects;
-}
-
-std::vector<Subject> SyntheticSubjects() {
-  SyntheticWorldOptions options;
-  options.width_px = 640;
-  options.height_px = 480;
-  options.focal_px = 800;
-  options.frames = kViews;
-  options.permute_labels = false;
-  const SyntheticWorld world(options);
-  std::vector<TrueFrame> frames;
-  for (int i = 0; i < world.frame_count(); ++i) {
-    const TrackedFrame tracked = world.MakeFrame(i);
-    frames.push_back({KeyframeId{static_cast<uint64_t>(i) + 1},
-                      world.camera(),
-                      tracked.T_world_camera,
-                      tracked.frame->image_bgr,
-                      tracked.frame->labels,
-                      {}});
-  }
-  std::vector<ObjectRecord> objects;
-  for (size_t i = 0; i < world.objects().size(); ++i) {
-    const Cuboid cuboid = world.TrueCuboid(static_cast<int>(i));
-    objects.push_back({.id = static_cast<int64_t>(i) + 1,
-                       .name = world.objects()[i].class_name,
-                       .class_name = world.objects()[i].class_name,
-                       .T_world_object = cuboid.T_world_object,
-                       .half_extents = cuboid.half_extents,
-                       .confidence = {}});
-  }
-  return MakeSubjects(frames, objects);
-}
-
-absl::StatusOr<std::vector<Subject>> LoadSubjects(const std::string& path) {
-  if (path.empty()) return SyntheticSubjects();
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(path, {}));
-  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", path);
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TrueFrame> frames, LoadTrueFrames(sequence, 0, 4));
-  return MakeSubjects(frames, sequence.objects()->objects);
 }
 
 // Trains a new field on the subject.

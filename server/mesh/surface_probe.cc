@@ -1,4 +1,4 @@
-#include "server/mesh/field_probe.h"
+#include "server/mesh/surface_probe.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,13 +13,13 @@ constexpr float kMost = 1e4f;
 
 }  // namespace
 
-FieldProbe::FieldProbe(const FieldSnapshot& snapshot)
+SurfaceProbe::SurfaceProbe(const FieldSnapshot& snapshot)
     : field_(*snapshot.field),
       level_(snapshot.surface_level),
       per_raw_(1.0f / snapshot.optics.raw_per_efold),
       connect_value_(std::clamp((snapshot.connect_level - level_) * per_raw_, -kMost, 0.0f)) {}
 
-void FieldProbe::Sample(std::span<const Eigen::Vector3f> points, std::span<float> values,
+void SurfaceProbe::Sample(std::span<const Eigen::Vector3f> points, std::span<float> values,
                         std::span<Rgb8> colors) const {
   field_.Sample(points, values, colors);
   for (float& value : values) {

@@ -9,9 +9,9 @@ namespace romap {
 
 // Asks a snapshot's field in the terms of this folder: the logarithm of the density over that at the surface. The only
 // place that knows raw values. The snapshot must have a field and outlive the probe.
-class FieldProbe {
+class SurfaceProbe {
  public:
-  explicit FieldProbe(const FieldSnapshot& snapshot);
+  explicit SurfaceProbe(const FieldSnapshot& snapshot);
 
   // values[i] at points[i] (Object frame, map units): 0 on the surface, > 0 inside, always finite; what is not a number
   // counts as kEmpty. `colors` is empty (not asked for) or as long as `points`.
