@@ -6,13 +6,9 @@
 #include <atomic>
 #include <barrier>
 #include <chrono>
-#include <cmath>
-#include <cstring>
 #include <numeric>
 #include <thread>
 #include <utility>
-
-#include "server/nerf/math/composite.h"
 
 namespace romap::nerf {
 namespace {
@@ -208,7 +204,10 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
   worker.BookIfTimed(TrainPhase::kMlp);
   kernels_->activate(chunk, model_.density_bias);
   CompositeRays(worker);
-  const int active = CompactActive(worker);
+  // About half of the samples remain: the others lie in empty space or behind the surface.
+  const int active =
+      kernels_->keep_active(static_cast<float>(config_.gradient_cut), 1.0f / static_cast<float>(config_.rays_per_step),
+                            model_.layout.features, model_.mlp.hidden, chunk);
   worker.BookIfTimed(TrainPhase::kRender);
   kernels_->mlp_backward(model_.mlp, active, chunk.features.data(), chunk.hidden.data(), chunk.d_raw.data(),
                          worker.mlp_gradient.data());
@@ -232,8 +231,8 @@ void FieldTrainer::CompositeRays(Worker& worker) {
         c.alpha.data() + at, c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
     float* weight = c.weight.data() + at;
     float* behind = c.behind.data() + at;
-    const RayResult result = plain::CompositeForward(samples, target, loss_weights_, weight, behind);
-    plain::CompositeBackward(samples, target, loss_weights_, result, weight, behind, c.d_raw.data() + kOutputs * at);
+    const RayResult result =
+        kernels_->composite(samples, target, loss_weights_, weight, behind, c.d_raw.data() + kOutputs * at);
     for (int i = 0; i < span.count; ++i) worker.visits.push_back({c.cell[static_cast<size_t>(at + i)], weight[i]});
     ++worker.stats.rays;
     if (target.is_object) {
@@ -241,30 +240,6 @@ void FieldTrainer::CompositeRays(Worker& worker) {
       ++worker.object_rays;
     }
   }
-}
-
-// Moves the samples whose gradient matters to the front, scaled to the mean over rays. About half of them remain: the
-// others lie in empty space or behind the surface.
-int FieldTrainer::CompactActive(Worker& worker) {
-  SampleChunk& c = worker.chunk;
-  const float cut = static_cast<float>(config_.gradient_cut);
-  const float scale = 1.0f / static_cast<float>(config_.rays_per_step);
-  const size_t features = static_cast<size_t>(model_.layout.features), hidden = static_cast<size_t>(model_.mlp.hidden);
-  size_t active = 0;
-  for (size_t i = 0; i < static_cast<size_t>(c.size); ++i) {
-    const float* d = c.d_raw.data() + kOutputs * i;
-    if (std::fabs(d[0]) + std::fabs(d[1]) + std::fabs(d[2]) + std::fabs(d[3]) <= cut) continue;
-    for (int o = 0; o < kOutputs; ++o) c.d_raw[kOutputs * active + o] = d[o] * scale;
-    if (active != i) {
-      c.x[active] = c.x[i];
-      c.y[active] = c.y[i];
-      c.z[active] = c.z[i];
-      std::memcpy(c.features.data() + features * active, c.features.data() + features * i, features * sizeof(float));
-      std::memcpy(c.hidden.data() + hidden * active, c.hidden.data() + hidden * i, hidden * sizeof(float));
-    }
-    ++active;
-  }
-  return static_cast<int>(active);
 }
 
 void FieldTrainer::OptimiseMlp(const AdamRates& rates, int threads) {

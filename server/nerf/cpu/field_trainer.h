@@ -68,7 +68,6 @@ class FieldTrainer : public Trainer {
   void RunSteps(const StepSource& source, Occupancy& occupancy, int steps, int thread, StepShare& share);
   void RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray, Worker& worker);
   void CompositeRays(Worker& worker);
-  int CompactActive(Worker& worker);
   void OptimiseMlp(const AdamRates& rates, int threads);
   void UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads);
   void OptimiseTable(const AdamRates& rates, int round, StepShare& share);

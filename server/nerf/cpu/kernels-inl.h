@@ -6,6 +6,7 @@
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/activation.h"
 #include "server/nerf/math/adam.h"
+#include "server/nerf/math/composite.h"
 #include "server/nerf/math/dense.h"
 #include "server/nerf/math/hash_grid.h"
 #include "server/nerf/math/ray.h"
@@ -244,6 +245,39 @@ void Activate(SampleChunk& chunk, float density_bias) {
   }
 }
 
+inline RayResult Composite(const RaySamples& samples, const RayTarget& target, const LossWeights& weights,
+                           float* weight, float* behind, float* d_raw) {
+  const RayResult result = CompositeForward(samples, target, weights, weight, behind);
+  CompositeBackward(samples, target, weights, result, weight, behind, d_raw);
+  return result;
+}
+
+template <class Wide>
+int KeepActive(float cut, float scale, int features, int hidden, SampleChunk& c) {
+  using L = Lane<Wide>;
+  int active = 0;
+  for (int i = 0; i < c.size; i += L::kLanes) {
+    Wide red, green, blue, density;
+    L::Load4(c.d_raw.data() + kOutputs * i, red, green, blue, density);
+    // What lies behind the last sample is of no size.
+    const Wide sum = L::FirstLanes(c.size - i, Abs(red) + Abs(green) + Abs(blue) + Abs(density));
+    active += L::StoreWhereGreater(sum, L::Set(cut), L::IotaInt(static_cast<uint32_t>(i)), c.active.data() + active);
+  }
+  const auto move_row = [](float* rows, int width, uint32_t from, int to) {
+    for (int f = 0; f < width; f += L::kLanes) L::Store(L::Load(rows + from * width + f), rows + to * width + f);
+  };
+  for (int to = 0; to < active; ++to) {
+    const uint32_t from = c.active[to];
+    c.x[to] = c.x[from];
+    c.y[to] = c.y[from];
+    c.z[to] = c.z[from];
+    for (int o = 0; o < kOutputs; ++o) c.d_raw[kOutputs * to + o] = c.d_raw[kOutputs * from + o] * scale;
+    move_row(c.features.data(), features, from, to);
+    move_row(c.hidden.data(), hidden, from, to);
+  }
+  return active;
+}
+
 template <class Wide>
 void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
           float* const* gradients, int gradient_count) {
@@ -272,6 +306,8 @@ KernelTable MakeKernelTable(const char* name) {
           .mlp_forward = MlpForward<Wide, Output>,
           .mlp_backward = MlpBackward<Wide>,
           .activate = Activate<Wide>,
+          .composite = Composite,
+          .keep_active = KeepActive<Wide>,
           .adam = Adam<Wide>};
 }
 

@@ -9,6 +9,7 @@ SampleChunk::SampleChunk(int capacity_, int feature_count, int hidden_width) : c
     *array = AlignedBuffer<float>(n);
   }
   cell = AlignedBuffer<uint32_t>(n);
+  active = AlignedBuffer<uint32_t>(n);
   features = AlignedBuffer<float>(n * static_cast<size_t>(feature_count));
   hidden = AlignedBuffer<float>(n * static_cast<size_t>(hidden_width));
   raw = AlignedBuffer<float>(n * kOutputs);

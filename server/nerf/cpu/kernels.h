@@ -38,6 +38,7 @@ struct SampleChunk {
   AlignedBuffer<float> red, green, blue;  // 0..1
   AlignedBuffer<float> density, alpha;    // per box side; opacity of the step
   AlignedBuffer<float> weight, behind;    // see CompositeForward
+  AlignedBuffer<uint32_t> active;         // numbers of the samples that keep_active chose
 };
 
 // The inner loops, one table per instruction set and one in plain floats. All arrays are aligned to 64 bytes.
@@ -65,6 +66,14 @@ struct KernelTable {
 
   // raw, length -> red, green, blue, density, alpha of the chunk's samples.
   void (*activate)(SampleChunk& chunk, float density_bias);
+
+  // CompositeForward and CompositeBackward of one ray (see math/composite.h).
+  RayResult (*composite)(const RaySamples& samples, const RayTarget& target, const LossWeights& weights, float* weight,
+                         float* behind, float* d_raw);
+
+  // Moves the samples whose |d_raw| sums to more than `cut` to the front, in their order: x, y, z, features, hidden and
+  // d_raw, this multiplied by `scale`. Returns how many they are; the arrays behind them are left in no order.
+  int (*keep_active)(float cut, float scale, int features, int hidden, SampleChunk& chunk);
 
   // Sums `gradient_count` gradient arrays, zeroes them, and updates parameters [begin, end), multiples of kMaxLanes.
   void (*adam)(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,

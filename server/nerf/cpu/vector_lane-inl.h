@@ -28,6 +28,7 @@ struct Lane {
   static HWY_INLINE Int SetInt(uint32_t x) { return hn::Set(DInt(), x); }
   static HWY_INLINE V Zero() { return hn::Zero(D()); }
   static HWY_INLINE V Iota() { return hn::Iota(D(), 0.0f); }
+  static HWY_INLINE Int IotaInt(uint32_t first) { return hn::Iota(DInt(), first); }
   static HWY_INLINE V Load(const float* p) { return hn::LoadU(D(), p); }
   static HWY_INLINE Int LoadInt(const uint32_t* p) { return hn::LoadU(DInt(), p); }
   static HWY_INLINE void Store(V x, float* p) { hn::StoreU(x, D(), p); }
@@ -49,6 +50,14 @@ struct Lane {
     const auto chosen = hn::RebindMask(D(), hn::Ne(word & hn::Shl(SetInt(1), bit & SetInt(31)), SetInt(0)));
     Store(hn::Compress(x, chosen), to);
     return static_cast<int>(hn::CountTrue(D(), chosen));
+  }
+  static HWY_INLINE int StoreWhereGreater(V a, V b, Int x, uint32_t* to) {
+    const auto chosen = hn::RebindMask(DInt(), hn::Gt(a, b));
+    StoreInt(hn::Compress(x, chosen), to);
+    return static_cast<int>(hn::CountTrue(DInt(), chosen));
+  }
+  static HWY_INLINE V FirstLanes(int count, V x) {
+    return hn::IfThenElseZero(hn::FirstN(D(), static_cast<size_t>(count)), x);
   }
   static HWY_INLINE bool AllZero(V x) { return hn::AllTrue(D(), hn::Eq(x, Zero())); }
   static HWY_INLINE V IfNonZero(V test, V yes, V no) { return hn::IfThenElse(hn::Ne(test, Zero()), yes, no); }

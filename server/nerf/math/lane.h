@@ -14,7 +14,8 @@
 ROMAP_MATH_BEGIN
 
 // What a formula needs of its lane type F, besides + - * /:
-//   MulAdd(a, b, c) = a b + c, Min, Max, Sqrt, Floor, and Lane<F> for loads, stores, constants, conversions and masks.
+//   MulAdd(a, b, c) = a b + c, Min, Max, Abs, Sqrt, Floor, and Lane<F> for loads, stores, constants, conversions and
+//   masks.
 // This is the plain form, one value per lane type; cpu/vector_lane-inl.h has the same for Highway vectors.
 template <class F>
 struct Lane;
@@ -22,6 +23,7 @@ struct Lane;
 ROMAP_HD float MulAdd(float a, float b, float c) { return a * b + c; }
 ROMAP_HD float Min(float a, float b) { return a < b ? a : b; }
 ROMAP_HD float Max(float a, float b) { return a > b ? a : b; }
+ROMAP_HD float Abs(float a) { return std::fabs(a); }
 ROMAP_HD float Sqrt(float a) { return std::sqrt(a); }
 ROMAP_HD float Floor(float a) { return std::floor(a); }
 
@@ -34,7 +36,8 @@ struct Lane<float> {
   static ROMAP_HD float Set(float x) { return x; }
   static ROMAP_HD Int SetInt(uint32_t x) { return x; }
   static ROMAP_HD float Zero() { return 0.0f; }
-  static ROMAP_HD float Iota() { return 0.0f; }  // 0, 1, 2.. along the lanes
+  static ROMAP_HD float Iota() { return 0.0f; }                  // 0, 1, 2.. along the lanes
+  static ROMAP_HD Int IotaInt(uint32_t first) { return first; }  // first, first + 1..
   static ROMAP_HD float Load(const float* p) { return *p; }
   static ROMAP_HD Int LoadInt(const uint32_t* p) { return *p; }
   static ROMAP_HD void Store(float x, float* p) { *p = x; }
@@ -59,6 +62,13 @@ struct Lane<float> {
     *to = x;
     return static_cast<int>((word >> (bit & 31u)) & 1u);
   }
+  // The same for those whose `a` is greater than `b`.
+  static ROMAP_HD int StoreWhereGreater(float a, float b, Int x, uint32_t* to) {
+    *to = x;
+    return a > b ? 1 : 0;
+  }
+  // The first `count` lanes of x, 0 in the others.
+  static ROMAP_HD float FirstLanes(int count, float x) { return count > 0 ? x : 0.0f; }
   static ROMAP_HD bool AllZero(float x) { return x == 0.0f; }
   // Lane by lane: test != 0 ? yes : no.
   static ROMAP_HD float IfNonZero(float test, float yes, float no) { return test != 0.0f ? yes : no; }
