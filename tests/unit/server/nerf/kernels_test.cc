@@ -106,6 +106,82 @@ TEST_P(KernelsTest, Activation) {
   ExpectNear(want.alpha, got.alpha, kPoints, 1e-5f);
 }
 
+TEST_P(KernelsTest, KeepsActiveSamplesInTheirOrder) {
+  constexpr int kFeatures = 16, kHidden = 32;
+  constexpr float kCut = 0.5f, kScale = 0.25f;
+  const auto make = [&] {
+    SampleChunk chunk(kPoints, kFeatures, kHidden);
+    chunk.size = kPoints;
+    uint64_t stream = 20;
+    for (AlignedBuffer<float>* array : {&chunk.x, &chunk.y, &chunk.z, &chunk.features, &chunk.hidden}) {
+      for (size_t i = 0; i < array->size(); ++i) (*array)[i] = Noise(stream, i);
+      ++stream;
+    }
+    // Behind the last sample lies what earlier chunks left there.
+    for (size_t i = 0; i < chunk.d_raw.size(); ++i) chunk.d_raw[i] = Noise(15, i / kOutputs) > 0 ? Noise(16, i) : 0.05f;
+    for (size_t i = kPoints * kOutputs; i < chunk.d_raw.size(); ++i) chunk.d_raw[i] = 9.0f;
+    return chunk;
+  };
+  const SampleChunk all = make();
+  std::vector<size_t> wanted;
+  for (size_t i = 0; i < kPoints; ++i) {
+    float sum = 0;
+    for (size_t o = 0; o < kOutputs; ++o) sum += std::fabs(all.d_raw[kOutputs * i + o]);
+    if (sum > kCut) wanted.push_back(i);
+  }
+  ASSERT_GT(wanted.size(), 20u);
+  ASSERT_LT(wanted.size(), 80u);
+  for (const KernelTable* kernels : {&plain_, &SimdKernels()}) {
+    SampleChunk kept = make();
+    ASSERT_EQ(kernels->keep_active(kCut, kScale, kFeatures, kHidden, kept), static_cast<int>(wanted.size()));
+    for (size_t to = 0; to < wanted.size(); ++to) {
+      const size_t from = wanted[to];
+      EXPECT_EQ(kept.x[to], all.x[from]);
+      EXPECT_EQ(kept.y[to], all.y[from]);
+      EXPECT_EQ(kept.z[to], all.z[from]);
+      for (size_t o = 0; o < kOutputs; ++o) {
+        EXPECT_EQ(kept.d_raw[kOutputs * to + o], kScale * all.d_raw[kOutputs * from + o]);
+      }
+      for (size_t f = 0; f < kFeatures; ++f) {
+        EXPECT_EQ(kept.features[kFeatures * to + f], all.features[kFeatures * from + f]);
+      }
+      for (size_t h = 0; h < kHidden; ++h) EXPECT_EQ(kept.hidden[kHidden * to + h], all.hidden[kHidden * from + h]);
+    }
+  }
+}
+
+TEST_P(KernelsTest, Compositing) {
+  constexpr int kSamples = 13;
+  float t[kSamples], length[kSamples], alpha[kSamples], density[kSamples], rgb[3][kSamples];
+  for (uint64_t i = 0; i < kSamples; ++i) {
+    t[i] = 1.0f + 0.1f * static_cast<float>(i);
+    length[i] = 0.1f;
+    density[i] = 4.0f * RandomUniform(17, 0, i);
+    alpha[i] = 1 - std::exp(-density[i] * length[i]);
+    for (uint64_t c = 0; c < 3; ++c) rgb[c][i] = RandomUniform(17, 1 + c, i);
+  }
+  const RaySamples samples{kSamples, t, length, alpha, density, {rgb[0], rgb[1], rgb[2]}};
+  LossWeights weights;
+  weights.opacity_object = weights.opacity_background = weights.depth = 0.5f;
+  weights.density = 0.01f;
+  weights.depth_limit = 10;
+  for (const bool is_object : {true, false}) {
+    RayTarget target;
+    target.rgb[0] = 0.9f;
+    target.depth = 1.3f;
+    target.is_object = is_object;
+    float want_weight[kSamples], got_weight[kSamples], behind[kSamples];
+    float want_d_raw[kSamples * kOutputs], got_d_raw[kSamples * kOutputs];
+    const RayResult want = plain_.composite(samples, target, weights, want_weight, behind, want_d_raw);
+    const RayResult got = SimdKernels().composite(samples, target, weights, got_weight, behind, got_d_raw);
+    EXPECT_NEAR(want.loss, got.loss, 1e-5f);
+    EXPECT_NEAR(want.color_loss, got.color_loss, 1e-5f);
+    EXPECT_GT(want.loss, 0);
+    for (int i = 0; i < kSamples; ++i) EXPECT_NEAR(want_weight[i], got_weight[i], 1e-6f);
+    for (int i = 0; i < kSamples * kOutputs; ++i) EXPECT_NEAR(want_d_raw[i], got_d_raw[i], 1e-6f) << i;
+  }
+}
+
 TEST_P(KernelsTest, AdamLeavesEntriesWithoutGradientAlone) {
   constexpr size_t kCount = 64;
   const AdamRates rates{0.01f, 0.8f, 0.95f};
@@ -161,6 +237,35 @@ TEST_P(KernelsTest, SamplesLieInOccupiedCellsAndInOrder) {
   int occupied = 0;
   for (size_t i = 0; i < size; ++i) occupied += static_cast<int>((bits[got.cell[i] / 32] >> (got.cell[i] % 32)) & 1u);
   EXPECT_GT(occupied, 0.8 * got.size);
+}
+
+// What a sample of a ray through a few occupied cells must be, worked out by hand.
+TEST_P(KernelsTest, SamplesSpreadOverOccupiedPiecesAsOneStretch) {
+  std::vector<uint32_t> bits(kOccupancyResolution * kOccupancyResolution * kOccupancyResolution / 32);
+  const auto occupy = [&](uint32_t x) { bits[((20 * 64 + 10) * 64 + x) / 32] |= 1u << (x % 32); };
+  for (const uint32_t x : {3u, 4u, 31u, 32u, 63u}) occupy(x);
+  // Along x through the middle of row (y 10, z 20): 64 pieces, each one cell long.
+  const Ray ray{{-1, 10.5f / 64, 20.5f / 64}, {1, 0, 0}, 0.5f, {}};
+  const SamplingRule rule{.occupied_bits = bits.data(), .finest_step = 0.5f / 64, .min_samples = 1, .max_samples = 16};
+  for (const KernelTable* kernels : {&plain_, &SimdKernels()}) {
+    SampleChunk chunk(64, 16, 16);
+    RaySpan span;
+    kernels->place_samples(&ray, 1, rule, chunk, &span);
+    ASSERT_GE(span.count, 10);  // five pieces, two samples in each, and rounding
+    ASSERT_LE(span.count, 11);
+    const float pieces_per_sample = 5.0f / static_cast<float>(span.count);
+    const float first_x[] = {3, 4, 31, 32, 63};
+    for (int i = 0; i < span.count; ++i) {
+      const float at = (static_cast<float>(i) + 0.5f) * pieces_per_sample;
+      const float piece = std::floor(at);
+      const size_t s = static_cast<size_t>(span.first + i);
+      EXPECT_NEAR(chunk.x[s], (first_x[static_cast<int>(piece)] + at - piece) / 64, 1e-4f);
+      EXPECT_NEAR(chunk.t[s], 1 + chunk.x[s], 1e-5f);
+      EXPECT_NEAR(chunk.y[s], 10.5f / 64, 1e-6f);
+      EXPECT_NEAR(chunk.length[s], pieces_per_sample / 64, 1e-6f);
+      EXPECT_EQ(chunk.cell[s], (20u * 64 + 10) * 64 + static_cast<uint32_t>(first_x[static_cast<int>(piece)]));
+    }
+  }
 }
 
 TEST_P(KernelsTest, UniformSamplingSpansTheBox) {
