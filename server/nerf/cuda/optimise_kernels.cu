@@ -8,6 +8,7 @@ namespace romap::nerf::cuda {
 namespace {
 
 constexpr unsigned kBlockThreads = 128;
+constexpr int kCellsOfThread = 4;
 constexpr int kRowWords = kOccupancyResolution / 32;
 static_assert(kOccupancyResolution == 64, "a row of cells must be one 64-bit word");
 
@@ -40,18 +41,25 @@ __device__ void OptimiseWeight(const OptimiseParams& p, const AdamRates& rates, 
   }
 }
 
-// One cell of the occupancy, a warp 32 neighbours.
-__device__ void ScoreCell(const OptimiseParams& p, uint32_t cell) {
-  const uint32_t visits = p.cell_visits[cell];
-  const bool due = UpdateIsDue(p.plan, *p.slice);
-  if (visits > 0) {
-    p.score[cell] = CellScore(p.score[cell], __uint_as_float(p.cell_weight[cell]), visits, p.decay);
-    p.cell_visits[cell] = 0;
-    p.cell_weight[cell] = 0;
+// kCellsOfThread neighbouring cells of the occupancy; eight threads make a word of live cells.
+__device__ void ScoreCells(const OptimiseParams& p, uint32_t first) {
+  const uint4 visits = *reinterpret_cast<const uint4*>(p.cell_visits + first);
+  if ((visits.x | visits.y | visits.z | visits.w) != 0) {
+    const uint32_t visits_of[kCellsOfThread] = {visits.x, visits.y, visits.z, visits.w};
+    for (int i = 0; i < kCellsOfThread; ++i) {
+      if (visits_of[i] == 0) continue;
+      float& score = p.score[first + i];
+      score = CellScore(score, __uint_as_float(p.cell_weight[first + i]), visits_of[i], p.decay);
+      p.cell_visits[first + i] = 0;
+      p.cell_weight[first + i] = 0;
+    }
   }
-  if (!due) return;
-  const unsigned live = __ballot_sync(kWholeWarp, p.score[cell] > p.threshold);
-  if (cell % 32 == 0) p.live_bits[cell / 32] = live & p.hull_bits[cell / 32];
+  if (!UpdateIsDue(p.plan, *p.slice)) return;
+  const uint32_t bit = first % 32;
+  uint32_t live = 0;
+  for (int i = 0; i < kCellsOfThread; ++i) live |= static_cast<uint32_t>(p.score[first + i] > p.threshold) << (bit + i);
+  for (int delta = 1; delta < 32 / kCellsOfThread; delta *= 2) live |= __shfl_xor_sync(kWholeWarp, live, delta);
+  if (bit == 0) p.live_bits[first / 32] = live & p.hull_bits[first / 32];
 }
 
 // Blocks of three kinds: for the table, for the MLP, for the cells.
@@ -64,7 +72,7 @@ __global__ void __launch_bounds__(kBlockThreads)
     const unsigned thread = (blockIdx.x - table_blocks) * kBlockThreads + threadIdx.x;
     OptimiseWeight(p, rates, static_cast<int>(thread / kWarpThreads));
   } else {
-    ScoreCell(p, (blockIdx.x - table_blocks - mlp_blocks) * kBlockThreads + threadIdx.x);
+    ScoreCells(p, ((blockIdx.x - table_blocks - mlp_blocks) * kBlockThreads + threadIdx.x) * kCellsOfThread);
   }
 }
 
@@ -97,8 +105,8 @@ cudaError_t LaunchStep(const StepLaunch& launch, MlpPath path, cudaStream_t stre
   if (const cudaError_t error = LaunchGradients(launch.step, path, stream); error != cudaSuccess) return error;
   const unsigned table_blocks = BlocksFor(launch.optimise.table_count);
   const unsigned mlp_blocks = BlocksFor(static_cast<size_t>(launch.optimise.mlp_count) * kWarpThreads);
-  ROMAP_LAUNCH(OptimiseKernel, dim3(table_blocks + mlp_blocks + BlocksFor(kCells)), dim3(kBlockThreads), 0, stream,
-               launch.optimise, table_blocks, mlp_blocks);
+  ROMAP_LAUNCH(OptimiseKernel, dim3(table_blocks + mlp_blocks + BlocksFor(kCells / kCellsOfThread)),
+               dim3(kBlockThreads), 0, stream, launch.optimise, table_blocks, mlp_blocks);
   ROMAP_LAUNCH(OccupancyKernel, dim3(BlocksFor(kOccupancyResolution * kOccupancyResolution)), dim3(kBlockThreads), 0,
                stream, launch.occupancy);
   return cudaGetLastError();

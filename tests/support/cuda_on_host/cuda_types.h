@@ -19,6 +19,9 @@ struct alignas(8) float2 {
 struct float3 {
   float x, y, z;
 };
+struct alignas(16) uint4 {
+  unsigned x, y, z, w;
+};
 struct alignas(16) float4 {
   float x, y, z, w;
 };
