@@ -54,14 +54,18 @@ std::vector<Eigen::Vector3d> ProbesOf(const ObjectView& view) {
   return probes;
 }
 
+// The crop holds all of the object: what lies outside is not of it. Of what the image does not show nothing is known.
 bool Contradicts(const Witness& witness, const Eigen::Vector3d& p_world) {
+  const ObjectView& view = *witness.view;
   const Eigen::Vector3d p = witness.T_camera_world * p_world;
   if (p.z() <= 0) return false;
-  const Eigen::Vector2d pixel = witness.view->camera.Project(p);
-  const cv::Rect& roi = witness.view->roi_px;
-  const double x = std::round(pixel.x()) - roi.x, y = std::round(pixel.y()) - roi.y;
-  if (!(x >= 0 && y >= 0 && x < roi.width && y < roi.height)) return false;
-  return witness.background.at<uint8_t>(static_cast<int>(y), static_cast<int>(x)) != 0;
+  const Eigen::Vector2d pixel = view.camera.Project(p);
+  if (!(pixel.array() >= 0).all() || pixel.x() >= view.camera.width_px || pixel.y() >= view.camera.height_px) {
+    return false;
+  }
+  const cv::Point at(cvRound(pixel.x()) - view.roi_px.x, cvRound(pixel.y()) - view.roi_px.y);
+  if (!cv::Rect({0, 0}, view.roi_px.size()).contains(at)) return true;
+  return witness.background.at<uint8_t>(at) != 0;
 }
 
 double MisplacedShare(const std::vector<Witness>& witnesses, const std::vector<std::vector<Eigen::Vector3d>>& probes,

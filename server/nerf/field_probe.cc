@@ -22,6 +22,22 @@ double ProbeReport::Loss(std::span<const float> view_weights) const {
   return weight > 0 ? sum / weight : 0;
 }
 
+std::vector<float> ProbeReport::NeedOfTiles(double share) const {
+  constexpr double kMostNeed = 4;
+  double sum = 0;
+  int count = 0;
+  for (float residual : tiles) {
+    sum += residual;
+    count += residual > 0 ? 1 : 0;
+  }
+  const double mean = sum / std::max(1, count);
+  std::vector<float> need(tiles.size(), 1.0f);
+  for (size_t i = 0; i < tiles.size() && mean > 0; ++i) {
+    need[i] = static_cast<float>(1 - share + share * std::min(kMostNeed, tiles[i] / mean));
+  }
+  return need;
+}
+
 void FieldProbe::Build(const RaySet& rays, size_t views) {
   views_ = views;
   rays_.clear();

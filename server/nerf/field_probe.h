@@ -23,6 +23,10 @@ struct ProbeReport {
   // Mean over the views of all residuals, weighted.
   double Loss(std::span<const float> view_weights) const;
 
+  // Weights for tiles, [views][PixelSampler::kTiles], with a mean near 1: `share` of them in proportion to the
+  // residual, at most four times as large as its mean, the rest evenly.
+  std::vector<float> NeedOfTiles(double share) const;
+
   std::vector<ViewResidual> views;
   std::vector<float> tiles;  // [views][PixelSampler::kTiles]: squared colour error plus missing opacity; 0 = no pixel
 };

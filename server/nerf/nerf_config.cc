@@ -61,6 +61,13 @@ void RayFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "px", .min = 1, .max = 100, .help = "Background rays lie within this distance of the mask"});
   fields.Add("sparse_depth_share", &c.sparse_depth_share,
              {.min = 0, .max = 0.5, .help = "Most rays of a step spent on pixels with a map point"});
+  fields.Add(
+      "border_weight", &c.border_weight,
+      {.min = 0, .max = 10, .help = "How often object pixels at the mask's border are chosen; 1 = as the others"});
+  fields.Add("residual_share", &c.residual_share,
+             {.min = 0, .max = 1, .help = "Share of the object rays that go where the residual is high"});
+  fields.Add("new_view_weight", &c.new_view_weight,
+             {.min = 0.1, .max = 10, .help = "How often a new view's pixels are chosen; 1 = as the others"});
   fields.Add("sampling", &c.sampling,
              {.choices = {"occupied", "uniform"},
               .help = "Samples in occupied cells, or evenly between entry and exit of the box as in the paper"});
@@ -130,8 +137,6 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "s", .min = 0, .max = 86400, .help = "Longest training of an object, summed over its workers"});
   fields.Add("most_time_per_view_s", &c.most_time_per_view_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "and so much more for each of its views"});
-  fields.Add("need_floor", &c.need_floor, {.min = 0, .max = 1, .help = "x"});
-  fields.Add("border_weight", &c.border_weight, {.min = 0, .max = 10, .help = "x"});
   fields.Add("settle_time_s", &c.settle_time_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Without a new view for this long, training is completed"});
 }

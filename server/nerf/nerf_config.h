@@ -38,6 +38,9 @@ struct NerfConfig {
   double background_share = 0.3;
   int background_band_px = 6;
   double sparse_depth_share = 0.1;
+  double border_weight = 2.0;
+  double residual_share = 0.0;
+  double new_view_weight = 1.0;
   std::string sampling = "occupied";
   int max_samples_per_ray = 16;
   int min_samples_per_ray = 4;
@@ -74,12 +77,10 @@ struct NerfConfig {
   double snapshot_interval_s = 1.0;
   double settle_time_s = 1.0;
   int probe_interval_steps = 25;
-  double least_loss_fall = 0.05;
-  int max_extra_steps = 200;
+  double least_loss_fall = 0.1;
+  int max_extra_steps = 100;
   double most_time_s = 8.0;
   double most_time_per_view_s = 0.3;
-  double need_floor = 1.0;
-  double border_weight = 1.0;
 
   double surface_level = 3.0;
   double connect_margin = 2.0;

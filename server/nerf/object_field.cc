@@ -100,19 +100,23 @@ bool ObjectField::CarryOverTo(const TrainingBox& box) {
 }
 
 absl::Status ObjectField::AddView(ObjectView view) {
-  if (!has_box_) return FailedPrecondition("{}: a view came before the box", id_.ToString());
+  if (!has_box_) return Refuse(FailedPrecondition("{}: a view came before the box", id_.ToString()));
   if (view.object != id_) {
-    return FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString());
+    return Refuse(FailedPrecondition("{}: a view of {} was offered", id_.ToString(), view.object.ToString()));
   }
   view = Moved(S_new_first_.Inverse(), std::move(view));
-  ROMAP_RETURN_IF_ERROR(Check(view));
+  if (absl::Status status = ValidateView(view, box_); !status.ok()) return Refuse(std::move(status));
   TakeView(std::move(view), false);
   plan_.OnNewView(steps());
   return absl::OkStatus();
 }
 
 void ObjectField::Move(const Sim3<World, World>& S_new_old) {
-  if (S_new_old.IsFinite()) S_new_first_ = S_new_old * S_new_first_;
+  if (!S_new_old.IsFinite()) {
+    motion_refused_ = true;
+    return;
+  }
+  S_new_first_ = S_new_old * S_new_first_;
 }
 
 absl::Status ObjectField::CorrectView(const ViewPose& pose) {
@@ -121,19 +125,16 @@ absl::Status ObjectField::CorrectView(const ViewPose& pose) {
   ObjectView corrected = *known;
   corrected.T_world_camera = S_new_first_.Inverse().Moved(pose.T_world_camera);
   const double shift_share = ShiftShare(known->T_world_camera, corrected.T_world_camera);
-  ROMAP_RETURN_IF_ERROR(Check(corrected));
+  if (absl::Status status = ValidateView(corrected, box_); !status.ok()) return Refuse(std::move(status));
   TakeView(std::move(corrected), shift_share < kLeastNewShift);
   plan_.OnCorrectedView(steps(), shift_share);
   return absl::OkStatus();
 }
 
-absl::Status ObjectField::Check(const ObjectView& view) {
-  const absl::Status status = ValidateView(view, box_);
-  if (!status.ok()) {
-    ++refused_views_;
-    view_fault_ = Message(status);
-  }
-  return status;
+absl::Status ObjectField::Refuse(absl::Status why) {
+  ++refused_views_;
+  view_fault_ = Message(why);
+  return why;
 }
 
 // The view is in the first world.
@@ -188,8 +189,7 @@ size_t ObjectField::MostRedundantView(const ObjectView& view) const {
 void ObjectField::PrepareViews() {
   if (!views_changed_) return;
   rays_.Build(views_, box_);
-  need_.assign(views_.size() * PixelSampler::kTiles, 1.0f);
-  WeighRays();
+  WeighRays(nullptr);
   black_views_ = static_cast<int>(std::ranges::count_if(views_, IsBlack));
   share_in_box_ = probe_.ShareMeeting(Space().extent);
   probe_.Build(rays_, views_.size());

@@ -74,7 +74,7 @@ class ObjectField {
 
  private:
   absl::Status FitBox(const Cuboid& cuboid);
-  absl::Status Check(const ObjectView& view);
+  absl::Status Refuse(absl::Status why);
   void TakeView(ObjectView view, bool keep_verdict);
   double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
   bool CarryOverTo(const TrainingBox& box);
@@ -84,7 +84,7 @@ class ObjectField {
   TrainStats RunSteps(int steps, int threads);
   void JudgeDepths();
   void Look();
-  void WeighRays();
+  void WeighRays(const ProbeReport* report);
   void RebuildHull();
   bool CanTrain() const;
   nerf::RenderSpace Space() const;
@@ -111,6 +111,7 @@ class ObjectField {
   std::vector<float> need_;             // [views][PixelSampler::kTiles]
   std::string box_fault_, view_fault_;  // of the last box or view that was refused
   int refused_views_ = 0;
+  bool motion_refused_ = false;
   int black_views_ = 0;
   bool depths_fit_ = true;
   double share_in_box_ = 1;  // of the rays through its masks

@@ -38,31 +38,37 @@ void ObjectField::JudgeDepths() {
   RebuildHull();
 }
 
-void ObjectField::WeighRays() { rays_.Weigh(trust_.Weights(), need_); }
+// Rays go where they are needed: to views that are new, to borders, and to tiles that are met worse than the others,
+// but some to all that can be trusted.
+void ObjectField::WeighRays(const ProbeReport* report) {
+  std::vector<float> views = trust_.Weights();
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (trust_.IsYoung(i, steps())) views[i] *= static_cast<float>(config_.new_view_weight);
+  }
+  std::vector<float> tiles(views.size() * PixelSampler::kTiles, 1.0f);
+  if (report != nullptr && config_.residual_share > 0) tiles = report->NeedOfTiles(config_.residual_share);
+  for (size_t i = PixelSampler::kBorderTile; i < tiles.size(); i += PixelSampler::kTiles) {
+    tiles[i] *= static_cast<float>(config_.border_weight);
+  }
+  rays_.Weigh(views, tiles);
+}
 
 void ObjectField::Look() {
   const ProbeReport report = probe_.Look(trainer_->model(), config_, Space());
-  gain_.Record(steps(), report.Loss(trust_.Weights()));
   if (trust_.Judge(report, steps())) {
     RebuildHull();
     plan_.OnNewView(steps());
+    gain_.Restart();
   }
-  float sum = 0;
-  int n = 0;
-  for (float t : report.tiles) sum += t, n += t > 0;
-  for (size_t i = 0; i < need_.size(); ++i) {
-    const float r = static_cast<float>(config_.need_floor) +
-                    (1 - static_cast<float>(config_.need_floor)) * std::min(4.0f, report.tiles[i] * n / sum);
-    need_[i] = 0.5f * (need_[i] + r);
-    if (i % PixelSampler::kTiles == PixelSampler::kBorderTile) need_[i] = static_cast<float>(config_.border_weight);
-  }
-  WeighRays();
+  gain_.Record(steps(), report.Loss(trust_.Weights()));
+  WeighRays(&report);
   plan_.OnFulfilled(steps(), gain_.FallPer100Steps());
 }
 
 std::string ObjectField::Concern() const {
   std::vector<std::string> concerns;
   if (!CanTrain()) concerns.push_back("training diverged again and again, and rests until something new is told of it");
+  if (motion_refused_) concerns.push_back("a correction of the map that is no motion was passed over");
   if (!box_fault_.empty()) concerns.push_back(box_fault_);
   if (refused_views_ > 0) {
     concerns.push_back(fmt::format("{} views were refused, the last: {}", refused_views_, view_fault_));

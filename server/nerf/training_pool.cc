@@ -26,6 +26,9 @@ struct TrainingPool::Job {
   uint64_t steps = 0;
   uint64_t allowed_steps = 0;   // if more views are to come
   uint64_t complete_steps = 0;  // if not
+  double loss_fall = 1;         // share of the loss that 100 steps take away; 1 while nobody knows
+  double busy_s = 0;            // of all workers
+  std::string concern;
   // Of the last snapshot.
   uint64_t sent_steps = 0;
   bool sent_converged = false;
@@ -34,6 +37,12 @@ struct TrainingPool::Job {
   uint64_t StepsLeft(bool complete) const {
     const uint64_t goal = complete ? complete_steps : allowed_steps;
     return goal > steps ? goal - steps : 0;
+  }
+
+  // Who comes first is less: objects that are far from a full training, then those that gain most from a step.
+  std::pair<double, double> Urgency(int full_steps) const {
+    const double share = static_cast<double>(steps) / static_cast<double>(std::max<uint64_t>(1, complete_steps));
+    return steps < static_cast<uint64_t>(full_steps) ? std::pair(share, 0.0) : std::pair(1.0, -loss_fall);
   }
 };
 
@@ -123,7 +132,9 @@ TrainingPool::Progress TrainingPool::GetProgress(uint64_t client_id) const {
     progress.steps += job->steps;
     if (job->leased || !job->offers.empty() || job->StepsLeft(true) > 0) ++progress.objects_training;
     const double planned = static_cast<double>(std::max<uint64_t>(job->complete_steps, config_.full_budget_steps));
-    done += std::min(1.0, static_cast<double>(job->steps) / planned);
+    const bool finished = job->steps > 0 && job->StepsLeft(true) == 0;
+    done += finished ? 1.0 : std::min(1.0, static_cast<double>(job->steps) / planned);
+    if (!job->concern.empty()) progress.concerns.emplace_back(id, job->concern);
   }
   progress.progress = done / progress.objects_total;
   return progress;
@@ -184,7 +195,7 @@ std::optional<TrainingPool::Clock::time_point> TrainingPool::NextSettleTime() co
 std::optional<TrainingPool::Lease> TrainingPool::Next(Clock::time_point now, std::optional<uint64_t> only_client) {
   Client* best_client = nullptr;
   std::shared_ptr<Job> best;
-  auto best_key = std::tuple(0, uint64_t{0}, 0.0);
+  auto best_key = std::tuple(0, uint64_t{0}, std::pair(0.0, 0.0));
   int busy = 0;
   for (const auto& [id, client] : clients_) {
     if (client->closing || (only_client && id != *only_client)) continue;
@@ -192,8 +203,7 @@ std::optional<TrainingPool::Lease> TrainingPool::Next(Clock::time_point now, std
     for (const auto& [object, job] : client->jobs) {
       if (!Runnable(*client, *job, now)) continue;
       ++busy;
-      const double planned = static_cast<double>(std::max<uint64_t>(1, job->complete_steps));
-      const auto key = std::tuple(client->leases, client->last_turn, static_cast<double>(job->steps) / planned);
+      const auto key = std::tuple(client->leases, client->last_turn, job->Urgency(config_.full_budget_steps));
       if (best && !(key < best_key)) continue;
       best_client = client.get();
       best = job;
@@ -259,16 +269,10 @@ void TrainingPool::Serve(Lease& lease, std::unique_lock<std::mutex>& lock) {
 
 void TrainingPool::GiveTo(ObjectField& field, ObjectViews offer) {
   if (offer.S_new_old) field.Move(*offer.S_new_old);
-  for (const ViewPose& pose : offer.corrected_views) {
-    const absl::Status status = field.CorrectView(pose);
-    if (!status.ok()) spdlog::warn("pose left out: {}", Message(status));
-  }
-  absl::Status status = field.SetBox(offer.cuboid);
-  if (!status.ok()) spdlog::warn("{}: box left out: {}", field.id().ToString(), Message(status));
-  for (ObjectView& view : offer.new_views) {
-    status = field.AddView(std::move(view));
-    if (!status.ok()) spdlog::warn("view left out: {}", Message(status));
-  }
+  // What is refused the field tells itself, in its concern.
+  for (const ViewPose& pose : offer.corrected_views) field.CorrectView(pose).IgnoreError();
+  field.SetBox(offer.cuboid).IgnoreError();
+  for (ObjectView& view : offer.new_views) field.AddView(std::move(view)).IgnoreError();
 }
 
 void TrainingPool::RunSlice(Lease& lease) {
@@ -276,18 +280,22 @@ void TrainingPool::RunSlice(Lease& lease) {
   if (!job.field) job.field = std::make_unique<ObjectField>(config_, job.id, job.id.value);
   ObjectField& field = *job.field;
   for (ObjectViews& offer : lease.offers) GiveTo(field, std::move(offer));
-  const uint64_t goal = field.AllowedSteps(lease.complete);
-  const uint64_t left = goal > field.steps() ? goal - field.steps() : 0;
-  const int steps = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(config_.slice_steps)));
-  if (steps > 0) field.Train(steps, lease.threads);
+  uint64_t goal = 0;
+  TrainStats stats;
+  if (HasTimeLeft(job)) {
+    goal = field.AllowedSteps(lease.complete);
+    const uint64_t left = goal > field.steps() ? goal - field.steps() : 0;
+    const int steps = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(config_.slice_steps)));
+    if (steps > 0) stats = field.Train(steps, lease.threads);
+    goal = field.AllowedSteps(lease.complete);
+  }
   const bool budget_used = field.steps() >= goal;
+  bool converged = false;
   {
     std::lock_guard lock(mutex_);
-    job.views = field.views();
-    job.steps = field.steps();
-    job.allowed_steps = field.AllowedSteps(false);
-    job.complete_steps = field.AllowedSteps(true);
-    if (job.steps < job.sent_steps) job.sent_steps = 0;  // training began anew
+    job.busy_s += stats.wall_s * lease.threads;
+    TakeNews(job, field);
+    converged = job.StepsLeft(true) == 0;
     if (job.removed || lease.client->closing || !ShouldSend(job, budget_used)) {
       if (budget_used) field.ReleaseScratch();
       return;
@@ -296,9 +304,28 @@ void TrainingPool::RunSlice(Lease& lease) {
     job.sent_time = Clock::now();
   }
   FieldSnapshot snapshot = field.Snapshot();
-  snapshot.converged = field.steps() >= field.AllowedSteps(true);
+  snapshot.converged = converged;
   if (budget_used) field.ReleaseScratch();
   lease.client->sink(std::move(snapshot));
+}
+
+// Not by hand: then nothing may depend on time.
+bool TrainingPool::HasTimeLeft(const Job& job) const {
+  if (threads_ == 0) return true;
+  const int views = job.field ? job.field->views() : 0;
+  return job.busy_s < config_.most_time_s + config_.most_time_per_view_s * views;
+}
+
+void TrainingPool::TakeNews(Job& job, const ObjectField& field) const {
+  job.views = field.views();
+  job.steps = field.steps();
+  job.allowed_steps = HasTimeLeft(job) ? field.AllowedSteps(false) : job.steps;
+  job.complete_steps = HasTimeLeft(job) ? field.AllowedSteps(true) : job.steps;
+  job.loss_fall = field.LossFall().value_or(1);
+  if (job.steps < job.sent_steps) job.sent_steps = 0;  // training began anew
+  std::string concern = field.Concern();
+  if (concern != job.concern && !concern.empty()) spdlog::warn("{}: {}", job.id.ToString(), concern);
+  job.concern = std::move(concern);
 }
 
 bool TrainingPool::ShouldSend(const Job& job, bool budget_used) const {

@@ -8,7 +8,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "common/messages.h"
@@ -19,7 +21,8 @@ namespace romap {
 
 // The server's workers that train the objects of all clients (paper: one thread pool trains all models). An object is
 // leased to one worker for a slice of steps and queued again: clients take turns, and within a client the object goes
-// first that is furthest from its budget. The budget of an object grows with its views (TrainingPlan). Thread-safe.
+// first that is furthest from its plan, then, of those beyond their plans, the one whose loss falls fastest. The budget
+// of an object grows with its views (TrainingPlan), and ends with its time. Thread-safe.
 //
 // A pool without workers trains only in TrainSlices(), on the caller's thread: what it does then depends on the order
 // of the calls alone, never on time.
@@ -34,6 +37,8 @@ class TrainingPool {
     int objects_training = 0;  // with steps left or views waiting
     uint64_t steps = 0;        // done on all objects that are still there
     double progress = 0;       // 0..1, mean over objects of steps done / steps planned; 1 without objects
+    // What is wrong with what objects were given, for people: see ObjectField::Concern.
+    std::vector<std::pair<ObjectId, std::string>> concerns = {};
   };
 
   // `threads` workers; 0 = none.
@@ -46,7 +51,7 @@ class TrainingPool {
   // A new client; the result names it in all other calls. Calls with an unknown client do nothing.
   uint64_t Register(Sink sink);
   // What is new about an object: corrections, cuboid, views. Taken in the order of the calls, between slices. What
-  // cannot be used is logged and left out, and all of an object whose training failed.
+  // cannot be used is left out, and so is all of an object whose training failed; what is wrong is logged, once.
   void Offer(uint64_t client, ObjectViews views);
   // The object is gone (merged, or an error). A snapshot already on its way may still arrive.
   void Remove(uint64_t client, ObjectId object);
@@ -72,6 +77,8 @@ class TrainingPool {
   void Serve(Lease& lease, std::unique_lock<std::mutex>& lock);
   void RunSlice(Lease& lease);
   static void GiveTo(ObjectField& field, ObjectViews offer);
+  void TakeNews(Job& job, const ObjectField& field) const;
+  bool HasTimeLeft(const Job& job) const;
   bool ShouldSend(const Job& job, bool budget_used) const;
   bool Complete(const Client& client, const Job& job, Clock::time_point now) const;
   bool Runnable(const Client& client, const Job& job, Clock::time_point now) const;

@@ -52,8 +52,7 @@ bool ViewTrust::Judge(const ProbeReport& report, uint64_t step) {
   std::vector<bool> verdict(views_.size());
   size_t odd = 0;
   for (size_t i = 0; i < views_.size(); ++i) {
-    const bool young = step < views_[i].since_step + kPatience_steps;
-    verdict[i] = young || oddness[i] <= (views_[i].trusted ? 1.0 : kForgiven);
+    verdict[i] = IsYoung(i, step) || oddness[i] <= (views_[i].trusted ? 1.0 : kForgiven);
     odd += verdict[i] ? 0 : 1;
   }
   if (static_cast<double>(odd) > kMostDistrusted * static_cast<double>(views_.size())) {
@@ -66,6 +65,8 @@ bool ViewTrust::Judge(const ProbeReport& report, uint64_t step) {
   }
   return changed;
 }
+
+bool ViewTrust::IsYoung(size_t index, uint64_t step) const { return step < views_[index].since_step + kPatience_steps; }
 
 void ViewTrust::Restart() {
   for (State& view : views_) view = {};

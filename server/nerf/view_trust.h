@@ -21,6 +21,8 @@ class ViewTrust {
   // The field forgot all; so do the verdicts.
   void Restart();
 
+  // Was trained on for too short a time to be judged.
+  bool IsYoung(size_t index, uint64_t step) const;
   bool trusted(size_t index) const { return views_[index].trusted; }
   size_t distrusted() const;
   // One per view: 1 trusted, 0 not.

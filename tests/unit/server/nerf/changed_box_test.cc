@@ -20,6 +20,7 @@ using testing::RawOnGrid;
 NerfConfig ShortConfig() {
   NerfConfig config;
   config.full_budget_steps = 150;
+  config.max_extra_steps = 0;
   return config;
 }
 

@@ -22,6 +22,7 @@ NerfConfig FastConfig() {
   config.finest_resolution = 128;
   config.rays_per_step = 512;
   config.full_budget_steps = 100;
+  config.max_extra_steps = 0;
   return config;
 }
 

@@ -31,6 +31,7 @@ NerfConfig TinyConfig() {
   config.slice_steps = 5;
   config.snapshot_interval_steps = 10;
   config.settle_time_s = 3600;
+  config.max_extra_steps = 0;
   return config;
 }
 
@@ -222,6 +223,90 @@ TEST(TrainingPoolTest, AMovedObjectIsNotTrainedAnewNorSentAgain) {
   EXPECT_TRUE(last.T_world_object.translation().isApprox(S * offer.cuboid.T_world_object.translation(), 1e-9));
 }
 
+TEST(TrainingPoolTest, TellsWhatIsWrongWithAnObject) {
+  Inbox inbox;
+  TrainingPool pool(TinyConfig(), 1);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, Offer(1, 4));
+  ObjectViews bad = Offer(2, 4);
+  bad.cuboid.half_extents.z() = NAN;
+  pool.Offer(client, bad);
+  WaitFor([&] { return pool.GetProgress(client).concerns.size() == 1; });
+  auto [object, concern] = pool.GetProgress(client).concerns.front();
+  EXPECT_EQ(object, ObjectId{2});
+  EXPECT_NE(concern.find("half extents must be positive"), std::string::npos) << concern;
+  pool.Offer(client, Offer(2, 5));
+  pool.Finish(client);
+  WaitUntilIdle(pool, client);
+  ASSERT_EQ(pool.GetProgress(client).concerns.size(), 1u);
+  concern = pool.GetProgress(client).concerns.front().second;
+  EXPECT_EQ(concern.find("half extents"), std::string::npos) << concern;
+  EXPECT_NE(concern.find("4 views were refused"), std::string::npos) << concern;
+  EXPECT_EQ(inbox.Of(2).back().concern, concern);
+  EXPECT_EQ(inbox.Of(1).back().concern, "");
+  EXPECT_EQ(inbox.Of(1).back().steps, 40u) << "others go on";
+}
+
+TEST(TrainingPoolTest, TimeIsLimitedButNotByHand) {
+  NerfConfig config = TinyConfig();
+  config.full_budget_steps = 100000;
+  config.most_time_s = 0.02;
+  config.most_time_per_view_s = 0.002;
+  {
+    Inbox inbox;
+    TrainingPool pool(config, 1);
+    const uint64_t client = pool.Register(inbox.Sink());
+    pool.Offer(client, Offer(1, 5));
+    pool.Finish(client);
+    WaitUntilIdle(pool, client);
+    const uint64_t steps = pool.GetProgress(client).steps;
+    EXPECT_GT(steps, 0u);
+    EXPECT_LT(steps, 100000u);
+    EXPECT_TRUE(inbox.Of(1).back().converged);
+    EXPECT_EQ(pool.GetProgress(client).progress, 1.0);
+  }
+  config.full_budget_steps = 200;
+  config.most_time_s = config.most_time_per_view_s = 0;
+  TrainingPool pool(config, 0);
+  const uint64_t client = pool.Register([](FieldSnapshot) {});
+  pool.Offer(client, Offer(1, 5));
+  pool.Finish(client);
+  pool.TrainSlices(client, 1000);
+  EXPECT_EQ(pool.GetProgress(client).steps, 200u);
+}
+
+TEST(TrainingPoolTest, WhatComesBeyondThePlansGoesWhereTheLossFallsFastest) {
+  NerfConfig config = TinyConfig();
+  config.probe_interval_steps = 10;
+  config.max_extra_steps = 100000;
+  config.least_loss_fall = 0;
+  ObjectViews shown = Offer(1, 5), black = Offer(2, 5);
+  for (ObjectView& view : black.new_views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
+  Inbox inbox;
+  TrainingPool pool(config, 0);
+  const uint64_t client = pool.Register(inbox.Sink());
+  pool.Offer(client, shown);
+  pool.Offer(client, black);
+  pool.Finish(client);
+  pool.TrainSlices(client, 16);  // the plans
+  const uint64_t first = inbox.Of(1).back().steps, second = inbox.Of(2).back().steps;
+  EXPECT_EQ(first, 40u);
+  EXPECT_EQ(second, 40u);
+  ObjectField field(config, ObjectId{1}, 1), black_field(config, ObjectId{2}, 2);
+  const auto fall = [](ObjectField& f, const ObjectViews& offer) {
+    EXPECT_TRUE(f.SetBox(offer.cuboid).ok());
+    for (const ObjectView& view : offer.new_views) EXPECT_TRUE(f.AddView(view).ok());
+    for (int i = 0; i < 8; ++i) f.Train(5, 1);
+    return f.LossFall().value();
+  };
+  const double falls[] = {fall(field, shown), fall(black_field, black)};
+  ASSERT_GT(std::abs(falls[0] - falls[1]), 0.01);
+  const uint64_t better = falls[0] > falls[1] ? 1 : 2;
+  pool.TrainSlices(client, 2);
+  EXPECT_EQ(inbox.Of(better).back().steps, 50u);
+  EXPECT_EQ(inbox.Of(3 - better).back().steps, 40u);
+}
+
 TEST(TrainingPoolTest, DivergedTrainingNeverLeaves) {
   NerfConfig config = TinyConfig();
   config.learning_rate = config.final_learning_rate = 1e30;  // overflows at once
@@ -252,6 +337,28 @@ TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
   EXPECT_GT(plan.LearningRate(full), config.final_learning_rate);
   for (int i = 0; i < 1000; ++i) plan.OnNewView(full);
   EXPECT_EQ(plan.AllowedSteps(40, false), full + static_cast<uint64_t>(config.max_refine_steps));
+}
+
+TEST(TrainingPlanTest, StepsBeyondThePlanAreEarnedByTheLoss) {
+  NerfConfig config;
+  config.least_loss_fall = 0.1;
+  config.max_extra_steps = 120;
+  const auto full = static_cast<uint64_t>(config.full_budget_steps);
+  TrainingPlan plan(config);
+  plan.OnFulfilled(full - 1, 0.5);
+  EXPECT_EQ(plan.AllowedSteps(5, true), full) << "it is not fulfilled";
+  plan.OnFulfilled(full, std::nullopt);
+  plan.OnFulfilled(full, 0.09);
+  EXPECT_EQ(plan.AllowedSteps(5, true), full);
+  plan.OnFulfilled(full, 0.11);
+  EXPECT_EQ(plan.AllowedSteps(5, true), full + 50);
+  EXPECT_LT(plan.LearningRate(full), 1.6 * config.final_learning_rate);
+  for (int i = 0; i < 10; ++i) plan.OnFulfilled(full + 1000, 0.5);
+  EXPECT_EQ(plan.AllowedSteps(5, true), full + 120);
+  plan.OnNewView(full + 120);  // something new earns anew
+  const uint64_t planned = plan.AllowedSteps(5, true);
+  plan.OnFulfilled(planned, 0.5);
+  EXPECT_EQ(plan.AllowedSteps(5, true), planned + 50);
 }
 
 TEST(TrainingPoolTest, WithoutWorkersItTrainsByHandAndAlwaysAlike) {

@@ -1,0 +1,274 @@
+// What a field makes of input that is not as it should be, and what it says about it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "server/nerf/object_field.h"
+#include "tests/unit/server/nerf/test_scene.h"
+
+namespace romap {
+namespace {
+
+using testing::BallScene;
+using testing::BallSurfaceError;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::RawOnGrid;
+
+NerfConfig SmallConfig() {
+  NerfConfig config;
+  config.levels = 6;
+  config.log2_table_entries = 12;
+  config.finest_resolution = 128;
+  config.rays_per_step = 512;
+  config.full_budget_steps = 150;
+  return config;
+}
+
+void TrainToTheEnd(ObjectField& field) {
+  while (field.AllowedSteps(true) > field.steps()) field.Train(20, 1);
+}
+
+ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& views,
+                      const NerfConfig& config = SmallConfig()) {
+  ObjectField field(config, scene.object, 1);
+  EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+  for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
+  TrainToTheEnd(field);
+  return field;
+}
+
+void Turn(ObjectView& view, double angle_deg) {
+  const Eigen::AngleAxisd turn(angle_deg * M_PI / 180, Eigen::Vector3d::UnitY());
+  view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
+}
+
+TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
+  BallScene scene;
+  scene.views = 16;
+  std::vector<ObjectView> views = scene.Views();
+  const ObjectField right = TrainedOn(scene, views);
+  EXPECT_EQ(right.Concern(), "");
+  Turn(views[6], 5);
+  ObjectField field = TrainedOn(scene, views);
+  const FieldSnapshot snapshot = field.Snapshot();
+  EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
+  EXPECT_EQ(snapshot.view_centers_object.size(), 15u);
+  const double right_error = BallSurfaceError(scene, right.Snapshot());
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.3 * right_error + 0.005);
+
+  // Its pose is corrected: it counts again.
+  ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
+  EXPECT_EQ(field.Concern(), "");
+  TrainToTheEnd(field);
+  EXPECT_EQ(field.Concern(), "");
+  EXPECT_EQ(field.Snapshot().view_centers_object.size(), 16u);
+}
+
+TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
+  BallScene scene;
+  scene.views = 16;
+  std::vector<ObjectView> views = scene.Views();
+  ObjectView& wrong = views[4];
+  wrong.ray_kind = cv::Mat(wrong.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kBackground)));
+  wrong.ray_kind(cv::Rect(0, 0, 20, 24)).setTo(static_cast<int>(RayKind::kObject));
+  const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
+  EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/5 contradicts"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
+}
+
+TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
+  // The lower half of the ball is not of the object, as the revised masks say.
+  const BallScene scene;
+  std::vector<ObjectView> views = scene.Views();
+  ObjectField field = TrainedOn(scene, views);
+  const Eigen::Vector3f below(0, 0, static_cast<float>(-0.8 * scene.radius_mu));
+  const auto raw_below = [&] {
+    const FieldSnapshot snapshot = field.Snapshot();
+    std::vector<float> raw(1);
+    snapshot.field->Sample(std::vector<Eigen::Vector3f>{below}, raw, {});
+    const int n = snapshot.hull.resolution;
+    const Eigen::Vector3i cell = ((below.cwiseQuotient(snapshot.box_half_extents).array() + 1) * 0.5f * n).cast<int>();
+    const bool in_hull = snapshot.hull.bits[static_cast<size_t>((cell.z() * n + cell.y()) * n + cell.x())] != 0;
+    return in_hull ? raw[0] : -1e4f;
+  };
+  const float level = field.Snapshot().surface_level;
+  EXPECT_GT(raw_below(), level);
+  for (ObjectView& view : views) {
+    view.ray_kind = view.ray_kind.clone();
+    for (int v = 0; v < scene.size_px; ++v) {
+      for (int u = 0; u < scene.size_px; ++u) {
+        const Eigen::Vector3d ray = view.T_world_camera.rotation() * view.camera.Unproject(u, v);
+        const Eigen::Vector3d eye = view.T_world_camera.translation() - scene.Center();
+        const double along = -eye.dot(ray) / ray.squaredNorm();
+        const bool low = (eye + along * ray).z() < -0.2 * scene.radius_mu;
+        if (low) view.ray_kind.at<uint8_t>(v, u) = static_cast<uint8_t>(RayKind::kBackground);
+      }
+    }
+    ASSERT_TRUE(field.AddView(view).ok());
+  }
+  EXPECT_EQ(field.views(), scene.views) << "they replace those of the same keyframes";
+  TrainToTheEnd(field);
+  EXPECT_LT(raw_below(), level);
+}
+
+TEST(FieldLifeTest, BlackImagesStillGiveAShapeAndAreNamed) {
+  const BallScene scene;
+  std::vector<ObjectView> views = scene.Views();
+  for (ObjectView& view : views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
+  const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
+  EXPECT_THAT(snapshot.concern, HasSubstr("black in 12 of its 12 views"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.12);
+}
+
+TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
+  const BallScene scene;
+  ObjectField field(SmallConfig(), scene.object, 1);
+  Cuboid box = scene.Box();
+  box.T_world_object = {box.T_world_object.rotation(),
+                        box.T_world_object.translation() + Eigen::Vector3d(0, 0, 2.6 * scene.radius_mu)};
+  ASSERT_TRUE(field.SetBox(box).ok());
+  for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
+  TrainToTheEnd(field);
+  const FieldSnapshot snapshot = field.Snapshot();
+  EXPECT_THAT(snapshot.concern, HasSubstr("its box misses"));
+  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  ASSERT_TRUE(field.SetBox(scene.Box()).ok());
+  TrainToTheEnd(field);
+  EXPECT_THAT(field.Concern(), Not(HasSubstr("its box misses")));
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.06);
+}
+
+TEST(FieldLifeTest, WhatIsRefusedIsSaid) {
+  const BallScene scene;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  ObjectField field(SmallConfig(), scene.object, 1);
+  Cuboid box = scene.Box();
+  box.half_extents.x() = nan;
+  EXPECT_FALSE(field.SetBox(box).ok());
+  EXPECT_THAT(field.Concern(), HasSubstr("half extents must be positive and finite"));
+  EXPECT_FALSE(field.AddView(scene.View(0)).ok());
+  EXPECT_THAT(field.Concern(), HasSubstr("a view came before the box"));
+  ASSERT_TRUE(field.SetBox(scene.Box()).ok());
+  ObjectView view = scene.View(0);
+  view.ray_kind = cv::Mat::zeros(view.roi_px.size(), CV_8UC1);
+  EXPECT_FALSE(field.AddView(view).ok());
+  EXPECT_EQ(field.Concern(), "2 views were refused, the last: view of object/7 in keyframe/1: its mask is empty");
+  view.ray_kind.at<uint8_t>(30, 30) = static_cast<uint8_t>(RayKind::kObject);
+  EXPECT_FALSE(field.AddView(view).ok());
+  EXPECT_THAT(field.Concern(), HasSubstr("its mask has only 1 px"));
+  view = scene.View(0);
+  view.camera.cx_px = nan;
+  EXPECT_FALSE(field.AddView(view).ok());
+  EXPECT_EQ(field.views(), 0);
+  field.Move({nan, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()});
+  EXPECT_THAT(field.Concern(), HasSubstr("a correction of the map that is no motion was passed over"));
+  ASSERT_TRUE(field.AddView(scene.View(0)).ok());
+  EXPECT_TRUE(field.Snapshot().T_world_object.IsFinite());
+}
+
+TEST(FieldLifeTest, NoNumbersInDepthLeaveNoTrace) {
+  BallScene scene;
+  scene.with_depth = true;
+  std::vector<ObjectView> views = scene.Views();
+  const float inf = std::numeric_limits<float>::infinity();
+  const std::array<float, 6> odd = {NAN, inf, -inf, 0, -1, std::numeric_limits<float>::max()};
+  for (ObjectView& view : views) {
+    for (int v = 0; v < scene.size_px; v += 2) {
+      for (int u = 0; u < scene.size_px; ++u) view.depth_mu.at<float>(v, u) = odd[static_cast<size_t>(u) % odd.size()];
+    }
+    view.sparse_depth = {{30, 30, NAN}, {NAN, 30, 1}, {30, 30, inf}, {1e30f, 30, 1}, {30, 30, -1}};
+  }
+  const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
+  EXPECT_TRUE(std::isfinite(snapshot.loss));
+  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.08);
+}
+
+TEST(FieldLifeTest, DepthOfAWrongScaleIsNotUsed) {
+  BallScene scene;
+  scene.with_depth = true;
+  std::vector<ObjectView> views = scene.Views();
+  for (ObjectView& view : views) view.depth_mu = view.depth_mu * 1.1;
+  const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
+  EXPECT_THAT(snapshot.concern, HasSubstr("depth images do not agree"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
+}
+
+TEST(FieldLifeTest, DepthCarvesWhatMasksCannot) {
+  // A dent that no outline shows: the depth on one side lies behind the ball's surface.
+  BallScene scene;
+  scene.with_depth = true;
+  const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
+  const Eigen::Vector3d place(0, 0, 0.8 * scene.radius_mu);  // in the Object frame
+  const auto kept = [&](bool dent, bool use_depth) {
+    VisualHull hull(NerfConfig{});
+    hull.Reset(box, use_depth);
+    for (ObjectView view : scene.Views()) {
+      if (dent) view.depth_mu = view.depth_mu + 0.5 * scene.radius_mu;
+      hull.Add(view);
+    }
+    const Eigen::Vector3i cell = ((place.cwiseQuotient(box.half_extents).array() + 1) * 32).cast<int>();
+    return hull.Carve()[static_cast<size_t>((cell.z() * 64 + cell.y()) * 64 + cell.x())] != 0;
+  };
+  EXPECT_TRUE(kept(false, true)) << "true depth leaves the ball";
+  EXPECT_FALSE(kept(true, true));
+  EXPECT_TRUE(kept(true, false));
+}
+
+TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
+  // Rounding differs, hence not to the last bit.
+  std::vector<std::vector<float>> raws;
+  std::vector<std::vector<uint8_t>> hulls;
+  for (const double scale : {1.0, 0.01, 100.0}) {
+    BallScene scene;
+    scene.radius_mu = 0.5 * scale;
+    const FieldSnapshot snapshot = TrainedOn(scene, scene.Views()).Snapshot();
+    raws.push_back(RawOnGrid(snapshot, 0.98f));
+    hulls.push_back(snapshot.hull.bits);
+    EXPECT_NEAR(snapshot.box_half_extents.x(), 0.55 * scale, 1e-5 * scale);
+  }
+  for (size_t k = 1; k < raws.size(); ++k) {
+    EXPECT_EQ(hulls[0], hulls[k]);
+    for (size_t i = 0; i < raws[0].size(); ++i) EXPECT_NEAR(raws[0][i], raws[k][i], 0.05) << i;
+  }
+}
+
+TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
+  const BallScene scene;
+  NerfConfig config = SmallConfig();
+  config.full_budget_steps = 40;  // far too few
+  config.least_loss_fall = 0.05;
+  config.max_extra_steps = 2000;
+  const ObjectField eager = TrainedOn(scene, scene.Views(), config);
+  EXPECT_GT(eager.steps(), 60u);
+  EXPECT_LT(eager.steps(), 2040u) << "it has converged";
+  config.max_extra_steps = 70;
+  EXPECT_LE(TrainedOn(scene, scene.Views(), config).steps(), 110u);
+  config.max_extra_steps = 0;
+  EXPECT_EQ(TrainedOn(scene, scene.Views(), config).steps(), 40u);
+  config.max_extra_steps = 2000;
+  config.least_loss_fall = 1;
+  EXPECT_EQ(TrainedOn(scene, scene.Views(), config).steps(), 40u);
+}
+
+TEST(FieldLifeTest, LooksDoNotDependOnHowTrainingIsSliced) {
+  const BallScene scene;
+  std::vector<ObjectView> views = scene.Views();
+  Turn(views[5], 5);
+  const auto train = [&](int slice) {
+    ObjectField field(SmallConfig(), scene.object, 1);
+    EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+    for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
+    for (int done = 0; done < 120; done += slice) field.Train(slice, 1);
+    return RawOnGrid(field.Snapshot());
+  };
+  EXPECT_EQ(train(120), train(8));
+}
+
+}  // namespace
+}  // namespace romap
