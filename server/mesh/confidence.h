@@ -17,6 +17,8 @@ namespace romap {
 // with `size` the pixels that the longest side of the box would have at that distance. The confidence is
 // 1 - exp(-sum of w / 2): 0 = no view observes it; one sharp view from the front gives 0.39, five give 0.92.
 //
+// Of more than 16 views, 16 stand for all.
+//
 // `cell_mu` is the longest distance between neighbouring vertices along an axis. Views whose pose or camera is not
 // finite observe nothing.
 void SetConfidence(std::span<const FieldView> views, const Eigen::Vector3f& box_half_extents, float cell_mu,

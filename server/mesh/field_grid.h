@@ -32,8 +32,11 @@ struct FieldGrid {
   }
   // The (x, y, z) of a node, as the inverse of Index().
   Eigen::Vector3f NodeAt(size_t index) const {
-    return {static_cast<float>(index % StrideY()), static_cast<float>(index % StrideZ() / StrideY()),
-            static_cast<float>(index / StrideZ())};
+    // Division of 32 bits takes half as long.
+    const auto node = static_cast<uint32_t>(index);
+    const auto stride_y = static_cast<uint32_t>(StrideY());
+    const auto row = node / stride_y, rows = static_cast<uint32_t>(nodes.y());
+    return {static_cast<float>(node - row * stride_y), static_cast<float>(row % rows), static_cast<float>(row / rows)};
   }
   Eigen::Vector3f Position(const Eigen::Vector3f& node) const { return origin + node.cwiseProduct(spacing); }
   // Inverse of Position(): node coordinates of a point of the Object frame.

@@ -1,7 +1,5 @@
 #include "server/mesh/hidden_space.h"
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -19,7 +17,6 @@ class HiddenSpace {
       : grid_(grid), sight_(grid, limits), state_(grid.value.size(), kUntouched) {}
 
   void Fill() {
-    if (sight_.has_views()) LookAtSurface();
     Flood(grid_, OpenNodesOnBox(), [this](size_t node) { return Enter(node); });
     for (size_t i = 0; i < state_.size(); ++i) {
       if (state_[i] != kOpen && IsSpace(i)) grid_.Edit(i, kSolid);
@@ -28,18 +25,6 @@ class HiddenSpace {
 
  private:
   bool IsSpace(size_t node) const { return !(grid_.value[node] > 0) && grid_.value[node] != kBeyondBox; }
-
-  // Tests the space next to matter first: what is seen there shows whole rays to be open, which spares the tests of all
-  // the space before it.
-  void LookAtSurface() {
-    const std::array<ptrdiff_t, 6> steps = NeighbourSteps(grid_);
-    for (size_t i = 0; i < state_.size(); ++i) {
-      if (!IsSpace(i) || grid_.value[i] == kEmpty) continue;
-      const bool at_surface =
-          std::any_of(steps.begin(), steps.end(), [&](ptrdiff_t step) { return grid_.value[i + step] > 0; });
-      if (at_surface && !sight_.IsSeen(i)) state_[i] = kClosed;
-    }
-  }
 
   bool Enter(size_t node) {
     if (state_[node] != kUntouched || !IsSpace(node)) return false;

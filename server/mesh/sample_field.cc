@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <utility>
 #include <vector>
@@ -16,8 +17,6 @@ namespace {
 constexpr size_t kBatchPoints = 8192;
 // Around a value below, no surface is near: e^-6 of the surface's density.
 constexpr float kClearlyEmpty = -6.0f;
-// Around a value above, no view will look for a hole.
-constexpr float kClearlyFull = 1.5f;
 // A mean over hull and box counts those as this: empty, but finite.
 constexpr float kLeastForMean = -16.0f;
 
@@ -42,11 +41,9 @@ class Sampling {
 
   SampledField Run() && {
     Ask(LatticeNodes());
-    std::vector<size_t> front = GuessBetweenLattice();
-    while (!front.empty()) {
-      Ask(front);
-      front = DoubtfulNeighbours(front);
-    }
+    GuessBetweenLattice();
+    FollowSpace();
+    FillWhatWasNotReached();
     return {std::move(grid_), asked_};
   }
 
@@ -87,8 +84,8 @@ class Sampling {
     return nodes;
   }
 
-  // Guesses the nodes between lattice nodes that agree; returns the others.
-  std::vector<size_t> GuessBetweenLattice() {
+  // Guesses the nodes between lattice nodes that are all clearly empty.
+  void GuessBetweenLattice() {
     const ptrdiff_t dy = static_cast<ptrdiff_t>(grid_.StrideY()), dz = static_cast<ptrdiff_t>(grid_.StrideZ());
     // By the axis whose coordinate is the odd one out: the lattice nodes around.
     const std::array<std::array<ptrdiff_t, 6>, 3> around = {{
@@ -96,41 +93,63 @@ class Sampling {
         {-dy, dy, -1 - dz, 1 - dz, dz - 1, 1 + dz},
         {-dz, dz, -1 - dy, 1 - dy, dy - 1, 1 + dy},
     }};
-    std::vector<size_t> doubtful;
     ForEachUnknown([&](int x, int y, int z, size_t node) {
       const int axis = (y & 1) == (z & 1) ? 0 : (x & 1) == (z & 1) ? 1 : 2;
-      float least = grid_.value[node + around[axis][0]], most = least, sum = 0;
+      float most = kBeyondBox, sum = 0;
       for (const ptrdiff_t step : around[axis]) {
-        const float value = grid_.value[node + step];
-        least = std::min(least, value);
-        most = std::max(most, value);
-        sum += std::max(value, kLeastForMean);
+        most = std::max(most, grid_.value[node + step]);
+        sum += std::max(grid_.value[node + step], kLeastForMean);
       }
-      if (most < kClearlyEmpty || least > kClearlyFull) {
-        grid_.value[node] = sum / 6.0f;
-        state_[node] = kGuessed;
-      } else {
-        doubtful.push_back(node);
-      }
+      if (most >= kClearlyEmpty) return;
+      grid_.value[node] = sum / 6.0f;
+      state_[node] = kGuessed;
     });
-    return doubtful;
   }
 
-  // Neighbours of nodes that were just asked which may have been guessed wrongly.
-  std::vector<size_t> DoubtfulNeighbours(const std::vector<size_t>& asked) {
-    std::vector<size_t> doubtful;
-    for (const size_t node : asked) {
-      const bool near_matter = grid_.value[node] > kClearlyEmpty;
-      const bool near_space = grid_.value[node] <= kClearlyFull;
-      for (const ptrdiff_t step : steps_) {
-        const size_t neighbour = node + step;
-        if (state_[neighbour] != kGuessed) continue;
-        if (grid_.value[neighbour] > 0 ? !near_space : !near_matter) continue;
-        state_[neighbour] = kUnknown;
-        doubtful.push_back(neighbour);
+  // Asks all nodes that can be reached from outside the hull through space, and the matter that bounds it.
+  void FollowSpace() {
+    std::vector<size_t> wave = HullBorder();
+    while (!wave.empty()) {
+      std::vector<size_t> unknown;
+      std::copy_if(wave.begin(), wave.end(), std::back_inserter(unknown),
+                   [this](size_t node) { return state_[node] == kUnknown; });
+      Ask(unknown);
+      std::vector<size_t> next;
+      for (const size_t node : wave) {
+        for (const ptrdiff_t step : steps_) {
+          const size_t neighbour = node + step;
+          if (state_[neighbour] == kDecided) continue;
+          // What was guessed next to what is not clearly empty may have been guessed wrongly.
+          const bool doubtful = state_[neighbour] == kGuessed && grid_.value[node] > kClearlyEmpty;
+          if (doubtful) state_[neighbour] = kUnknown;
+          const bool enter = reached_[neighbour] == 0 && !(grid_.value[node] > 0);
+          if (!doubtful && !enter) continue;
+          reached_[neighbour] = 1;
+          next.push_back(neighbour);
+        }
       }
+      wave = std::move(next);
     }
-    return doubtful;
+  }
+
+  std::vector<size_t> HullBorder() {
+    reached_.assign(state_.size(), 0);
+    std::vector<size_t> border;
+    for (size_t node = 0; node < state_.size(); ++node) {
+      if (state_[node] == kDecided) continue;
+      const bool at_border =
+          std::any_of(steps_.begin(), steps_.end(), [&](ptrdiff_t step) { return state_[node + step] == kDecided; });
+      if (!at_border) continue;
+      reached_[node] = 1;
+      border.push_back(node);
+    }
+    return border;
+  }
+
+  void FillWhatWasNotReached() {
+    for (size_t node = 0; node < state_.size(); ++node) {
+      if (state_[node] != kDecided && reached_[node] == 0 && !(grid_.value[node] > 0)) grid_.Edit(node, kSolid);
+    }
   }
 
   void Ask(const std::vector<size_t>& nodes) {
@@ -152,6 +171,7 @@ class Sampling {
   FieldGrid grid_;
   const std::array<ptrdiff_t, 6> steps_;
   std::vector<uint8_t> state_;
+  std::vector<uint8_t> reached_;  // 1 = space reaches here from outside the hull
   size_t asked_ = 0;
 };
 

@@ -46,9 +46,8 @@ bool SightTester::IsSeen(size_t node) {
   // Neighbours are mostly seen by the same view, so the last one to see anything goes first.
   for (size_t tried = 0; tried < views_.size(); ++tried) {
     const size_t view = (last_view_ + tried) % views_.size();
-    const Way way = WayTo(views_[view], place);
-    if (IsClear(place, way)) {
-      MarkSeen(place, way);
+    if (const std::optional<Way> way = ClearWay(views_[view], place)) {
+      MarkSeen(place, *way);
       last_view_ = view;
       return true;
     }
@@ -60,7 +59,7 @@ bool SightTester::IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vecto
   for (size_t tried = 0; tried < views_.size(); ++tried) {
     const size_t view = (last_view_ + tried) % views_.size();
     const Eigen::Vector3f way_mu = (views_[view] - place).cwiseProduct(spacing_);
-    if (normal.dot(way_mu) >= min_cosine * way_mu.norm() && IsClear(place, WayTo(views_[view], place))) {
+    if (normal.dot(way_mu) >= min_cosine * way_mu.norm() && ClearWay(views_[view], place)) {
       last_view_ = view;
       return true;
     }
@@ -68,35 +67,36 @@ bool SightTester::IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vecto
   return false;
 }
 
-SightTester::Way SightTester::WayTo(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const {
+std::optional<SightTester::Way> SightTester::ClearWay(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const {
   const Eigen::Vector3f way = view - place;
   const float way_mu = way.cwiseProduct(spacing_).norm();
-  if (!(way_mu > step_mu_)) return {Eigen::Vector3f::Zero(), 0};
+  if (!(way_mu > step_mu_)) return Way{};
   const Eigen::Vector3f step = way * (step_mu_ / way_mu);
+  Eigen::Vector3f at = place + Eigen::Vector3f::Constant(kToNearest);
+  const int steps = StepsWithinGrid(place, step, way_mu);
+  float depth = 0;
+  for (int i = 0; i < steps; ++i) {
+    at += step;
+    depth += optical_depth_[NodeNear(at)];
+    if (depth > max_optical_depth_) return std::nullopt;
+  }
+  return Way{step, steps};
+}
+
+int SightTester::StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vector3f& step, float way_mu) const {
   float steps = way_mu / step_mu_;
   for (int axis = 0; axis < 3; ++axis) {
     if (step[axis] == 0) continue;
     const float end = step[axis] > 0 ? static_cast<float>(nodes_[axis] - 1) : 0.0f;
     steps = std::min(steps, (end - place[axis]) / step[axis]);
   }
-  return {step, static_cast<int>(std::max(steps, 0.0f))};
+  return static_cast<int>(std::max(steps, 0.0f));
 }
 
 size_t SightTester::NodeNear(const Eigen::Vector3f& shifted) const {
   return static_cast<size_t>(static_cast<int>(shifted.z())) * stride_z_ +
          static_cast<size_t>(static_cast<int>(shifted.y())) * stride_y_ +
          static_cast<size_t>(static_cast<int>(shifted.x()));
-}
-
-bool SightTester::IsClear(const Eigen::Vector3f& place, const Way& way) const {
-  Eigen::Vector3f at = place + Eigen::Vector3f::Constant(kToNearest);
-  float depth = 0;
-  for (int i = 0; i < way.steps; ++i) {
-    at += way.step;
-    depth += optical_depth_[NodeNear(at)];
-    if (depth > max_optical_depth_) return false;
-  }
-  return true;
 }
 
 void SightTester::MarkSeen(const Eigen::Vector3f& place, const Way& way) {

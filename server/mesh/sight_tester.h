@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "server/mesh/field_grid.h"
@@ -33,12 +33,14 @@ class SightTester {
   bool IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float min_cosine);
 
  private:
-  struct Way {  // from a place towards a view
-    Eigen::Vector3f step;
-    int steps = 0;  // that stay among the grid's nodes and do not pass the view
+  // The way from a place towards a view: one step, and how many stay among the grid's nodes and do not pass the view.
+  struct Way {
+    Eigen::Vector3f step = Eigen::Vector3f::Zero();
+    int steps = 0;
   };
-  Way WayTo(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const;
-  bool IsClear(const Eigen::Vector3f& place, const Way& way) const;
+  // The way if it is clear.
+  std::optional<Way> ClearWay(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const;
+  int StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vector3f& step, float way_mu) const;
   void MarkSeen(const Eigen::Vector3f& place, const Way& way);
   size_t NodeNear(const Eigen::Vector3f& shifted) const;
 

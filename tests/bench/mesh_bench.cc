@@ -62,7 +62,7 @@ double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
   std::vector<Eigen::Vector3f> points;
   std::vector<bool> inside;
   for (size_t node = 0; node < grid.value.size(); ++node) {
-    if (grid.value[node] <= kEmpty) continue;
+    if (grid.value[node] <= kEmpty || grid.edited[node] != 0) continue;
     points.push_back(grid.Position(grid.NodeAt(node)));
     inside.push_back(grid.value[node] > 0);
   }
