@@ -7,8 +7,8 @@
 namespace romap {
 
 // Accuracy and completion over training time as in the paper's Fig. 8, side by side: one line per method of
-// `results.curves`, both axes logarithmic, the paper's own end results as crosses at its 2 s. CV_8UC3; an empty frame
-// where there are no curves.
+// `results.curves`, both axes logarithmic, the paper's own end results as crosses at its 2 s. CV_8UC3; without
+// curves it has the crosses alone.
 cv::Mat DrawConvergence(const PaperResults& results);
 
 }  // namespace romap

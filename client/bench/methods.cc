@@ -46,7 +46,7 @@ std::vector<BenchMethod> Table1Methods() {
        .title = "[33]* with true depth",
        .settings = {"nerf.preset=paper", "nerf.density_weight=0"},
        .with_depth = true},
-      {.id = "hull", .title = "visual hull, nothing learned", .trained = false},
+      {.id = "hull", .title = "visual hull, nothing learned", .settings = {"nerf.hull_margin=0"}, .trained = false},
       {.id = "imap", .title = "iMAP-style MLP 4 x 256, with depth", .settings = FrequencyMlp(256), .with_depth = true},
       {.id = "vmap", .title = "vMAP-style MLP 4 x 32, with depth", .settings = FrequencyMlp(32), .with_depth = true},
   };

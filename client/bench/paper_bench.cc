@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 #include <utility>
 
 #include "client/bench/convergence_plot.h"
@@ -35,34 +36,39 @@ absl::Status Validate(const PaperBenchOptions& options) {
   return absl::OkStatus();
 }
 
+// The tables with their methods as options name them, chosen or not. One's own rows must be right.
+absl::StatusOr<std::vector<BenchTable>> AllTables(const PaperBenchOptions& options) {
+  std::vector<BenchTable> tables = {{"1", Table1Methods()}, {"4", ModelSizeMethods()}, {"ablation", AblationMethods()}};
+  std::set<std::string> known;
+  for (const BenchTable& table : tables) {
+    for (const BenchMethod& method : table.methods) known.insert(method.id);
+  }
+  for (const BenchMethod& method : options.more_methods) {
+    if (!known.insert(method.id).second) return InvalidArgument("row '{}' is there already", method.id);
+    ROMAP_RETURN_IF_ERROR(Configure(method, options.settings).status());
+    tables.front().methods.push_back(method);
+  }
+  for (const std::string& id : options.methods) {
+    if (!known.contains(id)) return InvalidArgument("method '{}' is not one of {}", id, fmt::join(known, ", "));
+  }
+  return tables;
+}
+
+bool IsChosen(const std::vector<std::string>& chosen, const std::string& id) {
+  return std::ranges::find(chosen, id) != chosen.end();
+}
+
 // The chosen tables with the chosen methods that this build can do; what it cannot do becomes a note.
 absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& options,
                                                      std::vector<std::string>& notes) {
-  std::vector<BenchTable> tables = {{"1", Table1Methods()}, {"4", ModelSizeMethods()}, {"ablation", AblationMethods()}};
-  std::vector<BenchMethod>& first = tables.front().methods;
-  first.insert(first.end(), options.more_methods.begin(), options.more_methods.end());
-  std::vector<std::string> known;
-  for (const BenchTable& table : tables) {
-    for (const BenchMethod& method : table.methods) known.push_back(method.id);
-  }
-  for (const std::string& id : options.methods) {
-    if (std::ranges::find(known, id) == known.end()) {
-      return InvalidArgument("method '{}' is not one of {}", id, fmt::join(known, ", "));
-    }
-  }
-  std::erase_if(tables, [&](const BenchTable& table) {
-    return std::ranges::find(options.tables, table.id) == options.tables.end();
-  });
+  ROMAP_ASSIGN_OR_RETURN(std::vector<BenchTable> tables, AllTables(options));
+  std::erase_if(tables, [&](const BenchTable& table) { return !IsChosen(options.tables, table.id); });
   for (BenchTable& table : tables) {
     std::erase_if(table.methods, [&](const BenchMethod& method) {
-      if (!options.methods.empty() && std::ranges::find(options.methods, method.id) == options.methods.end())
-        return true;
-      const bool own =
-          std::ranges::find(options.more_methods, method.id, &BenchMethod::id) != options.more_methods.end();
+      if (!options.methods.empty() && !IsChosen(options.methods, method.id)) return true;
       const absl::Status status = Configure(method, options.settings).status();
-      if (status.ok() || own) return false;
-      notes.push_back(fmt::format("{} is left out: {}", method.title, Message(status)));
-      return true;
+      if (!status.ok()) notes.push_back(fmt::format("{} is left out: {}", method.title, Message(status)));
+      return !status.ok();
     });
   }
   std::erase_if(tables, [](const BenchTable& table) { return table.methods.empty(); });

@@ -1,0 +1,20 @@
+#include "client/bench/fma_peak.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace romap {
+namespace {
+
+// No speed is asserted; only that work was counted and timed in the right units.
+TEST(FmaPeakTest, IsARateThatAMachineCanHave) {
+  const double one = MeasureFmaPeakGflops(1, 0.01);
+  EXPECT_TRUE(std::isfinite(one));
+  EXPECT_GT(one, 0.01);
+  EXPECT_LT(one, 1e4);
+  EXPECT_GT(MeasureFmaPeakGflops(2, 0.01), 0.01);
+}
+
+}  // namespace
+}  // namespace romap
