@@ -1,33 +1,32 @@
 #pragma once
 
-#include <gtest/gtest.h>
+#include <Eigen/Core>
+#include <string>
 
 #include "client/files/sequence.h"
-#include "client/synth/synth.h"
 #include "tests/support/subprocess.h"
 
 namespace romap::testing {
 
-// Two made objects seen by a few small frames, with all truth: written anew by every test.
+struct TinyBall {
+  int64_t id;
+  std::string name;
+  Eigen::Vector3d center_world;  // m
+  double radius_m;
+};
+
+// Two striped balls seen from all around in small frames, with all truth, drawn exactly and written anew by every test.
 class TinySequence {
  public:
-  TinySequence() {
-    synth::SynthOptions options;
-    options.seed = 3;
-    options.objects = 2;
-    options.frames = 24;
-    options.width_px = 160;
-    options.height_px = 120;
-    EXPECT_TRUE(synth::MakeSequence(options, dir()).ok());
-  }
+  static constexpr int kFrames = 24;
+
+  TinySequence();
 
   std::string dir() const { return folder_ / "sequence"; }
   std::string operator/(const std::string& name) const { return folder_ / name; }
-  Sequence Open() const {
-    absl::StatusOr<Sequence> sequence = Sequence::Open(dir(), {.use_depth = true});
-    EXPECT_TRUE(sequence.ok()) << Message(sequence.status());
-    return *std::move(sequence);
-  }
+  Sequence Open() const;
+
+  static const std::vector<TinyBall>& Balls();
 
  private:
   testing_support::TemporaryFolder folder_;
