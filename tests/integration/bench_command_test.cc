@@ -1,0 +1,89 @@
+// `romap bench paper` as a user runs it: on a small made sequence, to the end and interrupted.
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "client/synth/synth.h"
+#include "tests/support/subprocess.h"
+
+namespace romap {
+namespace {
+
+using ::testing::HasSubstr;
+using testing_support::BackgroundProcess;
+using testing_support::ProcessResult;
+using testing_support::RunProcess;
+using testing_support::TemporaryFolder;
+
+namespace fs = std::filesystem;
+
+void MakeSmallSequence(const std::string& dir) {
+  synth::SynthOptions options;
+  options.seed = 3;
+  options.objects = 2;
+  options.frames = 40;
+  options.width_px = 200;
+  options.height_px = 150;
+  ASSERT_TRUE(synth::MakeSequence(options, dir).ok());
+}
+
+std::vector<std::string> BenchPaper(const TemporaryFolder& folder, const std::vector<std::string>& more) {
+  std::vector<std::string> command = {
+      ROMAP_CLIENT, "bench", "paper", folder / "sequence",         "--out", folder / "out",
+      "--threads",  "1",     "--set", "nerf.full_budget_steps=60", "--set", "mesh.resolution=32"};
+  command.insert(command.end(), more.begin(), more.end());
+  return command;
+}
+
+nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
+
+TEST(BenchCommandTest, AQuickBenchWritesTablesAndPicture) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  const ProcessResult run = RunProcess(BenchPaper(folder, {"--quick", "--row", "narrow: nerf.hidden_width=16"}));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("## Table 1"));
+  EXPECT_THAT(run.out, HasSubstr("## Table 3"));
+  EXPECT_THAT(run.out, HasSubstr("report: " + folder.path() + "/out/paper.md"));
+  const nlohmann::json json = ReadJson(folder / "out/paper.json");
+  std::vector<std::string> rows;
+  for (const nlohmann::json& row : json["tables"][0]["rows"]) {
+    rows.push_back(row["id"]);
+    EXPECT_EQ(row["results"].back()["found_share"], 1) << row.dump(1);
+    EXPECT_LT(row["results"].back()["mean"]["completion_cm"], 1.5) << row.dump(1);
+  }
+  EXPECT_THAT(rows, ::testing::ElementsAre("fast", "hull", "narrow"));
+  EXPECT_GT(fs::file_size(folder / "out/convergence.png"), 1000u);
+  EXPECT_TRUE(fs::exists(folder / "out/meshes/fast/objects"));
+
+  const ProcessResult wrong = RunProcess(BenchPaper(folder, {"--methods", "fats"}));
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("method 'fats' is not one of"));
+}
+
+TEST(BenchCommandTest, InterruptedItLeavesWhatThereIs) {
+  const TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  BackgroundProcess bench(BenchPaper(folder, {"--methods", "fast", "--tables", "1", "--seeds", "500"}));
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while (!fs::exists(folder / "out/paper.json") && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  bench.Signal(SIGINT);
+  const ProcessResult end = bench.Wait();
+  EXPECT_EQ(end.exit_code, 130) << end.err;
+  EXPECT_THAT(end.err, HasSubstr("of 1500 runs"));
+  EXPECT_THAT(end.out, HasSubstr("Stopped before the end"));
+  const nlohmann::json runs = ReadJson(folder / "out/paper.json")["runs"];
+  EXPECT_GE(runs["done"], 1);
+  EXPECT_LT(runs["done"], 1500);
+}
+
+}  // namespace
+}  // namespace romap
