@@ -37,7 +37,7 @@ struct HullFieldTest : public ::testing::Test {
 
 TEST_F(HullFieldTest, IsFullInsideAndEmptyOutside) {
   EXPECT_EQ(snapshot.object.value, 1u);
-  EXPECT_EQ(snapshot.view_centers_object.size(), views.size());
+  EXPECT_EQ(snapshot.cameras.size(), views.size());
   EXPECT_FLOAT_EQ(RawAt({0, 0, 0}), 10);
   EXPECT_FLOAT_EQ(RawAt({0.98f, 0.98f, 0.98f}), -10);
   EXPECT_EQ(RawAt({1.3f, 0, 0}), -1e4f);

@@ -57,7 +57,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   ObjectField field = TrainedOn(scene, views);
   const FieldSnapshot snapshot = field.Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
-  EXPECT_EQ(snapshot.view_centers_object.size(), 15u);
+  EXPECT_EQ(snapshot.cameras.size(), 15u);
   const double right_error = BallSurfaceError(scene, right.Snapshot());
   EXPECT_LT(BallSurfaceError(scene, snapshot), 1.3 * right_error + 0.005);
 
@@ -66,7 +66,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   EXPECT_EQ(field.Concern(), "");
   TrainToTheEnd(field);
   EXPECT_EQ(field.Concern(), "");
-  EXPECT_EQ(field.Snapshot().view_centers_object.size(), 16u);
+  EXPECT_EQ(field.Snapshot().cameras.size(), 16u);
 }
 
 TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
