@@ -70,7 +70,9 @@ absl::StatusOr<std::unique_ptr<DeviceTraining>> DeviceTraining::Create(const Ner
   training->rays_per_step_ = config.rays_per_step;
   training->step_blocks_ = StepBlocks(config.rays_per_step, config.max_samples_per_ray);
   ROMAP_RETURN_IF_ERROR(training->Allocate(model));
-  ROMAP_RETURN_IF_ERROR(training->Capture(config, model, path, stream));
+  training->path_ = path;
+  training->DescribeStep(config, model);
+  ROMAP_RETURN_IF_ERROR(training->Capture(stream));
   return training;
 }
 
@@ -111,64 +113,76 @@ absl::Status DeviceTraining::Allocate(const FieldModel& model) {
   return absl::OkStatus();
 }
 
-absl::Status DeviceTraining::Capture(const NerfConfig& config, const FieldModel& model, MlpPath path,
-                                     cudaStream_t stream) {
-  const StepParams step{.field = {model.layout, table_.data(), mlp_.data(), model.mlp.hidden, model.density_bias},
-                        .slice = slice_.data(),
-                        .counters = counters_.data(),
-                        .rays = rays_.data(),
-                        .color_loss = color_loss_.data(),
-                        .rays_per_step = rays_per_step_,
-                        .budget = MakeBudget(config),
-                        .loss_weights = MakeLossWeights(config),
-                        .gradient_cut = static_cast<float>(config.gradient_cut),
-                        .occupied_bits = occupied_bits_.data(),
-                        .cell_visits = cell_visits_.data(),
-                        .cell_weight = cell_weight_.data(),
-                        .layer_weight = layer_weight_.data(),
-                        .table_gradient = table_gradient_.data(),
-                        .mlp_partial = mlp_partial_.data()};
+void DeviceTraining::DescribeStep(const NerfConfig& config, const FieldModel& model) {
+  launch_.step = {.field = {model.layout, table_.data(), mlp_.data(), model.mlp.hidden, model.density_bias},
+                  .slice = slice_.data(),
+                  .counters = counters_.data(),
+                  .rays = rays_.data(),
+                  .color_loss = color_loss_.data(),
+                  .rays_per_step = rays_per_step_,
+                  .budget = MakeBudget(config),
+                  .loss_weights = MakeLossWeights(config),
+                  .gradient_cut = static_cast<float>(config.gradient_cut),
+                  .occupied_bits = occupied_bits_.data(),
+                  .cell_visits = cell_visits_.data(),
+                  .cell_weight = cell_weight_.data(),
+                  .layer_weight = layer_weight_.data(),
+                  .table_gradient = table_gradient_.data(),
+                  .mlp_partial = mlp_partial_.data()};
   const OccupancyPlan plan{.start = static_cast<uint64_t>(config.occupancy_start_step),
                            .interval = static_cast<uint64_t>(config.occupancy_interval_steps)};
-  const OptimiseParams optimise{.slice = slice_.data(),
-                                .learning_rate = learning_rate_.data(),
-                                .beta1 = static_cast<float>(config.adam_beta1),
-                                .beta2 = static_cast<float>(config.adam_beta2),
-                                .table_count = table_.size(),
-                                .table = table_.data(),
-                                .table_first = table_first_.data(),
-                                .table_second = table_second_.data(),
-                                .table_gradient = table_gradient_.data(),
-                                .mlp_count = static_cast<int>(mlp_.size()),
-                                .mlp = mlp_.data(),
-                                .mlp_first = mlp_first_.data(),
-                                .mlp_second = mlp_second_.data(),
-                                .mlp_partial = mlp_partial_.data(),
-                                .step_blocks = step_blocks_,
-                                .score = score_.data(),
-                                .cell_visits = cell_visits_.data(),
-                                .cell_weight = cell_weight_.data(),
-                                .decay = static_cast<float>(config.occupancy_decay),
-                                .threshold = static_cast<float>(config.occupancy_threshold),
-                                .plan = plan,
-                                .hull_bits = hull_bits_.data(),
-                                .live_bits = live_bits_.data()};
-  const OccupancyParams occupancy{.slice = slice_.data(),
-                                  .plan = plan,
-                                  .live_bits = live_bits_.data(),
-                                  .hull_bits = hull_bits_.data(),
-                                  .occupied_bits = occupied_bits_.data(),
-                                  .layer_weight = layer_weight_.data()};
-  ROMAP_RETURN_IF_ERROR(ToStatus(PrepareStep(step, path), "hold this field in a block's memory"));
+  launch_.optimise = {.slice = slice_.data(),
+                      .learning_rate = learning_rate_.data(),
+                      .beta1 = static_cast<float>(config.adam_beta1),
+                      .beta2 = static_cast<float>(config.adam_beta2),
+                      .table_count = table_.size(),
+                      .table = table_.data(),
+                      .table_first = table_first_.data(),
+                      .table_second = table_second_.data(),
+                      .table_gradient = table_gradient_.data(),
+                      .mlp_count = static_cast<int>(mlp_.size()),
+                      .mlp = mlp_.data(),
+                      .mlp_first = mlp_first_.data(),
+                      .mlp_second = mlp_second_.data(),
+                      .mlp_partial = mlp_partial_.data(),
+                      .step_blocks = step_blocks_,
+                      .score = score_.data(),
+                      .cell_visits = cell_visits_.data(),
+                      .cell_weight = cell_weight_.data(),
+                      .decay = static_cast<float>(config.occupancy_decay),
+                      .threshold = static_cast<float>(config.occupancy_threshold),
+                      .plan = plan,
+                      .hull_bits = hull_bits_.data(),
+                      .live_bits = live_bits_.data()};
+  launch_.occupancy = {.slice = slice_.data(),
+                       .plan = plan,
+                       .live_bits = live_bits_.data(),
+                       .hull_bits = hull_bits_.data(),
+                       .occupied_bits = occupied_bits_.data(),
+                       .layer_weight = layer_weight_.data()};
+}
+
+absl::Status DeviceTraining::Capture(cudaStream_t stream) {
+  ROMAP_RETURN_IF_ERROR(ToStatus(PrepareStep(launch_.step, path_), "hold this field in a block's memory"));
   ROMAP_RETURN_IF_ERROR(
       ToStatus(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capture a training step"));
-  const cudaError_t launched = LaunchStep({step, optimise, occupancy}, path, stream);
+  const cudaError_t launched = LaunchStep(launch_, path_, stream);
   cudaGraph_t graph = nullptr;
   const cudaError_t captured = cudaStreamEndCapture(stream, &graph);
   ROMAP_RETURN_IF_ERROR(ToStatus(launched != cudaSuccess ? launched : captured, "capture a training step"));
   const cudaError_t made = cudaGraphInstantiate(&graph_, graph, 0);
   cudaGraphDestroy(graph);
   return ToStatus(made, "capture a training step");
+}
+
+cudaError_t DeviceTraining::UploadRays(cudaStream_t stream) {
+  return cudaMemcpyAsync(rays_.data(), batches_[0].rays.data(), rays_.bytes(), cudaMemcpyHostToDevice, stream);
+}
+
+cudaError_t DeviceTraining::LaunchOne(bool gradients, cudaStream_t stream) {
+  if (const cudaError_t error = cudaMemsetAsync(&slice_.data()->next, 0, sizeof(SliceState::next), stream))
+    return error;
+  return gradients ? LaunchGradients(launch_.step, path_, stream) : LaunchOptimise(launch_, stream);
 }
 
 absl::Status DeviceTraining::Upload(const FieldTrainer::State& field, const Occupancy& occupancy, cudaStream_t stream) {

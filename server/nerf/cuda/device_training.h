@@ -50,6 +50,11 @@ class DeviceTraining {
   // `steps` steps, the first of them number `first_step` since training began; adds to `stats`.
   absl::Status Train(const StepSource& source, uint64_t first_step, int steps, cudaStream_t stream, TrainStats& stats);
 
+  // For measurements, with the rays of the last Train(): copies them once more; and launches the first kernel of a step
+  // (`gradients`) or the others, without a graph. The field is of no use afterwards.
+  cudaError_t UploadRays(cudaStream_t stream);
+  cudaError_t LaunchOne(bool gradients, cudaStream_t stream);
+
  private:
   // What the host prepares of the next steps while the device works on those before.
   struct Batch {
@@ -63,10 +68,13 @@ class DeviceTraining {
 
   DeviceTraining() = default;
   absl::Status Allocate(const FieldModel& model);
-  absl::Status Capture(const NerfConfig& config, const FieldModel& model, MlpPath path, cudaStream_t stream);
+  void DescribeStep(const NerfConfig& config, const FieldModel& model);
+  absl::Status Capture(cudaStream_t stream);
   absl::Status Launch(const StepSource& source, uint64_t first_step, int steps, Batch& batch, cudaStream_t stream);
   absl::Status TakeIn(Batch& batch, double& loss, uint64_t& rays) const;
 
+  MlpPath path_ = MlpPath::kTensorCores;
+  StepLaunch launch_ = {};
   int rays_per_step_ = 0;
   int step_blocks_ = 0;
   cudaGraphExec_t graph_ = nullptr;

@@ -138,8 +138,9 @@ size_t StepSharedBytes(const FieldView& field, const SampleBudget& budget, MlpPa
 // cudaErrorInvalidValue when the device has too little of it.
 cudaError_t PrepareStep(const StepParams& params, MlpPath path);
 
-// The first of the three launches of a step.
+// The first of the three launches of a step, and the other two.
 cudaError_t LaunchGradients(const StepParams& params, MlpPath path, cudaStream_t stream);
+cudaError_t LaunchOptimise(const StepLaunch& launch, cudaStream_t stream);
 
 // The three launches of one step. The order in which blocks add to table_gradient is the device's, so that entries may
 // differ in their last bits from run to run; all other sums are made in a fixed order.

@@ -102,7 +102,11 @@ __global__ void __launch_bounds__(kBlockThreads) OccupancyKernel(OccupancyParams
 }  // namespace
 
 cudaError_t LaunchStep(const StepLaunch& launch, MlpPath path, cudaStream_t stream) {
-  if (const cudaError_t error = LaunchGradients(launch.step, path, stream); error != cudaSuccess) return error;
+  const cudaError_t error = LaunchGradients(launch.step, path, stream);
+  return error != cudaSuccess ? error : LaunchOptimise(launch, stream);
+}
+
+cudaError_t LaunchOptimise(const StepLaunch& launch, cudaStream_t stream) {
   const unsigned table_blocks = BlocksFor(launch.optimise.table_count);
   const unsigned mlp_blocks = BlocksFor(static_cast<size_t>(launch.optimise.mlp_count) * kWarpThreads);
   ROMAP_LAUNCH(OptimiseKernel, dim3(table_blocks + mlp_blocks + BlocksFor(kCells / kCellsOfThread)),
