@@ -7,6 +7,9 @@ absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
     return InvalidArgument("CUDA: a field with {} hidden neurons; at most {} are possible", model.mlp.hidden,
                            kMaxHidden);
   }
+  if (model.NeedsGeneralKernels()) {
+    return InvalidArgument("CUDA: a frequency encoding or several hidden layers; a hash grid with one is possible");
+  }
   CudaField field;
   field.grid_ = model.layout;
   field.hidden_ = model.mlp.hidden;

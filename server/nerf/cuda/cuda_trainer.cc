@@ -70,6 +70,10 @@ absl::StatusOr<std::unique_ptr<Trainer>> MakeCudaTrainer(const NerfConfig& confi
     return InvalidArgument("CUDA: a field with {} hidden neurons; a multiple of 16 up to {} is possible",
                            config.hidden_width, kMaxHidden);
   }
+  if (config.encoding != "hash" || config.hidden_layers != 1) {
+    return InvalidArgument("CUDA: {} encoding with {} hidden layers; a hash grid with one is possible", config.encoding,
+                           config.hidden_layers);
+  }
   return std::make_unique<CudaTrainer>(config, seed);
 }
 

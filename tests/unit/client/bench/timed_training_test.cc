@@ -21,6 +21,7 @@ struct TimedTrainingTest : public ::testing::Test {
     request.config.log2_table_entries = 10;
     request.config.rays_per_step = 128;
     request.config.full_budget_steps = 30;
+    request.config.max_extra_steps = 0;
     request.cuboid = {object.T_world_object, object.half_extents, 1.0};
     request.views = &views;
     request.threads = 1;
