@@ -1,7 +1,6 @@
 #include "client/bench/method_runner.h"
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <utility>
 
@@ -17,10 +16,6 @@ namespace fs = std::filesystem;
 
 // Where curves have their points [s].
 constexpr double kMarks_s[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3.5, 5, 10, 20, 50, 100, 200, 500};
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 absl::Status WriteWorldMesh(const FieldSnapshot& snapshot, Mesh mesh, const std::string& path) {
   for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
@@ -86,9 +81,9 @@ absl::StatusOr<MethodRunner::Trained> MethodRunner::Train(const MethodRun& run, 
   trained.row.object = object.name;
   trained.row.views = static_cast<int>(views.size());
   if (!run.method.trained) {
-    const auto start = std::chrono::steady_clock::now();
-    trained.snapshot = MakeHullSnapshot(run.config.nerf, cuboid, views);
-    trained.row.setup_s = SecondsSince(start);
+    Stopwatch watch(clock_, /*threads=*/1);
+    trained.snapshot = watch.Time([&] { return MakeHullSnapshot(run.config.nerf, cuboid, views); });
+    trained.row.setup_s = watch.total_s();
     return trained;
   }
   TrainingRequest request{.config = run.config.nerf,
@@ -123,9 +118,9 @@ absl::StatusOr<Evaluation> MethodRunner::Evaluate(const MethodRun& run, const st
   for (const Trained& one : trained) {
     ObjectTraining& row = evaluation.objects.emplace_back(one.row);
     if (!one.snapshot.field) continue;
-    const auto start = std::chrono::steady_clock::now();
-    absl::StatusOr<Mesh> mesh = ExtractMesh(one.snapshot, run.config.mesh);
-    row.mesh_s = SecondsSince(start);
+    Stopwatch watch(clock_, /*threads=*/1);
+    absl::StatusOr<Mesh> mesh = watch.Time([&] { return ExtractMesh(one.snapshot, run.config.mesh); });
+    row.mesh_s = watch.total_s();
     if (!mesh.ok()) {
       row.fault = Message(mesh.status());
       continue;

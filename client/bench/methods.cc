@@ -19,7 +19,15 @@ std::vector<std::string> FrequencyMlp(int hidden_width) {
           "nerf.adam_beta1=0.9",      "nerf.adam_beta2=0.999",
           "nerf.carve_hull=false",    "nerf.hull_trim_share=0",
           "nerf.sampling=uniform",    "nerf.max_samples_per_ray=32",
-          "nerf.density_weight=0",    "nerf.full_budget_steps=10000"};
+          "nerf.density_weight=0",    "nerf.full_budget_steps=10000",
+          "nerf.max_extra_steps=0"};
+}
+
+// The paper's fields and its surface, which has 64^3 nodes whatever the object's size; then `more`.
+std::vector<std::string> PaperSettings(const std::vector<std::string>& more) {
+  std::vector<std::string> settings = {"nerf.preset=paper", "mesh.adapt_resolution=false", "mesh.resolution=64"};
+  settings.insert(settings.end(), more.begin(), more.end());
+  return settings;
 }
 
 }  // namespace
@@ -40,11 +48,11 @@ std::vector<BenchMethod> Table1Methods() {
   return {
       {.id = "fast", .title = "ours, fast"},
       {.id = "sdf", .title = "ours, signed distances", .settings = {"nerf.field=sdf"}},
-      {.id = "paper", .title = "ours, the paper's configuration", .settings = {"nerf.preset=paper"}},
-      {.id = "offline", .title = "[33]*", .settings = {"nerf.preset=paper", "nerf.density_weight=0"}},
+      {.id = "paper", .title = "ours, the paper's configuration", .settings = PaperSettings({})},
+      {.id = "offline", .title = "[33]*", .settings = PaperSettings({"nerf.density_weight=0"})},
       {.id = "offline-depth",
        .title = "[33]* with true depth",
-       .settings = {"nerf.preset=paper", "nerf.density_weight=0"},
+       .settings = PaperSettings({"nerf.density_weight=0"}),
        .with_depth = true},
       {.id = "hull", .title = "visual hull, nothing learned", .settings = {"nerf.hull_margin=0"}, .trained = false},
       {.id = "imap", .title = "iMAP-style MLP 4 x 256, with depth", .settings = FrequencyMlp(256), .with_depth = true},

@@ -22,7 +22,7 @@ struct ObjectTraining {
   double train_s = 0;  // by the bench's clock
   double wall_s = 0;
   double setup_s = 0;
-  double mesh_s = 0;                                     // of extracting the surface, wall time
+  double mesh_s = 0;                                     // of extracting the surface, by the clock of one thread
   double sampling_s = 0, forward_s = 0, backward_s = 0;  // CPU time of all threads
   uint64_t samples = 0;
   bool limited = false;  // the plan was cut to fit the time

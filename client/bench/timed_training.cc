@@ -1,12 +1,10 @@
 #include "client/bench/timed_training.h"
 
-#include <time.h>
-
 #include <algorithm>
-#include <chrono>
 #include <limits>
 #include <utility>
 
+#include "client/bench/stopwatch.h"
 #include "server/nerf/object_field.h"
 
 namespace romap {
@@ -14,40 +12,6 @@ namespace {
 
 constexpr double kProbe_s = 0.15;
 constexpr double kLongestSlice_s = 0.25;
-
-// Adds up time by a clock, and by the wall.
-class Stopwatch {
- public:
-  Stopwatch(BenchClock clock, int threads) : clock_(clock), threads_(threads) {}
-
-  // Runs `work` and returns its result.
-  template <class Work>
-  auto Time(Work work) {
-    const double start_s = Now(), wall_start_s = Wall();
-    auto result = work();
-    total_s_ += Now() - start_s;
-    wall_s_ += Wall() - wall_start_s;
-    return result;
-  }
-
-  double total_s() const { return total_s_; }
-  double wall_s() const { return wall_s_; }
-
- private:
-  static double Wall() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  }
-  double Now() const {
-    if (clock_ == BenchClock::kWall) return Wall();
-    timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec)) / threads_;
-  }
-
-  BenchClock clock_;
-  int threads_;
-  double total_s_ = 0, wall_s_ = 0;
-};
 
 absl::StatusOr<ObjectField> MakeField(const TrainingRequest& request, const NerfConfig& config) {
   if (request.views->empty()) return FailedPrecondition("an object without views cannot be trained");

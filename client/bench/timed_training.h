@@ -5,19 +5,13 @@
 #include <optional>
 #include <vector>
 
+#include "client/bench/stopwatch.h"
 #include "common/messages.h"
 #include "common/status.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
 
 namespace romap {
-
-// What a second of training is.
-enum class BenchClock {
-  kCpu,   // CPU time of this process over the number of threads: what a machine without other work would need, if
-          // threads never waited for each other
-  kWall,  // time that passed
-};
 
 struct TrainingRequest {
   NerfConfig config;

@@ -37,6 +37,7 @@ NerfConfig PaperPreset() {
   c.full_budget_steps = 2800;
   c.refine_steps_per_view = 300;
   c.max_refine_steps = 2800;
+  c.max_extra_steps = 0;
   return c;
 }
 

@@ -27,7 +27,7 @@ void MakeSmallSequence(const std::string& dir) {
   synth::SynthOptions options;
   options.seed = 3;
   options.objects = 2;
-  options.frames = 40;
+  options.frames = 24;
   options.width_px = 200;
   options.height_px = 150;
   ASSERT_TRUE(synth::MakeSequence(options, dir).ok());

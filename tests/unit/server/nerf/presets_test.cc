@@ -52,6 +52,7 @@ TEST(PresetsTest, PaperIsThePapersConfiguration) {
   EXPECT_EQ(c.opacity_weight_background, 0);
   EXPECT_EQ(c.first_budget_steps, 300);
   EXPECT_EQ(c.budget_steps_per_view, 300);
+  EXPECT_EQ(c.max_extra_steps, 0);
 }
 
 TEST(PresetsTest, ExplicitKeysOverrideWhereverThePresetStands) {
