@@ -13,6 +13,7 @@ constexpr int kProbesPerView = 60;
 constexpr size_t kMostViews = 12;  // spread over all
 constexpr int kBorder_px = 3;      // masks and poses are not sharper than this
 constexpr std::array<double, 10> kOtherScales = {0.5, 0.7, 0.83, 0.91, 0.95, 1.05, 1.1, 1.2, 1.4, 2.0};
+constexpr double kDepthNoise = 0.02;  // of the depth
 constexpr double kMostMisplaced = 0.4;
 constexpr double kNoise = 0.02;   // of the share, that says nothing
 constexpr double kClearly = 0.5;  // another scale fits when it leaves less than this of the contradictions
@@ -21,22 +22,27 @@ struct Witness {
   const ObjectView* view;
   SE3<Camera, World> T_camera_world;
   cv::Mat background;  // without a border around what is not
+  cv::Mat nearest_mu;  // least depth within the border, 0 where one is unknown
 };
+
+Witness MakeWitness(const ObjectView& view) {
+  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * kBorder_px + 1, 2 * kBorder_px + 1});
+  Witness witness{&view, view.T_world_camera.Inverse(), {}, {}};
+  cv::erode(view.ray_kind == static_cast<int>(RayKind::kBackground), witness.background, square);
+  cv::Mat depth_mu = cv::Mat::zeros(view.depth_mu.size(), CV_32FC1);
+  view.depth_mu.copyTo(depth_mu, view.depth_mu > 0);  // no number is not
+  cv::erode(depth_mu, witness.nearest_mu, square);
+  return witness;
+}
 
 std::vector<Witness> ChooseWitnesses(std::span<const ObjectView> views) {
   std::vector<const ObjectView*> with_depth;
   for (const ObjectView& view : views) {
     if (!view.depth_mu.empty()) with_depth.push_back(&view);
   }
-  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * kBorder_px + 1, 2 * kBorder_px + 1});
   std::vector<Witness> witnesses;
   const size_t count = std::min(kMostViews, with_depth.size());
-  for (size_t i = 0; i < count; ++i) {
-    const ObjectView& view = *with_depth[i * with_depth.size() / count];
-    Witness witness{&view, view.T_world_camera.Inverse(), {}};
-    cv::erode(view.ray_kind == static_cast<int>(RayKind::kBackground), witness.background, square);
-    witnesses.push_back(std::move(witness));
-  }
+  for (size_t i = 0; i < count; ++i) witnesses.push_back(MakeWitness(*with_depth[i * with_depth.size() / count]));
   return witnesses;
 }
 
@@ -54,35 +60,52 @@ std::vector<Eigen::Vector3d> ProbesOf(const ObjectView& view) {
   return probes;
 }
 
-// The crop holds all of the object: what lies outside is not of it. Of what the image does not show nothing is known.
-bool Contradicts(const Witness& witness, const Eigen::Vector3d& p_world) {
+enum class Verdict { kUnseen, kFits, kContradicts };
+
+// The crop holds all of the object: what lies outside is not of it. Before what the witness measured there is nothing.
+Verdict Ask(const Witness& witness, const Eigen::Vector3d& p_world, double scale) {
   const ObjectView& view = *witness.view;
   const Eigen::Vector3d p = witness.T_camera_world * p_world;
-  if (p.z() <= 0) return false;
+  if (p.z() <= 0) return Verdict::kUnseen;
   const Eigen::Vector2d pixel = view.camera.Project(p);
   if (!(pixel.array() >= 0).all() || pixel.x() >= view.camera.width_px || pixel.y() >= view.camera.height_px) {
-    return false;
+    return Verdict::kUnseen;
   }
   const cv::Point at(cvRound(pixel.x()) - view.roi_px.x, cvRound(pixel.y()) - view.roi_px.y);
-  if (!cv::Rect({0, 0}, view.roi_px.size()).contains(at)) return true;
-  return witness.background.at<uint8_t>(at) != 0;
+  if (!cv::Rect({0, 0}, view.roi_px.size()).contains(at)) return Verdict::kContradicts;
+  const double measured_mu = scale * witness.nearest_mu.at<float>(at);
+  const bool in_free_space = p.z() < (1 - kDepthNoise) * measured_mu;
+  return witness.background.at<uint8_t>(at) != 0 || in_free_space ? Verdict::kContradicts : Verdict::kFits;
 }
 
-double MisplacedShare(const std::vector<Witness>& witnesses, const std::vector<std::vector<Eigen::Vector3d>>& probes,
-                      double scale) {
+// Contradicted by a witness, or so far off that no other one sees it.
+bool IsMisplaced(const std::vector<Witness>& witnesses, size_t own, const Eigen::Vector3d& p_world, double scale) {
+  bool fits = false;
+  for (size_t i = 0; i < witnesses.size(); ++i) {
+    if (i == own) continue;
+    const Verdict verdict = Ask(witnesses[i], p_world, scale);
+    if (verdict == Verdict::kContradicts) return true;
+    fits |= verdict == Verdict::kFits;
+  }
+  return !fits;
+}
+
+using Probes = std::vector<std::vector<Eigen::Vector3d>>;  // of each witness
+
+double MisplacedShare(const std::vector<Witness>& witnesses, const Probes& probes, double scale) {
   size_t all = 0, misplaced = 0;
   for (size_t i = 0; i < witnesses.size(); ++i) {
     all += probes[i].size();
     for (const Eigen::Vector3d& p_camera : probes[i]) {
       const Eigen::Vector3d p_world = witnesses[i].view->T_world_camera * (scale * p_camera);
-      misplaced += std::ranges::any_of(witnesses, [&](const Witness& w) { return Contradicts(w, p_world); }) ? 1 : 0;
+      misplaced += IsMisplaced(witnesses, i, p_world, scale) ? 1 : 0;
     }
   }
   return all > 0 ? static_cast<double>(misplaced) / static_cast<double>(all) : 0;
 }
 
-std::vector<std::vector<Eigen::Vector3d>> AllProbes(const std::vector<Witness>& witnesses) {
-  std::vector<std::vector<Eigen::Vector3d>> probes;
+Probes AllProbes(const std::vector<Witness>& witnesses) {
+  Probes probes;
   for (const Witness& witness : witnesses) probes.push_back(ProbesOf(*witness.view));
   return probes;
 }
@@ -97,7 +120,7 @@ double MisplacedShare(std::span<const ObjectView> views, double scale) {
 bool DepthsFit(std::span<const ObjectView> views) {
   const std::vector<Witness> witnesses = ChooseWitnesses(views);
   if (witnesses.size() < 2) return true;
-  const auto probes = AllProbes(witnesses);
+  const Probes probes = AllProbes(witnesses);
   const double misplaced = MisplacedShare(witnesses, probes, 1);
   if (misplaced <= kNoise) return true;
   if (misplaced > kMostMisplaced) return false;

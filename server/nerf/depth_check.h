@@ -6,8 +6,9 @@
 
 namespace romap {
 
-// The share of the dense depths, each multiplied by `scale`, that other views contradict: put into space, the point is
-// seen as background by at least one of them. Looks at a sample of the object's pixels. 0 without dense depth.
+// The share of the dense depths, all multiplied by `scale`, that other views contradict: put into space, the point lies
+// on background of at least one of them, or before what that one measured. Looks at a sample of the object's pixels. 0
+// without dense depth.
 double MisplacedShare(std::span<const ObjectView> views, double scale);
 
 // Whether the dense depths belong to these views: no other scale makes clearly more of them agree with the masks, and

@@ -188,11 +188,12 @@ size_t ObjectField::MostRedundantView(const ObjectView& view) const {
 
 void ObjectField::PrepareViews() {
   if (!views_changed_) return;
-  rays_.Build(views_, box_);
+  JudgeDepths();
+  rays_.Build(views_, box_, depths_fit_);
+  probe_.Build(rays_, views_.size());
   WeighRays(nullptr);
   black_views_ = static_cast<int>(std::ranges::count_if(views_, IsBlack));
   share_in_box_ = probe_.ShareMeeting(Space().extent);
-  probe_.Build(rays_, views_.size());
   occupancy_.SetHull(hull_.Carve());
   views_changed_ = false;
   gain_.Restart();

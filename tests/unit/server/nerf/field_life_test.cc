@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -29,12 +31,22 @@ NerfConfig SmallConfig() {
   return config;
 }
 
+// Learns well enough to tell a right shape from a wrong one.
+NerfConfig ShapeConfig() {
+  NerfConfig config;
+  config.full_budget_steps = 120;
+  config.max_extra_steps = 0;
+  return config;
+}
+
 void TrainToTheEnd(ObjectField& field) {
-  while (field.AllowedSteps(true) > field.steps()) field.Train(20, 1);
+  while (field.AllowedSteps(true) > field.steps()) {
+    field.Train(static_cast<int>(std::min<uint64_t>(20, field.AllowedSteps(true) - field.steps())), 1);
+  }
 }
 
 ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& views,
-                      const NerfConfig& config = SmallConfig()) {
+                      const NerfConfig& config = ShapeConfig()) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
@@ -127,7 +139,7 @@ TEST(FieldLifeTest, BlackImagesStillGiveAShapeAndAreNamed) {
 
 TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
   const BallScene scene;
-  ObjectField field(SmallConfig(), scene.object, 1);
+  ObjectField field(ShapeConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   box.T_world_object = {box.T_world_object.rotation(),
                         box.T_world_object.translation() + Eigen::Vector3d(0, 0, 2.6 * scene.radius_mu)};
@@ -200,24 +212,25 @@ TEST(FieldLifeTest, DepthOfAWrongScaleIsNotUsed) {
 }
 
 TEST(FieldLifeTest, DepthCarvesWhatMasksCannot) {
-  // A dent that no outline shows: the depth on one side lies behind the ball's surface.
+  // A dent that no outline shows: what one view measured lies behind the ball's surface.
   BallScene scene;
   scene.with_depth = true;
   const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
-  const Eigen::Vector3d place(0, 0, 0.8 * scene.radius_mu);  // in the Object frame
-  const auto kept = [&](bool dent, bool use_depth) {
+  const Eigen::Vector3d eye = box.T_world_object.Inverse() * scene.View(0).T_world_camera.translation();
+  const Eigen::Vector3d place = 0.9 * scene.radius_mu * eye.normalized();  // in the Object frame
+  const auto kept = [&](double dent_mu, bool use_depth) {
     VisualHull hull(NerfConfig{});
     hull.Reset(box, use_depth);
     for (ObjectView view : scene.Views()) {
-      if (dent) view.depth_mu = view.depth_mu + 0.5 * scene.radius_mu;
+      cv::add(view.depth_mu, dent_mu, view.depth_mu, view.depth_mu > 0);
       hull.Add(view);
     }
     const Eigen::Vector3i cell = ((place.cwiseQuotient(box.half_extents).array() + 1) * 32).cast<int>();
     return hull.Carve()[static_cast<size_t>((cell.z() * 64 + cell.y()) * 64 + cell.x())] != 0;
   };
-  EXPECT_TRUE(kept(false, true)) << "true depth leaves the ball";
-  EXPECT_FALSE(kept(true, true));
-  EXPECT_TRUE(kept(true, false));
+  EXPECT_TRUE(kept(0, true)) << "true depth leaves the ball";
+  EXPECT_FALSE(kept(0.5 * scene.radius_mu, true));
+  EXPECT_TRUE(kept(0.5 * scene.radius_mu, false));
 }
 
 TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
@@ -227,7 +240,7 @@ TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
   for (const double scale : {1.0, 0.01, 100.0}) {
     BallScene scene;
     scene.radius_mu = 0.5 * scale;
-    const FieldSnapshot snapshot = TrainedOn(scene, scene.Views()).Snapshot();
+    const FieldSnapshot snapshot = TrainedOn(scene, scene.Views(), SmallConfig()).Snapshot();
     raws.push_back(RawOnGrid(snapshot, 0.98f));
     hulls.push_back(snapshot.hull.bits);
     EXPECT_NEAR(snapshot.box_half_extents.x(), 0.55 * scale, 1e-5 * scale);
