@@ -71,7 +71,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
   EXPECT_EQ(snapshot.cameras.size(), 15u);
   const double right_error = BallSurfaceError(scene, right.Snapshot());
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.3 * right_error + 0.005);
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.3 * right_error + 0.01);
 
   // Its pose is corrected: it counts again.
   ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
@@ -98,15 +98,22 @@ TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
   const BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   ObjectField field = TrainedOn(scene, views);
-  const Eigen::Vector3f below(0, 0, static_cast<float>(-0.8 * scene.radius_mu));
+  const Eigen::Vector3d eye_below = scene.Box().T_world_object.Inverse() * scene.View(1).T_world_camera.translation();
+  // The highest raw value that the hull leaves, near the surface that a low view looks at.
   const auto raw_below = [&] {
     const FieldSnapshot snapshot = field.Snapshot();
-    std::vector<float> raw(1);
-    snapshot.field->Sample(std::vector<Eigen::Vector3f>{below}, raw, {});
     const int n = snapshot.hull.resolution;
-    const Eigen::Vector3i cell = ((below.cwiseQuotient(snapshot.box_half_extents).array() + 1) * 0.5f * n).cast<int>();
-    const bool in_hull = snapshot.hull.bits[static_cast<size_t>((cell.z() * n + cell.y()) * n + cell.x())] != 0;
-    return in_hull ? raw[0] : -1e4f;
+    std::vector<Eigen::Vector3f> places;
+    for (double share = 0.85; share < 1; share += 0.02) {
+      const Eigen::Vector3f place = (share * scene.radius_mu * eye_below.normalized()).cast<float>();
+      const Eigen::Vector3i cell =
+          ((place.cwiseQuotient(snapshot.box_half_extents).array() + 1) * 0.5f * n).cast<int>();
+      if (snapshot.hull.bits[static_cast<size_t>((cell.z() * n + cell.y()) * n + cell.x())] != 0)
+        places.push_back(place);
+    }
+    std::vector<float> raw(places.size());
+    snapshot.field->Sample(places, raw, {});
+    return raw.empty() ? -1e4f : *std::ranges::max_element(raw);
   };
   const float level = field.Snapshot().surface_level;
   EXPECT_GT(raw_below(), level);
