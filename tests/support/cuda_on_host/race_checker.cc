@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <mutex>
 #include <unordered_map>
+#include <utility>
 
 #include "tests/support/cuda_on_host/block_runner.h"
 #include "tests/support/cuda_on_host/runtime_api.h"
@@ -34,6 +35,7 @@ struct Log {
   std::unordered_map<uintptr_t, Word> words;
   int races = 0;
   std::string first;
+  DeviceTraffic traffic;
 };
 
 Log& TheLog() {
@@ -117,6 +119,14 @@ void Note(const volatile void* p, size_t bytes, bool write, bool atomic) {
   const Memory memory = KindOf(address);
   if (memory == Memory::kOther) return;
   std::lock_guard lock(TheLog().mutex);
+  if (memory == Memory::kDevice) {
+    DeviceTraffic& traffic = TheLog().traffic;
+    if (atomic) {
+      traffic.atomic += write ? bytes : 0;  // the emulated exchange reads first
+    } else {
+      (write ? traffic.written : traffic.read) += bytes;
+    }
+  }
   for (uintptr_t at = address / kWordBytes * kWordBytes; at < address + bytes; at += kWordBytes) {
     NoteWord(TheLog().words[at], now, memory, write);
   }
@@ -132,6 +142,11 @@ int RaceCount() {
 std::string FirstRace() {
   std::lock_guard lock(TheLog().mutex);
   return TheLog().first;
+}
+
+DeviceTraffic TakeDeviceTraffic() {
+  std::lock_guard lock(TheLog().mutex);
+  return std::exchange(TheLog().traffic, {});
 }
 
 void ResetRaces() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace romap::cuda_on_host {
@@ -16,5 +17,11 @@ int RaceCount();
 // What the first race was: kind of memory, blocks and threads; empty when there was none.
 std::string FirstRace();
 void ResetRaces();
+
+// Bytes that kernels moved to and from device memory since the last call; threads that read the same word each count.
+struct DeviceTraffic {
+  uint64_t read = 0, written = 0, atomic = 0;
+};
+DeviceTraffic TakeDeviceTraffic();
 
 }  // namespace romap::cuda_on_host

@@ -87,6 +87,9 @@ void store_matrix_sync(T* p, const fragment<accumulator, M, N, K, T>& f, unsigne
   __syncwarp();
 }
 
+// Products of tiles that warps have begun since the program began.
+inline std::atomic<uint64_t> tile_products{0};
+
 // d = a * b + c, summed in float.
 template <int M, int N, int K, class TD, class TA, class LA, class LB>
 void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M, N, K, TA, LA>& a,
@@ -95,6 +98,7 @@ void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M,
   using B = fragment<matrix_b, M, N, K, TA, LB>;
   using romap::cuda_on_host::SlotOfLane;
   const unsigned lane = romap::cuda_on_host::Lane();
+  if (lane == 0) ++tile_products;
   SlotOfLane(lane).pointers[0] = &a;
   SlotOfLane(lane).pointers[1] = &b;
   __syncwarp();
