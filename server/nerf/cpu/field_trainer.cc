@@ -48,9 +48,8 @@ struct FieldTrainer::Worker {
         rays(static_cast<size_t>(chunk_rays)),
         spans(static_cast<size_t>(chunk_rays)),
         table_gradient(model.table.size() + kMaxLanes),
-        mlp_gradient(model.mlp.parameters.size()) {
-    visits.reserve(static_cast<size_t>(config.rays_per_step * config.max_samples_per_ray));
-  }
+        mlp_gradient(model.mlp.parameters.size()),
+        visits(static_cast<size_t>((config.rays_per_step + chunk_rays) * config.max_samples_per_ray)) {}
 
   // Books the CPU time since the last call to `phase`.
   void Book(TrainPhase phase) {
@@ -79,8 +78,9 @@ struct FieldTrainer::Worker {
   SampleChunk chunk;
   std::vector<Ray> rays;
   std::vector<RaySpan> spans;
-  std::vector<Visit> visits;  // of one step, for the occupancy
   AlignedBuffer<float> table_gradient, mlp_gradient;
+  AlignedBuffer<Visit> visits;  // of one step, for the occupancy; the first visit_count are in use
+  size_t visit_count = 0;
   bool timed = false;  // the chunk at work
   double booked_until_s = 0;
   std::array<double, static_cast<size_t>(TrainPhase::kCount)> phase_s = {};  // of timed chunks; the optimiser's of all
@@ -159,7 +159,7 @@ void FieldTrainer::RunSteps(const StepSource& source, Occupancy& occupancy, int 
   for (int i = 0; i < steps; ++i) {
     const uint64_t step = steps_done_ + static_cast<uint64_t>(i);
     const double start_s = ThreadCpuSeconds();
-    worker.visits.clear();
+    worker.visit_count = 0;
     const int chunks = (config_.rays_per_step + worker.chunk_rays - 1) / worker.chunk_rays;
     for (int chunk = thread; chunk < chunks; chunk += share.threads) {
       worker.timed = (i + chunk / share.threads) % kTimedChunk == 0;
@@ -221,6 +221,8 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
 
 void FieldTrainer::CompositeRays(Worker& worker) {
   SampleChunk& c = worker.chunk;
+  Worker::Visit* visit = worker.visits.data() + worker.visit_count;
+  worker.visit_count += static_cast<size_t>(c.size);
   for (int r = 0; r < worker.ray_count; ++r) {
     const RaySpan span = worker.spans[static_cast<size_t>(r)];
     if (span.count == 0) continue;
@@ -233,7 +235,8 @@ void FieldTrainer::CompositeRays(Worker& worker) {
     float* behind = c.behind.data() + at;
     const RayResult result =
         kernels_->composite(samples, target, loss_weights_, weight, behind, c.d_raw.data() + kOutputs * at);
-    for (int i = 0; i < span.count; ++i) worker.visits.push_back({c.cell[static_cast<size_t>(at + i)], weight[i]});
+    for (int i = 0; i < span.count; ++i) visit[i] = {c.cell[static_cast<size_t>(at + i)], weight[i]};
+    visit += span.count;
     ++worker.stats.rays;
     if (target.is_object) {
       worker.stats.color_loss += result.color_loss;
@@ -252,10 +255,10 @@ void FieldTrainer::OptimiseMlp(const AdamRates& rates, int threads) {
 
 void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads) {
   for (int t = 0; t < threads; ++t) {
-    const std::vector<Worker::Visit>& visits = workers_[static_cast<size_t>(t)]->visits;
-    for (size_t i = 0; i < visits.size(); ++i) {
-      occupancy.Prefetch(visits[std::min(i + kPrefetchVisits, visits.size() - 1)].cell);
-      occupancy.Record(visits[i].cell, visits[i].weight);
+    const Worker& worker = *workers_[static_cast<size_t>(t)];
+    for (size_t i = 0; i < worker.visit_count; ++i) {
+      occupancy.Prefetch(worker.visits[std::min(i + kPrefetchVisits, worker.visit_count - 1)].cell);
+      occupancy.Record(worker.visits[i].cell, worker.visits[i].weight);
     }
   }
   const uint64_t done = step + 1;
