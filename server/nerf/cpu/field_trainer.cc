@@ -3,20 +3,17 @@
 #include <time.h>
 
 #include <algorithm>
-#include <atomic>
-#include <barrier>
 #include <chrono>
 #include <numeric>
 #include <thread>
-#include <utility>
 
 namespace romap::nerf {
 namespace {
 
 constexpr int kChunkSamples = 1024;  // activations of a chunk stay in the second-level cache
 
-constexpr size_t kPrefetchVisits = 24;    // how far ahead cells of the occupancy are fetched
-constexpr size_t kOptimiserBlock = 8192;  // parameters that a thread takes at a time
+constexpr size_t kPrefetchVisits = 24;       // how far ahead cells of the occupancy are fetched
+constexpr size_t kOptimiserBlock = 1 << 15;  // parameters that a thread takes at a time
 
 // Asking for the time of a thread is a call of the kernel: only one chunk in so many is timed by phase.
 constexpr int kTimedChunk = 8;
@@ -40,7 +37,7 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
   return w;
 }
 
-// One thread's buffers.
+// What one share of the rays of a step is rendered with; its gradients. As many as there are threads.
 struct FieldTrainer::Worker {
   Worker(const NerfConfig& config, const FieldModel& model)
       : chunk_rays(kChunkSamples / config.max_samples_per_ray),
@@ -51,18 +48,21 @@ struct FieldTrainer::Worker {
         mlp_gradient(model.mlp.parameters.size()),
         visits(static_cast<size_t>((config.rays_per_step + chunk_rays) * config.max_samples_per_ray)) {}
 
-  // Books the CPU time since the last call to `phase`.
+  void Begin() {
+    phase_s = {};
+    render_s = optimise_s = 0;
+    object_rays = 0;
+    stats = {};
+  }
+  // Books the CPU time since the last call to `phase`, if the chunk at work is timed.
   void Book(TrainPhase phase) {
+    if (!timed) return;
     const double now_s = ThreadCpuSeconds();
     phase_s[static_cast<size_t>(phase)] += now_s - booked_until_s;
     booked_until_s = now_s;
   }
-  void BookIfTimed(TrainPhase phase) {
-    if (timed) Book(phase);
-  }
   // Divides the time that all chunks took among the phases as they shared the timed chunks.
-  void ShareRenderTime(double render_s) {
-    const double optimise_s = std::exchange(phase_s[static_cast<size_t>(TrainPhase::kOptimise)], 0);
+  void ShareRenderTime() {
     const double timed_s = std::accumulate(phase_s.begin(), phase_s.end(), 0.0);
     for (size_t p = 0; p < phase_s.size(); ++p) stats.phase_cpu_s[p] = phase_s[p] * render_s / std::max(1e-9, timed_s);
     stats.phase_cpu_s[static_cast<size_t>(TrainPhase::kOptimise)] = optimise_s;
@@ -83,15 +83,11 @@ struct FieldTrainer::Worker {
   size_t visit_count = 0;
   bool timed = false;  // the chunk at work
   double booked_until_s = 0;
-  std::array<double, static_cast<size_t>(TrainPhase::kCount)> phase_s = {};  // of timed chunks; the optimiser's of all
+  std::array<double, static_cast<size_t>(TrainPhase::kCount)> phase_s = {};  // of timed chunks
+  double render_s = 0;                                                       // of all chunks
+  double optimise_s = 0;                                                     // of the thread of the same number
   uint64_t object_rays = 0;
   TrainStats stats;
-};
-
-struct FieldTrainer::StepShare {
-  std::barrier<> barrier;
-  int threads;
-  std::atomic<uint64_t> blocks_taken = 0;  // of the hash table, by the optimiser, over all steps; see OptimiseTable
 };
 
 FieldTrainer::FieldTrainer(const NerfConfig& config, uint64_t seed, const KernelTable& kernels)
@@ -122,23 +118,22 @@ void FieldTrainer::ReleaseScratch() { workers_.clear(); }
 TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) {
   const auto start = std::chrono::steady_clock::now();
   while (static_cast<int>(workers_.size()) < threads) workers_.push_back(std::make_unique<Worker>(config_, model_));
-  StepShare share{.barrier = std::barrier<>(threads), .threads = threads};
-  for (int t = 0; t < threads; ++t) {
-    workers_[static_cast<size_t>(t)]->stats = {};
-    workers_[static_cast<size_t>(t)]->object_rays = 0;
-  }
+  for (int t = 0; t < threads; ++t) workers_[static_cast<size_t>(t)]->Begin();
   {
+    const uint64_t optimiser_tasks = 1 + (model_.table.size() + kOptimiserBlock - 1) / kOptimiserBlock;
+    StepTasks tasks(static_cast<uint64_t>(steps), {static_cast<uint64_t>(threads), optimiser_tasks});
     std::vector<std::jthread> helpers;
     for (int t = 1; t < threads; ++t) {
-      helpers.emplace_back([&, t] { RunSteps(source, occupancy, steps, t, share); });
+      helpers.emplace_back([&, t] { RunTasks(source, occupancy, t, threads, tasks); });
     }
-    RunSteps(source, occupancy, steps, 0, share);
+    RunTasks(source, occupancy, 0, threads, tasks);
   }
   steps_done_ += static_cast<uint64_t>(steps);
   TrainStats total;
   uint64_t object_rays = 0;
   for (int t = 0; t < threads; ++t) {
-    const Worker& worker = *workers_[static_cast<size_t>(t)];
+    Worker& worker = *workers_[static_cast<size_t>(t)];
+    worker.ShareRenderTime();
     total.rays += worker.stats.rays;
     total.samples += worker.stats.samples;
     total.active_samples += worker.stats.active_samples;
@@ -152,34 +147,34 @@ TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int
   return total;
 }
 
-void FieldTrainer::RunSteps(const StepSource& source, Occupancy& occupancy, int steps, int thread, StepShare& share) {
-  Worker& worker = *workers_[static_cast<size_t>(thread)];
-  worker.phase_s = {};
-  double render_s = 0;
-  for (int i = 0; i < steps; ++i) {
-    const uint64_t step = steps_done_ + static_cast<uint64_t>(i);
-    const double start_s = ThreadCpuSeconds();
-    worker.visit_count = 0;
-    const int chunks = (config_.rays_per_step + worker.chunk_rays - 1) / worker.chunk_rays;
-    for (int chunk = thread; chunk < chunks; chunk += share.threads) {
-      worker.timed = (i + chunk / share.threads) % kTimedChunk == 0;
-      if (worker.timed) worker.booked_until_s = ThreadCpuSeconds();
-      RenderChunk(source, occupancy, step, chunk * worker.chunk_rays, worker);
+void FieldTrainer::RunTasks(const StepSource& source, Occupancy& occupancy, int thread, int shares, StepTasks& tasks) {
+  double optimise_s = 0;
+  while (const std::optional<StepTasks::Task> task = tasks.Take()) {
+    if (task->phase == 0) {
+      RenderShare(source, occupancy, task->step, static_cast<int>(task->index), shares);
+    } else {
+      const double start_s = ThreadCpuSeconds();
+      Optimise(source, occupancy, steps_done_ + task->step, task->index, shares);
+      optimise_s += ThreadCpuSeconds() - start_s;
     }
-    worker.booked_until_s = ThreadCpuSeconds();
-    render_s += worker.booked_until_s - start_s;
-    share.barrier.arrive_and_wait();
-    const AdamRates rates{source.learning_rate(step), static_cast<float>(config_.adam_beta1),
-                          static_cast<float>(config_.adam_beta2)};
-    if (thread == 0) {
-      OptimiseMlp(rates, share.threads);
-      UpdateOccupancy(occupancy, step, share.threads);
-    }
-    OptimiseTable(rates, i, share);
-    share.barrier.arrive_and_wait();
-    worker.Book(TrainPhase::kOptimise);
+    tasks.Finish();
   }
-  worker.ShareRenderTime(render_s);
+  workers_[static_cast<size_t>(thread)]->optimise_s = optimise_s;
+}
+
+// `round`: steps since Run() began.
+void FieldTrainer::RenderShare(const StepSource& source, const Occupancy& occupancy, uint64_t round, int share,
+                               int shares) {
+  Worker& worker = *workers_[static_cast<size_t>(share)];
+  const double start_s = ThreadCpuSeconds();
+  worker.visit_count = 0;
+  const int chunks = (config_.rays_per_step + worker.chunk_rays - 1) / worker.chunk_rays;
+  for (int chunk = share; chunk < chunks; chunk += shares) {
+    worker.timed = (round + static_cast<uint64_t>(chunk / shares)) % kTimedChunk == 0;
+    if (worker.timed) worker.booked_until_s = ThreadCpuSeconds();
+    RenderChunk(source, occupancy, steps_done_ + round, chunk * worker.chunk_rays, worker);
+  }
+  worker.render_s += ThreadCpuSeconds() - start_s;
 }
 
 void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray,
@@ -196,25 +191,25 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
   chunk.size = 0;
   kernels_->place_samples(worker.rays.data(), worker.ray_count, rule, chunk, worker.spans.data());
   kernels_->to_grid(source.grid, chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data());
-  worker.BookIfTimed(TrainPhase::kSampling);
+  worker.Book(TrainPhase::kSampling);
   kernels_->encode(model_.layout, model_.table.data(), chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                    chunk.features.data());
-  worker.BookIfTimed(TrainPhase::kEncode);
+  worker.Book(TrainPhase::kEncode);
   kernels_->mlp_forward(model_.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
-  worker.BookIfTimed(TrainPhase::kMlp);
+  worker.Book(TrainPhase::kMlp);
   kernels_->activate(chunk, model_.density_bias);
   CompositeRays(worker);
   // About half of the samples remain: the others lie in empty space or behind the surface.
   const int active =
       kernels_->keep_active(static_cast<float>(config_.gradient_cut), 1.0f / static_cast<float>(config_.rays_per_step),
                             model_.layout.features, model_.mlp.hidden, chunk);
-  worker.BookIfTimed(TrainPhase::kRender);
+  worker.Book(TrainPhase::kRender);
   kernels_->mlp_backward(model_.mlp, active, chunk.features.data(), chunk.hidden.data(), chunk.d_raw.data(),
                          worker.mlp_gradient.data());
-  worker.BookIfTimed(TrainPhase::kMlpBackward);
+  worker.Book(TrainPhase::kMlpBackward);
   kernels_->encode_backward(model_.layout, active, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                             chunk.features.data(), worker.table_gradient.data());
-  worker.BookIfTimed(TrainPhase::kEncodeBackward);
+  worker.Book(TrainPhase::kEncodeBackward);
   worker.stats.samples += static_cast<uint64_t>(chunk.size);
   worker.stats.active_samples += static_cast<uint64_t>(active);
 }
@@ -245,16 +240,27 @@ void FieldTrainer::CompositeRays(Worker& worker) {
   }
 }
 
-void FieldTrainer::OptimiseMlp(const AdamRates& rates, int threads) {
+// The first task is what must be done by one thread, so that it starts first; the others are blocks of the hash table.
+void FieldTrainer::Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, uint64_t task, int shares) {
+  const AdamRates rates{source.learning_rate(step), static_cast<float>(config_.adam_beta1),
+                        static_cast<float>(config_.adam_beta2)};
   std::array<float*, kMostThreads> gradients;
-  for (int t = 0; t < threads; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->mlp_gradient.data();
-  kernels_->adam(rates, 0, model_.mlp.parameters.size(), model_.mlp.parameters.data(), mlp_first_.data(),
-                 mlp_second_.data(), gradients.data(), threads);
-  model_.mlp.UpdateTransposed();
+  if (task == 0) {
+    for (int t = 0; t < shares; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->mlp_gradient.data();
+    kernels_->adam(rates, 0, model_.mlp.parameters.size(), model_.mlp.parameters.data(), mlp_first_.data(),
+                   mlp_second_.data(), gradients.data(), shares);
+    model_.mlp.UpdateTransposed();
+    UpdateOccupancy(occupancy, step, shares);
+    return;
+  }
+  for (int t = 0; t < shares; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->table_gradient.data();
+  const size_t begin = (task - 1) * kOptimiserBlock;
+  kernels_->adam(rates, begin, std::min(model_.table.size(), begin + kOptimiserBlock), model_.table.data(),
+                 table_first_.data(), table_second_.data(), gradients.data(), shares);
 }
 
-void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads) {
-  for (int t = 0; t < threads; ++t) {
+void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int shares) {
+  for (int t = 0; t < shares; ++t) {
     const Worker& worker = *workers_[static_cast<size_t>(t)];
     for (size_t i = 0; i < worker.visit_count; ++i) {
       occupancy.Prefetch(worker.visits[std::min(i + kPrefetchVisits, worker.visit_count - 1)].cell);
@@ -265,24 +271,6 @@ void FieldTrainer::UpdateOccupancy(Occupancy& occupancy, uint64_t step, int thre
   if (done >= static_cast<uint64_t>(config_.occupancy_start_step) &&
       done % static_cast<uint64_t>(config_.occupancy_interval_steps) == 0) {
     occupancy.Update();
-  }
-}
-
-// Blocks go to whoever comes first: one thread has other things to do, and cores may be shared. What comes out does not
-// depend on who does it. `round`: steps since Run() began.
-void FieldTrainer::OptimiseTable(const AdamRates& rates, int round, StepShare& share) {
-  std::array<float*, kMostThreads> gradients;
-  for (int t = 0; t < share.threads; ++t) gradients[t] = workers_[static_cast<size_t>(t)]->table_gradient.data();
-  const size_t size = model_.table.size();
-  const uint64_t blocks = (size + kOptimiserBlock - 1) / kOptimiserBlock;
-  // Each thread takes one block that is not there in each round, to learn that there are no more.
-  const uint64_t before = static_cast<uint64_t>(round) * (blocks + static_cast<uint64_t>(share.threads));
-  for (;;) {
-    const uint64_t block = share.blocks_taken.fetch_add(1, std::memory_order_relaxed) - before;
-    if (block >= blocks) return;
-    const size_t begin = block * kOptimiserBlock;
-    kernels_->adam(rates, begin, std::min(size, begin + kOptimiserBlock), model_.table.data(), table_first_.data(),
-                   table_second_.data(), gradients.data(), share.threads);
   }
 }
 

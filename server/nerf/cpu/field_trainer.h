@@ -8,6 +8,7 @@
 #include "server/nerf/cpu/field_model.h"
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/cpu/occupancy.h"
+#include "server/nerf/cpu/step_tasks.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
 #include "server/nerf/trainer.h"
@@ -63,14 +64,13 @@ class FieldTrainer : public Trainer {
 
  private:
   struct Worker;
-  struct StepShare;
 
-  void RunSteps(const StepSource& source, Occupancy& occupancy, int steps, int thread, StepShare& share);
+  void RunTasks(const StepSource& source, Occupancy& occupancy, int thread, int shares, StepTasks& tasks);
+  void RenderShare(const StepSource& source, const Occupancy& occupancy, uint64_t round, int share, int shares);
   void RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray, Worker& worker);
   void CompositeRays(Worker& worker);
-  void OptimiseMlp(const AdamRates& rates, int threads);
-  void UpdateOccupancy(Occupancy& occupancy, uint64_t step, int threads);
-  void OptimiseTable(const AdamRates& rates, int round, StepShare& share);
+  void Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, uint64_t task, int shares);
+  void UpdateOccupancy(Occupancy& occupancy, uint64_t step, int shares);
 
   NerfConfig config_;
   LossWeights loss_weights_;
