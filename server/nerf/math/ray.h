@@ -33,7 +33,8 @@ ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent,
   return exit > entry;
 }
 
-// Index of the cell of a `resolution`^3 (at most 128^3) grid that holds a point; the point is in cells and is clamped into the grid.
+// Index of the cell of a `resolution`^3 (at most 128^3) grid that holds a point; the point is in cells and is clamped
+// into the grid.
 template <class F>
 ROMAP_HD typename Lane<F>::Int CellIndex(F x_cells, F y_cells, F z_cells, int resolution) {
   const F zero = Lane<F>::Zero(), last = Lane<F>::Set(static_cast<float>(resolution - 1));
