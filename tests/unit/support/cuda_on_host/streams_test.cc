@@ -1,0 +1,105 @@
+// Streams that work late, graphs, and devices that fail.
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/support/cuda_on_host/cuda_on_host.h"
+
+namespace romap {
+namespace {
+
+using cuda_on_host::SetDeviceTraits;
+
+__global__ void AddOne(int* value, const int* limit) {
+  if (*value < *limit) *value += 1;
+}
+
+class CudaStreams : public testing::Test {
+ protected:
+  void SetUp() override {
+    SetDeviceTraits({});
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), cudaSuccess);
+    ASSERT_EQ(cudaMalloc(&device_, 2 * sizeof(int)), cudaSuccess);
+    const int start[] = {0, 100};
+    ASSERT_EQ(cudaMemcpy(device_, start, sizeof(start), cudaMemcpyHostToDevice), cudaSuccess);
+  }
+  void TearDown() override {
+    SetDeviceTraits({});
+    EXPECT_EQ(cudaFree(device_), cudaSuccess);
+    EXPECT_EQ(cudaStreamDestroy(stream_), cudaSuccess);
+  }
+
+  void Launch() { ROMAP_LAUNCH(AddOne, dim3(1), dim3(1), 0, stream_, device_, device_ + 1); }
+  int Value() const {
+    int value = -1;
+    EXPECT_EQ(cudaMemcpy(&value, device_, sizeof(value), cudaMemcpyDeviceToHost), cudaSuccess);
+    return value;
+  }
+
+  cudaStream_t stream_ = nullptr;
+  int* device_ = nullptr;
+};
+
+TEST_F(CudaStreams, WorkIsDoneWhenSomebodyWaits) {
+  Launch();
+  int copied = 77;
+  EXPECT_EQ(cudaMemcpyAsync(&copied, device_, sizeof(copied), cudaMemcpyDeviceToHost, stream_), cudaSuccess);
+  EXPECT_EQ(Value(), 0);
+  EXPECT_EQ(copied, 77);
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaSuccess);
+  EXPECT_EQ(Value(), 1);
+  EXPECT_EQ(copied, 1);
+}
+
+TEST_F(CudaStreams, SourcesOfCopiesAreReadLate) {
+  int source = 5;
+  EXPECT_EQ(cudaMemcpyAsync(device_, &source, sizeof(source), cudaMemcpyHostToDevice, stream_), cudaSuccess);
+  source = 6;  // a mistake that must show
+  EXPECT_EQ(cudaDeviceSynchronize(), cudaSuccess);
+  EXPECT_EQ(Value(), 6);
+}
+
+TEST_F(CudaStreams, EventsWaitForWhatCameBefore) {
+  cudaEvent_t event = nullptr;
+  ASSERT_EQ(cudaEventCreate(&event), cudaSuccess);
+  Launch();
+  EXPECT_EQ(cudaEventRecord(event, stream_), cudaSuccess);
+  EXPECT_EQ(cudaEventSynchronize(event), cudaSuccess);
+  EXPECT_EQ(Value(), 1);
+  EXPECT_EQ(cudaEventDestroy(event), cudaSuccess);
+}
+
+TEST_F(CudaStreams, GraphsReplayWhatWasCaptured) {
+  ASSERT_EQ(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), cudaSuccess);
+  Launch();
+  Launch();
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorStreamCaptureUnsupported);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t executable = nullptr;
+  ASSERT_EQ(cudaStreamEndCapture(stream_, &graph), cudaSuccess);
+  ASSERT_EQ(cudaGraphInstantiate(&executable, graph), cudaSuccess);
+  EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaSuccess);
+  EXPECT_EQ(Value(), 0);  // captured, not run
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(cudaGraphLaunch(executable, stream_), cudaSuccess);
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaSuccess);
+  EXPECT_EQ(Value(), 6);
+  EXPECT_EQ(cudaGraphExecDestroy(executable), cudaSuccess);
+}
+
+TEST_F(CudaStreams, AFaultStaysUntilTheMachineIsAnother) {
+  SetDeviceTraits({.kernels_before_fault = 1});
+  Launch();
+  Launch();
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorLaunchFailure);
+  EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorLaunchFailure);
+  void* more = nullptr;
+  EXPECT_EQ(cudaMalloc(&more, 10), cudaErrorLaunchFailure);
+  int value = 0;
+  EXPECT_EQ(cudaMemcpy(&value, device_, sizeof(value), cudaMemcpyDeviceToHost), cudaErrorLaunchFailure);
+  SetDeviceTraits({});
+  EXPECT_EQ(Value(), 1);  // what the first kernel did
+}
+
+}  // namespace
+}  // namespace romap
