@@ -30,7 +30,8 @@ Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& con
   double longest = config.resolution;
   if (config.adapt_resolution) {
     const double side_px = LongestSide_px(snapshot);
-    if (side_px > 0) longest = std::clamp(side_px / config.pixels_per_node, 0.5 * longest, 2.0 * longest);
+    const double most = snapshot.converged ? 2.0 * longest : longest;
+    if (side_px > 0) longest = std::clamp(side_px / config.pixels_per_node, 0.5 * longest, most);
   }
   const int most = std::max(2, static_cast<int>(std::lround(longest)));
   const int least = std::clamp(config.min_side_nodes, 2, most);

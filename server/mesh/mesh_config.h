@@ -22,7 +22,7 @@ struct MeshConfig {
         "resolution", &resolution,
         {.unit = "nodes", .min = 8, .max = 256, .help = "Grid nodes along the longest side of the object's box"});
     fields.Add("adapt_resolution", &adapt_resolution,
-               {.help = "Half to twice as many nodes, by the object's size in the training views"});
+               {.help = "Half to (when training is done) twice as many nodes, by the size in the views"});
     fields.Add("pixels_per_node", &pixels_per_node,
                {.unit = "px", .min = 0.5, .max = 50, .help = "Size in a good view that earns a node, when adapting"});
     fields.Add("min_side_nodes", &min_side_nodes,
