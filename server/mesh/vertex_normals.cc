@@ -1,6 +1,7 @@
 #include "server/mesh/vertex_normals.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -12,9 +13,6 @@ constexpr float kReach = 0.5f;
 constexpr float kLeastAgreement = 0.5f;  // cosine between the field's normal and the triangles'
 // Values beyond say "empty" or "full" and no longer how steep the surface is.
 constexpr float kMostValue = 12.0f;
-
-// Corners of a tetrahedron in a cube. Differences over its six edges cancel all even terms of the field.
-constexpr std::array<std::array<float, 3>, 4> kTetrahedron = {{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
 
 // Vertices whose edge ends with what the field itself says, on both sides.
 std::vector<uint32_t> VerticesOfTheField(const FieldGrid& grid, const GridSurface& surface) {
@@ -53,22 +51,21 @@ void SetFieldNormals(const FieldGrid& grid, const SurfaceProbe& probe, GridSurfa
   const std::vector<uint32_t> vertices = VerticesOfTheField(grid, surface);
   const Eigen::Vector3f reach = kReach * grid.spacing;
   std::vector<Eigen::Vector3f> points;
-  points.reserve(kTetrahedron.size() * vertices.size());
+  points.reserve(6 * vertices.size());
   for (const uint32_t vertex : vertices) {
-    for (const auto& [x, y, z] : kTetrahedron) {
-      points.push_back(mesh.vertices[vertex] + reach.cwiseProduct(Eigen::Vector3f(x, y, z)));
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3f offset = reach[axis] * Eigen::Vector3f::Unit(axis);
+      points.push_back(mesh.vertices[vertex] + offset);
+      points.push_back(mesh.vertices[vertex] - offset);
     }
   }
   std::vector<float> values(points.size());
   probe.Sample(points, values);
+  for (float& value : values) value = std::clamp(value, -kMostValue, kMostValue);
   for (size_t i = 0; i < vertices.size(); ++i) {
-    Eigen::Vector3f inwards = Eigen::Vector3f::Zero();
-    for (size_t corner = 0; corner < kTetrahedron.size(); ++corner) {
-      const auto& [x, y, z] = kTetrahedron[corner];
-      const float value = std::clamp(values[kTetrahedron.size() * i + corner], -kMostValue, kMostValue);
-      inwards += value * Eigen::Vector3f(x, y, z);
-    }
-    inwards = inwards.cwiseQuotient(reach);
+    const float* around = &values[6 * i];
+    const Eigen::Vector3f inwards =
+        Eigen::Vector3f(around[0] - around[1], around[2] - around[3], around[4] - around[5]).cwiseQuotient(reach);
     const float length = inwards.norm();
     if (!(length > 0)) continue;
     const Eigen::Vector3f normal = -inwards / length;
