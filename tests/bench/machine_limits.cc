@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "client/bench/fma_peak.h"
+
 #define HWY_DISABLED_TARGETS HWY_SSSE3
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/bench/machine_limits.cc"
@@ -16,32 +18,6 @@ HWY_BEFORE_NAMESPACE();
 namespace romap::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-
-// Returns the number of floating-point operations done. `sink` keeps the compiler from leaving them out.
-double MultiplyAdds(int rounds, float* sink) {
-  const hn::CappedTag<float, 16> d;
-  using V = hn::VFromD<decltype(d)>;
-  constexpr int kChains = 12;  // enough to hide the latency, few enough for the registers of every instruction set
-  const V factor = hn::Set(d, 0.999f), summand = hn::Set(d, 0.001f);
-  V v0 = summand, v1 = v0, v2 = v0, v3 = v0, v4 = v0, v5 = v0, v6 = v0, v7 = v0, v8 = v0, v9 = v0, v10 = v0, v11 = v0;
-  for (int i = 0; i < rounds; ++i) {
-    v0 = hn::MulAdd(v0, factor, summand);
-    v1 = hn::MulAdd(v1, factor, summand);
-    v2 = hn::MulAdd(v2, factor, summand);
-    v3 = hn::MulAdd(v3, factor, summand);
-    v4 = hn::MulAdd(v4, factor, summand);
-    v5 = hn::MulAdd(v5, factor, summand);
-    v6 = hn::MulAdd(v6, factor, summand);
-    v7 = hn::MulAdd(v7, factor, summand);
-    v8 = hn::MulAdd(v8, factor, summand);
-    v9 = hn::MulAdd(v9, factor, summand);
-    v10 = hn::MulAdd(v10, factor, summand);
-    v11 = hn::MulAdd(v11, factor, summand);
-  }
-  const V sum = v0 + v1 + v2 + v3 + v4 + v5 + v6 + v7 + v8 + v9 + v10 + v11;
-  *sink = hn::GetLane(sum);
-  return 2.0 * kChains * static_cast<double>(hn::Lanes(d)) * rounds;
-}
 
 // Sum of the four floats at each of `count` (a multiple of 4) places.
 float LoadAt(const float* table, const uint32_t* places, size_t count) {
@@ -77,7 +53,6 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace romap {
 
-HWY_EXPORT(MultiplyAdds);
 HWY_EXPORT(LoadAt);
 HWY_EXPORT(UpdateAt);
 HWY_EXPORT(UpdateAll);
@@ -133,16 +108,7 @@ double RandomAccessSeconds(size_t table_bytes, const Access& access) {
 
 }  // namespace
 
-double PeakFlopPerSecond() {
-  constexpr int kRounds = 1 << 18;
-  double operations = 0;
-  const double seconds = ShortestSeconds([&] {
-    float sink;
-    operations = HWY_DYNAMIC_DISPATCH(MultiplyAdds)(kRounds, &sink);
-    g_sink = sink;
-  });
-  return operations / seconds;
-}
+double PeakFlopPerSecond() { return 1e9 * MeasureFmaPeakGflops(1); }
 
 double RandomLoadSeconds(size_t table_bytes) {
   return RandomAccessSeconds(table_bytes, [](const float* table, const std::vector<uint32_t>& places) {
