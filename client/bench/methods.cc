@@ -25,7 +25,8 @@ std::vector<std::string> FrequencyMlp(int hidden_width) {
 
 // The paper's fields and its surface, which has 64^3 nodes whatever the object's size; then `more`.
 std::vector<std::string> PaperSettings(const std::vector<std::string>& more) {
-  std::vector<std::string> settings = {"nerf.preset=paper", "mesh.adapt_resolution=false", "mesh.resolution=64"};
+  std::vector<std::string> settings = {"nerf.preset=paper", "mesh.adapt_resolution=false", "mesh.resolution=64",
+                                       "mesh.min_side_nodes=64"};
   settings.insert(settings.end(), more.begin(), more.end());
   return settings;
 }
