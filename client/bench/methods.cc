@@ -19,7 +19,8 @@ std::vector<std::string> FrequencyMlp(int hidden_width) {
           "nerf.adam_beta1=0.9",      "nerf.adam_beta2=0.999",
           "nerf.carve_hull=false",    "nerf.hull_trim_share=0",
           "nerf.sampling=uniform",    "nerf.max_samples_per_ray=32",
-          "nerf.density_weight=0",    "nerf.full_budget_steps=10000",
+          "nerf.density_weight=0",    "nerf.contrast_weight=0",
+          "nerf.border_weight=1",     "nerf.full_budget_steps=10000",
           "nerf.max_extra_steps=0"};
 }
 
@@ -80,6 +81,7 @@ std::vector<BenchMethod> AblationMethods() {
       {.id = "no-opacity",
        .title = "no opacity loss",
        .settings = {"nerf.opacity_weight_object=0", "nerf.opacity_weight_background=0"}},
+      {.id = "no-contrast", .title = "no contrast loss", .settings = {"nerf.contrast_weight=0"}},
       {.id = "no-density", .title = "no density loss", .settings = {"nerf.density_weight=0"}},
       {.id = "no-background", .title = "no background rays", .settings = {"nerf.background_share=0"}},
       {.id = "random-background",

@@ -9,7 +9,7 @@ struct MeshConfig {
   int resolution = 64;
   bool adapt_resolution = true;
   double pixels_per_node = 2.5;
-  int min_side_nodes = 32;
+  int min_side_nodes = 48;
   bool fill_unseen = true;
   double unseen_optical_depth = 0.2;
   bool cut_below_support = true;

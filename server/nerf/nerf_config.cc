@@ -87,6 +87,15 @@ void LossFields(NerfConfig& c, ConfigFields& fields) {
              {.min = 0, .max = 100, .help = "Weight of opacity on background rays"});
   fields.Add("density_weight", &c.density_weight,
              {.min = 0, .max = 100, .help = "Weight of the density of samples on background rays (paper .01)"});
+  fields.Add(
+      "contrast_weight", &c.contrast_weight,
+      {.min = 0, .max = 100, .help = "Weight of errors in the difference of two near pixels' colours; 0 = no pairs"});
+  fields.Add(
+      "contrast_distance", &c.contrast_distance,
+      {.unit = "mask sizes",
+       .min = 0.001,
+       .max = 0.5,
+       .help = "How far the pixels of a pair are apart, give or take half; a mask's size is the root of its area"});
   fields.Add("depth_weight", &c.depth_weight,
              {.min = 0, .max = 100, .help = "Weight of the depth error, box sides, on rays with depth (paper .5)"});
   fields.Add("depth_limit", &c.depth_limit,

@@ -38,7 +38,7 @@ struct NerfConfig {
   double background_share = 0.3;
   int background_band_px = 6;
   double sparse_depth_share = 0.1;
-  double border_weight = 2.0;
+  double border_weight = 1.0;
   double residual_share = 0.0;
   double new_view_weight = 1.0;
   std::string sampling = "occupied";
@@ -51,6 +51,8 @@ struct NerfConfig {
   double opacity_weight_object = 0.5;
   double opacity_weight_background = 0.5;
   double density_weight = 0.01;
+  double contrast_weight = 1.0;
+  double contrast_distance = 0.1;
   double depth_weight = 0.5;
   double depth_limit = 0.2;
   bool random_background = false;
@@ -67,11 +69,11 @@ struct NerfConfig {
 
   // Schedule of the training pool.
   int min_views = 3;
-  int first_budget_steps = 60;
-  int budget_steps_per_view = 10;
-  int full_budget_steps = 300;
+  int first_budget_steps = 80;
+  int budget_steps_per_view = 20;
+  int full_budget_steps = 600;
   int refine_steps_per_view = 6;
-  int max_refine_steps = 100;
+  int max_refine_steps = 200;
   int slice_steps = 20;
   int snapshot_interval_steps = 40;
   double snapshot_interval_s = 1.0;

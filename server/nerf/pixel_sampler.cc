@@ -9,8 +9,8 @@
 namespace romap {
 namespace {
 
-// A full training reads about 150 000 object rays; more pixels than this are thinned out evenly.
-constexpr double kMostObjectPixels = 1 << 18;
+// A full training reads about 100 000 object pixels besides partners; more than this are thinned out evenly.
+constexpr double kMostObjectPixels = 1 << 17;
 constexpr int kBorder_px = 2;  // object pixels so near to another kind lie at the border
 
 cv::Mat KindMask(const ObjectView& view, RayKind kind) { return view.ray_kind == static_cast<int>(kind); }
@@ -28,7 +28,8 @@ TrainingPixel PixelAt(const ObjectView& view, uint16_t view_index, int x, int y,
 
 }  // namespace
 
-PixelSampler::PixelSampler(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed) {
+PixelSampler::PixelSampler(const NerfConfig& config, uint64_t seed)
+    : config_(config), seed_(seed), rays_per_slot_(config.contrast_weight > 0 ? 2 : 1) {
   object_.salt = 1;
   background_.salt = 2;
   sparse_.salt = 3;
@@ -46,14 +47,16 @@ void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
     CollectPixels(views[i], static_cast<uint16_t>(i), keep_share, use_depth);
     CollectMapPoints(views[i], static_cast<uint16_t>(i));
   }
+  for (Line* line : {&object_, &background_, &sparse_}) line->pixels.shrink_to_fit();
   const int rays = config_.rays_per_step;
   const int background = background_.pixels.empty() ? 0 : static_cast<int>(rays * config_.background_share);
   // A map point is seen again and again, so their share is bounded by how many there are.
   const int sparse =
       std::min(static_cast<int>(rays * config_.sparse_depth_share), static_cast<int>(sparse_.pixels.size() / 8));
-  background_.SetRays(background, seed_);
-  sparse_.SetRays(sparse, seed_);
-  object_.SetRays(rays - background - sparse, seed_);
+  background_.SetRays(background / rays_per_slot_ * rays_per_slot_, seed_);
+  sparse_.SetRays(sparse / rays_per_slot_ * rays_per_slot_, seed_);
+  const int left = rays - background_.rays() - sparse_.rays();
+  object_.SetRays((left + rays_per_slot_ - 1) / rays_per_slot_, seed_);
   Weigh(std::vector<float>(views.size(), 1.0f), std::vector<float>(views.size() * kTiles, 1.0f));
 }
 
@@ -64,6 +67,7 @@ void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, do
   cv::dilate(is_object, near_object, Square(config_.background_band_px));
   cv::erode(is_object, inside, Square(kBorder_px), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   std::array<std::vector<TrainingPixel>, kTiles> tiles;
+  const double apart_px = std::clamp(config_.contrast_distance * std::sqrt(cv::countNonZero(is_object)), 1.5, 80.0);
   for (int y = 0; y < view.roi_px.height; ++y) {
     for (int x = 0; x < view.roi_px.width; ++x) {
       const bool object = is_object.at<uint8_t>(y, x) != 0;
@@ -80,7 +84,9 @@ void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, do
       const int row = (y - bounds.y) * kTilesPerSide / bounds.height;
       const int tile = inside.at<uint8_t>(y, x) != 0 ? row * kTilesPerSide + column : kBorderTile;
       const float z_mu = !use_depth || view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(y, x);
-      tiles[static_cast<size_t>(tile)].push_back(PixelAt(view, view_index, x, y, z_mu));
+      TrainingPixel pixel = PixelAt(view, view_index, x, y, z_mu);
+      if (rays_per_slot_ == 2) pixel.partner = FindPartner(view, is_object, {x, y}, apart_px, key, use_depth);
+      tiles[static_cast<size_t>(tile)].push_back(pixel);
     }
   }
   for (const std::vector<TrainingPixel>& tile : tiles) {
@@ -88,6 +94,24 @@ void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, do
     object_.CloseGroup();
   }
   background_.CloseGroup();
+}
+
+// An object pixel about `apart_px` away, at most 80, in a direction that `key` draws.
+PartnerPixel PixelSampler::FindPartner(const ObjectView& view, const cv::Mat& is_object, cv::Point at, double apart_px,
+                                       uint64_t key, bool use_depth) const {
+  constexpr int kTries = 4;  // at the border most directions lead away from the object
+  for (uint64_t attempt = 0; attempt < kTries; ++attempt) {
+    const double angle_rad = 2 * M_PI * nerf::RandomUniform(seed_, 40 + 2 * attempt, key);
+    const double distance_px = apart_px * (0.5 + nerf::RandomUniform(seed_, 41 + 2 * attempt, key));
+    const cv::Point step(cvRound(distance_px * std::cos(angle_rad)), cvRound(distance_px * std::sin(angle_rad)));
+    const cv::Point to = at + step;
+    if (step == cv::Point() || !cv::Rect({0, 0}, is_object.size()).contains(to)) continue;
+    if (is_object.at<uint8_t>(to) == 0) continue;
+    const float z_mu = !use_depth || view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(to);
+    const TrainingPixel found = PixelAt(view, 0, to.x, to.y, z_mu);
+    return {static_cast<int8_t>(step.x), static_cast<int8_t>(step.y), found.rgb, found.z_mu};
+  }
+  return {};
 }
 
 void PixelSampler::CollectMapPoints(const ObjectView& view, uint16_t view_index) {
@@ -158,10 +182,14 @@ std::vector<const TrainingPixel*> PixelSampler::Line::Spread(size_t group, size_
 }
 
 PixelSampler::Choice PixelSampler::At(uint64_t step, int index) const {
-  if (index < background_.rays()) return {&background_.At(step, index), false};
+  if (index < background_.rays()) return {background_.At(step, index), false};
   index -= background_.rays();
-  if (index < sparse_.rays()) return {&sparse_.At(step, index), true};
-  return {&object_.At(step, index - sparse_.rays()), true};
+  if (index < sparse_.rays()) return {sparse_.At(step, index), true};
+  index -= sparse_.rays();
+  const TrainingPixel& pixel = object_.At(step, index / rays_per_slot_);
+  const bool paired = rays_per_slot_ == 2 && (pixel.partner.du_px != 0 || pixel.partner.dv_px != 0);
+  if (index % rays_per_slot_ == 0) return {pixel, true, paired ? 1 : 0};
+  return {paired ? pixel.Partner() : pixel, true, paired ? -1 : 0};
 }
 
 }  // namespace romap

@@ -11,16 +11,30 @@
 
 namespace romap {
 
+// An object pixel near another one of the same view.
+struct PartnerPixel {
+  int8_t du_px = 0, dv_px = 0;  // from the other pixel; both 0: there is none
+  std::array<uint8_t, 3> rgb = {};
+  float z_mu = 0;  // as TrainingPixel's
+};
+
 // A pixel that a ray can be sent through.
 struct TrainingPixel {
   uint16_t view;        // index of the view it belongs to
   uint16_t u_px, v_px;  // in the full image
   std::array<uint8_t, 3> rgb;
   float z_mu;  // z depth, map units; <= 0: unknown
+  PartnerPixel partner = {};
+
+  TrainingPixel Partner() const {
+    return {view, static_cast<uint16_t>(u_px + partner.du_px), static_cast<uint16_t>(v_px + partner.dv_px), partner.rgb,
+            partner.z_mu};
+  }
 };
 
 // Chooses the pixels of every step: background pixels of a band around the masks, where they say most about the shape,
-// pixels with a map point, and object pixels. Pixels of occluders are never chosen.
+// pixels with a map point, and object pixels, these in pairs where contrast has a weight: the rays 2 k and 2 k + 1 of a
+// step. Pixels of occluders are never chosen.
 //
 // The pixels of a kind lie tile after tile and view after view on a line on which each takes up room by its tile's
 // weight. Every ray of a step owns an equal part of that line and goes through it from step to step by the golden ratio
@@ -34,8 +48,9 @@ class PixelSampler {
   static constexpr int kTiles = kBorderTile + 1;
 
   struct Choice {
-    const TrainingPixel* pixel;
+    TrainingPixel pixel;
     bool is_object;
+    int partner = 0;  // see nerf::RayTarget
   };
 
   PixelSampler(const NerfConfig& config, uint64_t seed);
@@ -89,10 +104,13 @@ class PixelSampler {
   };
 
   void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth);
+  PartnerPixel FindPartner(const ObjectView& view, const cv::Mat& is_object, cv::Point at, double apart_px,
+                           uint64_t key, bool use_depth) const;
   void CollectMapPoints(const ObjectView& view, uint16_t view_index);
 
   NerfConfig config_;
   uint64_t seed_;
+  int rays_per_slot_;  // of object pixels: 2 where they come in pairs
   Line object_, background_, sparse_;
 };
 

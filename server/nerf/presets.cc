@@ -24,7 +24,9 @@ NerfConfig PaperPreset() {
   c.opacity_weight_background = 0;
   c.density_weight = 0.01;
   c.depth_weight = 0.5;
+  c.contrast_weight = 0;
   c.random_background = true;
+  c.border_weight = 1;
 
   c.learning_rate = 0.01;
   c.final_learning_rate = 0.001;

@@ -39,7 +39,8 @@ nerf::Ray RaySet::Through(const TrainingPixel& pixel, bool is_object, float jitt
 nerf::Ray RaySet::Get(uint64_t step, int index) const {
   const PixelSampler::Choice choice = sampler_.At(step, index);
   const uint64_t draw = 8 * static_cast<uint64_t>(index);
-  nerf::Ray ray = Through(*choice.pixel, choice.is_object, nerf::RandomUniform(seed_, step, draw));
+  nerf::Ray ray = Through(choice.pixel, choice.is_object, nerf::RandomUniform(seed_, step, draw));
+  ray.target.partner = choice.partner;
   if (config_.random_background) {
     for (int c = 0; c < 3; ++c) ray.target.background[c] = nerf::RandomUniform(seed_, step, draw + 1 + c);
   }

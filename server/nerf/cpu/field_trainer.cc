@@ -32,6 +32,7 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
   w.opacity_background = static_cast<float>(config.opacity_weight_background);
   w.density = static_cast<float>(config.density_weight);
   w.depth = static_cast<float>(config.depth_weight);
+  w.contrast = static_cast<float>(config.contrast_weight);
   w.depth_limit = static_cast<float>(config.depth_limit);
   w.random_background = config.random_background;
   return w;
@@ -40,10 +41,11 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
 // What one share of the rays of a step is rendered with; its gradients. As many as there are threads.
 struct FieldTrainer::Worker {
   Worker(const NerfConfig& config, const FieldModel& model)
-      : chunk_rays(kChunkSamples / config.max_samples_per_ray),
+      : chunk_rays(kChunkSamples / config.max_samples_per_ray / 2 * 2),  // pairs stay together
         chunk(kChunkSamples, model.layout.features, model.mlp.hidden),
         rays(static_cast<size_t>(chunk_rays)),
         spans(static_cast<size_t>(chunk_rays)),
+        results(static_cast<size_t>(chunk_rays)),
         table_gradient(model.table.size() + kMaxLanes),
         mlp_gradient(model.mlp.parameters.size()),
         visits(static_cast<size_t>((config.rays_per_step + chunk_rays) * config.max_samples_per_ray)) {}
@@ -78,6 +80,7 @@ struct FieldTrainer::Worker {
   SampleChunk chunk;
   std::vector<Ray> rays;
   std::vector<RaySpan> spans;
+  std::vector<RayResult> results;
   AlignedBuffer<float> table_gradient, mlp_gradient;
   AlignedBuffer<Visit> visits;  // of one step, for the occupancy; the first visit_count are in use
   size_t visit_count = 0;
@@ -216,25 +219,17 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
 
 void FieldTrainer::CompositeRays(Worker& worker) {
   SampleChunk& c = worker.chunk;
+  kernels_->composite(worker.rays.data(), worker.spans.data(), worker.ray_count, loss_weights_, c,
+                      worker.results.data());
   Worker::Visit* visit = worker.visits.data() + worker.visit_count;
   worker.visit_count += static_cast<size_t>(c.size);
-  for (int r = 0; r < worker.ray_count; ++r) {
-    const RaySpan span = worker.spans[static_cast<size_t>(r)];
-    if (span.count == 0) continue;
-    const RayTarget& target = worker.rays[static_cast<size_t>(r)].target;
-    const int at = span.first;
-    const RaySamples samples{
-        span.count,          c.t.data() + at,       c.length.data() + at,
-        c.alpha.data() + at, c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
-    float* weight = c.weight.data() + at;
-    float* behind = c.behind.data() + at;
-    const RayResult result =
-        kernels_->composite(samples, target, loss_weights_, weight, behind, c.d_raw.data() + kOutputs * at);
-    for (int i = 0; i < span.count; ++i) visit[i] = {c.cell[static_cast<size_t>(at + i)], weight[i]};
-    visit += span.count;
+  for (size_t r = 0; r < static_cast<size_t>(worker.ray_count); ++r) {
+    const size_t first = static_cast<size_t>(worker.spans[r].first), count = static_cast<size_t>(worker.spans[r].count);
+    if (count == 0) continue;
+    for (size_t i = first; i < first + count; ++i) *visit++ = {c.cell[i], c.weight[i]};
     ++worker.stats.rays;
-    if (target.is_object) {
-      worker.stats.color_loss += result.color_loss;
+    if (worker.rays[r].target.is_object) {
+      worker.stats.color_loss += worker.results[r].color_loss;
       ++worker.object_rays;
     }
   }

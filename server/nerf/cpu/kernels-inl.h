@@ -245,11 +245,34 @@ void Activate(SampleChunk& chunk, float density_bias) {
   }
 }
 
-inline RayResult Composite(const RaySamples& samples, const RayTarget& target, const LossWeights& weights,
-                           float* weight, float* behind, float* d_raw) {
-  const RayResult result = CompositeForward(samples, target, weights, weight, behind);
-  CompositeBackward(samples, target, weights, result, weight, behind, d_raw);
-  return result;
+inline RaySamples SamplesOf(const RaySpan& span, const SampleChunk& c) {
+  const int at = span.first;
+  return {span.count,          c.t.data() + at,       c.length.data() + at,
+          c.alpha.data() + at, c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
+}
+
+inline void Composite(const Ray* rays, const RaySpan* spans, int ray_count, const LossWeights& weights, SampleChunk& c,
+                      RayResult* results) {
+  for (int r = 0; r < ray_count; ++r) {
+    if (spans[r].count == 0) continue;
+    const int at = spans[r].first;
+    results[r] =
+        CompositeForward(SamplesOf(spans[r], c), rays[r].target, weights, c.weight.data() + at, c.behind.data() + at);
+  }
+  for (int r = 0; r < ray_count; ++r) {
+    if (spans[r].count == 0) continue;
+    RayTarget target = rays[r].target;
+    const int partner = r + target.partner;
+    if (partner != r && partner >= 0 && partner < ray_count && spans[partner].count > 0) {
+      float error[3], partner_error[3];
+      ColorError(results[r], target, weights, error);
+      ColorError(results[partner], rays[partner].target, weights, partner_error);
+      target = ContrastTarget(target, weights, error, partner_error, results[r]);
+    }
+    const int at = spans[r].first;
+    CompositeBackward(SamplesOf(spans[r], c), target, weights, results[r], c.weight.data() + at, c.behind.data() + at,
+                      c.d_raw.data() + kOutputs * at);
+  }
 }
 
 template <class Wide>

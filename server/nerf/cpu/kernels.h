@@ -67,9 +67,11 @@ struct KernelTable {
   // raw, length -> red, green, blue, density, alpha of the chunk's samples.
   void (*activate)(SampleChunk& chunk, float density_bias);
 
-  // CompositeForward and CompositeBackward of one ray (see math/composite.h).
-  RayResult (*composite)(const RaySamples& samples, const RayTarget& target, const LossWeights& weights, float* weight,
-                         float* behind, float* d_raw);
+  // Renders rays and their adjoint (see math/composite.h): weight, behind and d_raw of the chunk's samples, and
+  // `results`, one per ray; rays without samples keep theirs. A ray whose partner is not among them, or has no samples,
+  // has none.
+  void (*composite)(const Ray* rays, const RaySpan* spans, int ray_count, const LossWeights& weights,
+                    SampleChunk& chunk, RayResult* results);
 
   // Moves the samples whose |d_raw| sums to more than `cut` to the front, in their order: x, y, z, features, hidden and
   // d_raw, this multiplied by `scale`. Returns how many they are; the arrays behind them are left in no order.

@@ -88,21 +88,34 @@ __device__ void Activate(const FieldView& field, Tile<T>& tile) {
   tile.alpha[s] = plain::StepOpacity(tile.density[s], tile.length[s]);
 }
 
-// Renders the calling thread's ray and turns tile.raw into the derivatives of its loss.
+// Renders the calling thread's ray and turns tile.raw into the derivatives of its loss. To be called by whole warps:
+// partners exchange their errors.
 template <class T>
 __device__ void RenderRay(const StepParams& p, const TileRays& in, Tile<T>& tile) {
   const int r = threadIdx.x;
-  const int count = tile.ways[r].count;
-  in.color_loss[r] = -1.0f;
-  if (count == 0) return;
+  const int count = r < in.count ? tile.ways[r].count : 0;
+  if (r < in.count) in.color_loss[r] = -1.0f;
   const int at = r * tile.samples_per_ray;
-  const RayTarget& target = in.rays[r].target;
   const RaySamples ray{count,           tile.t + at,       tile.length + at,
                        tile.alpha + at, tile.density + at, {tile.red + at, tile.green + at, tile.blue + at}};
-  const RayResult result = plain::CompositeForward(ray, target, p.loss_weights, tile.weight + at, tile.behind + at);
+  RayTarget target{};
+  RayResult result{};
+  float error[3] = {}, partner_error[3];
+  if (count > 0) {
+    target = in.rays[r].target;
+    result = plain::CompositeForward(ray, target, p.loss_weights, tile.weight + at, tile.behind + at);
+    plain::ColorError(result, target, p.loss_weights, error);
+  }
+  // A ray at an even place and the one behind it are partners or have none, and lie in one warp.
+  const bool partner_seen = __shfl_xor_sync(kWholeWarp, count, 1) > 0;
+  for (int c = 0; c < 3; ++c) partner_error[c] = __shfl_xor_sync(kWholeWarp, error[c], 1);
+  if (count == 0) return;
+  if (target.is_object) in.color_loss[r] = result.color_loss;
+  if (target.partner != 0 && partner_seen) {
+    target = plain::ContrastTarget(target, p.loss_weights, error, partner_error, result);
+  }
   plain::CompositeBackward(ray, target, p.loss_weights, result, tile.weight + at, tile.behind + at,
                            tile.raw + kOutputs * at);
-  if (target.is_object) in.color_loss[r] = result.color_loss;
   atomicAdd(&p.counters->rays, 1ull);
   atomicAdd(&p.counters->samples, static_cast<unsigned long long>(count));
 }
@@ -165,7 +178,7 @@ __device__ void WorkOnTile(const StepParams& p, const TileRays& in, Tile<typenam
   __syncwarp();
   if (used) Activate(p.field, tile);
   __syncthreads();
-  if (static_cast<int>(threadIdx.x) < in.count) RenderRay(p, in, tile);
+  if (static_cast<int>(threadIdx.x) / kWarpThreads * kWarpThreads < in.count) RenderRay(p, in, tile);
   __syncthreads();
   if (used) RecordVisit(p, cell, tile);
   const float largest = CutDerivatives(p, used, tile);
@@ -277,7 +290,7 @@ cudaError_t LaunchEvaluate(const EvaluateParams& params, MlpPath path, cudaStrea
 }
 
 int StepBlocks(int rays_per_step, int most_samples) {
-  const int rays_per_tile = kTileSamples / most_samples;
+  const int rays_per_tile = RaySlots(most_samples);
   const int tiles = (rays_per_step + rays_per_tile - 1) / rays_per_tile;
   return tiles < kMaxStepBlocks ? tiles : kMaxStepBlocks;
 }

@@ -31,6 +31,9 @@ struct RayWay {
   uint64_t occupied;
 };
 
+// Rays of a tile: an even number, so that pairs stay together.
+__host__ __device__ inline int RaySlots(int samples_per_ray) { return kTileSamples / samples_per_ray / 2 * 2; }
+
 // Places in a block's memory, all aligned to 128 bytes. T holds the MLP's factors: half or float.
 template <class T>
 struct Tile {
@@ -102,7 +105,7 @@ __host__ __device__ size_t LayOutTile(const FieldView& field, int samples_per_ra
   Arena arena(memory);
   LayOutMlp(field, arena, tile);
   tile.samples_per_ray = samples_per_ray;
-  tile.ray_slots = kTileSamples / samples_per_ray;
+  tile.ray_slots = RaySlots(samples_per_ray);
   arena.Take(tile.ways, tile.ray_slots);
   for (float** array : {&tile.x, &tile.y, &tile.z, &tile.weight}) arena.Take(*array, kTileSamples);
   arena.Take(tile.active, kTileSamples);

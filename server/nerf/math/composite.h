@@ -45,6 +45,35 @@ ROMAP_HD RayResult CompositeForward(const RaySamples& s, const RayTarget& target
   return out;
 }
 
+// Colour error of a rendered ray, 0 where it is to show none.
+template <class F>
+ROMAP_HD void ColorError(const RayResult& result, const RayTarget& target, const LossWeights& w, F* error) {
+  const bool colored = target.is_object || w.random_background;
+  for (int c = 0; c < 3; ++c) {
+    const F back = w.random_background ? target.background[c] : 0;
+    const F wanted = target.is_object ? target.rgb[c] : back;
+    error[c] = colored ? result.rgb[c] + (1 - result.opacity) * back - wanted : 0;
+  }
+}
+
+// The loss of contrast, w.contrast |e - e'|^2 with the colour errors e, e' of two rays through pixels near each other.
+// It wants the difference of two colours right rather than the colours: light that changes slowly over a surface, as
+// reflections do when the view changes, is in both and counts for less, and a field that knows no directions has less
+// reason to explain it by dents. Half of it is added to result.loss, for the partner adds the other half. Returns the
+// target for CompositeBackward, which is `target` moved so that the squared error of colour has the derivative of both
+// losses.
+template <class F>
+ROMAP_HD RayTarget ContrastTarget(const RayTarget& target, const LossWeights& w, const F* error, const F* partner_error,
+                                  RayResult& result) {
+  RayTarget moved = target;
+  for (int c = 0; c < 3; ++c) {
+    const F difference = error[c] - partner_error[c];
+    moved.rgb[c] -= w.contrast * difference;
+    result.loss += static_cast<F>(0.5) * w.contrast * difference * difference;
+  }
+  return moved;
+}
+
 // Adjoint of CompositeForward: d loss / d raw outputs, d_raw[count][4] = (r, g, b, density), given the forward's
 // results. With G_i = dL/dw_i: dL/dsigma_i = delta_i (T_{i+1} G_i - sum_{j>i} w_j G_j).
 template <class F>

@@ -49,6 +49,7 @@ struct LossWeights {
   float opacity_background = 0;    // times sum w on background rays
   float density = 0;               // times sum sigma_i on background rays (paper: L_density)
   float depth = 0;                 // times |sum w_i (t_i - t*)| on rays with depth (paper: L_depth)
+  float contrast = 0;              // times |e - e'|^2 of the colour errors of a ray and its partner
   float depth_limit = 0;           // residual beyond which a depth is taken for an outlier, in units of box side
   bool random_background = false;  // paper: L_rr; also lets object rays blend over the random colour
 };
@@ -59,6 +60,9 @@ struct RayTarget {
   float background[3] = {0, 0, 0};  // random colour, used when LossWeights::random_background
   float depth = -1;                 // along the ray, in units of box side; < 0: unknown
   bool is_object = true;
+  // Object rays may come in pairs through pixels near each other: 1 = the next ray is the partner, -1 = the one before
+  // is, 0 = there is none.
+  int partner = 0;
 };
 
 inline constexpr int kOccupancyResolution = 64;  // one row of cells is one machine word (see cpu/occupancy.h)

@@ -137,6 +137,42 @@ INSTANTIATE_TEST_SUITE_P(Losses, CompositeGradientTest,
                                            LossCase{"RandomBackground", false, true, -1}),
                          [](const auto& info) { return info.param.name; });
 
+// Two rays with three samples each, partners of one another.
+TEST(CompositeTest, ContrastHasTheGradientOfBothRaysLosses) {
+  constexpr int kSamples = 3;
+  for (const bool random_background : {false, true}) {
+    const LossWeights weights{.opacity_object = 0.5f, .contrast = 3.0f, .random_background = random_background};
+    std::array<Ray, 2> rays{};
+    rays[0].target = {{0.9f, 0.2f, 0.4f}, {0.1f, 0.7f, 0.3f}, -1, true, 1};
+    rays[1].target = {{0.3f, 0.6f, 0.1f}, {0.8f, 0.5f, 0.2f}, -1, true, -1};
+    const std::array<RaySpan, 2> spans = {RaySpan{0, kSamples}, RaySpan{kSamples, kSamples}};
+    SampleChunk chunk(2 * kSamples, 16, 16);
+    chunk.size = 2 * kSamples;
+    for (int i = 0; i < chunk.size; ++i) {
+      chunk.t[static_cast<size_t>(i)] = 2.0f + 0.1f * static_cast<float>(i % kSamples);
+      chunk.length[static_cast<size_t>(i)] = 0.1f;
+    }
+    for (size_t i = 0; i < static_cast<size_t>(chunk.size * kOutputs); ++i) chunk.raw[i] = Noise(8, i);
+    std::array<RayResult, 2> results{};
+    const auto loss = [&] {
+      PlainKernels().activate(chunk, 0);
+      PlainKernels().composite(rays.data(), spans.data(), 2, weights, chunk, results.data());
+      return results[0].loss + results[1].loss;
+    };
+    const float whole = loss();
+    float error[2][3];
+    double squares = 0, contrast = 0;
+    for (int r = 0; r < 2; ++r) plain::ColorError(results[r], rays[r].target, weights, error[r]);
+    for (int c = 0; c < 3; ++c) {
+      squares += error[0][c] * error[0][c] + error[1][c] * error[1][c];
+      contrast += (error[0][c] - error[1][c]) * (error[0][c] - error[1][c]);
+    }
+    EXPECT_NEAR(whole, squares + 3 * contrast + 0.5 * (2 - results[0].opacity - results[1].opacity), 1e-5);
+    std::vector<float> d_raw(chunk.d_raw.data(), chunk.d_raw.data() + chunk.size * kOutputs);
+    ExpectGradient(loss, chunk.raw.data(), d_raw.data(), chunk.size * kOutputs, chunk.size * kOutputs, 1e-2f, 5e-3);
+  }
+}
+
 TEST(CompositeTest, OutlierDepthHasNoGradient) {
   const float t[1] = {2}, length[1] = {0.1f}, alpha[1] = {0.5f}, density[1] = {7}, color[1] = {0.5f};
   const RaySamples samples{1, t, length, alpha, density, {color, color, color}};

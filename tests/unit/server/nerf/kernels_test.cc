@@ -150,36 +150,58 @@ TEST_P(KernelsTest, KeepsActiveSamplesInTheirOrder) {
   }
 }
 
+// Rays of 13 samples, one without any in between, of which two are partners, and background.
 TEST_P(KernelsTest, Compositing) {
-  constexpr int kSamples = 13;
-  float t[kSamples], length[kSamples], alpha[kSamples], density[kSamples], rgb[3][kSamples];
-  for (uint64_t i = 0; i < kSamples; ++i) {
-    t[i] = 1.0f + 0.1f * static_cast<float>(i);
-    length[i] = 0.1f;
-    density[i] = 4.0f * RandomUniform(17, 0, i);
-    alpha[i] = 1 - std::exp(-density[i] * length[i]);
-    for (uint64_t c = 0; c < 3; ++c) rgb[c][i] = RandomUniform(17, 1 + c, i);
+  constexpr int kSamples = 13, kRays = 5;
+  const std::array<RaySpan, kRays> spans = {RaySpan{0, kSamples}, RaySpan{kSamples, kSamples}, RaySpan{2 * kSamples, 0},
+                                            RaySpan{2 * kSamples, kSamples}, RaySpan{3 * kSamples, kSamples}};
+  std::array<Ray, kRays> rays{};
+  for (size_t r = 0; r < kRays; ++r) {
+    rays[r].target.rgb[0] = 0.9f - 0.2f * static_cast<float>(r);
+    rays[r].target.depth = 1.3f;
+    rays[r].target.is_object = r < 4;
+    rays[r].target.partner = r % 2 == 0 ? 1 : -1;  // of 0 and 1; the ray at 2 has no samples, 4 has nothing behind it
   }
-  const RaySamples samples{kSamples, t, length, alpha, density, {rgb[0], rgb[1], rgb[2]}};
   LossWeights weights;
   weights.opacity_object = weights.opacity_background = weights.depth = 0.5f;
   weights.density = 0.01f;
   weights.depth_limit = 10;
-  for (const bool is_object : {true, false}) {
-    RayTarget target;
-    target.rgb[0] = 0.9f;
-    target.depth = 1.3f;
-    target.is_object = is_object;
-    float want_weight[kSamples], got_weight[kSamples], behind[kSamples];
-    float want_d_raw[kSamples * kOutputs], got_d_raw[kSamples * kOutputs];
-    const RayResult want = plain_.composite(samples, target, weights, want_weight, behind, want_d_raw);
-    const RayResult got = SimdKernels().composite(samples, target, weights, got_weight, behind, got_d_raw);
-    EXPECT_NEAR(want.loss, got.loss, 1e-5f);
-    EXPECT_NEAR(want.color_loss, got.color_loss, 1e-5f);
-    EXPECT_GT(want.loss, 0);
-    for (int i = 0; i < kSamples; ++i) EXPECT_NEAR(want_weight[i], got_weight[i], 1e-6f);
-    for (int i = 0; i < kSamples * kOutputs; ++i) EXPECT_NEAR(want_d_raw[i], got_d_raw[i], 1e-6f) << i;
+  weights.contrast = 2;
+  const auto run = [&](const KernelTable& kernels, SampleChunk& chunk, std::array<RayResult, kRays>& results) {
+    chunk.size = (kRays - 1) * kSamples;
+    for (size_t i = 0; i < static_cast<size_t>(chunk.size); ++i) {
+      chunk.t[i] = 1.0f + 0.1f * static_cast<float>(i % kSamples);
+      chunk.length[i] = 0.1f;
+      chunk.density[i] = 4.0f * RandomUniform(17, 0, i);
+      chunk.alpha[i] = 1 - std::exp(-chunk.density[i] * chunk.length[i]);
+      chunk.red[i] = RandomUniform(17, 1, i);
+      chunk.green[i] = RandomUniform(17, 2, i);
+      chunk.blue[i] = RandomUniform(17, 3, i);
+    }
+    kernels.composite(rays.data(), spans.data(), kRays, weights, chunk, results.data());
+  };
+  SampleChunk want(kRays * kSamples, 16, 16), got(kRays * kSamples, 16, 16);
+  std::array<RayResult, kRays> want_results{}, got_results{};
+  run(plain_, want, want_results);
+  run(SimdKernels(), got, got_results);
+  for (size_t r = 0; r < kRays; ++r) {
+    EXPECT_NEAR(want_results[r].loss, got_results[r].loss, 1e-5f);
+    EXPECT_NEAR(want_results[r].color_loss, got_results[r].color_loss, 1e-5f);
+    EXPECT_EQ(want_results[r].loss > 0, spans[r].count > 0);
   }
+  for (size_t i = 0; i < static_cast<size_t>(want.size); ++i) {
+    EXPECT_NEAR(want.weight[i], got.weight[i], 1e-6f);
+    EXPECT_NEAR(want.behind[i], got.behind[i], 1e-6f);
+  }
+  for (size_t i = 0; i < static_cast<size_t>(want.size * kOutputs); ++i) {
+    EXPECT_NEAR(want.d_raw[i], got.d_raw[i], 1e-6f) << i;
+  }
+  // Without a partner to be seen the loss is the plain one.
+  weights.contrast = 0;
+  run(plain_, want, want_results);
+  EXPECT_LT(want_results[0].loss, got_results[0].loss);
+  EXPECT_EQ(want_results[3].loss, got_results[3].loss);
+  EXPECT_EQ(want_results[4].loss, got_results[4].loss);
 }
 
 TEST_P(KernelsTest, AdamLeavesEntriesWithoutGradientAlone) {

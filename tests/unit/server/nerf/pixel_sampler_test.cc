@@ -35,7 +35,7 @@ class PixelSamplerTest : public ::testing::Test {
     for (int step = 0; step < steps; ++step) {
       for (int i = 0; i < config_.rays_per_step; ++i) {
         const PixelSampler::Choice choice = sampler.At(static_cast<uint64_t>(step), i);
-        if (choice.is_object) ++counts[choice.pixel->view];
+        if (choice.is_object) ++counts[choice.pixel.view];
       }
     }
     return counts;
@@ -60,15 +60,15 @@ TEST_F(PixelSamplerTest, ChoosesObjectPixelsAndABandOfBackgroundButNoOccluders) 
   int object = 0;
   for (int step = 0; step < 50; ++step) {
     for (int i = 0; i < config_.rays_per_step; ++i) {
-      const auto [pixel, is_object] = sampler.At(static_cast<uint64_t>(step), i);
+      const auto [pixel, is_object, partner] = sampler.At(static_cast<uint64_t>(step), i);
       object += is_object ? 1 : 0;
-      EXPECT_EQ(KindAt(*pixel), static_cast<uint8_t>(is_object ? RayKind::kObject : RayKind::kBackground));
-      const cv::Vec3b& bgr = views_[pixel->view].color_bgr.at<cv::Vec3b>(pixel->v_px, pixel->u_px);
-      EXPECT_EQ(pixel->rgb, (std::array<uint8_t, 3>{bgr[2], bgr[1], bgr[0]}));
+      EXPECT_EQ(KindAt(pixel), static_cast<uint8_t>(is_object ? RayKind::kObject : RayKind::kBackground));
+      const cv::Vec3b& bgr = views_[pixel.view].color_bgr.at<cv::Vec3b>(pixel.v_px, pixel.u_px);
+      EXPECT_EQ(pixel.rgb, (std::array<uint8_t, 3>{bgr[2], bgr[1], bgr[0]}));
       if (is_object) continue;
-      const cv::Mat is_mask = views_[pixel->view].ray_kind == static_cast<int>(RayKind::kObject);
+      const cv::Mat is_mask = views_[pixel.view].ray_kind == static_cast<int>(RayKind::kObject);
       const int reach = config_.background_band_px;
-      const cv::Rect around(pixel->u_px - reach, pixel->v_px - reach, 2 * reach + 1, 2 * reach + 1);
+      const cv::Rect around(pixel.u_px - reach, pixel.v_px - reach, 2 * reach + 1, 2 * reach + 1);
       EXPECT_GT(cv::countNonZero(is_mask(around & cv::Rect({0, 0}, is_mask.size()))), 0);
     }
   }
@@ -76,6 +76,7 @@ TEST_F(PixelSamplerTest, ChoosesObjectPixelsAndABandOfBackgroundButNoOccluders) 
 }
 
 TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
+  config_.contrast_weight = 0;  // a partner comes by beside its own turn
   const PixelSampler sampler = Build();
   std::vector<int> pixels;
   int all_pixels = 0;
@@ -91,8 +92,8 @@ TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
   const int steps = all_pixels / 140 + 1;
   for (int step = 0; step < steps; ++step) {
     for (int i = 0; i < config_.rays_per_step; ++i) {
-      const auto [pixel, is_object] = sampler.At(static_cast<uint64_t>(step), i);
-      if (is_object) ++times[{pixel->view, pixel->u_px, pixel->v_px}];
+      const auto [pixel, is_object, partner] = sampler.At(static_cast<uint64_t>(step), i);
+      if (is_object) ++times[{pixel.view, pixel.u_px, pixel.v_px}];
     }
   }
   EXPECT_GT(static_cast<double>(times.size()), 0.8 * all_pixels);
@@ -119,7 +120,7 @@ TEST_F(PixelSamplerTest, IsTheSameForTheSameSeedAndAnotherForAnother) {
   int differ = 0;
   for (int i = 0; i < config_.rays_per_step; ++i) {
     const auto place = [&](const PixelSampler& sampler) {
-      const TrainingPixel& pixel = *sampler.At(3, i).pixel;
+      const TrainingPixel pixel = sampler.At(3, i).pixel;
       return std::tuple(pixel.view, pixel.u_px, pixel.v_px);
     };
     EXPECT_EQ(place(a), place(b));
@@ -140,12 +141,12 @@ TEST_F(PixelSamplerTest, DepthThatCannotBeIsNone) {
   PixelSampler without(config_, 5);
   without.Build(views_, false);
   for (int i = 0; i < config_.rays_per_step; ++i) {
-    const auto [pixel, is_object] = sampler.At(0, i);
-    EXPECT_LE(without.At(0, i).pixel->z_mu, 0);
-    if (is_object && pixel->u_px % 4 == 3) {
-      EXPECT_EQ(pixel->z_mu, 2);
+    const auto [pixel, is_object, partner] = sampler.At(0, i);
+    EXPECT_LE(without.At(0, i).pixel.z_mu, 0);
+    if (is_object && pixel.u_px % 4 == 3) {
+      EXPECT_EQ(pixel.z_mu, 2);
     } else {
-      EXPECT_LE(pixel->z_mu, 0);
+      EXPECT_LE(pixel.z_mu, 0);
     }
   }
 }
@@ -159,10 +160,40 @@ TEST_F(PixelSamplerTest, MapPointsGetRaysAsLongAsTheyAreNotFew) {
   }
   const PixelSampler sampler = Build();
   int with_depth = 0;
-  for (int i = 0; i < config_.rays_per_step; ++i) with_depth += sampler.At(0, i).pixel->z_mu == 1.5f ? 1 : 0;
+  for (int i = 0; i < config_.rays_per_step; ++i) with_depth += sampler.At(0, i).pixel.z_mu == 1.5f ? 1 : 0;
   EXPECT_EQ(with_depth, static_cast<int>(config_.rays_per_step * config_.sparse_depth_share));
   views_[0].sparse_depth.resize(12);  // 4 of them on the object
-  EXPECT_EQ(Build().At(0, config_.rays_per_step - 1).pixel->z_mu, 0);
+  EXPECT_EQ(Build().At(0, config_.rays_per_step - 1).pixel.z_mu, 0);
+}
+
+TEST_F(PixelSamplerTest, ObjectPixelsComeInPairsOfOneViewSomePixelsApart) {
+  for (ObjectView& view : views_) view.depth_mu = cv::Mat(view.roi_px.size(), CV_32FC1, cv::Scalar(2));
+  const PixelSampler sampler = Build();
+  int paired = 0, object = 0;
+  for (int i = 0; i < config_.rays_per_step; ++i) {
+    const auto [pixel, is_object, partner] = sampler.At(7, i);
+    EXPECT_TRUE(is_object || partner == 0);
+    object += is_object ? 1 : 0;
+    if (partner == 0) continue;
+    ++paired;
+    EXPECT_EQ(partner, i % 2 == 0 ? 1 : -1);
+    const PixelSampler::Choice other = sampler.At(7, i + partner);
+    EXPECT_EQ(other.partner, -partner);
+    EXPECT_EQ(other.pixel.view, pixel.view);
+    const double apart_px = std::hypot(pixel.u_px - other.pixel.u_px, pixel.v_px - other.pixel.v_px);
+    const int mask_px = cv::countNonZero(views_[pixel.view].ray_kind == static_cast<int>(RayKind::kObject));
+    const double wanted_px = config_.contrast_distance * std::sqrt(mask_px);
+    EXPECT_GE(apart_px, 0.5 * wanted_px - 1);
+    EXPECT_LE(apart_px, 1.5 * wanted_px + 1);
+    EXPECT_EQ(KindAt(pixel), static_cast<uint8_t>(RayKind::kObject));
+    const cv::Vec3b& bgr = views_[pixel.view].color_bgr.at<cv::Vec3b>(pixel.v_px, pixel.u_px);
+    EXPECT_EQ(pixel.rgb, (std::array<uint8_t, 3>{bgr[2], bgr[1], bgr[0]}));
+    EXPECT_EQ(pixel.z_mu, 2);
+  }
+  EXPECT_GT(paired, 0.9 * object);
+  config_.contrast_weight = 0;
+  const PixelSampler single = Build();
+  for (int i = 0; i < config_.rays_per_step; ++i) EXPECT_EQ(single.At(7, i).partner, 0);
 }
 
 }  // namespace

@@ -63,6 +63,8 @@ inline std::vector<Ray> TestRays(int count, uint64_t seed) {
     ray.jitter = random(10);
     ray.target.is_object = r % 3 != 0;
     if (r % 3 == 1) ray.target.depth = 1.0f + random(11);
+    if (r % 6 == 4 && r + 1 < rays.size()) ray.target.partner = 1;
+    if (r % 6 == 5) ray.target.partner = -1;
   }
   return rays;
 }
@@ -87,6 +89,7 @@ inline StepInput TestStep(int rays, SampleBudget budget, bool random_background)
                         .opacity_background = 0.4f,
                         .density = 0.01f,
                         .depth = 0.5f,
+                        .contrast = 1.5f,
                         .depth_limit = 0.3f,
                         .random_background = random_background};
   constexpr size_t kWords = size_t{kOccupancyResolution} * kOccupancyResolution * kOccupancyResolution / 32;
@@ -126,7 +129,7 @@ struct StepOnCpu {
     kernels.encode(field.layout, field.table.data(), c.size, c.x.data(), c.y.data(), c.z.data(), c.features.data());
     kernels.mlp_forward(field.mlp, c.size, c.features.data(), c.hidden.data(), c.raw.data());
     kernels.activate(c, field.density_bias);
-    for (size_t r = 0; r < spans.size(); ++r) Composite(r, input);
+    Composite(input);
     kernels.mlp_backward(field.mlp, c.size, c.features.data(), c.hidden.data(), c.d_raw.data(), mlp_gradient.data());
     kernels.encode_backward(field.layout, c.size, c.x.data(), c.y.data(), c.z.data(), c.features.data(),
                             table_gradient.data());
@@ -139,7 +142,7 @@ struct StepOnCpu {
                           c.features.data());
     for (size_t i = 0; i < static_cast<size_t>(c.size); ++i) ForwardRounded(field, i);
     PlainKernels().activate(c, field.density_bias);
-    for (size_t r = 0; r < spans.size(); ++r) Composite(r, input);
+    Composite(input);
     for (size_t i = 0; i < static_cast<size_t>(c.size); ++i) BackwardRounded(field, i);
     PlainKernels().encode_backward(field.layout, c.size, c.x.data(), c.y.data(), c.z.data(), c.features.data(),
                                    table_gradient.data());
@@ -202,19 +205,11 @@ struct StepOnCpu {
     }
   }
 
-  void Composite(size_t r, const StepInput& input) {
-    SampleChunk& c = chunk;
-    if (spans[r].count == 0) return;
-    const int at = spans[r].first;
-    const RaySamples samples{spans[r].count,        c.t.data() + at,
-                             c.length.data() + at,  c.alpha.data() + at,
-                             c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
-    float* d_raw = c.d_raw.data() + kOutputs * at;
-    results[r] = plain::CompositeForward(samples, input.rays[r].target, input.loss_weights, c.weight.data() + at,
-                                         c.behind.data() + at);
-    plain::CompositeBackward(samples, input.rays[r].target, input.loss_weights, results[r], c.weight.data() + at,
-                             c.behind.data() + at, d_raw);
-    for (int i = 0; i < spans[r].count; ++i, d_raw += kOutputs) {
+  void Composite(const StepInput& input) {
+    PlainKernels().composite(input.rays.data(), spans.data(), static_cast<int>(spans.size()), input.loss_weights, chunk,
+                             results.data());
+    for (int i = 0; i < chunk.size; ++i) {
+      float* d_raw = chunk.d_raw.data() + kOutputs * i;
       const float size = std::fabs(d_raw[0]) + std::fabs(d_raw[1]) + std::fabs(d_raw[2]) + std::fabs(d_raw[3]);
       const bool active = size > input.gradient_cut;
       active_samples += active;
