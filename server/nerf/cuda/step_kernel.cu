@@ -36,9 +36,9 @@ __device__ void FindWays(const StepParams& p, const TileRays& in, Tile<T>& tile)
         const int occupied = !p.budget.skip_empty || (p.occupied_bits[cell / 32] >> (cell % 32) & 1) != 0;
         way.occupied |= static_cast<uint64_t>(__ballot_sync(kWholeWarp, occupied)) << (half * kWarpThreads);
       }
-      const float stretch = way.piece * static_cast<float>(CountBits(way.occupied));
-      way.count = SampleCount(p.budget, stretch);
-      if (way.count > 0) way.length = stretch / static_cast<float>(way.count);
+      const float pieces = static_cast<float>(CountBits(way.occupied));
+      way.count = SampleCount(p.budget, way.piece * pieces);
+      if (way.count > 0) way.length = way.piece * (pieces / static_cast<float>(way.count));
     }
     if (lane == 0) tile.ways[r] = way;
   }

@@ -51,9 +51,12 @@ ROMAP_HD float RayPoint(const Ray& ray, int axis, float t) {
 
 // The cell of the occupancy grid at t; points outside [0, extent] count as those at its border.
 ROMAP_HD uint32_t CellOnRay(const Ray& ray, const float* extent, float t) {
-  return plain::CellIndex(RayPoint(ray, 0, t) * (kOccupancyResolution / extent[0]),
-                          RayPoint(ray, 1, t) * (kOccupancyResolution / extent[1]),
-                          RayPoint(ray, 2, t) * (kOccupancyResolution / extent[2]), kOccupancyResolution);
+  float at_cell[3];
+  for (int a = 0; a < 3; ++a) {
+    const float cells_per_unit = kOccupancyResolution / extent[a];
+    at_cell[a] = plain::MulAdd(ray.direction[a] * cells_per_unit, t, ray.origin[a] * cells_per_unit);
+  }
+  return plain::CellIndex(at_cell[0], at_cell[1], at_cell[2], kOccupancyResolution);
 }
 
 // Middle of piece `i`, `piece` long, of a way that begins at `entry`.
@@ -74,7 +77,8 @@ ROMAP_HD float SamplePlace(int i, int count, float jitter, uint64_t occupied, fl
   const int pieces = CountBits(occupied);
   const float at = (static_cast<float>(i) + jitter) * (static_cast<float>(pieces) / static_cast<float>(count));
   const int passed = static_cast<int>(at) < pieces ? static_cast<int>(at) : pieces - 1;
-  return entry + piece * (static_cast<float>(PlaceOfBit(occupied, passed)) + at - static_cast<float>(passed));
+  const float place = static_cast<float>(PlaceOfBit(occupied, passed)) + (at - static_cast<float>(passed));
+  return plain::MulAdd(place, piece, entry);
 }
 
 }  // namespace romap::nerf
