@@ -31,7 +31,6 @@ struct TrainingPool::Job {
   std::string concern;
   // Of the last snapshot.
   uint64_t sent_steps = 0;
-  bool sent_converged = false;
   Clock::time_point sent_time = Clock::now();
 
   uint64_t StepsLeft(bool complete) const {
@@ -289,13 +288,14 @@ void TrainingPool::RunSlice(Lease& lease) {
     if (steps > 0) stats = field.Train(steps, lease.threads);
     goal = field.AllowedSteps(lease.complete);
   }
-  const bool budget_used = field.steps() >= goal;
+  bool budget_used = field.steps() >= goal;
   bool converged = false;
   {
     std::lock_guard lock(mutex_);
     job.busy_s += stats.wall_s * lease.threads;
     TakeNews(job, field);
     converged = job.StepsLeft(true) == 0;
+    budget_used |= converged;  // out of time, perhaps: no later slice would send what there is
     if (job.removed || lease.client->closing || !ShouldSend(job, budget_used)) {
       if (budget_used) field.ReleaseScratch();
       return;
