@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/status.h"
+#include "common/thread_time.h"
 #include "server/mesh/confidence.h"
-#include "server/mesh/surface_probe.h"
 #include "server/mesh/floaters.h"
 #include "server/mesh/grid_nodes.h"
 #include "server/mesh/hidden_space.h"
@@ -17,6 +16,7 @@
 #include "server/mesh/refine_vertices.h"
 #include "server/mesh/sample_field.h"
 #include "server/mesh/support_height.h"
+#include "server/mesh/surface_probe.h"
 #include "server/mesh/vertex_normals.h"
 
 namespace romap {
@@ -45,12 +45,6 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   }
   if (config.resolution < 2) return InvalidArgument("mesh.resolution {} must be at least 2", config.resolution);
   return absl::OkStatus();
-}
-
-double ThreadCpuSeconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 // Books the time since the last booking on one phase after the other.

@@ -17,9 +17,9 @@
 #include "client/bench/true_views.h"
 #include "client/files/ply.h"
 #include "client/files/sequence.h"
-#include "common/config.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
+#include "tests/bench/run_configured.h"
 
 namespace romap {
 namespace {
@@ -130,13 +130,5 @@ int main(int argc, char** argv) {
   app.add_option("--first-yaw-deg", options.first_yaw_deg);
   app.add_flag("--depth", options.depth);
   CLI11_PARSE(app, argc, argv);
-  romap::ConfigFields fields;
-  fields.Section("nerf");
-  options.nerf.Fields(fields);
-  fields.Section("mesh");
-  options.mesh.Fields(fields);
-  absl::Status status = fields.Set(options.assignments);
-  if (status.ok()) status = romap::Run(options);
-  if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
-  return status.ok() ? 0 : 1;
+  return romap::RunConfigured(options, romap::Run);
 }

@@ -15,17 +15,16 @@
 #include <vector>
 
 #include "client/files/sequence.h"
-#include "common/config.h"
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
-#include "server/mesh/surface_probe.h"
 #include "server/mesh/sample_field.h"
+#include "server/mesh/surface_probe.h"
 #include "server/nerf/object_field.h"
+#include "tests/bench/run_configured.h"
 #include "tests/bench/training_scene.h"
 
 namespace romap {
 namespace {
-
 
 struct Options {
   std::string sequence;
@@ -124,13 +123,5 @@ int main(int argc, char** argv) {
   app.add_option("--steps", options.steps)->check(CLI::PositiveNumber);
   app.add_option("--repeats", options.repeats)->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  romap::ConfigFields fields;
-  fields.Section("nerf");
-  options.nerf.Fields(fields);
-  fields.Section("mesh");
-  options.mesh.Fields(fields);
-  absl::Status status = fields.Set(options.assignments);
-  if (status.ok()) status = romap::Run(options);
-  if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
-  return status.ok() ? 0 : 1;
+  return romap::RunConfigured(options, romap::Run);
 }

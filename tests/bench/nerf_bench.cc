@@ -20,6 +20,7 @@
 #include "common/config.h"
 #include "common/status.h"
 #include "server/nerf/cpu/field_trainer.h"
+#include "server/nerf/presets.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/visual_hull.h"
 #include "tests/bench/machine_limits.h"
@@ -44,19 +45,6 @@ struct Subject {
   TrainingBox box;
   std::vector<ObjectView> views;
 };
-
-// The configuration of the paper's section on the NeRF model.
-NerfConfig PaperConfig() {
-  NerfConfig config;
-  config.levels = 16;
-  config.log2_table_entries = 16;
-  config.finest_resolution = 2048;
-  config.hidden_width = 64;
-  config.rays_per_step = 4096;
-  config.sampling = "uniform";
-  config.max_samples_per_ray = 32;
-  return config;
-}
 
 absl::StatusOr<std::vector<Subject>> LoadSubjects(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(path));
@@ -196,7 +184,7 @@ void BenchPreset(const char* name, const NerfConfig& config, int default_steps, 
 
 absl::Status Run(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(const std::vector<Subject> subjects, LoadSubjects(options.sequence));
-  NerfConfig fast, paper = PaperConfig();
+  NerfConfig fast, paper = *NerfPreset("paper");
   for (NerfConfig* config : {&fast, &paper}) {
     ConfigFields fields;
     fields.Section("nerf");

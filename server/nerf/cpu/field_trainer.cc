@@ -1,11 +1,11 @@
 #include "server/nerf/cpu/field_trainer.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <chrono>
 #include <numeric>
 #include <thread>
+
+#include "common/thread_time.h"
 
 namespace romap::nerf {
 namespace {
@@ -17,12 +17,6 @@ constexpr size_t kOptimiserBlock = 1 << 15;  // parameters that a thread takes a
 
 // Asking for the time of a thread is a call of the kernel: only one chunk in so many is timed by phase.
 constexpr int kTimedChunk = 8;
-
-double ThreadCpuSeconds() {
-  timespec now;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 }  // namespace
 

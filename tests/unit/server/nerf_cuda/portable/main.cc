@@ -6,23 +6,11 @@
 
 #include "common/status.h"
 #include "server/nerf/cuda/device_health.h"
+#include "server/nerf/presets.h"
 #include "tests/unit/server/nerf_cuda/runtime_table.h"
 
 namespace romap::nerf::cuda {
 namespace {
-
-// The field and the iteration of the paper's section on the implementation.
-NerfConfig PaperConfig() {
-  NerfConfig config;
-  config.levels = 16;
-  config.log2_table_entries = 16;
-  config.finest_resolution = 2048;
-  config.hidden_width = 64;
-  config.rays_per_step = 4096;
-  config.max_samples_per_ray = 32;
-  config.sampling = "uniform";
-  return config;
-}
 
 int Main(int argc, char** argv) {
   if (const absl::Status status = DeviceStatus(); !status.ok()) {
@@ -33,7 +21,8 @@ int Main(int argc, char** argv) {
   if (RUN_ALL_TESTS() != 0) return 1;
   constexpr int kSteps = 320;
   std::vector<RuntimeTable> tables;
-  for (const auto& [config, name] : {std::pair(NerfConfig{}, "fast"), std::pair(PaperConfig(), "paper's field")}) {
+  for (const auto& [config, name] :
+       {std::pair(NerfConfig{}, "fast"), std::pair(*NerfPreset("paper"), "paper's field")}) {
     const absl::StatusOr<RuntimeTable> table = MeasureRuntime(config, name, kSteps);
     if (!table.ok()) {
       std::printf("%s\n", Message(table.status()).c_str());
