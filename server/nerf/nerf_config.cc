@@ -10,6 +10,8 @@ void FieldFields(NerfConfig& c, ConfigFields& fields) {
              {.choices = NerfPresetNames(),
               .help = "Sets all fields below it that are not given: the fast recipe, or the paper's own",
               .on_set = [&c](const std::string& name) { c = *NerfPreset(name); }});
+  fields.Add("field", &c.field,
+             {.choices = {"density", "sdf"}, .help = "What the field holds: density, or signed distances (CPU only)"});
   fields.Add("encoding", &c.encoding,
              {.choices = {"hash", "frequency"}, .help = "Of positions: hash grid, or sines and cosines (baselines)"});
   fields.Add("levels", &c.levels,
@@ -102,6 +104,15 @@ void LossFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "box sides", .min = 0, .max = 10, .help = "Depth errors beyond this are taken for outliers"});
   fields.Add("random_background", &c.random_background,
              {.help = "Blend every ray over a random colour (the paper's L_rr)"});
+  fields.Add(
+      "first_sharpness", &c.first_sharpness,
+      {.unit = "per box side", .min = 1, .max = 1000, .help = "Of surfaces at the first step, signed distances"});
+  fields.Add("last_sharpness", &c.last_sharpness,
+             {.unit = "per box side", .min = 10, .max = 100000, .help = "Of surfaces at the last step"});
+  fields.Add("eikonal_weight", &c.eikonal_weight,
+             {.min = 0, .max = 10, .help = "Weight of (|gradient| - 1)^2 of signed distances"});
+  fields.Add("curvature_weight", &c.curvature_weight,
+             {.min = 0, .max = 10, .help = "Weight of the squared bend of signed distances, per stencil"});
 }
 
 void ScheduleFields(NerfConfig& c, ConfigFields& fields) {

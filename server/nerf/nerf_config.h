@@ -11,7 +11,8 @@ namespace romap {
 struct NerfConfig {
   std::string preset = "fast";  // see presets.h
 
-  // Field: encoding and MLP.
+  // Field: what it holds, encoding and MLP.
+  std::string field = "density";
   std::string encoding = "hash";
   int levels = 8;
   int log2_table_entries = 14;
@@ -56,6 +57,10 @@ struct NerfConfig {
   double depth_weight = 0.5;
   double depth_limit = 0.2;
   bool random_background = false;
+  double first_sharpness = 20;
+  double last_sharpness = 1000;
+  double eikonal_weight = 0.01;
+  double curvature_weight = 0.001;
 
   // Optimiser.
   double learning_rate = 0.02;

@@ -12,6 +12,8 @@
 #include "common/status.h"
 #include "server/nerf/cpu/field_trainer.h"
 #include "server/nerf/field_sampler.h"
+#include "server/nerf/field_surface.h"
+#include "server/nerf/hull_distance.h"
 #include "server/nerf/math/random.h"
 #include "server/nerf/view_check.h"
 
@@ -240,8 +242,12 @@ TrainStats ObjectField::RunSteps(int steps, int threads) {
   const nerf::StepSource source{
       .ray = [this](uint64_t step, int index) { return rays_.Get(step, index); },
       .learning_rate = [this](uint64_t step) { return static_cast<float>(plan_.LearningRate(step)); },
+      .progress = [this](uint64_t step) { return static_cast<float>(plan_.Progress(step)); },
       .extent = space.extent,
       .grid = space.grid};
+  if (trainer_->model().IsDistance() && trainer_->steps_done() == 0) {
+    trainer_->FitDistances(source, DistanceToBorder(occupancy_.hull(), box_.ExtentUnit()));
+  }
   TrainStats stats = trainer_->Run(source, occupancy_, steps, std::clamp(threads, 1, 64));
   if (!trainer_->model().IsFinite()) {
     spdlog::warn("{}: training diverged after {} steps with {} views; starting anew", id_.ToString(),
@@ -271,10 +277,7 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.S_new_first = S_new_first_;
   snapshot.T_world_object = box.T_world_object;
   snapshot.box_half_extents = box.half_extents.cast<float>();
-  snapshot.surface_level = static_cast<float>(config_.surface_level);
-  // Training measures density per unit of the box's Unit space.
-  snapshot.optics.surface_density_per_mu = static_cast<float>(std::exp(config_.surface_level) / box.unit_mu);
-  snapshot.connect_level = static_cast<float>(config_.surface_level - config_.connect_margin);
+  DescribeSurface(config_, trainer_->model(), box, snapshot);
   snapshot.hull = {nerf::kOccupancyResolution, occupancy_.TrimmedHull(config_.hull_trim_share)};
   for (size_t i = 0; i < views_.size(); ++i) {
     if (!trust_.trusted(i)) continue;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
@@ -20,6 +21,9 @@ class Trainer {
 
   // `steps` more steps; `threads` (1..64) counts the threads of the CPU, the caller being one of them.
   virtual TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) = 0;
+
+  // Gives a new field of signed distances a shape to begin with; see cpu/distance_fit.h.
+  virtual void FitDistances(const StepSource& source, std::span<const float> distance) = 0;
 
   // Shrinks the features to `share`, (0..1], of what they are without changing what the field shows, so that it learns
   // something else more readily; see FieldTrainer::Loosen.

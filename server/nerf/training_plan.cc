@@ -59,9 +59,13 @@ uint64_t TrainingPlan::AllowedSteps(int views, bool complete) const {
 }
 
 double TrainingPlan::LearningRate(uint64_t step) const {
+  return config_.final_learning_rate *
+         std::pow(config_.learning_rate / config_.final_learning_rate, 1 - Progress(step));
+}
+
+double TrainingPlan::Progress(uint64_t step) const {
   const double left = std::max(0.0, static_cast<double>(planned_steps_) - static_cast<double>(step));
-  const double share = std::min(1.0, left / config_.full_budget_steps);
-  return config_.final_learning_rate * std::pow(config_.learning_rate / config_.final_learning_rate, share);
+  return 1 - std::min(1.0, left / config_.full_budget_steps);
 }
 
 }  // namespace romap

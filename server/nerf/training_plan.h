@@ -35,6 +35,9 @@ class TrainingPlan {
   // Steps allowed so far. `complete`: no more views are expected, so train to the end of the plan.
   uint64_t AllowedSteps(int views, bool complete) const;
   double LearningRate(uint64_t step) const;
+  // How far a full training is at `step`: 0 at its first, 1 at the end of the plan. What extends the plan sets it back
+  // a little.
+  double Progress(uint64_t step) const;
 
  private:
   NerfConfig config_;

@@ -46,6 +46,7 @@ struct FieldModel {
   AlignedBuffer<float> table;  // [entries][2]
   MlpWeights mlp;
   float density_bias = 0;  // added to the raw density output, so that `raw` below and in snapshots includes it
+  float sharpness = 0;     // > 0: a field of signed distances (signed_distance.h), which has no bias; per box side
 
   FieldModel() = default;
   // Table uniform in +-1e-4, MLP uniform within Glorot and Bengio's bound (2010), between hidden layers within that of
@@ -53,6 +54,7 @@ struct FieldModel {
   FieldModel(const NerfConfig& config, uint64_t seed);
   FieldModel Clone() const;
   bool IsFinite() const;
+  bool IsDistance() const { return sharpness > 0; }
   // Whether it is anything else than a hash grid with one hidden layer: see KernelTable::general.
   bool NeedsGeneralKernels() const { return layout.octaves > 0 || mlp.layers > 1; }
 };

@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <numeric>
+#include <optional>
 #include <thread>
 
 #include "common/thread_time.h"
+#include "server/nerf/cpu/distance_fit.h"
+#include "server/nerf/cpu/shape_probe.h"
+#include "server/nerf/math/random.h"
 
 namespace romap::nerf {
 namespace {
@@ -14,6 +19,11 @@ constexpr int kChunkSamples = 1024;  // activations of a chunk stay in the secon
 
 constexpr size_t kPrefetchVisits = 24;       // how far ahead cells of the occupancy are fetched
 constexpr size_t kOptimiserBlock = 1 << 15;  // parameters that a thread takes at a time
+
+// Of the points at which the shape of a signed-distance field is looked at, box sides: at the first step, at the last.
+constexpr float kFirstSpacing = 0.02f;
+constexpr float kLastSpacing = 0.01f;
+constexpr uint64_t kShapeSeed = 77;
 
 // Asking for the time of a thread is a call of the kernel: only one chunk in so many is timed by phase.
 constexpr int kTimedChunk = 8;
@@ -24,7 +34,7 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
   LossWeights w;
   w.opacity_object = static_cast<float>(config.opacity_weight_object);
   w.opacity_background = static_cast<float>(config.opacity_weight_background);
-  w.density = static_cast<float>(config.density_weight);
+  w.density = config.field == "density" ? static_cast<float>(config.density_weight) : 0.0f;
   w.depth = static_cast<float>(config.depth_weight);
   w.contrast = static_cast<float>(config.contrast_weight);
   w.depth_limit = static_cast<float>(config.depth_limit);
@@ -42,7 +52,9 @@ struct FieldTrainer::Worker {
         results(static_cast<size_t>(chunk_rays)),
         table_gradient(model.table.size() + kMaxLanes),
         mlp_gradient(model.mlp.parameters.size()),
-        visits(static_cast<size_t>((config.rays_per_step + chunk_rays) * config.max_samples_per_ray)) {}
+        visits(static_cast<size_t>((config.rays_per_step + chunk_rays) * config.max_samples_per_ray)) {
+    if (model.IsDistance()) shape.emplace(config, model);
+  }
 
   void Begin() {
     phase_s = {};
@@ -76,7 +88,8 @@ struct FieldTrainer::Worker {
   std::vector<RaySpan> spans;
   std::vector<RayResult> results;
   AlignedBuffer<float> table_gradient, mlp_gradient;
-  AlignedBuffer<Visit> visits;  // of one step, for the occupancy; the first visit_count are in use
+  std::optional<ShapeProbe> shape;  // of signed-distance fields
+  AlignedBuffer<Visit> visits;      // of one step, for the occupancy; the first visit_count are in use
   size_t visit_count = 0;
   bool timed = false;  // the chunk at work
   double booked_until_s = 0;
@@ -100,6 +113,10 @@ FieldTrainer::FieldTrainer(const NerfConfig& config, uint64_t seed, const Kernel
 FieldTrainer::~FieldTrainer() = default;
 FieldTrainer::FieldTrainer(FieldTrainer&&) noexcept = default;
 FieldTrainer& FieldTrainer::operator=(FieldTrainer&&) noexcept = default;
+
+void FieldTrainer::FitDistances(const StepSource& source, std::span<const float> distance) {
+  nerf::FitDistances(config_, *kernels_, source, distance, state());
+}
 
 void FieldTrainer::Loosen(float share) {
   if (model_.table.size() == 0) return;
@@ -126,6 +143,7 @@ TrainStats FieldTrainer::Run(const StepSource& source, Occupancy& occupancy, int
     RunTasks(source, occupancy, 0, threads, tasks);
   }
   steps_done_ += static_cast<uint64_t>(steps);
+  if (model_.IsDistance()) model_.sharpness = SharpnessAt(source.progress(steps_done_));
   TrainStats total;
   uint64_t object_rays = 0;
   for (int t = 0; t < threads; ++t) {
@@ -195,7 +213,11 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
   kernels_->mlp_forward(model_.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
   worker.Book(TrainPhase::kMlp);
   kernels_->activate(chunk, model_.density_bias);
-  CompositeRays(worker);
+  if (model_.IsDistance()) {
+    RenderDistances(source, step, first_ray, worker);
+  } else {
+    CompositeRays(worker);
+  }
   // About half of the samples remain: the others lie in empty space or behind the surface.
   const int active =
       kernels_->keep_active(static_cast<float>(config_.gradient_cut), 1.0f / static_cast<float>(config_.rays_per_step),
@@ -227,6 +249,25 @@ void FieldTrainer::CompositeRays(Worker& worker) {
       ++worker.object_rays;
     }
   }
+}
+
+// Surfaces get sharper by the same factor with every step.
+float FieldTrainer::SharpnessAt(float progress) const {
+  const double first = config_.first_sharpness;
+  return static_cast<float>(first * std::pow(config_.last_sharpness / first, progress));
+}
+
+void FieldTrainer::RenderDistances(const StepSource& source, uint64_t step, int first_ray, Worker& worker) {
+  const float progress = source.progress(step), sharpness = SharpnessAt(progress);
+  SampleChunk& chunk = worker.chunk;
+  kernels_->distance_opacity(worker.spans.data(), worker.ray_count, sharpness, chunk);
+  CompositeRays(worker);
+  kernels_->distance_backward(worker.spans.data(), worker.ray_count, sharpness, chunk);
+  const float spacing = kFirstSpacing * std::pow(kLastSpacing / kFirstSpacing, progress);
+  worker.shape->AddGradients(model_, *kernels_, chunk, {worker.spans.data(), static_cast<size_t>(worker.ray_count)},
+                             spacing, RandomBits(kShapeSeed, step, static_cast<uint64_t>(first_ray)),
+                             1.0f / static_cast<float>(config_.rays_per_step), worker.table_gradient.data(),
+                             worker.mlp_gradient.data());
 }
 
 // The first task is what must be done by one thread, so that it starts first; the others are blocks of the hash table.

@@ -19,7 +19,8 @@ namespace romap::nerf {
 struct StepSource {
   std::function<Ray(uint64_t step, int index)> ray;
   std::function<float(uint64_t step)> learning_rate;
-  std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
+  std::function<float(uint64_t step)> progress = {};  // 0..1 of the plan; signed-distance fields alone need it
+  std::array<float, 3> extent = {1, 1, 1};            // of the box in Unit space
   GridPose grid = {};
 };
 
@@ -40,6 +41,8 @@ class FieldTrainer : public Trainer {
   // `steps` more steps on `threads` (1..kMostThreads) threads (the caller is one of them). Nothing is allocated within
   // a step.
   TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) override;
+
+  void FitDistances(const StepSource& source, std::span<const float> distance) override;
 
   // Makes a trained field ready to learn something else without changing what it shows: features shrink to `share`
   // (0..1] of what they are, and the weights that read them out grow to 1 / share. Hidden neurons are linear or zero,
@@ -66,9 +69,11 @@ class FieldTrainer : public Trainer {
   struct Worker;
 
   void RunTasks(const StepSource& source, Occupancy& occupancy, int thread, int shares, StepTasks& tasks);
+  float SharpnessAt(float progress) const;
   void RenderShare(const StepSource& source, const Occupancy& occupancy, uint64_t round, int share, int shares);
   void RenderChunk(const StepSource& source, const Occupancy& occupancy, uint64_t step, int first_ray, Worker& worker);
   void CompositeRays(Worker& worker);
+  void RenderDistances(const StepSource& source, uint64_t step, int first_ray, Worker& worker);
   void Optimise(const StepSource& source, Occupancy& occupancy, uint64_t step, uint64_t task, int shares);
   void UpdateOccupancy(Occupancy& occupancy, uint64_t step, int shares);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "server/nerf/cpu/distance_kernels-inl.h"
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/activation.h"
 #include "server/nerf/math/adam.h"
@@ -329,6 +330,8 @@ KernelTable MakeKernelTable(const char* name) {
           .mlp_forward = MlpForward<Wide, Output>,
           .mlp_backward = MlpBackward<Wide>,
           .activate = Activate<Wide>,
+          .distance_opacity = PassThroughDistances<Wide>,
+          .distance_backward = PassThroughDistancesBackward,
           .composite = Composite,
           .keep_active = KeepActive<Wide>,
           .adam = Adam<Wide>};

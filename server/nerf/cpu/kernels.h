@@ -37,6 +37,7 @@ struct SampleChunk {
   AlignedBuffer<float> d_raw;             // [capacity][kOutputs]
   AlignedBuffer<float> red, green, blue;  // 0..1
   AlignedBuffer<float> density, alpha;    // per box side; opacity of the step
+  AlignedBuffer<float> light;             // of signed-distance fields: see LightAtRaw
   AlignedBuffer<float> weight, behind;    // see CompositeForward
   AlignedBuffer<uint32_t> active;         // numbers of the samples that keep_active chose
 };
@@ -66,6 +67,12 @@ struct KernelTable {
 
   // raw, length -> red, green, blue, density, alpha of the chunk's samples.
   void (*activate)(SampleChunk& chunk, float density_bias);
+
+  // What activate does for density, for signed distances; to be called behind it. Opacities come of neighbouring
+  // samples (see math/signed_distance.h), and density and length are set to 1: d_raw of `composite` is then the
+  // derivative by the optical depth of a sample's stretch, which distance_backward turns into that by the raw output.
+  void (*distance_opacity)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
+  void (*distance_backward)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
 
   // Renders rays and their adjoint (see math/composite.h): weight, behind and d_raw of the chunk's samples, and
   // `results`, one per ray; rays without samples keep theirs. A ray whose partner is not among them, or has no samples,

@@ -47,6 +47,9 @@ std::vector<RayResult> RenderRays(const FieldModel& model, const NerfConfig& con
                    chunk.features.data());
     kernels.mlp_forward(model.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
     kernels.activate(chunk, model.density_bias);
+    if (model.IsDistance()) {
+      kernels.distance_opacity(spans.data(), static_cast<int>(some.size()), model.sharpness, chunk);
+    }
     Composite(some, spans, chunk, results);
   }
   return results;

@@ -30,6 +30,10 @@ class CudaTrainer : public Trainer {
     return host_.Run(source, occupancy, steps, threads);
   }
 
+  void FitDistances(const StepSource& source, std::span<const float> distance) override {
+    host_.FitDistances(source, distance);
+  }
+
   void Loosen(float share) override { host_.Loosen(share); }
 
   void ReleaseScratch() override {
@@ -73,6 +77,9 @@ absl::StatusOr<std::unique_ptr<Trainer>> MakeCudaTrainer(const NerfConfig& confi
   if (config.encoding != "hash" || config.hidden_layers != 1) {
     return InvalidArgument("CUDA: {} encoding with {} hidden layers; a hash grid with one is possible", config.encoding,
                            config.hidden_layers);
+  }
+  if (config.field != "density") {
+    return InvalidArgument("CUDA: a field of kind {}; density is possible", config.field);
   }
   return std::make_unique<CudaTrainer>(config, seed);
 }

@@ -8,7 +8,7 @@ namespace romap::nerf {
 
 inline constexpr int kFeaturesPerLevel = 2;
 inline constexpr int kMaxLevels = 16;
-inline constexpr int kOutputs = 4;  // red, green, blue, density, before activation
+inline constexpr int kOutputs = 4;  // red, green, blue, density or distance, before activation
 
 // Largest sizes of the frequency encoding and of deep MLPs.
 inline constexpr int kMaxOctaves = 16;
@@ -93,6 +93,16 @@ struct RayResult {
   float depth_excess;  // sum w_i (t_i - t*), 0 without depth
   float loss;          // all terms
   float color_loss;    // squared colour error alone
+};
+
+// Fields of signed distances (signed_distance.h): box sides inside the surface per unit of the raw output.
+inline constexpr float kDistancePerRaw = 0.1f;
+inline constexpr int kStencilPoints = 5;  // at which the shape of such a field is looked at
+
+// Weights of the losses on that shape, >= 0.
+struct ShapeWeights {
+  float eikonal = 0;
+  float curvature = 0;
 };
 
 struct AdamRates {

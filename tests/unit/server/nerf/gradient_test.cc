@@ -2,36 +2,20 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/activation.h"
 #include "server/nerf/math/composite.h"
 #include "server/nerf/math/random.h"
+#include "tests/unit/server/nerf/gradient_check.h"
 
 namespace romap::nerf {
 namespace {
 
-float Noise(uint64_t stream, uint64_t i) { return 2.0f * RandomUniform(11, stream, i) - 1.0f; }
+using testing::ExpectGradient;
 
-// Compares gradient[i] with (f(x + e) - f(x - e)) / 2 e for `checks` of the `count` entries of x.
-void ExpectGradient(const std::function<double()>& f, float* x, const float* gradient, size_t count, size_t checks,
-                    float step, double tolerance) {
-  double largest = 0;
-  for (size_t i = 0; i < count; ++i) largest = std::max<double>(largest, std::fabs(gradient[i]));
-  ASSERT_GT(largest, 0);
-  for (size_t check = 0; check < checks; ++check) {
-    const size_t i = checks >= count ? check % count : RandomBits(3, 9, check) % count;
-    const float before = x[i];
-    x[i] = before + step;
-    const double above = f();
-    x[i] = before - step;
-    const double below = f();
-    x[i] = before;
-    EXPECT_NEAR(gradient[i], (above - below) / (2.0 * step), tolerance * largest) << "entry " << i;
-  }
-}
+float Noise(uint64_t stream, uint64_t i) { return 2.0f * RandomUniform(11, stream, i) - 1.0f; }
 
 NerfConfig SmallConfig() {
   NerfConfig config;

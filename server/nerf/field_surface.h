@@ -1,0 +1,14 @@
+#pragma once
+
+#include "common/messages.h"
+#include "server/nerf/cpu/field_model.h"
+#include "server/nerf/nerf_config.h"
+#include "server/nerf/training_box.h"
+
+namespace romap {
+
+// Fills in what the raw values of a field mean: surface_level, optics and connect_level of its snapshot.
+void DescribeSurface(const NerfConfig& config, const nerf::FieldModel& model, const TrainingBox& box,
+                     FieldSnapshot& snapshot);
+
+}  // namespace romap
