@@ -45,6 +45,9 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
              {.min = 0, .max = 1, .help = "Least share of the views seeing a hull cell that must call it empty"});
   fields.Add("hull_trim_share", &c.hull_trim_share,
              {.min = 0, .max = 0.2, .help = "Outermost layers in which fewer rays end are cut off the hull; 0 = none"});
+  fields.Add(
+      "hull_show_share", &c.hull_show_share,
+      {.min = 0, .max = 1, .help = "Least share of the views seeing a hull cell that must show the object there"});
   fields.Add("occupancy_start_step", &c.occupancy_start_step,
              {.unit = "steps", .min = 0, .max = 100000, .help = "First step that narrows the occupied cells"});
   fields.Add("occupancy_interval_steps", &c.occupancy_interval_steps,

@@ -20,18 +20,30 @@ enum class Verdict { kUnknown, kEmpty, kFull, kMixed };
 
 }  // namespace
 
+// What a view's mask holds under a footprint.
+struct VisualHull::Look {
+  Verdict matter = Verdict::kUnknown;  // pixels that are not background
+  Verdict object = Verdict::kUnknown;  // pixels that show the object itself
+  // Whether all that lies under the footprint is alike.
+  bool IsPlain() const {
+    return matter == Verdict::kEmpty ||
+           (matter == Verdict::kFull && (object == Verdict::kEmpty || object == Verdict::kFull));
+  }
+};
+
 // One view's mask, ready to be asked about balls of the Object frame.
 struct VisualHull::Footprints {
   SE3<Camera, Object> T_camera_object;
   CameraModel camera;
   cv::Rect roi_px;
-  cv::Mat occupied_sum;  // integral image of "not background"
-  cv::Mat nearest_mu;    // least depth under a cell's footprint, 0 where one is unknown; empty without depth
+  cv::Mat matter_sum;  // integral image of "not background"
+  cv::Mat object_sum;  // the same of "object"
+  cv::Mat nearest_mu;  // least depth under a cell's footprint, 0 where one is unknown; empty without depth
 
   Footprints(const ObjectView& view, const TrainingBox& box, bool use_depth, double cell_radius_mu)
       : T_camera_object(view.T_world_camera.Inverse() * box.T_world_object), camera(view.camera), roi_px(view.roi_px) {
-    const cv::Mat occupied = (view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255;
-    cv::integral(occupied, occupied_sum, CV_32S);
+    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, matter_sum, CV_32S);
+    cv::integral((view.ray_kind == static_cast<int>(RayKind::kObject)) / 255, object_sum, CV_32S);
     if (!use_depth || view.depth_mu.empty()) return;
     const double least_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
     if (least_z_mu <= 0) return;  // some cells' footprints have no bound
@@ -58,20 +70,22 @@ struct VisualHull::Footprints {
   }
 
   // The mask under a ball's footprint, taken as a square of its radius.
-  Verdict Ask(const Eigen::Vector3d& center_object, double radius_mu) const {
+  Look Ask(const Eigen::Vector3d& center_object, double radius_mu) const {
     const Eigen::Vector3d p = T_camera_object * center_object;
-    if (p.z() <= radius_mu) return Verdict::kUnknown;
+    if (p.z() <= radius_mu) return {};
     const Eigen::Vector2d pixel = camera.Project(p);
     const double radius_px = radius_mu * std::max(camera.fx_px, camera.fy_px) / p.z();
     const int x0 = static_cast<int>(std::floor(pixel.x() - radius_px + 0.5)) - roi_px.x;
     const int y0 = static_cast<int>(std::floor(pixel.y() - radius_px + 0.5)) - roi_px.y;
     const int x1 = static_cast<int>(std::floor(pixel.x() + radius_px + 0.5)) - roi_px.x + 1;
     const int y1 = static_cast<int>(std::floor(pixel.y() + radius_px + 0.5)) - roi_px.y + 1;
-    if (x0 < 0 || y0 < 0 || x1 > roi_px.width || y1 > roi_px.height) return Verdict::kUnknown;
-    const int occupied = occupied_sum.at<int>(y1, x1) - occupied_sum.at<int>(y0, x1) - occupied_sum.at<int>(y1, x0) +
-                         occupied_sum.at<int>(y0, x0);
-    if (occupied == 0) return Verdict::kEmpty;
-    return occupied == (x1 - x0) * (y1 - y0) ? Verdict::kFull : Verdict::kMixed;
+    if (x0 < 0 || y0 < 0 || x1 > roi_px.width || y1 > roi_px.height) return {};
+    const auto judge = [&](const cv::Mat& sum) {
+      const int count = sum.at<int>(y1, x1) - sum.at<int>(y0, x1) - sum.at<int>(y1, x0) + sum.at<int>(y0, x0);
+      if (count == 0) return Verdict::kEmpty;
+      return count == (x1 - x0) * (y1 - y0) ? Verdict::kFull : Verdict::kMixed;
+    };
+    return {judge(matter_sum), judge(object_sum)};
   }
 };
 
@@ -79,18 +93,22 @@ VisualHull::VisualHull(const NerfConfig& config)
     : carve_(config.carve_hull),
       margin_(config.hull_margin),
       min_votes_(config.hull_min_votes),
-      vote_share_(config.hull_vote_share) {}
+      vote_share_(config.hull_vote_share),
+      show_share_(config.hull_show_share) {}
 
 void VisualHull::Reset(const TrainingBox& box, bool use_depth) {
   box_ = box;
   use_depth_ = use_depth;
   seen_.assign(CellIndexOf(0, 0, kCells), 0);
   against_.assign(seen_.size(), 0);
+  shown_.assign(seen_.size(), 0);
+  views_ = 0;
 }
 
 double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kCells * margin_; }
 
 void VisualHull::Vote(const ObjectView& view, int sign) {
+  views_ += sign;
   const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
   for (int z = 0; z < kCells; z += kBlock) {
     for (int y = 0; y < kCells; y += kBlock) {
@@ -105,17 +123,18 @@ void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz,
     return Eigen::Vector3d(x + half, y + half, z + half).cwiseProduct(cell) - box_.half_extents;
   };
   const double cell_radius_mu = CellRadius_mu();
-  const Verdict block = footprints.Ask(center(bx, by, bz, 0.5 * kBlock), 0.5 * kBlock * cell.norm());
-  const bool decided = block == Verdict::kEmpty || block == Verdict::kFull;
+  const Look block = footprints.Ask(center(bx, by, bz, 0.5 * kBlock), 0.5 * kBlock * cell.norm());
   for (int z = bz; z < bz + kBlock; ++z) {
     for (int y = by; y < by + kBlock; ++y) {
       for (int x = bx; x < bx + kBlock; ++x) {
-        Verdict verdict = decided ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
-        if (verdict == Verdict::kUnknown) continue;
-        if (footprints.IsBeforeAll(center(x, y, z, 0.5), cell_radius_mu)) verdict = Verdict::kEmpty;
+        const Look look = block.IsPlain() ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
+        if (look.matter == Verdict::kUnknown) continue;
+        const bool empty =
+            look.matter == Verdict::kEmpty || footprints.IsBeforeAll(center(x, y, z, 0.5), cell_radius_mu);
         const size_t i = CellIndexOf(x, y, z);
         seen_[i] = static_cast<uint8_t>(seen_[i] + sign);
-        if (verdict == Verdict::kEmpty) against_[i] = static_cast<uint8_t>(against_[i] + sign);
+        if (empty) against_[i] = static_cast<uint8_t>(against_[i] + sign);
+        if (!empty && look.object != Verdict::kEmpty) shown_[i] = static_cast<uint8_t>(shown_[i] + sign);
       }
     }
   }
@@ -123,10 +142,11 @@ void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz,
 
 std::vector<uint8_t> VisualHull::Carve() const {
   if (!carve_) return std::vector<uint8_t>(seen_.size(), 1);
+  const bool asks_evidence = show_share_ > 0 && views_ > 0;
   std::vector<uint8_t> cells(seen_.size());
   for (size_t i = 0; i < cells.size(); ++i) {
     const double needed = std::max<double>(min_votes_, vote_share_ * seen_[i]);
-    cells[i] = against_[i] < needed ? 1 : 0;
+    cells[i] = against_[i] < needed && (shown_[i] > 0 || !asks_evidence) && shown_[i] >= show_share_ * seen_[i] ? 1 : 0;
   }
   return cells;
 }

@@ -13,6 +13,9 @@ namespace romap {
 // cell's whole footprint is background in it. A cell outside the crop, or before which an occluder stands, is unknown
 // to the view. Votes instead of a plain intersection, because one bad mask would cut the object for good. Dense depth
 // votes too, whatever a pixel shows: before what was measured there is nothing.
+//
+// Nor is possible what only hides behind other things or beyond the crops: some of the views that could show the object
+// in a cell must do so.
 class VisualHull {
  public:
   explicit VisualHull(const NerfConfig& config);
@@ -26,6 +29,7 @@ class VisualHull {
   std::vector<uint8_t> Carve() const;
 
  private:
+  struct Look;
   struct Footprints;
   double CellRadius_mu() const;  // of a footprint
   void Vote(const ObjectView& view, int sign);
@@ -37,8 +41,11 @@ class VisualHull {
   double margin_;
   int min_votes_;
   double vote_share_;
+  double show_share_;
+  int views_ = 0;
   std::vector<uint8_t> seen_;     // views whose crop holds the cell's footprint
   std::vector<uint8_t> against_;  // views that call it empty
+  std::vector<uint8_t> shown_;    // views that show the object under it
 };
 
 }  // namespace romap

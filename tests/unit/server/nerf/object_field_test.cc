@@ -302,15 +302,69 @@ TEST(VisualHullTest, OccludersAndPixelsOutsideTheCropCarveNothing) {
   const BallScene scene;
   VisualHull hull(NerfConfig{});
   hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
-  ObjectView view = scene.View(0);
-  view.ray_kind = cv::Mat(view.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kOccluder)));
-  hull.Add(view);
-  view = scene.View(1);
+  for (const ObjectView& view : scene.Views()) hull.Add(view);
+  const std::vector<uint8_t> before = hull.Carve();
+  for (int i = 0; i < 3; ++i) {
+    ObjectView view = scene.View(i);
+    view.ray_kind = cv::Mat(view.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kOccluder)));
+    hull.Add(view);
+  }
+  ObjectView view = scene.View(1);
   view.roi_px = {0, 0, 2, 2};  // smaller than any cell's footprint
   view.ray_kind = view.ray_kind(view.roi_px).clone();
   hull.Add(view);
-  const std::vector<uint8_t> cells = hull.Carve();
-  EXPECT_EQ(std::count(cells.begin(), cells.end(), 1), static_cast<std::ptrdiff_t>(cells.size()));
+  // The votes against a cell count for less among more views, never for more.
+  const std::vector<uint8_t> after = hull.Carve();
+  for (size_t i = 0; i < after.size(); ++i) EXPECT_GE(after[i], before[i]) << "cell " << i;
+}
+
+TEST(VisualHullTest, WhatOnlyHidesBehindOtherThingsIsNotTheObject) {
+  // In every view something stands before all that is not the ball.
+  const BallScene scene;
+  NerfConfig config;
+  const auto carved = [&](double show_share) {
+    config.hull_show_share = show_share;
+    VisualHull hull(config);
+    hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
+    for (ObjectView view : scene.Views()) {
+      view.ray_kind.setTo(static_cast<int>(RayKind::kOccluder),
+                          view.ray_kind == static_cast<int>(RayKind::kBackground));
+      hull.Add(view);
+    }
+    return hull.Carve();
+  };
+  const std::vector<uint8_t> unasked = carved(0), asked = carved(0.5);
+  int inside = 0, outside = 0;
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const Eigen::Vector3d cell(static_cast<double>(i % 64), static_cast<double>(i / 64 % 64),
+                               static_cast<double>(i / 4096));
+    const double distance = 1.1 * ((cell.array() + 0.5) / 32.0 - 1.0).matrix().norm();
+    EXPECT_EQ(unasked[i], 1);
+    if (distance < 0.98) {
+      EXPECT_EQ(asked[i], 1) << "cell " << i;
+      ++inside;
+    } else if (distance > 1.7) {  // the corners; nearer cells lie before or behind the ball in many views
+      EXPECT_EQ(asked[i], 0) << "cell " << i;
+      ++outside;
+    }
+  }
+  EXPECT_GT(inside, 0);
+  EXPECT_GT(outside, 0);
+}
+
+TEST(VisualHullTest, WithoutViewsAllIsPossible) {
+  const BallScene scene;
+  VisualHull hull(NerfConfig{});
+  hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
+  const auto all = [&] {
+    const std::vector<uint8_t> cells = hull.Carve();
+    return std::ranges::count(cells, 1) == static_cast<std::ptrdiff_t>(cells.size());
+  };
+  EXPECT_TRUE(all());
+  hull.Add(scene.View(0));
+  EXPECT_FALSE(all());
+  hull.Remove(scene.View(0));
+  EXPECT_TRUE(all());
 }
 
 }  // namespace
