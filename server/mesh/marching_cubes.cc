@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -14,30 +16,41 @@ namespace {
 // Below, a value means "nothing here" and says nothing about where the surface is.
 constexpr float kClampBelow = -6.0f;
 
-constexpr int kGroup = 8;  // nodes whose flags are looked at together, as one word
-constexpr uint64_t kAllInside = 0x0101010101010101;
+constexpr int kGroup = 8;  // nodes whose flags are looked at together, as one word with a byte for each
 
+// Calls visit(k) for each byte k of a word of flags that is 1.
+template <class Visit>
+void ForEachFlag(uint64_t flags, Visit visit) {
+  for (; flags != 0; flags &= flags - 1) visit(std::countr_zero(flags) / 8);
+}
+
+// One pass: at each node the vertices on the edges that end there are made, and then the triangles of the cell whose
+// last corner it is, all of whose edges end at this node or earlier ones.
 class Marcher {
  public:
   explicit Marcher(const FieldGrid& grid)
       : grid_(grid),
         stride_{1, grid.StrideY(), grid.StrideZ()},
+        inside_(grid.value.size() + kGroup, 0),
         vertex_of_edge_(std::make_unique_for_overwrite<uint32_t[]>(3 * grid.value.size())) {
+    const size_t cell_size = stride_[0] + stride_[1] + stride_[2];
     for (int corner = 0; corner < kCellCorners; ++corner) {
-      corner_offset_[corner] = (corner & 1) + (corner >> 1 & 1) * stride_[1] + (corner >> 2 & 1) * stride_[2];
+      corner_back_[corner] = cell_size - ((corner & 1) + (corner >> 1 & 1) * stride_[1] + (corner >> 2) * stride_[2]);
     }
     for (int edge = 0; edge < kCellEdges; ++edge) {
-      edge_offset_[edge] = 3 * corner_offset_[EdgeCorner(edge)] + EdgeAxis(edge);
+      const int axis = EdgeAxis(edge);
+      edge_back_[edge] = 3 * static_cast<ptrdiff_t>(corner_back_[EdgeCorner(edge)] - stride_[axis]) - axis;
     }
   }
 
   GridSurface Run() && {
-    // Groups at the end of the last row look a little beyond the last node.
-    inside_.assign(grid_.value.size() + stride_[2] + stride_[1] + 2 * kGroup, 0);
     for (size_t i = 0; i < grid_.value.size(); ++i) inside_[i] = grid_.value[i] > 0;
-    ForEachMixedGroup([this](int x, int y, int z, size_t node) { AddVertices(x, y, z, node); });
-    surface_.mesh.triangles.reserve(2 * surface_.mesh.vertices.size());
-    ForEachMixedGroup([this](int, int, int, size_t node) { AddTriangles(node); });
+    // The first node of each axis ends no edge and no cell.
+    for (int z = 1; z < grid_.nodes.z(); ++z) {
+      for (int y = 1; y < grid_.nodes.y(); ++y) {
+        for (int x = 1; x < grid_.nodes.x(); x += kGroup) MarchGroup(x, y, z);
+      }
+    }
     return std::move(surface_);
   }
 
@@ -48,64 +61,59 @@ class Marcher {
     return flags;
   }
 
-  // Whether all corners of the group's cells agree.
-  bool IsUniform(size_t node) const {
-    uint64_t any = 0, all = kAllInside;
-    for (const size_t offset : corner_offset_) {
-      const uint64_t flags = Flags(node + offset);
+  // The nodes (x .. x + 7, y, z), as far as the row goes.
+  void MarchGroup(int x, int y, int z) {
+    const size_t node = grid_.Index(x, y, z);
+    // A flag is 0 or 1 and has room in its byte for those of all eight corners.
+    uint64_t any = 0, all = ~uint64_t{0}, pattern = 0;
+    for (int corner = 0; corner < kCellCorners; ++corner) {
+      const uint64_t flags = Flags(node - corner_back_[corner]);
       any |= flags;
       all &= flags;
+      pattern |= flags << corner;
     }
-    return any == 0 || all == kAllInside;
+    uint64_t mixed = any & ~all;
+    const int left = grid_.nodes.x() - x;
+    if (left < kGroup) mixed &= (uint64_t{1} << 8 * left) - 1;
+    if (mixed == 0) return;
+    AddVertices(x, y, z, node);
+    ForEachFlag(mixed, [&](int k) { AddTriangles(node + k, pattern >> 8 * k & 0xff); });
   }
 
-  // The last node of an axis is outside, as are its neighbours in the outermost layer, so nothing is missed by leaving
-  // it out.
-  template <class Visit>
-  void ForEachMixedGroup(Visit visit) {
-    const Eigen::Vector3i cells = grid_.nodes.array() - 1;
-    for (int z = 0; z < cells.z(); ++z) {
-      for (int y = 0; y < cells.y(); ++y) {
-        const size_t row = grid_.Index(0, y, z);
-        for (int x = 0; x < cells.x(); x += kGroup) {
-          if (IsUniform(row + x)) continue;
-          for (int k = x; k < std::min(x + kGroup, cells.x()); ++k) visit(k, y, z, row + k);
-        }
+  void AddVertices(int x, int y, int z, size_t group) {
+    std::array<uint64_t, 3> crossed;
+    for (int axis = 0; axis < 3; ++axis) crossed[axis] = Flags(group) ^ Flags(group - stride_[axis]);
+    uint64_t any = crossed[0] | crossed[1] | crossed[2];
+    const int left = grid_.nodes.x() - x;
+    if (left < kGroup) any &= (uint64_t{1} << 8 * left) - 1;
+    ForEachFlag(any, [&](int k) {
+      const size_t node = group + k;
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((crossed[axis] >> 8 * k & 1) == 0) continue;
+        const size_t lower = node - stride_[axis];
+        Eigen::Vector3f at(static_cast<float>(x + k), static_cast<float>(y), static_cast<float>(z));
+        at[axis] -= 1.0f - EdgeCrossing(grid_.value[lower], grid_.value[node]);
+        vertex_of_edge_[3 * node + axis] = static_cast<uint32_t>(surface_.mesh.vertices.size());
+        surface_.mesh.vertices.push_back(grid_.Position(at));
+        surface_.grid_edges.push_back(static_cast<uint32_t>(3 * lower + axis));
       }
-    }
+    });
   }
 
-  // On the edges in direction x, y, z of a node.
-  void AddVertices(int x, int y, int z, size_t node) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const size_t neighbour = node + stride_[axis];
-      if (inside_[node] == inside_[neighbour]) continue;
-      Eigen::Vector3f at(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
-      at[axis] += EdgeCrossing(grid_.value[node], grid_.value[neighbour]);
-      const size_t edge = 3 * node + axis;
-      vertex_of_edge_[edge] = static_cast<uint32_t>(surface_.mesh.vertices.size());
-      surface_.mesh.vertices.push_back(grid_.Position(at));
-      surface_.grid_edges.push_back(static_cast<uint32_t>(edge));
-    }
-  }
-
-  void AddTriangles(size_t node) {
-    int pattern = 0;
-    for (int corner = 0; corner < kCellCorners; ++corner) pattern |= inside_[node + corner_offset_[corner]] << corner;
+  void AddTriangles(size_t last_node, size_t pattern) {
+    const uint32_t* edges = &vertex_of_edge_[3 * last_node];
     for (const auto& [a, b, c] : table_[pattern]) {
-      surface_.mesh.triangles.push_back({VertexOn(node, a), VertexOn(node, b), VertexOn(node, c)});
+      surface_.mesh.triangles.push_back({*(edges - edge_back_[a]), *(edges - edge_back_[b]), *(edges - edge_back_[c])});
     }
   }
-
-  uint32_t VertexOn(size_t node, int edge) const { return vertex_of_edge_[3 * node + edge_offset_[edge]]; }
 
   const FieldGrid& grid_;
   const MarchingCubesTable& table_ = GetMarchingCubesTable();
   const std::array<size_t, 3> stride_;
-  std::array<size_t, kCellCorners> corner_offset_;  // of a cell's corners from its first node
-  std::array<size_t, kCellEdges> edge_offset_;      // of a cell's edges in vertex_of_edge_ from its first node's
-  std::vector<uint8_t> inside_;
-  std::unique_ptr<uint32_t[]> vertex_of_edge_;  // three per node; set where the edge is crossed
+  std::array<size_t, kCellCorners> corner_back_;  // from a cell's last node back to its corners
+  std::array<ptrdiff_t, kCellEdges> edge_back_;   // in vertex_of_edge_, from a cell's last node's to its edges
+  std::vector<uint8_t> inside_;                   // by node; a group at the end looks beyond the last one
+  std::unique_ptr<uint32_t[]> vertex_of_edge_;    // three per node: of the edges that end there, where crossed
   GridSurface surface_;
 };
 

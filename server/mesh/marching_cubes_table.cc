@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cassert>
 #include <limits>
+#include <vector>
 
 namespace romap {
 namespace {
@@ -75,7 +76,7 @@ class LoopCutter {
     }
   }
 
-  void AppendTriangles(std::vector<std::array<uint8_t, 3>>& triangles) const {
+  void AppendTriangles(CellTriangles& triangles) const {
     const int last = static_cast<int>(loop_.size()) - 1;
     assert(cost_[0][last] < kForbidden && "every loop has a cut that stays off the faces");
     Append(0, last, triangles);
@@ -104,10 +105,10 @@ class LoopCutter {
     cost_[first][last] = best + DiagonalCost(first, last);
   }
 
-  void Append(int first, int last, std::vector<std::array<uint8_t, 3>>& triangles) const {
+  void Append(int first, int last, CellTriangles& triangles) const {
     if (last - first < 2) return;
     const int apex = apex_[first][last];
-    triangles.push_back(
+    triangles.Add(
         {static_cast<uint8_t>(loop_[first]), static_cast<uint8_t>(loop_[apex]), static_cast<uint8_t>(loop_[last])});
     Append(first, apex, triangles);
     Append(apex, last, triangles);

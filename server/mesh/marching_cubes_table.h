@@ -1,8 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cassert>
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 namespace romap {
 
@@ -25,9 +26,32 @@ inline constexpr int EdgeCorner(int edge) {
   }
 }
 
-// Triangles of a cell for each of the 256 patterns of inside corners (bit c = corner c is inside). Each triangle names
-// three cell edges, counter-clockwise seen from outside.
-using MarchingCubesTable = std::array<std::vector<std::array<uint8_t, 3>>, 256>;
+// No pattern of corners needs more: a single border crosses at most seven cell edges.
+inline constexpr size_t kMostCellTriangles = 5;
+
+// The triangles of one cell, each of which names three cell edges, counter-clockwise seen from outside. Of fixed size,
+// so that the whole table is 4 KB in one piece.
+class CellTriangles {
+ public:
+  using Triangle = std::array<uint8_t, 3>;
+
+  // At most kMostCellTriangles.
+  void Add(const Triangle& triangle) {
+    assert(count_ < kMostCellTriangles);
+    triangles_[count_++] = triangle;
+  }
+  size_t size() const { return count_; }
+  const Triangle& operator[](size_t i) const { return triangles_[i]; }
+  const Triangle* begin() const { return triangles_.data(); }
+  const Triangle* end() const { return triangles_.data() + count_; }
+
+ private:
+  uint8_t count_ = 0;
+  std::array<Triangle, kMostCellTriangles> triangles_;
+};
+
+// Triangles of a cell for each of the 256 patterns of inside corners (bit c = corner c is inside).
+using MarchingCubesTable = std::array<CellTriangles, 256>;
 
 // Built once, from first principles (Lorensen & Cline 1987 give the idea). On each face of the cell the border of each
 // run of inside corners is a segment between two cell edges; the segments link to closed loops, which are cut into
