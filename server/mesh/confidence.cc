@@ -20,152 +20,162 @@ constexpr float kHiddenCells = 1.5f;
 constexpr float kMostSlope = 4.0f;
 // More views than these say little more and are not asked; the weights of those that are stand for the others.
 constexpr size_t kMostViews = 16;
+// Of a bin of the depth buffer, so that surface which faces the view leaves no bin empty.
+constexpr float kBinCells = 2.0f;
 // Beyond, a depth buffer would only be a waste: the camera is inside the object.
 constexpr int kMostSide = 512;
 // Pixels farther out are in no image, and numbers of theirs might overflow.
 constexpr float kMostPixel = 1e6f;
 
-// One view's picture of the vertices, in cells of about the mesh's own fineness.
-class DepthBuffer {
- public:
-  // Cell (0, 0) begins at `least_px`, cells are `cell_px` wide.
-  DepthBuffer(const Eigen::Vector2f& least_px, const Eigen::Vector2f& most_px, float cell_px)
-      : least_px_(least_px), per_px_(1.0f / cell_px) {
-    const Eigen::Vector2f size = (most_px - least_px) * per_px_;
-    width_ = std::min(static_cast<int>(size.x()) + 3, kMostSide);
-    height_ = std::min(static_cast<int>(size.y()) + 3, kMostSide);
-    depth_.assign(static_cast<size_t>(width_) * static_cast<size_t>(height_), std::numeric_limits<float>::infinity());
-  }
+// So many vertices are projected at a time: what is known of them stays in the nearest cache.
+constexpr Eigen::Index kBlock = 256;
+using Block = Eigen::Array<float, kBlock, 1>;
 
-  // A vertex covers the four cells whose middles are nearest, which leaves no gaps between neighbours.
-  void Draw(const Eigen::Vector2f& pixel, float depth_mu) {
-    const Eigen::Vector2f at = (pixel - least_px_) * per_px_ + Eigen::Vector2f::Constant(0.5f);
-    const int x = std::clamp(static_cast<int>(at.x()), 0, width_ - 2);
-    const int y = std::clamp(static_cast<int>(at.y()), 0, height_ - 2);
-    float* row = &depth_[static_cast<size_t>(y * width_ + x)];
-    for (float* cell : {row, row + 1, row + width_, row + width_ + 1}) *cell = std::min(*cell, depth_mu);
-  }
-
-  float At(const Eigen::Vector2f& pixel) const {
-    const Eigen::Vector2f at = (pixel - least_px_) * per_px_ + Eigen::Vector2f::Constant(1.0f);
-    const int x = std::clamp(static_cast<int>(at.x()), 0, width_ - 1);
-    const int y = std::clamp(static_cast<int>(at.y()), 0, height_ - 1);
-    return depth_[static_cast<size_t>(y * width_ + x)];
-  }
-
- private:
-  Eigen::Vector2f least_px_;
-  float per_px_;
-  int width_ = 0;
-  int height_ = 0;
-  std::vector<float> depth_;
-};
-
-// A vertex that faces a view.
-struct FacingVertex {
-  uint32_t vertex;
-  float depth_mu;
-  float cosine;
-  Eigen::Vector2f pixel;  // full image
-};
-
-// Coordinates of vertices and normals by axis, for arithmetic on many at a time.
+// Coordinates of vertices and normals by axis, for arithmetic on many at a time; filled up to whole blocks with zeros,
+// which as normals face no view.
 struct VertexArrays {
   std::array<Eigen::ArrayXf, 3> vertex, normal;
+  Eigen::Index blocks;
 
-  explicit VertexArrays(const Mesh& mesh) {
-    const auto count = static_cast<Eigen::Index>(mesh.vertices.size());
+  explicit VertexArrays(const Mesh& mesh)
+      : blocks((static_cast<Eigen::Index>(mesh.vertices.size()) + kBlock - 1) / kBlock) {
     for (int axis = 0; axis < 3; ++axis) {
-      vertex[axis].resize(count);
-      normal[axis].resize(count);
-      for (Eigen::Index i = 0; i < count; ++i) {
-        vertex[axis][i] = mesh.vertices[i][axis];
-        normal[axis][i] = mesh.normals[i][axis];
+      vertex[axis] = Eigen::ArrayXf::Zero(blocks * kBlock);
+      normal[axis] = Eigen::ArrayXf::Zero(blocks * kBlock);
+      for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+        vertex[axis][static_cast<Eigen::Index>(i)] = mesh.vertices[i][axis];
+        normal[axis][static_cast<Eigen::Index>(i)] = mesh.normals[i][axis];
       }
     }
   }
 };
 
+// The vertices that face a view, in the order of the mesh.
+struct FacingVertices {
+  size_t count = 0;
+  std::vector<uint32_t> vertex;
+  std::vector<float> depth_mu, cosine, u_px, v_px;  // pixels of the full image
+  float nearest_mu;
+  Eigen::Vector2f least_px, most_px;
+
+  explicit FacingVertices(size_t capacity)
+      : vertex(capacity), depth_mu(capacity), cosine(capacity), u_px(capacity), v_px(capacity) {}
+
+  void Collect(const VertexArrays& arrays, const FieldView& view) {
+    const Eigen::Matrix3f R = view.T_camera_object.RotationMatrix().cast<float>();
+    const Eigen::Vector3f t = view.T_camera_object.translation().cast<float>();
+    const Eigen::Vector3f center = -(R.transpose() * t);
+    const float fx_px = static_cast<float>(view.camera.fx_px), fy_px = static_cast<float>(view.camera.fy_px);
+    const float cx_px = static_cast<float>(view.camera.cx_px), cy_px = static_cast<float>(view.camera.cy_px);
+    count = 0;
+    for (Eigen::Index block = 0; block < arrays.blocks; ++block) {
+      const auto of = [&](const Eigen::ArrayXf& all) { return all.segment<kBlock>(block * kBlock); };
+      const Block x = of(arrays.vertex[0]), y = of(arrays.vertex[1]), z = of(arrays.vertex[2]);
+      const Block dx = center.x() - x, dy = center.y() - y, dz = center.z() - z;
+      const Block toward = of(arrays.normal[0]) * dx + of(arrays.normal[1]) * dy + of(arrays.normal[2]) * dz;
+      const Block block_cosine = toward / (dx.square() + dy.square() + dz.square()).sqrt();
+      const Block depth = R(2, 0) * x + R(2, 1) * y + R(2, 2) * z + t.z();
+      const Block per_depth = depth.inverse();
+      const Block u = (R(0, 0) * x + R(0, 1) * y + R(0, 2) * z + t.x()) * per_depth * fx_px + cx_px;
+      const Block v = (R(1, 0) * x + R(1, 1) * y + R(1, 2) * z + t.y()) * per_depth * fy_px + cy_px;
+      for (Eigen::Index i = 0; i < kBlock; ++i) {
+        // Whether a vertex faces the view cannot be foretold: each is written, and kept by moving on.
+        vertex[count] = static_cast<uint32_t>(block * kBlock + i);
+        depth_mu[count] = depth[i];
+        cosine[count] = block_cosine[i];
+        u_px[count] = u[i];
+        v_px[count] = v[i];
+        count += static_cast<size_t>((block_cosine[i] > 0) & (depth[i] > 0) & (std::abs(u[i]) < kMostPixel) &
+                                     (std::abs(v[i]) < kMostPixel));
+      }
+    }
+    FindBounds();
+  }
+
+ private:
+  void FindBounds() {
+    const auto of = [this](const std::vector<float>& all) {
+      return Eigen::Map<const Eigen::ArrayXf>(all.data(), static_cast<Eigen::Index>(count));
+    };
+    if (count == 0) return;
+    nearest_mu = of(depth_mu).minCoeff();
+    least_px = {of(u_px).minCoeff(), of(v_px).minCoeff()};
+    most_px = {of(u_px).maxCoeff(), of(v_px).maxCoeff()};
+  }
+};
+
+// The nearest depth in each bin of a view's picture; a bin is about two of the mesh's cells wide.
+class DepthBuffer {
+ public:
+  DepthBuffer(const FacingVertices& facing, float bin_px)
+      : least_px_(facing.least_px), per_px_(1.0f / bin_px), bin_(facing.count) {
+    const Eigen::Vector2f size = (facing.most_px - least_px_) * per_px_;
+    const int width = std::min(static_cast<int>(size.x()), kMostSide - 1) + 1;
+    const int height = std::min(static_cast<int>(size.y()), kMostSide - 1) + 1;
+    nearest_mu_.assign(static_cast<size_t>(width) * static_cast<size_t>(height),
+                       std::numeric_limits<float>::infinity());
+    for (size_t i = 0; i < facing.count; ++i) {
+      const int x = std::min(static_cast<int>((facing.u_px[i] - least_px_.x()) * per_px_), width - 1);
+      const int y = std::min(static_cast<int>((facing.v_px[i] - least_px_.y()) * per_px_), height - 1);
+      bin_[i] = static_cast<uint32_t>(y * width + x);
+      float& nearest = nearest_mu_[bin_[i]];
+      nearest = std::min(nearest, facing.depth_mu[i]);
+    }
+  }
+
+  // Where the i-th of the facing vertices is.
+  float NearestAt(size_t i) const { return nearest_mu_[bin_[i]]; }
+
+ private:
+  Eigen::Vector2f least_px_;
+  float per_px_;
+  std::vector<uint32_t> bin_;  // of each facing vertex
+  std::vector<float> nearest_mu_;
+};
+
 class Observation {
  public:
   Observation(const Mesh& mesh, const Eigen::Vector3f& box_half_extents, float cell_mu)
-      : arrays_(mesh), longest_side_mu_(2.0f * box_half_extents.maxCoeff()), cell_mu_(cell_mu) {
-    facing_.reserve(mesh.vertices.size());
-  }
+      : arrays_(mesh),
+        longest_side_mu_(2.0f * box_half_extents.maxCoeff()),
+        cell_mu_(cell_mu),
+        facing_(static_cast<size_t>(arrays_.blocks * kBlock)) {}
 
   // Adds the view's weights to those of the vertices it observes.
   void Add(const FieldView& view, std::vector<float>& weights) {
     const auto focal_px = static_cast<float>(std::max(view.camera.fx_px, view.camera.fy_px));
-    CollectFacing(view);
-    if (facing_.empty() || !std::isfinite(focal_px)) return;
-    const DepthBuffer buffer = DrawFacing(focal_px);
-    for (const FacingVertex& facing : facing_) {
-      if (IsHidden(facing, buffer) || !IsOnObject(view, facing.pixel)) continue;
-      const float side_px = focal_px * longest_side_mu_ / facing.depth_mu;
-      weights[facing.vertex] += facing.cosine * std::min(1.0f, side_px / kSharpSide_px);
+    if (!view.T_camera_object.IsFinite() || !std::isfinite(focal_px)) return;
+    facing_.Collect(arrays_, view);
+    if (facing_.count == 0) return;
+    const DepthBuffer buffer(facing_, kBinCells * std::max(focal_px * cell_mu_ / facing_.nearest_mu, 1.0f));
+    const float sharp_mu = focal_px * longest_side_mu_ / kSharpSide_px;  // within this depth a view is sharp
+    for (size_t i = 0; i < facing_.count; ++i) {
+      if (!IsOnObject(view, facing_.u_px[i], facing_.v_px[i]) || IsHidden(i, buffer)) continue;
+      weights[facing_.vertex[i]] += facing_.cosine[i] * std::min(1.0f, sharp_mu / facing_.depth_mu[i]);
     }
   }
 
  private:
-  void CollectFacing(const FieldView& view) {
-    facing_.clear();
-    if (!view.T_camera_object.IsFinite()) return;
-    const Eigen::Matrix3f R = view.T_camera_object.RotationMatrix().cast<float>();
-    const Eigen::Vector3f t = view.T_camera_object.translation().cast<float>();
-    const Eigen::Vector3f center = -(R.transpose() * t);
-    const auto& [x, y, z] = arrays_.vertex;
-    const auto& [nx, ny, nz] = arrays_.normal;
-    cosine_ = (nx * (center.x() - x) + ny * (center.y() - y) + nz * (center.z() - z)) /
-              ((center.x() - x).square() + (center.y() - y).square() + (center.z() - z).square()).sqrt();
-    depth_mu_ = R(2, 0) * x + R(2, 1) * y + R(2, 2) * z + t.z();
-    const auto project = [&](int row, double focal_px, double middle_px, Eigen::ArrayXf& pixel) {
-      pixel = (R(row, 0) * x + R(row, 1) * y + R(row, 2) * z + t[row]) / depth_mu_ * static_cast<float>(focal_px) +
-              static_cast<float>(middle_px);
-    };
-    project(0, view.camera.fx_px, view.camera.cx_px, u_px_);
-    project(1, view.camera.fy_px, view.camera.cy_px, v_px_);
-    for (Eigen::Index i = 0; i < cosine_.size(); ++i) {
-      if (!(cosine_[i] > 0 && depth_mu_[i] > 0)) continue;
-      const Eigen::Vector2f pixel(u_px_[i], v_px_[i]);
-      if (!(pixel.cwiseAbs().maxCoeff() < kMostPixel)) continue;
-      facing_.push_back({static_cast<uint32_t>(i), depth_mu_[i], cosine_[i], pixel});
-    }
-  }
-
-  DepthBuffer DrawFacing(float focal_px) const {
-    Eigen::Vector2f least = facing_.front().pixel, most = least;
-    float nearest_mu = facing_.front().depth_mu;
-    for (const FacingVertex& facing : facing_) {
-      least = least.cwiseMin(facing.pixel);
-      most = most.cwiseMax(facing.pixel);
-      nearest_mu = std::min(nearest_mu, facing.depth_mu);
-    }
-    DepthBuffer buffer(least, most, std::max(focal_px * cell_mu_ / nearest_mu, 1.0f));
-    for (const FacingVertex& facing : facing_) buffer.Draw(facing.pixel, facing.depth_mu);
-    return buffer;
-  }
-
-  bool IsHidden(const FacingVertex& facing, const DepthBuffer& buffer) const {
-    const float behind_cells = (facing.depth_mu - buffer.At(facing.pixel)) / cell_mu_;
+  bool IsHidden(size_t i, const DepthBuffer& buffer) const {
+    const float behind_cells = (facing_.depth_mu[i] - buffer.NearestAt(i)) / cell_mu_;
     if (behind_cells <= kHiddenCells) return false;
-    const float slope = std::sqrt(std::max(1.0f - facing.cosine * facing.cosine, 0.0f)) / facing.cosine;
+    const float cosine = facing_.cosine[i];
+    const float slope = std::sqrt(std::max(1.0f - cosine * cosine, 0.0f)) / cosine;
     return behind_cells > kHiddenCells + 2.0f * std::min(slope, kMostSlope);
   }
 
-  static bool IsOnObject(const FieldView& view, const Eigen::Vector2f& pixel) {
-    const Eigen::Vector2f in_roi = pixel - Eigen::Vector2i(view.roi_px.x, view.roi_px.y).cast<float>();
-    if (!(in_roi.minCoeff() >= -0.5f)) return false;
-    const int x = static_cast<int>(in_roi.x() + 0.5f);
-    const int y = static_cast<int>(in_roi.y() + 0.5f);
-    if (x >= view.ray_kind.cols || y >= view.ray_kind.rows) return false;
-    return view.ray_kind.at<uint8_t>(y, x) == static_cast<uint8_t>(RayKind::kObject);
+  static bool IsOnObject(const FieldView& view, float u_px, float v_px) {
+    // Shifted by a pixel, so that truncation does not take what is left of the crop for its first column.
+    const int x = static_cast<int>(u_px - static_cast<float>(view.roi_px.x) + 1.5f) - 1;
+    const int y = static_cast<int>(v_px - static_cast<float>(view.roi_px.y) + 1.5f) - 1;
+    if (x < 0 || y < 0 || x >= view.ray_kind.cols || y >= view.ray_kind.rows) return false;
+    return view.ray_kind.ptr<uint8_t>(y)[x] == static_cast<uint8_t>(RayKind::kObject);
   }
 
   const VertexArrays arrays_;
   const float longest_side_mu_;
   const float cell_mu_;
-  Eigen::ArrayXf cosine_, depth_mu_, u_px_, v_px_;  // of all vertices in the present view
-  std::vector<FacingVertex> facing_;
+  FacingVertices facing_;  // of the present view
 };
 
 }  // namespace
