@@ -107,9 +107,9 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   clock.EndPhase();
   RefineVertices(grid, probe, surface);
   clock.EndPhase();
-  SetFieldNormals(grid, probe, surface);
-  clock.EndPhase();
   Mesh mesh = std::move(surface.mesh);
+  SetVertexNormals(mesh);
+  clock.EndPhase();
   ColorVertices(probe, mesh);
   clock.EndPhase();
   SetConfidence(snapshot.cameras, snapshot.box_half_extents, grid.spacing.maxCoeff(), mesh);
