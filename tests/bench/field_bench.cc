@@ -2,10 +2,12 @@
 //   field_bench SEQUENCE [OUT] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0] [--steps 0] [--threads 2]
 //               [--loosen 0] [--seed 1] [--depth] [--masks mask.txt]
 //               [--first-steps 0] [--first-scale 1 1 1] [--first-yaw-deg 0]
+//               [--pose-noise-deg 0] [--pose-noise-cm 0] [--mask-noise-px 0] [--noise-seed 1]
 // Every `every`-th frame becomes a view. `loosen` 0.2 makes the cuboids 20 % longer. `steps` 0 = the plan's full
 // budget. `first-steps` are done in a box that is scaled along its axes, its lowest corner staying, and turned, before
-// the right one replaces it; the rows then tell of the last step in the wrong box, the next one, and the rest. With
-// OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
+// the right one replaces it; the rows then tell of the last step in the wrong box, the next one, and the rest. Noise
+// is on every view: see frame_noise.h. With OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an
+// evaluator.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -19,6 +21,7 @@
 #include "client/files/sequence.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
+#include "tests/bench/frame_noise.h"
 #include "tests/bench/run_configured.h"
 
 namespace romap {
@@ -39,6 +42,7 @@ struct Options {
   std::vector<double> first_scale = {1, 1, 1};
   double first_yaw_deg = 0;
   bool depth = false;
+  FrameNoise noise;
   NerfConfig nerf;
   MeshConfig mesh;
 };
@@ -98,7 +102,8 @@ absl::Status BenchObject(const TrueFrames& frames, ObjectRecord object, const Op
 absl::Status Run(const Options& options) {
   SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
   ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, sequence_options));
-  ROMAP_ASSIGN_OR_RETURN(const TrueFrames frames, LoadTrueFrames(sequence, options.every, options.offset));
+  ROMAP_ASSIGN_OR_RETURN(const TrueFrames true_frames, LoadTrueFrames(sequence, options.every, options.offset));
+  const TrueFrames frames = WithNoise(true_frames, options.noise);
   std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
               "Msam/s", "active", "loss");
   for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);
@@ -129,6 +134,10 @@ int main(int argc, char** argv) {
   app.add_option("--first-scale", options.first_scale)->expected(3);
   app.add_option("--first-yaw-deg", options.first_yaw_deg);
   app.add_flag("--depth", options.depth);
+  app.add_option("--pose-noise-deg", options.noise.pose_deg)->check(CLI::NonNegativeNumber);
+  app.add_option("--pose-noise-cm", options.noise.pose_cm)->check(CLI::NonNegativeNumber);
+  app.add_option("--mask-noise-px", options.noise.mask_px)->check(CLI::NonNegativeNumber);
+  app.add_option("--noise-seed", options.noise.seed);
   CLI11_PARSE(app, argc, argv);
   return romap::RunConfigured(options, romap::Run);
 }
