@@ -1,0 +1,97 @@
+// Objects and the pool that trains them, on a device that the host pretends to have.
+#include "tests/unit/server/nerf_cuda/device_test.h"
+// Its macros must come first.
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "server/nerf/object_field.h"
+#include "server/nerf/training_pool.h"
+#include "tests/unit/server/nerf/test_scene.h"
+
+namespace romap::nerf::cuda {
+namespace {
+
+using romap::testing::BallScene;
+using romap::testing::RawOnGrid;
+
+using ObjectsOnDeviceTest = DeviceTest;
+
+NerfConfig TinyConfig() {
+  NerfConfig config;
+  config.levels = 3;
+  config.log2_table_entries = 9;
+  config.finest_resolution = 32;
+  config.hidden_width = 16;
+  config.rays_per_step = 64;
+  config.first_budget_steps = 4;
+  config.full_budget_steps = 12;
+  config.slice_steps = 4;
+  config.probe_interval_steps = 10;
+  config.settle_time_s = 3600;
+  config.max_extra_steps = 0;
+  config.most_time_s = 3600;
+  return config;
+}
+
+BallScene TinyScene(uint64_t object) {
+  BallScene scene;
+  scene.object = ObjectId{object};
+  scene.views = 4;
+  scene.size_px = 32;
+  return scene;
+}
+
+std::vector<float> Train(const NerfConfig& config, int steps) {
+  const BallScene scene = TinyScene(1);
+  ObjectField field(config, scene.object, 5);
+  EXPECT_TRUE(field.SetBox(scene.Box()).ok());
+  for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
+  EXPECT_EQ(field.Train(steps, 1).steps, steps);
+  EXPECT_EQ(field.steps(), static_cast<uint64_t>(steps));
+  return RawOnGrid(field.Snapshot(), 0.7f);
+}
+
+TEST_F(ObjectsOnDeviceTest, AnObjectLearnsOnTheDeviceWhatItLearnsOnTheCpu) {
+  NerfConfig config = TinyConfig();
+  const std::vector<float> on_device = Train(config, 12);
+  config.backend = "cpu";
+  const std::vector<float> on_cpu = Train(config, 12), at_first = Train(config, 1);
+  double apart = 0, moved = 0;
+  for (size_t i = 0; i < on_cpu.size(); ++i) {
+    apart += std::fabs(on_device[i] - on_cpu[i]);
+    moved += std::fabs(at_first[i] - on_cpu[i]);
+  }
+  EXPECT_LT(apart, 0.1 * moved);
+  EXPECT_NE(on_device, on_cpu) << "both were trained on the CPU";
+}
+
+TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
+  std::mutex mutex;
+  std::map<ObjectId, FieldSnapshot> last;
+  TrainingPool pool(TinyConfig(), 2);
+  const uint64_t client = pool.Register([&](FieldSnapshot snapshot) {
+    std::lock_guard lock(mutex);
+    last[snapshot.object] = std::move(snapshot);
+  });
+  cuda_on_host::SetDeviceTraits({.kernels_before_fault = 20});  // of 72
+  for (uint64_t object = 1; object <= 2; ++object) {
+    const BallScene scene = TinyScene(object);
+    pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
+  }
+  pool.Finish(client);
+  while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  pool.Unregister(client);
+  EXPECT_EQ(DeviceStatus().code(), absl::StatusCode::kUnavailable) << "the device has not failed";
+  ASSERT_EQ(last.size(), 2u);
+  for (const auto& [object, snapshot] : last) {
+    EXPECT_TRUE(snapshot.converged);
+    EXPECT_EQ(snapshot.steps, 12u);
+    for (const float raw : RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
+  }
+  EXPECT_EQ(cuda_on_host::AllocatedBytes(), 0u);
+}
+
+}  // namespace
+}  // namespace romap::nerf::cuda
