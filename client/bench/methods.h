@@ -26,7 +26,7 @@ struct EngineConfig {
 // The defaults, then `base`, then the method's own settings. INVALID_ARGUMENT: a field is unknown or out of range.
 absl::StatusOr<EngineConfig> Configure(const BenchMethod& method, const std::vector<std::string>& base);
 
-// The rows of the paper's Table 1, and what is compared with it beyond: ours in three forms, the offline method [33]
+// The rows of the paper's Table 1, and what is compared with it beyond: ours in four forms, the offline method [33]
 // with and without depth with the losses the paper gives it (L_rgb + L_rr, + L_depth), the visual hull, and per-object
 // MLPs of the sizes of iMAP (4 x 256) and vMAP (4 x 32) on frequency encodings, with depth.
 std::vector<BenchMethod> Table1Methods();

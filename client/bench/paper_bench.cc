@@ -58,18 +58,17 @@ bool IsChosen(const std::vector<std::string>& chosen, const std::string& id) {
   return std::ranges::find(chosen, id) != chosen.end();
 }
 
-// The chosen tables with the chosen methods that this build can do; what it cannot do becomes a note.
-absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& options,
-                                                     std::vector<std::string>& notes) {
+// The chosen tables with the chosen methods.
+absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(std::vector<BenchTable> tables, AllTables(options));
   std::erase_if(tables, [&](const BenchTable& table) { return !IsChosen(options.tables, table.id); });
   for (BenchTable& table : tables) {
     std::erase_if(table.methods, [&](const BenchMethod& method) {
-      if (!options.methods.empty() && !IsChosen(options.methods, method.id)) return true;
-      const absl::Status status = Configure(method, options.settings).status();
-      if (!status.ok()) notes.push_back(fmt::format("{} is left out: {}", method.title, Message(status)));
-      return !status.ok();
+      return !options.methods.empty() && !IsChosen(options.methods, method.id);
     });
+    for (const BenchMethod& method : table.methods) {
+      ROMAP_RETURN_IF_ERROR(Configure(method, options.settings).status());
+    }
   }
   std::erase_if(tables, [](const BenchTable& table) { return table.methods.empty(); });
   if (tables.empty()) return InvalidArgument("no method is left to run");
@@ -88,7 +87,7 @@ class PaperBench {
 
   absl::StatusOr<PaperResults> Run() {
     ROMAP_RETURN_IF_ERROR(Configure(BenchMethod(), options_.settings).status());
-    ROMAP_ASSIGN_OR_RETURN(results_.tables, ChooseTables(options_, results_.notes));
+    ROMAP_ASSIGN_OR_RETURN(results_.tables, ChooseTables(options_));
     Prepare();
     const absl::Status status = AllRuns();
     std::error_code error;
