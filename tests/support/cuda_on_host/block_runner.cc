@@ -62,7 +62,7 @@ class BlockRunner {
   void Run(uint64_t block_number);
   void Yield() { scheduler_ = std::move(scheduler_).resume(); }
   unsigned Barrier(int line, bool predicate);
-  void WarpArrive(uint32_t mask);
+  void WarpArrive(uint32_t mask, bool orders_memory);
   void NoteSpin() { spun_ = true; }
   Warp& CurrentWarp() { return warps[current->linear / kWarpSize]; }
 
@@ -190,7 +190,7 @@ unsigned BlockRunner::Barrier(int line, bool predicate) {
   return last_votes_;
 }
 
-void BlockRunner::WarpArrive(uint32_t mask) {
+void BlockRunner::WarpArrive(uint32_t mask, bool orders_memory) {
   Warp& warp = CurrentWarp();
   const unsigned lane = current->linear % kWarpSize;
   const uint32_t self = 1u << lane;
@@ -203,7 +203,7 @@ void BlockRunner::WarpArrive(uint32_t mask) {
   if ((warp.arrived & mask) == mask) {
     warp.arrived &= ~mask;
     warp.released |= mask;
-    ++warp.barriers;
+    if (orders_memory) ++warp.barriers;
   }
   while ((warp.released & self) == 0) Yield();
   warp.released &= ~self;
@@ -246,7 +246,8 @@ const dim3& BlockDim() { return Runner().block_dim; }
 const dim3& GridDim() { return Runner().grid_dim; }
 unsigned Lane() { return Runner().current->linear % kWarpSize; }
 unsigned BlockBarrier(int line, bool predicate) { return Runner().Barrier(line, predicate); }
-void WarpBarrier(unsigned mask) { Runner().WarpArrive(mask); }
+void WarpBarrier(unsigned mask) { Runner().WarpArrive(mask, true); }
+void WarpMeeting(unsigned mask) { Runner().WarpArrive(mask, false); }
 LaneSlot& SlotOfLane(unsigned lane) { return Runner().CurrentWarp().slots[lane]; }
 
 void* DynamicShared() {

@@ -49,10 +49,12 @@ void* DynamicShared();  // 128-byte aligned, all NaN when the block starts
 // Waits for all threads of the block; returns for how many of them `predicate` held. `line` tells barriers apart.
 unsigned BlockBarrier(int line, bool predicate);
 
-// Waits for all lanes in `mask` (those that exist).
+// Waits for all lanes in `mask` (those that exist). A barrier also orders what they do to memory; a meeting, which
+// other warp collectives are, does not.
 void WarpBarrier(unsigned mask);
+void WarpMeeting(unsigned mask);
 
-// Where the lanes of a warp hand values to each other between two WarpBarriers.
+// Where the lanes of a warp hand values to each other between two WarpMeetings.
 struct alignas(16) LaneSlot {
   unsigned char bytes[16];
   const void* pointers[2];
@@ -71,7 +73,7 @@ struct ThreadStamp {
   uint64_t block = 0;
   unsigned thread = 0;
   uint64_t block_barriers = 0;  // passed by the block
-  uint64_t warp_barriers = 0;   // passed by the warp
+  uint64_t warp_barriers = 0;   // passed by the warp; meetings do not count
 };
 ThreadStamp CurrentStamp();
 bool InDynamicShared(uintptr_t address);

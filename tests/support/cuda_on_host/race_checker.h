@@ -10,8 +10,8 @@ namespace romap::cuda_on_host {
 // -fsanitize=thread (and linked without it): it takes the place of the thread sanitizer's runtime.
 //
 // Threads of different blocks are never ordered within a launch; threads of one block are ordered by any __syncthreads
-// that lies between, lanes of one warp also by any warp collective. Only the last write and the last two readers of
-// each word are remembered, so a race can be missed, but what is reported is one.
+// that lies between, lanes of one warp also by __syncwarp, but by no other warp collective. Only the last write and the
+// last two readers of each word are remembered, so a race can be missed, but what is reported is one.
 
 int RaceCount();
 // What the first race was: kind of memory, blocks and threads; empty when there was none.

@@ -33,6 +33,9 @@ struct fragment {
   static int IndexOf(int row, int col) { return (row * kCols + col) / 32; }
 };
 
+// Lanes come together for an operation, which says nothing of what they wrote before it.
+inline void Meet() { romap::cuda_on_host::WarpMeeting(0xffffffffu); }
+
 // The alignment that the device asks of loads and stores.
 template <class T>
 void CheckAccess(const T* p, unsigned leading_dimension) {
@@ -45,46 +48,46 @@ void CheckAccess(const T* p, unsigned leading_dimension) {
 template <class Fragment, class T>
 void fill_fragment(Fragment& f, T value) {
   for (auto& element : f.x) element = value;
-  __syncwarp();
+  Meet();
 }
 
 template <class Use, int M, int N, int K, class T, class Layout>
 void load_matrix_sync(fragment<Use, M, N, K, T, Layout>& f, const T* p, unsigned leading_dimension) {
   CheckAccess(p, leading_dimension);
-  __syncwarp();
+  Meet();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     f.x[i] = std::is_same_v<Layout, row_major> ? p[row * leading_dimension + col] : p[col * leading_dimension + row];
   }
-  __syncwarp();
+  Meet();
 }
 
 template <int M, int N, int K, class T>
 void load_matrix_sync(fragment<accumulator, M, N, K, T>& f, const T* p, unsigned leading_dimension, layout_t layout) {
   CheckAccess(p, leading_dimension);
-  __syncwarp();
+  Meet();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     f.x[i] = layout == mem_row_major ? p[row * leading_dimension + col] : p[col * leading_dimension + row];
   }
-  __syncwarp();
+  Meet();
 }
 
 template <int M, int N, int K, class T>
 void store_matrix_sync(T* p, const fragment<accumulator, M, N, K, T>& f, unsigned leading_dimension, layout_t layout) {
   CheckAccess(p, leading_dimension);
-  __syncwarp();
+  Meet();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     p[layout == mem_row_major ? row * leading_dimension + col : col * leading_dimension + row] = f.x[i];
   }
-  __syncwarp();
+  Meet();
 }
 
 // Products of tiles that warps have begun since the program began.
@@ -101,7 +104,7 @@ void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M,
   if (lane == 0) ++tile_products;
   SlotOfLane(lane).pointers[0] = &a;
   SlotOfLane(lane).pointers[1] = &b;
-  __syncwarp();
+  Meet();
   TD result[fragment<accumulator, M, N, K, TD>::num_elements];
   for (int i = 0; i < d.num_elements; ++i) {
     const int row = d.Row(static_cast<int>(lane), i);
@@ -114,7 +117,7 @@ void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M,
     }
     result[i] = static_cast<TD>(static_cast<float>(c.x[i]) + sum);
   }
-  __syncwarp();
+  Meet();
   for (int i = 0; i < d.num_elements; ++i) d.x[i] = result[i];
 }
 

@@ -40,7 +40,11 @@ __global__ void LaneExchange(int* out, bool with_warp_barrier) {
   __shared__ int values[kBlock];
   const unsigned t = threadIdx.x;
   values[t] = static_cast<int>(t);
-  if (with_warp_barrier) __syncwarp();
+  if (with_warp_barrier) {
+    __syncwarp();
+  } else {
+    __any_sync(0xffffffffu, 1);  // lanes come together, but what they wrote need not be seen
+  }
   out[blockIdx.x * kBlock + t] = values[t ^ 1];
 }
 
