@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "server/mesh/view_pixels.h"
+
 namespace romap {
 namespace {
 
@@ -150,7 +152,7 @@ class Observation {
     const DepthBuffer buffer(facing_, kBinCells * std::max(focal_px * cell_mu_ / facing_.nearest_mu, 1.0f));
     const float sharp_mu = focal_px * longest_side_mu_ / kSharpSide_px;  // within this depth a view is sharp
     for (size_t i = 0; i < facing_.count; ++i) {
-      if (!IsOnObject(view, facing_.u_px[i], facing_.v_px[i]) || IsHidden(i, buffer)) continue;
+      if (KindAt(view, facing_.u_px[i], facing_.v_px[i]) != RayKind::kObject || IsHidden(i, buffer)) continue;
       weights[facing_.vertex[i]] += facing_.cosine[i] * std::min(1.0f, sharp_mu / facing_.depth_mu[i]);
     }
   }
@@ -162,14 +164,6 @@ class Observation {
     const float cosine = facing_.cosine[i];
     const float slope = std::sqrt(std::max(1.0f - cosine * cosine, 0.0f)) / cosine;
     return behind_cells > kHiddenCells + 2.0f * std::min(slope, kMostSlope);
-  }
-
-  static bool IsOnObject(const FieldView& view, float u_px, float v_px) {
-    // Shifted by a pixel, so that truncation does not take what is left of the crop for its first column.
-    const int x = static_cast<int>(u_px - static_cast<float>(view.roi_px.x) + 1.5f) - 1;
-    const int y = static_cast<int>(v_px - static_cast<float>(view.roi_px.y) + 1.5f) - 1;
-    if (x < 0 || y < 0 || x >= view.ray_kind.cols || y >= view.ray_kind.rows) return false;
-    return view.ray_kind.ptr<uint8_t>(y)[x] == static_cast<uint8_t>(RayKind::kObject);
   }
 
   const VertexArrays arrays_;

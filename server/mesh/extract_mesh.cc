@@ -9,6 +9,7 @@
 #include "common/status.h"
 #include "common/thread_time.h"
 #include "server/mesh/confidence.h"
+#include "server/mesh/confirmed_space.h"
 #include "server/mesh/floaters.h"
 #include "server/mesh/grid_nodes.h"
 #include "server/mesh/hidden_space.h"
@@ -90,6 +91,8 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   auto [grid, asked_nodes] = SampleField(snapshot, probe, nodes);
   clock.EndPhase();
 
+  EmptyUnconfirmed(snapshot.cameras, config.min_confirmed_share, grid);
+  clock.EndPhase();
   const SightLimits sight = SightOf(snapshot, config);
   FillHiddenSpace(grid, config.fill_unseen ? sight : SightLimits{});
   clock.EndPhase();

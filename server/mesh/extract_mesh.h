@@ -11,8 +11,8 @@
 
 namespace romap {
 
-inline constexpr std::array kMeshPhaseNames = {"sample", "hidden",  "support", "floaters",  "march",
-                                               "refine", "normals", "colors",  "confidence"};
+inline constexpr std::array kMeshPhaseNames = {"sample", "confirm", "hidden",  "support", "floaters",
+                                               "march",  "refine",  "normals", "colors",  "confidence"};
 
 // What one extraction cost.
 struct MeshStats {
@@ -25,9 +25,9 @@ struct MeshStats {
 // units), oriented outwards. Where the field leaves its box the surface closes along the box. With config.trim_unseen
 // what no view saw is left out, and the mesh is open there.
 //
-// The field is sampled on a grid, cavities and unseen space become solid, floaters go, marching cubes runs at the
-// snapshot's surface level (paper, sections "System Overview" and "Implementation Details"), and its vertices move to
-// where the field crosses that level.
+// The field is sampled on a grid, what few views confirm goes, cavities and unseen space become solid, floaters go,
+// marching cubes runs at the snapshot's surface level (paper, sections "System Overview" and "Implementation Details"),
+// and its vertices move to where the field crosses that level.
 //
 // FAILED_PRECONDITION: the field nowhere rises above its surface level, or nothing of it was seen and unseen parts are
 // to be trimmed. INVALID_ARGUMENT: a snapshot that cannot be (no field, box without volume, hull of another size than

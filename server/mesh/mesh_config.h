@@ -10,6 +10,7 @@ struct MeshConfig {
   bool adapt_resolution = true;
   double pixels_per_node = 2.5;
   int min_side_nodes = 48;
+  double min_confirmed_share = 0.25;
   bool fill_unseen = true;
   double unseen_optical_depth = 0.2;
   bool cut_below_support = true;
@@ -27,6 +28,8 @@ struct MeshConfig {
                {.unit = "px", .min = 0.5, .max = 50, .help = "Size in a good view that earns a node, when adapting"});
     fields.Add("min_side_nodes", &min_side_nodes,
                {.unit = "nodes", .min = 2, .max = 256, .help = "Least nodes along the short sides of flat boxes"});
+    fields.Add("min_confirmed_share", &min_confirmed_share,
+               {.min = 0, .max = 1, .help = "Where a smaller share of the views shows the object there is nothing"});
     fields.Add("fill_unseen", &fill_unseen,
                {.help = "Empty space that no training view can see becomes solid (undersides, insides)"});
     fields.Add("unseen_optical_depth", &unseen_optical_depth,

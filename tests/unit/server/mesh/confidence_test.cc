@@ -32,6 +32,7 @@ MeshConfig AsTheFieldSays() {
   MeshConfig config;
   config.fill_unseen = false;
   config.cut_below_support = false;
+  config.min_confirmed_share = 0;
   return config;
 }
 

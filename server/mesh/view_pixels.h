@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "common/messages.h"
+
+namespace romap {
+
+// What a view's mask shows at a pixel of the full image; none outside the view's crop. The pixel's coordinates must be
+// finite and fit an int.
+inline std::optional<RayKind> KindAt(const FieldView& view, float u_px, float v_px) {
+  // Shifted by a pixel, so that truncation does not take what is left of the crop for its first column.
+  const int x = static_cast<int>(u_px - static_cast<float>(view.roi_px.x) + 1.5f) - 1;
+  const int y = static_cast<int>(v_px - static_cast<float>(view.roi_px.y) + 1.5f) - 1;
+  if (x < 0 || y < 0 || x >= view.ray_kind.cols || y >= view.ray_kind.rows) return std::nullopt;
+  return static_cast<RayKind>(view.ray_kind.ptr<uint8_t>(y)[x]);
+}
+
+}  // namespace romap
