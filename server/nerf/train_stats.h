@@ -26,6 +26,9 @@ struct TrainStats {
     for (double s : phase_cpu_s) sum += s;
     return sum;
   }
+  // What it took of the machine: CPU time, which work of others beside it does not change; on a device, which tells
+  // no such time, wall time.
+  double BusySeconds() const { return CpuSeconds() > 0 ? CpuSeconds() : wall_s; }
 };
 
 }  // namespace romap

@@ -27,7 +27,7 @@ struct TrainingPool::Job {
   uint64_t allowed_steps = 0;   // if more views are to come
   uint64_t complete_steps = 0;  // if not
   double loss_fall = 1;         // share of the loss that 100 steps take away; 1 while nobody knows
-  double busy_s = 0;            // CPU time of all workers
+  double busy_s = 0;            // of all workers, see TrainStats::BusySeconds
   std::string concern;
   // Of the last snapshot.
   uint64_t sent_steps = 0;
@@ -292,7 +292,7 @@ void TrainingPool::RunSlice(Lease& lease) {
   bool converged = false;
   {
     std::lock_guard lock(mutex_);
-    job.busy_s += stats.CpuSeconds();
+    job.busy_s += stats.BusySeconds();
     TakeNews(job, field);
     converged = job.StepsLeft(true) == 0;
     budget_used |= converged;  // out of time, perhaps: no later slice would send what there is

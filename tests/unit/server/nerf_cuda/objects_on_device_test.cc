@@ -67,6 +67,20 @@ TEST_F(ObjectsOnDeviceTest, AnObjectLearnsOnTheDeviceWhatItLearnsOnTheCpu) {
   EXPECT_NE(on_device, on_cpu) << "both were trained on the CPU";
 }
 
+TEST_F(ObjectsOnDeviceTest, TimeOnADeviceIsLimitedToo) {
+  NerfConfig config = TinyConfig();
+  config.most_time_s = 0.001;
+  config.most_time_per_view_s = 0;
+  TrainingPool pool(config, 1);
+  const uint64_t client = pool.Register([](FieldSnapshot) {});
+  const BallScene scene = TinyScene(1);
+  pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
+  pool.Finish(client);
+  while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(pool.GetProgress(client).steps, 4u) << "one slice takes more than that";
+  pool.Unregister(client);
+}
+
 TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
   std::mutex mutex;
   std::map<ObjectId, FieldSnapshot> last;
