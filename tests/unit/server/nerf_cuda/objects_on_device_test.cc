@@ -26,7 +26,8 @@ NerfConfig TinyConfig() {
   config.hidden_width = 16;
   config.rays_per_step = 64;
   config.first_budget_steps = 4;
-  config.full_budget_steps = 12;
+  config.full_budget_steps = 8;
+  config.max_samples_per_ray = 8;
   config.slice_steps = 4;
   config.probe_interval_steps = 10;
   config.settle_time_s = 3600;
@@ -55,9 +56,9 @@ std::vector<float> Train(const NerfConfig& config, int steps) {
 
 TEST_F(ObjectsOnDeviceTest, AnObjectLearnsOnTheDeviceWhatItLearnsOnTheCpu) {
   NerfConfig config = TinyConfig();
-  const std::vector<float> on_device = Train(config, 12);
+  const std::vector<float> on_device = Train(config, 8);
   config.backend = "cpu";
-  const std::vector<float> on_cpu = Train(config, 12), at_first = Train(config, 1);
+  const std::vector<float> on_cpu = Train(config, 8), at_first = Train(config, 1);
   double apart = 0, moved = 0;
   for (size_t i = 0; i < on_cpu.size(); ++i) {
     apart += std::fabs(on_device[i] - on_cpu[i]);
@@ -89,7 +90,7 @@ TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
     std::lock_guard lock(mutex);
     last[snapshot.object] = std::move(snapshot);
   });
-  cuda_on_host::SetDeviceTraits({.kernels_before_fault = 20});  // of 72
+  cuda_on_host::SetDeviceTraits({.kernels_before_fault = 14});  // of 48
   for (uint64_t object = 1; object <= 2; ++object) {
     const BallScene scene = TinyScene(object);
     pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
@@ -101,7 +102,7 @@ TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
   ASSERT_EQ(last.size(), 2u);
   for (const auto& [object, snapshot] : last) {
     EXPECT_TRUE(snapshot.converged);
-    EXPECT_EQ(snapshot.steps, 12u);
+    EXPECT_EQ(snapshot.steps, 8u);
     for (const float raw : RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
   }
   EXPECT_EQ(cuda_on_host::AllocatedBytes(), 0u);
