@@ -1,98 +1,115 @@
 #include "server/mesh/floaters.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <cstdlib>
+#include <utility>
 #include <vector>
-
-#include "server/mesh/grid_flood.h"
 
 namespace romap {
 namespace {
 
-constexpr uint32_t kNoPiece = 0;
+// Neighbouring nodes of one row of the grid (along x) that hang together.
+struct Run {
+  int begin, end;   // x of the first, and behind the last
+  uint32_t parent;  // a run of the same piece, itself for the one that stands for all
+  uint32_t size;    // nodes inside the surface; of the whole piece where the run stands for it
+};
 
-// Index steps to the 20 nodes around a node that share an edge or a corner of a cell with it, but no side.
-std::array<ptrdiff_t, 20> DiagonalSteps(const FieldGrid& grid) {
-  std::array<ptrdiff_t, 20> steps;
-  size_t count = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        if (std::abs(x) + std::abs(y) + std::abs(z) < 2) continue;
-        steps[count++] = x + y * static_cast<ptrdiff_t>(grid.StrideY()) + z * static_cast<ptrdiff_t>(grid.StrideZ());
+// The pieces of matter: runs that touch over sides, edges or corners of cells, united row by row (Rosenfeld and Pfaltz,
+// 1966).
+class Pieces {
+ public:
+  Pieces(const FieldGrid& grid, float connect_value) : grid_(grid), connect_value_(connect_value) {
+    const int rows = grid.nodes.y() * grid.nodes.z();
+    first_run_.reserve(static_cast<size_t>(rows) + 1);
+    for (int row = 0; row < rows; ++row) {
+      first_run_.push_back(static_cast<uint32_t>(runs_.size()));
+      AddRuns(row);
+    }
+    first_run_.push_back(static_cast<uint32_t>(runs_.size()));
+    // The rows of the ring are empty, so that none of these is beside a row of the next or last layer.
+    for (int row = grid.nodes.y() + 1; row < rows; ++row) {
+      for (const int step : {1, grid.nodes.y() - 1, grid.nodes.y(), grid.nodes.y() + 1}) Unite(row, row - step);
+    }
+  }
+
+  size_t Largest() const {
+    uint32_t largest = 0;
+    for (const Run& run : runs_) largest = std::max(largest, run.size);
+    return largest;
+  }
+
+  // Calls visit(first node, nodes, size of its piece) for each run.
+  template <class Visit>
+  void ForEachRun(Visit visit) {
+    for (size_t row = 0; row + 1 < first_run_.size(); ++row) {
+      for (uint32_t i = first_run_[row]; i < first_run_[row + 1]; ++i) {
+        const Run& run = runs_[i];
+        visit(row * grid_.StrideY() + static_cast<size_t>(run.begin), static_cast<size_t>(run.end - run.begin),
+              static_cast<size_t>(runs_[Root(i)].size));
       }
     }
   }
-  return steps;
-}
-
-class Pieces {
- public:
-  Pieces(const FieldGrid& grid, float connect_value)
-      : grid_(grid),
-        connect_value_(connect_value),
-        sides_(NeighbourSteps(grid)),
-        diagonals_(DiagonalSteps(grid)),
-        piece_of_(grid.value.size(), kNoPiece) {
-    for (size_t seed = 0; seed < grid.value.size(); ++seed) {
-      if (grid.value[seed] > 0 && piece_of_[seed] == kNoPiece) Collect(seed);
-    }
-  }
-
-  // Of the node's piece: nodes inside the surface.
-  size_t SizeAt(size_t node) const { return size_[piece_of_[node]]; }
-  size_t Largest() const { return *std::max_element(size_.begin(), size_.end()); }
 
  private:
-  void Collect(size_t seed) {
-    size_.push_back(0);
-    Enter(seed);
-    while (!stack_.empty()) {
-      const size_t node = stack_.back();
-      stack_.pop_back();
-      bool inner = true;
-      for (const ptrdiff_t step : sides_) inner &= Enter(node + step);
-      if (inner) continue;  // then its neighbours reach all that lies across its corners
-      for (const ptrdiff_t step : diagonals_) Enter(node + step);
+  void AddRuns(int row) {
+    const float* value = &grid_.value[static_cast<size_t>(row) * grid_.StrideY()];
+    for (int x = 0; x < grid_.nodes.x(); ++x) {
+      if (!(value[x] > connect_value_)) continue;
+      Run run{.begin = x, .end = x, .parent = static_cast<uint32_t>(runs_.size()), .size = 0};
+      for (; run.end < grid_.nodes.x() && value[run.end] > connect_value_; ++run.end) run.size += value[run.end] > 0;
+      x = run.end;
+      runs_.push_back(run);
     }
   }
 
-  // Whether the node belongs to the piece.
-  bool Enter(size_t node) {
-    if (!(grid_.value[node] > connect_value_)) return false;
-    if (piece_of_[node] == kNoPiece) {
-      piece_of_[node] = static_cast<uint32_t>(size_.size() - 1);
-      size_.back() += grid_.value[node] > 0;
-      stack_.push_back(node);
+  // Unites the pieces of runs of two rows that touch each other.
+  void Unite(int row_a, int row_b) {
+    uint32_t a = first_run_[static_cast<size_t>(row_a)], b = first_run_[static_cast<size_t>(row_b)];
+    const uint32_t end_a = first_run_[static_cast<size_t>(row_a) + 1];
+    const uint32_t end_b = first_run_[static_cast<size_t>(row_b) + 1];
+    while (a < end_a && b < end_b) {
+      if (runs_[a].begin <= runs_[b].end && runs_[b].begin <= runs_[a].end) Join(a, b);
+      runs_[a].end < runs_[b].end ? ++a : ++b;
     }
-    return true;
+  }
+
+  void Join(uint32_t a, uint32_t b) {
+    a = Root(a);
+    b = Root(b);
+    if (a == b) return;
+    if (a > b) std::swap(a, b);
+    runs_[b].parent = a;
+    runs_[a].size += runs_[b].size;
+  }
+
+  uint32_t Root(uint32_t run) {
+    while (runs_[run].parent != run) run = runs_[run].parent = runs_[runs_[run].parent].parent;
+    return run;
   }
 
   const FieldGrid& grid_;
   const float connect_value_;
-  const std::array<ptrdiff_t, 6> sides_;
-  const std::array<ptrdiff_t, 20> diagonals_;
-  std::vector<uint32_t> piece_of_;  // by node
-  std::vector<size_t> size_ = {0};  // by piece; [kNoPiece] unused
-  std::vector<size_t> stack_;
+  std::vector<Run> runs_;            // row after row, by x
+  std::vector<uint32_t> first_run_;  // by row, and where the last row ends
 };
 
 }  // namespace
 
 size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share) {
-  const Pieces pieces(grid, connect_value);
+  Pieces pieces(grid, connect_value);
   const double least = min_share * static_cast<double>(pieces.Largest());
   size_t remaining = 0;
-  for (size_t node = 0; node < grid.value.size(); ++node) {
-    if (!(grid.value[node] > 0)) continue;
-    if (static_cast<double>(pieces.SizeAt(node)) < least) {
-      grid.Edit(node, kEmpty);
-    } else {
-      ++remaining;
+  pieces.ForEachRun([&](size_t first, size_t nodes, size_t size_of_piece) {
+    for (size_t node = first; node < first + nodes; ++node) {
+      if (!(grid.value[node] > 0)) continue;
+      if (static_cast<double>(size_of_piece) < least) {
+        grid.Edit(node, kEmpty);
+      } else {
+        ++remaining;
+      }
     }
-  }
+  });
   return remaining;
 }
 
