@@ -93,8 +93,9 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
 
   EmptyUnconfirmed(snapshot.cameras, config.min_confirmed_share, grid);
   clock.EndPhase();
-  const SightLimits sight = SightOf(snapshot, config);
-  FillHiddenSpace(grid, config.fill_unseen ? sight : SightLimits{});
+  SightTester sight(grid, SightOf(snapshot, config));
+  SightTester no_sight(grid, {});
+  FillHiddenSpace(grid, config.fill_unseen ? sight : no_sight);
   clock.EndPhase();
   if (config.cut_below_support) {
     const auto height = FindSupportHeight(grid, sight);

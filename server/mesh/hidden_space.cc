@@ -13,8 +13,8 @@ enum State : uint8_t { kUntouched, kOpen, kClosed };
 
 class HiddenSpace {
  public:
-  HiddenSpace(FieldGrid& grid, const SightLimits& limits)
-      : grid_(grid), sight_(grid, limits), state_(grid.value.size(), kUntouched) {}
+  HiddenSpace(FieldGrid& grid, SightTester& sight)
+      : grid_(grid), sight_(sight), state_(grid.value.size(), kUntouched) {}
 
   void Fill() {
     Flood(grid_, OpenNodesOnBox(), [this](size_t node) { return Enter(node); });
@@ -48,12 +48,12 @@ class HiddenSpace {
   }
 
   FieldGrid& grid_;
-  SightTester sight_;
+  SightTester& sight_;
   std::vector<uint8_t> state_;
 };
 
 }  // namespace
 
-void FillHiddenSpace(FieldGrid& grid, const SightLimits& limits) { HiddenSpace(grid, limits).Fill(); }
+void FillHiddenSpace(FieldGrid& grid, SightTester& sight) { HiddenSpace(grid, sight).Fill(); }
 
 }  // namespace romap

@@ -10,6 +10,8 @@ namespace {
 constexpr float kTransparent = -12.0f;
 // Places are shifted by half a node, so that truncation rounds to the nearest node.
 constexpr float kToNearest = 0.5f;
+// Longer than any way through a grid.
+constexpr float kMostSteps = 1e6f;
 
 }  // namespace
 
@@ -46,11 +48,11 @@ bool SightTester::IsSeen(size_t node) {
   // Neighbours are mostly seen by the same view, so the last one to see anything goes first.
   for (size_t tried = 0; tried < views_.size(); ++tried) {
     const size_t view = (last_view_ + tried) % views_.size();
-    if (const std::optional<Way> way = ClearWay(views_[view], place)) {
-      MarkSeen(place, *way);
-      last_view_ = view;
-      return true;
-    }
+    if (!IsWayClear(views_[view], place)) continue;
+    seen_[node] = 1;
+    for (size_t i = 0; i < way_length_; ++i) seen_[way_[i]] = 1;
+    last_view_ = view;
+    return true;
   }
   return false;
 }
@@ -59,7 +61,7 @@ bool SightTester::IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vecto
   for (size_t tried = 0; tried < views_.size(); ++tried) {
     const size_t view = (last_view_ + tried) % views_.size();
     const Eigen::Vector3f way_mu = (views_[view] - place).cwiseProduct(spacing_);
-    if (normal.dot(way_mu) >= min_cosine * way_mu.norm() && ClearWay(views_[view], place)) {
+    if (normal.dot(way_mu) >= min_cosine * way_mu.norm() && IsWayClear(views_[view], place)) {
       last_view_ = view;
       return true;
     }
@@ -67,20 +69,25 @@ bool SightTester::IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vecto
   return false;
 }
 
-std::optional<SightTester::Way> SightTester::ClearWay(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const {
+bool SightTester::IsWayClear(const Eigen::Vector3f& view, const Eigen::Vector3f& place) {
+  way_length_ = 0;
   const Eigen::Vector3f way = view - place;
   const float way_mu = way.cwiseProduct(spacing_).norm();
-  if (!(way_mu > step_mu_)) return Way{};
+  if (!(way_mu > step_mu_)) return true;
   const Eigen::Vector3f step = way * (step_mu_ / way_mu);
   Eigen::Vector3f at = place + Eigen::Vector3f::Constant(kToNearest);
   const int steps = StepsWithinGrid(place, step, way_mu);
+  if (way_.size() < static_cast<size_t>(steps)) way_.resize(static_cast<size_t>(steps));
   float depth = 0;
   for (int i = 0; i < steps; ++i) {
     at += step;
-    depth += optical_depth_[NodeNear(at)];
-    if (depth > max_optical_depth_) return std::nullopt;
+    const size_t node = NodeNear(at);
+    depth += optical_depth_[node];
+    if (depth > max_optical_depth_) return false;
+    way_[static_cast<size_t>(i)] = static_cast<uint32_t>(node);
   }
-  return Way{step, steps};
+  way_length_ = static_cast<size_t>(steps);
+  return true;
 }
 
 int SightTester::StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vector3f& step, float way_mu) const {
@@ -90,22 +97,14 @@ int SightTester::StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vect
     const float end = step[axis] > 0 ? static_cast<float>(nodes_[axis] - 1) : 0.0f;
     steps = std::min(steps, (end - place[axis]) / step[axis]);
   }
-  return static_cast<int>(std::max(steps, 0.0f));
+  // A view so far away that the way to it has no direction in floats is no way off.
+  return steps > 0 && steps < kMostSteps ? static_cast<int>(steps) : 0;
 }
 
 size_t SightTester::NodeNear(const Eigen::Vector3f& shifted) const {
   return static_cast<size_t>(static_cast<int>(shifted.z())) * stride_z_ +
          static_cast<size_t>(static_cast<int>(shifted.y())) * stride_y_ +
          static_cast<size_t>(static_cast<int>(shifted.x()));
-}
-
-void SightTester::MarkSeen(const Eigen::Vector3f& place, const Way& way) {
-  Eigen::Vector3f at = place + Eigen::Vector3f::Constant(kToNearest);
-  seen_[NodeNear(at)] = 1;
-  for (int i = 0; i < way.steps; ++i) {
-    at += way.step;
-    seen_[NodeNear(at)] = 1;
-  }
 }
 
 }  // namespace romap

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "server/mesh/field_grid.h"
@@ -33,15 +32,9 @@ class SightTester {
   bool IsSurfaceSeen(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float min_cosine);
 
  private:
-  // The way from a place towards a view: one step, and how many stay among the grid's nodes and do not pass the view.
-  struct Way {
-    Eigen::Vector3f step = Eigen::Vector3f::Zero();
-    int steps = 0;
-  };
-  // The way if it is clear.
-  std::optional<Way> ClearWay(const Eigen::Vector3f& view, const Eigen::Vector3f& place) const;
+  // Whether the way from a place towards a view is clear. The nodes on it are then in `way_`.
+  bool IsWayClear(const Eigen::Vector3f& view, const Eigen::Vector3f& place);
   int StepsWithinGrid(const Eigen::Vector3f& place, const Eigen::Vector3f& step, float way_mu) const;
-  void MarkSeen(const Eigen::Vector3f& place, const Way& way);
   size_t NodeNear(const Eigen::Vector3f& shifted) const;
 
   const Eigen::Vector3i nodes_;
@@ -53,7 +46,9 @@ class SightTester {
   std::vector<Eigen::Vector3f> views_;  // in node coordinates
   std::vector<float> optical_depth_;    // of one step, by node
   std::vector<uint8_t> seen_;           // by node: 1 = some view sees it
-  size_t last_view_ = 0;                // that saw something
+  std::vector<uint32_t> way_;           // nodes on the last way that was clear: the first `way_length_`
+  size_t way_length_ = 0;
+  size_t last_view_ = 0;  // that saw something
 };
 
 }  // namespace romap

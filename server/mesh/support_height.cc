@@ -55,8 +55,7 @@ bool IsOfTheField(const FieldGrid& grid, const GridSurface& surface, uint32_t ve
 
 }  // namespace
 
-std::optional<float> FindSupportHeight(const FieldGrid& grid, const SightLimits& limits) {
-  SightTester sight(grid, limits);
+std::optional<float> FindSupportHeight(const FieldGrid& grid, SightTester& sight) {
   if (!sight.has_views()) return std::nullopt;
   const GridSurface surface = MarchingCubes(grid);
   const Mesh& mesh = surface.mesh;

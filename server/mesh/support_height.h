@@ -14,7 +14,9 @@ namespace romap {
 // Cameras mostly look down on an object, so neither masks nor colours tell where it ends below: hidden space reaches
 // down to the bottom of the box. But what carries the object was seen around it, and where that begins the visible
 // surface ends.
-std::optional<float> FindSupportHeight(const FieldGrid& grid, const SightLimits& limits);
+//
+// `sight` may have been made before hidden space was filled: what no view sees hides nothing else from any.
+std::optional<float> FindSupportHeight(const FieldGrid& grid, SightTester& sight);
 
 // Ends all matter below `height` in a flat face at that height.
 void CutBelow(FieldGrid& grid, float height);
