@@ -162,6 +162,11 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "s", .min = 0, .max = 3600, .help = "and so much more for each of its views"});
   fields.Add("settle_time_s", &c.settle_time_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Without a new view for this long, training is completed"});
+  fields.Add("pose_prior_px", &c.pose_prior_px,
+             {.unit = "px",
+              .min = 0,
+              .max = 100,
+              .help = "Views' poses are refined and believed to be off by this much at most; 0 = taken as they are"});
 }
 
 }  // namespace

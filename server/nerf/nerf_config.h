@@ -89,6 +89,7 @@ struct NerfConfig {
   int max_extra_steps = 100;
   double most_time_s = 8.0;
   double most_time_per_view_s = 0.3;
+  double pose_prior_px = 8.0;
 
   double surface_level = 3.0;
   double connect_margin = 2.0;

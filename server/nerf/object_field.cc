@@ -60,6 +60,7 @@ ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
       seed_(seed),
       hull_(config_),
       rays_(config_, seed),
+      refiner_(config_),
       occupancy_(config_),
       plan_(config_),
       trainer_(nerf::MakeTrainer(config_, seed)) {}
@@ -108,7 +109,8 @@ absl::Status ObjectField::AddView(ObjectView view) {
   }
   view = Moved(S_new_first_.Inverse(), std::move(view));
   if (absl::Status status = ValidateView(view, box_); !status.ok()) return Refuse(std::move(status));
-  TakeView(std::move(view), false);
+  const SE3<World, Camera> T_given = view.T_world_camera;
+  refiner_.OnView(TakeView(std::move(view), false), T_given);
   plan_.OnNewView(steps());
   return absl::OkStatus();
 }
@@ -124,11 +126,16 @@ void ObjectField::Move(const Sim3<World, World>& S_new_old) {
 absl::Status ObjectField::CorrectView(const ViewPose& pose) {
   const auto known = std::ranges::find(views_, pose.keyframe, &ObjectView::keyframe);
   if (known == views_.end()) return absl::OkStatus();
+  const auto index = static_cast<size_t>(known - views_.begin());
+  const SE3<World, Camera> T_given = S_new_first_.Inverse().Moved(pose.T_world_camera);
   ObjectView corrected = *known;
-  corrected.T_world_camera = S_new_first_.Inverse().Moved(pose.T_world_camera);
-  const double shift_share = ShiftShare(known->T_world_camera, corrected.T_world_camera);
+  corrected.T_world_camera = T_given;
   if (absl::Status status = ValidateView(corrected, box_); !status.ok()) return Refuse(std::move(status));
-  TakeView(std::move(corrected), shift_share < kLeastNewShift);
+  const double shift_share = ShiftShare(refiner_.given(index), T_given);
+  const bool is_close = shift_share < kLeastNewShift;
+  if (is_close) corrected.T_world_camera = WithRefinement(index, T_given);
+  TakeView(std::move(corrected), is_close);
+  refiner_.OnView(index, T_given);
   plan_.OnCorrectedView(steps(), shift_share);
   return absl::OkStatus();
 }
@@ -139,8 +146,15 @@ absl::Status ObjectField::Refuse(absl::Status why) {
   return why;
 }
 
-// The view is in the first world.
-void ObjectField::TakeView(ObjectView view, bool keep_verdict) {
+// A new pose of a view with the refinement that its old one has had.
+SE3<World, Camera> ObjectField::WithRefinement(size_t index, const SE3<World, Camera>& T_world_camera) const {
+  const auto seen_from = [&](const SE3<World, Camera>& pose) { return pose.Inverse() * box_.T_world_object; };
+  const ObjectMotion found = MotionBetween(seen_from(refiner_.given(index)), seen_from(views_[index].T_world_camera));
+  return box_.T_world_object * Moved(seen_from(T_world_camera), found).Inverse();
+}
+
+// The view is in the first world. Returns its index.
+size_t ObjectField::TakeView(ObjectView view, bool keep_verdict) {
   divergences_ = 0;
   views_changed_ = true;
   auto same = std::ranges::find(views_, view.keyframe, &ObjectView::keyframe);
@@ -148,6 +162,7 @@ void ObjectField::TakeView(ObjectView view, bool keep_verdict) {
     same = views_.begin() + static_cast<std::ptrdiff_t>(MostRedundantView(view));
   }
   const auto index = static_cast<size_t>(same - views_.begin());
+  if (hull_drift_px_ > 0) RebuildHull();  // views can only be removed with the poses they were added with
   if (same != views_.end()) {
     if (trust_.trusted(index)) hull_.Remove(*same);
     *same = std::move(view);
@@ -156,6 +171,7 @@ void ObjectField::TakeView(ObjectView view, bool keep_verdict) {
   }
   if (!keep_verdict) trust_.OnView(index, steps());
   if (trust_.trusted(index)) hull_.Add(views_[index]);
+  return index;
 }
 
 // How far a view moved against the box, in sides of the box: by the corner that moved most in the camera's frame.

@@ -13,6 +13,7 @@
 #include "server/nerf/field_probe.h"
 #include "server/nerf/gain_meter.h"
 #include "server/nerf/nerf_config.h"
+#include "server/nerf/pose_refiner.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/train_stats.h"
 #include "server/nerf/trainer.h"
@@ -46,8 +47,8 @@ class ObjectField {
   void Move(const Sim3<World, World>& S_new_old);
 
   // The corrected pose, in the new world, of a view that is there; one that is not (any more) is passed over. Training
-  // goes on from what is learned, the longer the more changed. INVALID_ARGUMENT: see ValidateView; then the view stays
-  // as it was.
+  // goes on from what is learned, the longer the more changed. What training itself found the old pose to be off is
+  // taken to hold for one close to it too. INVALID_ARGUMENT: see ValidateView; then the view stays as it was.
   absl::Status CorrectView(const ViewPose& pose);
 
   // What is wrong with what the object was given, for people: views that were refused or that contradict the others, a
@@ -75,7 +76,8 @@ class ObjectField {
  private:
   absl::Status FitBox(const Cuboid& cuboid);
   absl::Status Refuse(absl::Status why);
-  void TakeView(ObjectView view, bool keep_verdict);
+  size_t TakeView(ObjectView view, bool keep_verdict);
+  SE3<World, Camera> WithRefinement(size_t index, const SE3<World, Camera>& T_world_camera) const;
   double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
   bool CarryOverTo(const TrainingBox& box);
   void Restart();
@@ -84,6 +86,7 @@ class ObjectField {
   TrainStats RunSteps(int steps, int threads);
   void JudgeDepths();
   void Look();
+  void RefinePoses();
   void WeighRays(const ProbeReport* report);
   void RebuildHull();
   bool CanTrain() const;
@@ -102,11 +105,13 @@ class ObjectField {
   TrainingBox box_;
   bool has_box_ = false;
   bool views_changed_ = false;
-  std::vector<ObjectView> views_;
+  std::vector<ObjectView> views_;  // with their refined poses
   VisualHull hull_;
   RaySet rays_;
   FieldProbe probe_;
   ViewTrust trust_;
+  PoseRefiner refiner_;
+  double hull_drift_px_ = 0;  // how far refined poses have moved since the hull was built
   GainMeter gain_;
   std::vector<float> need_;             // [views][PixelSampler::kTiles]
   std::string box_fault_, view_fault_;  // of the last box or view that was refused

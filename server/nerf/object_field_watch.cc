@@ -13,7 +13,8 @@
 namespace romap {
 namespace {
 
-constexpr double kLeastShareInBox = 0.5;  // of the rays through an object's masks
+constexpr double kMostHullDrift_px = 0.5;  // of the views' poses
+constexpr double kLeastShareInBox = 0.5;   // of the rays through an object's masks
 
 }  // namespace
 
@@ -24,6 +25,7 @@ nerf::RenderSpace ObjectField::Space() const {
 
 // Votes of views that are left out go, those of views that are forgiven come back.
 void ObjectField::RebuildHull() {
+  hull_drift_px_ = 0;
   hull_.Reset(box_, depths_fit_);
   for (size_t i = 0; i < views_.size(); ++i) {
     if (trust_.trusted(i)) hull_.Add(views_[i]);
@@ -53,7 +55,16 @@ void ObjectField::WeighRays(const ProbeReport* report) {
   rays_.Weigh(views, tiles);
 }
 
+void ObjectField::RefinePoses() {
+  if (!refiner_.IsDue(views_.size(), steps())) return;
+  hull_drift_px_ += refiner_.Refine(views_, trust_.Weights(), box_, rays_, trainer_->model(), Space(), steps());
+  rays_.SetCameras(views_, box_);
+  probe_.Build(rays_, views_.size());
+  if (hull_drift_px_ > kMostHullDrift_px) RebuildHull();
+}
+
 void ObjectField::Look() {
+  RefinePoses();
   const ProbeReport report = probe_.Look(trainer_->model(), config_, Space());
   if (trust_.Judge(report, steps())) {
     RebuildHull();

@@ -40,6 +40,7 @@ NerfConfig PaperPreset() {
   c.refine_steps_per_view = 300;
   c.max_refine_steps = 2800;
   c.max_extra_steps = 0;
+  c.pose_prior_px = 0;
   return c;
 }
 

@@ -6,6 +6,10 @@ namespace romap {
 
 void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth) {
   sampler_.Build(views, use_depth);
+  SetCameras(views, box);
+}
+
+void RaySet::SetCameras(std::span<const ObjectView> views, const TrainingBox& box) {
   cameras_.clear();
   unit_mu_ = static_cast<float>(box.unit_mu);
   const SE3<Object, World> T_object_world = box.T_world_object.Inverse();

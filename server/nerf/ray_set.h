@@ -20,6 +20,8 @@ class RaySet {
   // Replaces all rays. `use_depth`: rays through pixels with dense depth are told of it. Keeps no reference to the
   // views.
   void Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth = true);
+  // The views are the same, but their cameras or the box moved.
+  void SetCameras(std::span<const ObjectView> views, const TrainingBox& box);
   bool empty() const { return sampler_.empty(); }
 
   // See PixelSampler.

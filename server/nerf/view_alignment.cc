@@ -1,0 +1,256 @@
+#include "server/nerf/view_alignment.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "server/nerf/math/random.h"
+
+namespace romap {
+namespace {
+
+constexpr int kReach_px = 5;           // the outline is looked at on both sides so far
+constexpr double kSmoothing_px = 1.5;  // gradients of the picture must reach as far as errors of poses do
+constexpr int kBorder_px = 2;          // of the crop, where gradients cannot be taken
+constexpr int kIterations = 4;
+constexpr float kSolid = 0.5f;  // opacity from which a colour is compared
+constexpr size_t kFewestSolid = 10;
+
+// Errors of neighbouring pixels are alike, and the field is no more than a guess: only so much of what they say counts.
+constexpr double kInformation = 0.05;
+
+constexpr double kFirstColorScale = 0.1;  // while the errors' own is not known
+constexpr double kLeastColorScale = 0.02;
+constexpr double kLeastOutlineScale = 0.1;
+
+Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Eigen::Quaterniond Turn(const Eigen::Vector3d& turn_rad) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad.norm(), turn_rad.stableNormalized()));
+}
+
+// Bilinear; channels 0..1. (x, y) lies in the image, off its last row and column.
+template <size_t kChannels>
+Eigen::Array<double, kChannels, 1> Interpolate(const cv::Mat& image, double x, double y) {
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const double right = x - x0, low = y - y0;
+  const uint8_t* upper = image.ptr<uint8_t>(y0) + static_cast<size_t>(x0) * kChannels;
+  const uint8_t* lower = image.ptr<uint8_t>(y0 + 1) + static_cast<size_t>(x0) * kChannels;
+  Eigen::Array<double, kChannels, 1> values;
+  for (size_t c = 0; c < kChannels; ++c) {
+    const double above = upper[c] + right * (upper[c + kChannels] - upper[c]);
+    const double below = lower[c] + right * (lower[c + kChannels] - lower[c]);
+    values[static_cast<Eigen::Index>(c)] = (above + low * (below - above)) / 255;
+  }
+  return values;
+}
+
+// Rows: channels; columns: x, y; per pixel.
+template <size_t kChannels>
+Eigen::Matrix<double, kChannels, 2> Gradient(const cv::Mat& image, const Eigen::Vector2d& at) {
+  Eigen::Matrix<double, kChannels, 2> gradient;
+  gradient.col(0) =
+      0.5 * (Interpolate<kChannels>(image, at.x() + 1, at.y()) - Interpolate<kChannels>(image, at.x() - 1, at.y()));
+  gradient.col(1) =
+      0.5 * (Interpolate<kChannels>(image, at.x(), at.y() + 1) - Interpolate<kChannels>(image, at.x(), at.y() - 1));
+  return gradient;
+}
+
+// `count` of all, evenly spread, beginning at a share `offset` of their distance.
+void AppendSpread(const std::vector<cv::Point>& all, size_t count, double offset, std::vector<cv::Point>& chosen) {
+  count = std::min(count, all.size());
+  const double apart = static_cast<double>(all.size()) / static_cast<double>(std::max<size_t>(1, count));
+  for (size_t i = 0; i < count; ++i) {
+    chosen.push_back(all[std::min(all.size() - 1, static_cast<size_t>((static_cast<double>(i) + offset) * apart))]);
+  }
+}
+
+}  // namespace
+
+SE3<Camera, Object> Moved(const SE3<Camera, Object>& T_camera_object, const ObjectMotion& motion) {
+  return {Turn(motion.head<3>()) * T_camera_object.rotation(), T_camera_object.translation() + motion.tail<3>()};
+}
+
+ObjectMotion MotionBetween(const SE3<Camera, Object>& T_from, const SE3<Camera, Object>& T_to) {
+  const Eigen::AngleAxisd turn(T_to.rotation() * T_from.rotation().conjugate());
+  ObjectMotion motion;
+  motion << turn.angle() * turn.axis(), T_to.translation() - T_from.translation();
+  return motion;
+}
+
+// What errors are divided by.
+struct ViewAlignment::Scales {
+  double color = kFirstColorScale, outline = 1;
+};
+
+// Where a point of the object is now.
+struct ViewAlignment::Place {
+  cv::Point before;    // its pixel before all motion, in the crop
+  Eigen::Vector2d at;  // in the crop
+  Eigen::Matrix<double, 2, 6> flow;
+};
+
+// Normal equations at one motion.
+struct ViewAlignment::Equations {
+  struct Channel {
+    ObjectMotion gradient = ObjectMotion::Zero();
+    double residual = 0, weight = 0;
+  };
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+  ObjectMotion b = ObjectMotion::Zero();
+  double cost = 0;
+  std::array<Channel, 3> channels;
+  std::vector<double> color_errors;
+  double outline_square = 0;
+  size_t outline_count = 0;
+
+  void Add(const ObjectMotion& gradient, double residual, double weight) {
+    A += weight * gradient * gradient.transpose();
+    b += weight * residual * gradient;
+  }
+
+  // Light that changes with the view is an offset of a channel: it is eliminated.
+  void EliminateOffsets() {
+    for (const Channel& channel : channels) {
+      if (channel.weight <= 0) continue;
+      A -= channel.gradient * channel.gradient.transpose() / channel.weight;
+      b -= channel.gradient * channel.residual / channel.weight;
+      cost -= channel.residual * channel.residual / channel.weight;
+    }
+  }
+
+  // As large as the errors themselves: then those of a field that is not sharp yet say little.
+  Scales OwnScales() {
+    const auto middle = color_errors.begin() + static_cast<std::ptrdiff_t>(color_errors.size() / 2);
+    std::nth_element(color_errors.begin(), middle, color_errors.end());
+    const double outline = std::sqrt(outline_square / static_cast<double>(outline_count));
+    return {std::max(kLeastColorScale, 1.48 * *middle), std::max(kLeastOutlineScale, outline)};
+  }
+};
+
+ViewAlignment::ViewAlignment(const ObjectView& view)
+    : camera_(view.camera), roi_px_(view.roi_px), bgr_(view.color_bgr) {
+  const cv::Size surroundings(2 * kReach_px + 1, 2 * kReach_px + 1);
+  cv::GaussianBlur(bgr_, smooth_bgr_, {7, 7}, kSmoothing_px);
+  object_ = view.ray_kind == static_cast<int>(RayKind::kObject);
+  cv::blur(object_, ramp_, surroundings, {-1, -1}, cv::BORDER_REPLICATE);
+  const cv::Mat occluder = view.ray_kind == static_cast<int>(RayKind::kOccluder);
+  cv::dilate(occluder, doubtful_, cv::getStructuringElement(cv::MORPH_RECT, surroundings));
+}
+
+std::vector<cv::Point> ViewAlignment::Pixels(size_t most, uint64_t salt) const {
+  std::vector<cv::Point> inside, outline;
+  for (int y = 0; y < roi_px_.height; ++y) {
+    const uint8_t* ramp = ramp_.ptr<uint8_t>(y);
+    const uint8_t* object = object_.ptr<uint8_t>(y);
+    const uint8_t* doubtful = doubtful_.ptr<uint8_t>(y);
+    for (int x = 0; x < roi_px_.width; ++x) {
+      if (object[x] != 0) inside.emplace_back(x + roi_px_.x, y + roi_px_.y);
+      if (ramp[x] > 0 && ramp[x] < 255 && doubtful[x] == 0) outline.emplace_back(x + roi_px_.x, y + roi_px_.y);
+    }
+  }
+  std::vector<cv::Point> chosen;
+  AppendSpread(inside, most, nerf::RandomUniform(salt, 7, 0), chosen);
+  AppendSpread(outline, most, nerf::RandomUniform(salt, 7, 1), chosen);
+  return chosen;
+}
+
+// The mask must change along the way as the rendering differs from it at the start. Where both agree nothing is asked,
+// however wide the ramp, so a pose that is right stays.
+void ViewAlignment::AddOutline(const RenderedPixel& pixel, const Place& place, const Scales& scales,
+                               Equations& equations) const {
+  const cv::Point now_px(cvRound(place.at.x()), cvRound(place.at.y()));
+  if (doubtful_.at<uint8_t>(place.before) != 0 || doubtful_.at<uint8_t>(now_px) != 0) return;
+  const double change = Interpolate<1>(ramp_, place.at.x(), place.at.y())[0] - ramp_.at<uint8_t>(place.before) / 255.0;
+  const double residual = change + object_.at<uint8_t>(place.before) / 255.0 - pixel.opacity;
+  const double weight = 1 / (scales.outline * scales.outline);
+  equations.Add((Gradient<1>(ramp_, place.at) * place.flow).transpose(), residual, weight);
+  equations.cost += weight * residual * residual;
+  equations.outline_square += residual * residual;
+  ++equations.outline_count;
+}
+
+void ViewAlignment::AddColor(const RenderedPixel& pixel, const Place& place, const Scales& scales,
+                             Equations& equations) const {
+  if (pixel.opacity < kSolid || object_.at<uint8_t>(place.before) == 0) return;
+  const Eigen::Array3d now = Interpolate<3>(smooth_bgr_, place.at.x(), place.at.y());
+  const Eigen::Matrix<double, 3, 6> gradient = Gradient<3>(smooth_bgr_, place.at) * place.flow;
+  const double limit = 1.345 * scales.color;  // Huber's
+  for (int c = 0; c < 3; ++c) {
+    const double before = smooth_bgr_.at<cv::Vec3b>(place.before)[c] / 255.0;
+    const double seen = bgr_.at<cv::Vec3b>(place.before)[c] / 255.0;
+    const double residual = now[c] - before + seen - pixel.bgr[static_cast<size_t>(c)];
+    const double size = std::abs(residual), square = scales.color * scales.color;
+    const double weight = (size <= limit ? 1 : limit / size) / square;
+    const ObjectMotion row = gradient.row(c).transpose();
+    equations.Add(row, residual, weight);
+    equations.cost += (size <= limit ? size * size : 2 * limit * size - limit * limit) / square;
+    Equations::Channel& channel = equations.channels[static_cast<size_t>(c)];
+    channel.gradient += weight * row;
+    channel.residual += weight * residual;
+    channel.weight += weight;
+    equations.color_errors.push_back(size);
+  }
+}
+
+ViewAlignment::Equations ViewAlignment::Linearize(std::span<const RenderedPixel> rendered,
+                                                  const Eigen::Vector3d& center, const ObjectMotion& motion,
+                                                  const Scales& scales) const {
+  Equations equations;
+  const Eigen::Quaterniond turn = Turn(motion.head<3>());
+  const Eigen::Vector2d corner(roi_px_.x, roi_px_.y);
+  for (const RenderedPixel& pixel : rendered) {
+    const Eigen::Vector3d arm = turn * (pixel.p_camera_mu - center);
+    const Eigen::Vector3d p = center + arm + motion.tail<3>();
+    const Eigen::Vector2d at = camera_.Project(p) - corner;
+    const bool inside = at.x() >= kBorder_px && at.x() < roi_px_.width - kBorder_px && at.y() >= kBorder_px &&
+                        at.y() < roi_px_.height - kBorder_px;
+    if (p.z() <= 0 || !inside) continue;
+    Eigen::Matrix<double, 3, 6> moved;
+    moved << -Skew(arm), Eigen::Matrix3d::Identity();
+    Eigen::Matrix<double, 2, 3> projected;
+    projected << camera_.fx_px, 0, -camera_.fx_px * p.x() / p.z(), 0, camera_.fy_px, -camera_.fy_px * p.y() / p.z();
+    const Place place{{pixel.u_px - roi_px_.x, pixel.v_px - roi_px_.y}, at, projected / p.z() * moved};
+    AddOutline(pixel, place, scales, equations);
+    AddColor(pixel, place, scales, equations);
+  }
+  equations.EliminateOffsets();
+  return equations;
+}
+
+ObjectMotion ViewAlignment::Align(std::span<const RenderedPixel> rendered, const SE3<Camera, Object>& T_camera_object,
+                                  const ObjectMotion& so_far, double prior_px) const {
+  const Eigen::Vector3d center = T_camera_object.translation();
+  ObjectMotion best = ObjectMotion::Zero();
+  Equations equations = Linearize(rendered, center, best, {});
+  if (equations.color_errors.size() < 3 * kFewestSolid || equations.outline_count == 0) return best;
+  const Scales scales = equations.OwnScales();
+  // A camera that is turned or shifted by so much moves the object by `prior_px`, but hardly turns it.
+  ObjectMotion per_deviation = ObjectMotion::Constant(camera_.fx_px / prior_px);
+  per_deviation.tail<3>() /= center.z();
+  const ObjectMotion prior = per_deviation.cwiseAbs2();
+  const auto cost = [&](const ObjectMotion& motion) {
+    return kInformation * equations.cost + prior.dot((so_far + motion).cwiseAbs2());
+  };
+  equations = Linearize(rendered, center, best, scales);
+  double least = cost(best);
+  for (int i = 0; i < kIterations; ++i) {
+    Eigen::Matrix<double, 6, 6> A = kInformation * equations.A;
+    A.diagonal() += prior;
+    const ObjectMotion step = A.ldlt().solve(-(kInformation * equations.b + prior.cwiseProduct(so_far + best)));
+    if (!step.allFinite()) break;
+    equations = Linearize(rendered, center, best + step, scales);
+    const double now = cost(best + step);
+    if (!(now < least)) break;
+    least = now;
+    best += step;
+  }
+  return best;
+}
+
+}  // namespace romap

@@ -1,0 +1,147 @@
+#include "server/nerf/view_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace romap {
+namespace {
+
+constexpr double kFocal_px = 500, kDistance_mu = 2;
+
+// A smooth pattern on an ellipse, facing the camera, over the whole plane.
+struct Picture {
+  Eigen::Vector2d center_px{330, 250};
+  bool textured = true;
+
+  bool Holds(const Eigen::Vector2d& p) const {
+    const Eigen::Vector2d q = (p - center_px).cwiseQuotient(Eigen::Vector2d(40, 28));
+    return q.squaredNorm() < 1;
+  }
+  std::array<float, 3> Bgr(const Eigen::Vector2d& p) const {
+    if (!textured) return {0.5f, 0.5f, 0.5f};
+    const auto wave = [&](double x, double y) {
+      return static_cast<float>(0.5 + 0.3 * std::sin(x * p.x() + y * p.y()));
+    };
+    return {wave(0.3, 0.1), wave(-0.1, 0.25), wave(0.2, -0.2)};
+  }
+
+  ObjectView View() const {
+    ObjectView view;
+    view.camera.width_px = 640;
+    view.camera.height_px = 480;
+    view.camera.fx_px = view.camera.fy_px = kFocal_px;
+    view.camera.cx_px = 319.5;
+    view.camera.cy_px = 239.5;
+    view.roi_px = {270, 200, 120, 100};
+    view.color_bgr = cv::Mat(view.roi_px.size(), CV_8UC3);
+    view.ray_kind = cv::Mat(view.roi_px.size(), CV_8UC1);
+    for (int y = 0; y < view.roi_px.height; ++y) {
+      for (int x = 0; x < view.roi_px.width; ++x) {
+        const Eigen::Vector2d p(x + view.roi_px.x, y + view.roi_px.y);
+        const auto bgr = Bgr(p);
+        for (int c = 0; c < 3; ++c) {
+          view.color_bgr.at<cv::Vec3b>(y, x)[c] = static_cast<uint8_t>(std::lround(255 * bgr[static_cast<size_t>(c)]));
+        }
+        view.ray_kind.at<uint8_t>(y, x) = static_cast<uint8_t>(Holds(p) ? RayKind::kObject : RayKind::kBackground);
+      }
+    }
+    return view;
+  }
+
+  SE3<Camera, Object> Pose(const ObjectView& view) const {
+    return {Eigen::Quaterniond::Identity(), kDistance_mu * view.camera.Unproject(center_px.x(), center_px.y())};
+  }
+};
+
+// What a field shows that would have to undergo `shift_px` and then `roll_rad` about its middle to look as in the view.
+std::vector<RenderedPixel> Render(const Picture& picture, const ObjectView& view, const Eigen::Vector2d& shift_px,
+                                  double roll_rad = 0, float brighter = 0) {
+  std::vector<RenderedPixel> rendered;
+  for (const cv::Point& at : ViewAlignment(view).Pixels(150, 3)) {
+    const Eigen::Vector2d arm = Eigen::Vector2d(at.x, at.y) - picture.center_px;
+    const Eigen::Vector2d source = picture.center_px + Eigen::Rotation2Dd(roll_rad) * arm + shift_px;
+    RenderedPixel pixel{at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), picture.Bgr(source),
+                        picture.Holds(source) ? 1.0f : 0.0f};
+    for (float& channel : pixel.bgr) channel += brighter;
+    rendered.push_back(pixel);
+  }
+  return rendered;
+}
+
+Eigen::Vector2d Shift_px(const ObjectMotion& motion) { return motion.segment<2>(3) * kFocal_px / kDistance_mu; }
+
+TEST(ViewAlignmentTest, MotionsAreWhatTakesAPoseToAnother) {
+  const SE3<Camera, Object> T(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())),
+                              {0.1, -0.2, 2});
+  ObjectMotion motion;
+  motion << 0.02, -0.01, 0.03, 0.1, 0.2, -0.1;
+  const SE3<Camera, Object> T_moved = Moved(T, motion);
+  EXPECT_TRUE(MotionBetween(T, T_moved).isApprox(motion, 1e-9));
+  EXPECT_TRUE(MotionBetween(T, T).isZero(1e-9));
+  EXPECT_TRUE((T_moved * Eigen::Vector3d::Zero()).isApprox(Eigen::Vector3d(0.2, 0, 1.9), 1e-9)) << "about its centre";
+}
+
+TEST(ViewAlignmentTest, FindsAPlantedShiftAndRoll) {
+  const Picture picture;
+  const ObjectView view = picture.View();
+  const ViewAlignment alignment(view);
+  for (const Eigen::Vector2d& shift_px :
+       {Eigen::Vector2d(2, 0), Eigen::Vector2d(-1, 1.5), Eigen::Vector2d(0.4, -0.3)}) {
+    const ObjectMotion motion =
+        alignment.Align(Render(picture, view, shift_px), picture.Pose(view), ObjectMotion::Zero(), 8);
+    EXPECT_LT((Shift_px(motion) - shift_px).norm(), 0.1 + 0.1 * shift_px.norm()) << Shift_px(motion).transpose();
+  }
+  const ObjectMotion rolled =
+      alignment.Align(Render(picture, view, {0, 0}, 0.02), picture.Pose(view), ObjectMotion::Zero(), 8);
+  EXPECT_NEAR(rolled[2], 0.02, 0.006);
+  EXPECT_LT(Shift_px(rolled).norm(), 0.1);
+}
+
+TEST(ViewAlignmentTest, TheOutlineAloneTellsShifts) {
+  Picture picture;
+  picture.textured = false;
+  const ObjectView view = picture.View();
+  const ObjectMotion motion =
+      ViewAlignment(view).Align(Render(picture, view, {-1.5, 1}), picture.Pose(view), ObjectMotion::Zero(), 8);
+  EXPECT_LT((Shift_px(motion) - Eigen::Vector2d(-1.5, 1)).norm(), 0.6) << Shift_px(motion).transpose();
+}
+
+TEST(ViewAlignmentTest, LeavesAPoseThatIsRightEvenInOtherLight) {
+  const Picture picture;
+  const ObjectView view = picture.View();
+  for (const float brighter : {0.0f, 0.15f}) {
+    const ObjectMotion motion = ViewAlignment(view).Align(Render(picture, view, {0, 0}, 0, brighter),
+                                                          picture.Pose(view), ObjectMotion::Zero(), 8);
+    EXPECT_LT(Shift_px(motion).norm(), 0.05);
+  }
+}
+
+TEST(ViewAlignmentTest, AnOccluderIsNoOutline) {
+  Picture picture;
+  picture.textured = false;
+  ObjectView view = picture.View();
+  const std::vector<RenderedPixel> whole = Render(picture, view, {0, 0});
+  view.ray_kind.colRange(0, 50).setTo(static_cast<int>(RayKind::kOccluder));
+  const ObjectMotion motion = ViewAlignment(view).Align(whole, picture.Pose(view), ObjectMotion::Zero(), 8);
+  EXPECT_LT(Shift_px(motion).norm(), 0.1);
+}
+
+TEST(ViewAlignmentTest, WhatNothingHoldsGoesBackToThePoseThatWasGiven) {
+  Picture picture;
+  picture.textured = false;
+  ObjectView view = picture.View();
+  view.ray_kind.setTo(static_cast<int>(RayKind::kObject));
+  std::vector<RenderedPixel> rendered;
+  for (const cv::Point& at : ViewAlignment(view).Pixels(100, 1)) {
+    rendered.push_back({at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), {0.5f, 0.5f, 0.5f}, 1.0f});
+  }
+  ObjectMotion so_far = ObjectMotion::Zero();
+  so_far[3] = 0.01;
+  const ObjectMotion motion = ViewAlignment(view).Align(rendered, picture.Pose(view), so_far, 2);
+  EXPECT_TRUE(motion.isApprox(-so_far, 1e-6)) << motion.transpose();
+  EXPECT_TRUE(ViewAlignment(view).Align({}, picture.Pose(view), so_far, 2).isZero()) << "nothing was rendered";
+}
+
+}  // namespace
+}  // namespace romap
