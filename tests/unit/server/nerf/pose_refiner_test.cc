@@ -89,7 +89,7 @@ TEST(PoseRefinerTest, PutsRightOneViewAndLeavesTheOthers) {
   views[5] = Off(views[5], 2.5, -1);
   const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, FastConfig()));
   ASSERT_EQ(errors_px.size(), 14u);
-  for (size_t i = 0; i < errors_px.size(); ++i) EXPECT_LT(errors_px[i], i == 5 ? 1.2 : 0.5) << i;
+  for (size_t i = 0; i < errors_px.size(); ++i) EXPECT_LT(errors_px[i], i == 5 ? 1.5 : 0.5) << i;
 }
 
 TEST(PoseRefinerTest, NeverMovesAllViewsAlike) {

@@ -56,9 +56,9 @@ struct Picture {
 
 // What a field shows that would have to undergo `shift_px` and then `roll_rad` about its middle to look as in the view.
 std::vector<RenderedPixel> Render(const Picture& picture, const ObjectView& view, const Eigen::Vector2d& shift_px,
-                                  double roll_rad = 0, float brighter = 0) {
+                                  double roll_rad = 0, float brighter = 0, size_t pixels = 150) {
   std::vector<RenderedPixel> rendered;
-  for (const cv::Point& at : ViewAlignment(view).Pixels(150, 3)) {
+  for (const cv::Point& at : ViewAlignment(view).Pixels(pixels, 3)) {
     const Eigen::Vector2d arm = Eigen::Vector2d(at.x, at.y) - picture.center_px;
     const Eigen::Vector2d source = picture.center_px + Eigen::Rotation2Dd(roll_rad) * arm + shift_px;
     RenderedPixel pixel{at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), picture.Bgr(source),
@@ -102,8 +102,8 @@ TEST(ViewAlignmentTest, TheOutlineAloneTellsShifts) {
   Picture picture;
   picture.textured = false;
   const ObjectView view = picture.View();
-  const ObjectMotion motion =
-      ViewAlignment(view).Align(Render(picture, view, {-1.5, 1}), picture.Pose(view), ObjectMotion::Zero(), 8);
+  const ObjectMotion motion = ViewAlignment(view).Align(Render(picture, view, {-1.5, 1}, 0, 0, 2000),
+                                                        picture.Pose(view), ObjectMotion::Zero(), 8);
   EXPECT_LT((Shift_px(motion) - Eigen::Vector2d(-1.5, 1)).norm(), 0.6) << Shift_px(motion).transpose();
 }
 
