@@ -80,6 +80,7 @@ double PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> w
     views[i].T_world_camera = box.T_world_object * Moved(T_now, kGain * motion).Inverse();
     before.push_back(T_now);
   }
+  GiveUpOutliers(views, weights, box);
   RemoveCommonMotion(views, weights, box);
   prior_px_ = std::clamp(kPriorPerError * TypicalError_px(views, weights, box),
                          std::min(kLeastPrior_px, config_.pose_prior_px), config_.pose_prior_px);
@@ -92,6 +93,19 @@ double PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> w
   if (moved_px < kStill_px) interval_steps_ *= 2;
   next_step_ = step + interval_steps_;
   return moved_px;
+}
+
+// A view that is much further off than the others is not a little off but wrong. It must not be bent until it fits
+// somewhere, but stay as odd as it is, so that it is seen to be.
+void PoseRefiner::GiveUpOutliers(std::span<ObjectView> views, std::span<const float> weights,
+                                 const TrainingBox& box) const {
+  constexpr double kPerTypicalError = 3, kAlways_px = 2;
+  const double most_px = kAlways_px + kPerTypicalError * TypicalError_px(views, weights, box);
+  for (size_t i = 0; i < views.size(); ++i) {
+    const double error_px = Shift_px(views[i], given_[i].Inverse() * box.T_world_object,
+                                     views[i].T_world_camera.Inverse() * box.T_world_object);
+    if (weights[i] <= 0 || error_px > most_px) views[i].T_world_camera = given_[i];
+  }
 }
 
 // Standard deviation, along each axis of the picture, of where cameras were told to be. Single cameras that are far off

@@ -35,6 +35,7 @@ class PoseRefiner {
                 const nerf::FieldModel& model, const nerf::RenderSpace& space, uint64_t step);
 
  private:
+  void GiveUpOutliers(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;
   void RemoveCommonMotion(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;
   double TypicalError_px(std::span<const ObjectView> views, std::span<const float> weights,
                          const TrainingBox& box) const;
