@@ -27,6 +27,7 @@ void AddTo(TrainStats& sum, const TrainStats& slice) {
   sum.samples += slice.samples;
   sum.active_samples += slice.active_samples;
   sum.wall_s += slice.wall_s;
+  sum.look_cpu_s += slice.look_cpu_s;
   sum.color_loss = slice.color_loss;
   sum.restarted |= slice.restarted;
   for (size_t p = 0; p < sum.phase_cpu_s.size(); ++p) sum.phase_cpu_s[p] += slice.phase_cpu_s[p];

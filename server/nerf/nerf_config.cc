@@ -156,8 +156,9 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add(
       "max_extra_steps", &c.max_extra_steps,
       {.unit = "steps", .min = 0, .max = 100000, .help = "Most such steps since the last view or box; 0 = none"});
-  fields.Add("most_time_s", &c.most_time_s,
-             {.unit = "s", .min = 0, .max = 86400, .help = "Longest training of an object, CPU time of all its workers"});
+  fields.Add(
+      "most_time_s", &c.most_time_s,
+      {.unit = "s", .min = 0, .max = 86400, .help = "Longest training of an object, CPU time of all its workers"});
   fields.Add("most_time_per_view_s", &c.most_time_per_view_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "and so much more for each of its views"});
   fields.Add("settle_time_s", &c.settle_time_s,

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -10,6 +11,7 @@
 
 #include "common/map_motion.h"
 #include "common/status.h"
+#include "common/thread_time.h"
 #include "server/nerf/cpu/field_trainer.h"
 #include "server/nerf/field_sampler.h"
 #include "server/nerf/field_surface.h"
@@ -48,6 +50,7 @@ void Add(const TrainStats& more, TrainStats& total) {
   total.active_samples += more.active_samples;
   total.color_loss = more.color_loss;
   total.wall_s += more.wall_s;
+  total.look_cpu_s += more.look_cpu_s;
   total.restarted |= more.restarted;
   for (size_t p = 0; p < total.phase_cpu_s.size(); ++p) total.phase_cpu_s[p] += more.phase_cpu_s[p];
 }
@@ -162,15 +165,14 @@ size_t ObjectField::TakeView(ObjectView view, bool keep_verdict) {
     same = views_.begin() + static_cast<std::ptrdiff_t>(MostRedundantView(view));
   }
   const auto index = static_cast<size_t>(same - views_.begin());
-  if (hull_drift_px_ > 0) RebuildHull();  // views can only be removed with the poses they were added with
   if (same != views_.end()) {
-    if (trust_.trusted(index)) hull_.Remove(*same);
+    if (trust_.trusted(index)) WithdrawVote(index);
     *same = std::move(view);
   } else {
     views_.push_back(std::move(view));
   }
   if (!keep_verdict) trust_.OnView(index, steps());
-  if (trust_.trusted(index)) hull_.Add(views_[index]);
+  if (trust_.trusted(index)) VoteOnHull(index);
   return index;
 }
 
@@ -239,7 +241,13 @@ TrainStats ObjectField::Train(int steps, int threads) {
     const uint64_t until_look = StepsUntilLook();
     const uint64_t run = std::min(static_cast<uint64_t>(steps - total.steps), until_look);
     Add(RunSteps(static_cast<int>(run), threads), total);
-    if (!total.restarted && run == until_look) Look();
+    if (!total.restarted && run == until_look) {
+      const auto start = std::chrono::steady_clock::now();
+      const double start_cpu_s = ThreadCpuSeconds();
+      Look();
+      total.look_cpu_s += ThreadCpuSeconds() - start_cpu_s;
+      total.wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    }
   }
   train_seconds_ += total.wall_s;
   loss_ = total.color_loss;

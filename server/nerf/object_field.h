@@ -89,6 +89,8 @@ class ObjectField {
   void RefinePoses();
   void WeighRays(const ProbeReport* report);
   void RebuildHull();
+  void VoteOnHull(size_t view);
+  void WithdrawVote(size_t view);
   bool CanTrain() const;
   nerf::RenderSpace Space() const;
   size_t MostRedundantView(const ObjectView& view) const;
@@ -111,7 +113,7 @@ class ObjectField {
   FieldProbe probe_;
   ViewTrust trust_;
   PoseRefiner refiner_;
-  double hull_drift_px_ = 0;  // how far refined poses have moved since the hull was built
+  std::vector<SE3<World, Camera>> voted_;  // where the views were when they voted on the hull
   GainMeter gain_;
   std::vector<float> need_;             // [views][PixelSampler::kTiles]
   std::string box_fault_, view_fault_;  // of the last box or view that was refused

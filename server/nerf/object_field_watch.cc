@@ -13,8 +13,8 @@
 namespace romap {
 namespace {
 
-constexpr double kMostHullDrift_px = 0.5;  // of the views' poses
-constexpr double kLeastShareInBox = 0.5;   // of the rays through an object's masks
+constexpr double kLeastVoteShift = 0.01;  // of the box's side, two thirds of a hull's cell: views so far off vote anew
+constexpr double kLeastShareInBox = 0.5;  // of the rays through an object's masks
 
 }  // namespace
 
@@ -25,12 +25,23 @@ nerf::RenderSpace ObjectField::Space() const {
 
 // Votes of views that are left out go, those of views that are forgiven come back.
 void ObjectField::RebuildHull() {
-  hull_drift_px_ = 0;
   hull_.Reset(box_, depths_fit_);
   for (size_t i = 0; i < views_.size(); ++i) {
-    if (trust_.trusted(i)) hull_.Add(views_[i]);
+    if (trust_.trusted(i)) VoteOnHull(i);
   }
   occupancy_.SetHull(hull_.Carve());
+}
+
+void ObjectField::VoteOnHull(size_t view) {
+  voted_.resize(views_.size());
+  voted_[view] = views_[view].T_world_camera;
+  hull_.Add(views_[view]);
+}
+
+void ObjectField::WithdrawVote(size_t view) {
+  ObjectView as_voted = views_[view];
+  as_voted.T_world_camera = voted_[view];
+  hull_.Remove(as_voted);
 }
 
 void ObjectField::JudgeDepths() {
@@ -57,10 +68,17 @@ void ObjectField::WeighRays(const ProbeReport* report) {
 
 void ObjectField::RefinePoses() {
   if (!refiner_.IsDue(views_.size(), steps())) return;
-  hull_drift_px_ += refiner_.Refine(views_, trust_.Weights(), box_, rays_, trainer_->model(), Space(), steps());
+  refiner_.Refine(views_, trust_.Weights(), box_, rays_, trainer_->model(), Space(), steps());
   rays_.SetCameras(views_, box_);
   probe_.Build(rays_, views_.size());
-  if (hull_drift_px_ > kMostHullDrift_px) RebuildHull();
+  bool voted_anew = false;
+  for (size_t i = 0; i < views_.size(); ++i) {
+    if (!trust_.trusted(i) || ShiftShare(voted_[i], views_[i].T_world_camera) < kLeastVoteShift) continue;
+    WithdrawVote(i);
+    VoteOnHull(i);
+    voted_anew = true;
+  }
+  if (voted_anew) occupancy_.SetHull(hull_.Carve());
 }
 
 void ObjectField::Look() {

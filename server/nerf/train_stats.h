@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <numeric>
 
 namespace romap {
 
@@ -21,14 +22,13 @@ struct TrainStats {
   bool restarted = false;  // a parameter was not finite; training began anew
   std::array<double, static_cast<int>(TrainPhase::kCount)> phase_cpu_s = {};  // over all threads
 
-  double CpuSeconds() const {
-    double sum = 0;
-    for (double s : phase_cpu_s) sum += s;
-    return sum;
-  }
-  // What it took of the machine: CPU time, which work of others beside it does not change; on a device, which tells
-  // no such time, wall time.
-  double BusySeconds() const { return CpuSeconds() > 0 ? CpuSeconds() : wall_s; }
+  double look_cpu_s = 0;  // between steps: how well views are met, where their cameras are
+
+  double StepCpuSeconds() const { return std::accumulate(phase_cpu_s.begin(), phase_cpu_s.end(), 0.0); }
+  double CpuSeconds() const { return StepCpuSeconds() + look_cpu_s; }
+  // What it took of the machine: CPU time, which work of others beside it does not change; on a device, whose steps
+  // tell no such time, wall time.
+  double BusySeconds() const { return StepCpuSeconds() > 0 ? CpuSeconds() : wall_s; }
 };
 
 }  // namespace romap

@@ -12,7 +12,7 @@ namespace {
 constexpr int kCells = nerf::kOccupancyResolution;
 constexpr double kDepthNoise = 0.01;  // of the depth: nearer to what was measured than this is not called empty
 constexpr int kMostReach_px = 30;     // a camera so near tells too little of a cell
-constexpr int kBlock = 8;             // cells per side of a block that is tested as a whole first
+constexpr int kLargestBlock = 16;     // cells per side of the blocks that are tested as a whole first
 
 size_t CellIndexOf(int x, int y, int z) { return (static_cast<size_t>(z) * kCells + y) * kCells + x; }
 
@@ -57,9 +57,10 @@ struct VisualHull::Footprints {
     cv::erode(depth_mu, nearest_mu, square);
   }
 
+  bool KnowsDepth() const { return !nearest_mu.empty(); }
+
   // Whether all that was measured under a ball lies behind it.
   bool IsBeforeAll(const Eigen::Vector3d& center_object, double radius_mu) const {
-    if (nearest_mu.empty()) return false;
     const Eigen::Vector3d p = T_camera_object * center_object;
     const Eigen::Vector2d pixel = camera.Project(p);
     const int x = static_cast<int>(std::lround(pixel.x())) - roi_px.x;
@@ -110,31 +111,38 @@ double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kCe
 void VisualHull::Vote(const ObjectView& view, int sign) {
   views_ += sign;
   const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
-  for (int z = 0; z < kCells; z += kBlock) {
-    for (int y = 0; y < kCells; y += kBlock) {
-      for (int x = 0; x < kCells; x += kBlock) VoteBlock(footprints, x, y, z, sign);
+  for (int z = 0; z < kCells; z += kLargestBlock) {
+    for (int y = 0; y < kCells; y += kLargestBlock) {
+      for (int x = 0; x < kCells; x += kLargestBlock) VoteBlock(footprints, {x, y, z}, kLargestBlock, sign);
     }
   }
 }
 
-void VisualHull::VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign) {
+// Cells from `first` on, `side` along each axis. They are asked as a whole, and in halves where they are not alike.
+void VisualHull::VoteBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign) {
   const Eigen::Vector3d cell = 2.0 * box_.half_extents / kCells;
-  const auto center = [&](int x, int y, int z, double half) -> Eigen::Vector3d {
-    return Eigen::Vector3d(x + half, y + half, z + half).cwiseProduct(cell) - box_.half_extents;
-  };
-  const double cell_radius_mu = CellRadius_mu();
-  const Look block = footprints.Ask(center(bx, by, bz, 0.5 * kBlock), 0.5 * kBlock * cell.norm());
-  for (int z = bz; z < bz + kBlock; ++z) {
-    for (int y = by; y < by + kBlock; ++y) {
-      for (int x = bx; x < bx + kBlock; ++x) {
-        const Look look = block.IsPlain() ? block : footprints.Ask(center(x, y, z, 0.5), cell_radius_mu);
-        if (look.matter == Verdict::kUnknown) continue;
-        const bool empty =
-            look.matter == Verdict::kEmpty || footprints.IsBeforeAll(center(x, y, z, 0.5), cell_radius_mu);
-        const size_t i = CellIndexOf(x, y, z);
+  const Eigen::Vector3d middle =
+      (first.cast<double>().array() + 0.5 * side).matrix().cwiseProduct(cell) - box_.half_extents;
+  const double radius_mu = side == 1 ? CellRadius_mu() : 0.5 * side * cell.norm();
+  const Look look = footprints.Ask(middle, radius_mu);
+  const bool depth_may_tell = footprints.KnowsDepth() && look.matter != Verdict::kEmpty;
+  if (side > 1 && (!look.IsPlain() || depth_may_tell)) {
+    const int half = side / 2;
+    for (int octant = 0; octant < 8; ++octant) {
+      const Eigen::Vector3i corner(octant & 1, octant >> 1 & 1, octant >> 2);
+      VoteBlock(footprints, first + half * corner, half, sign);
+    }
+    return;
+  }
+  if (look.matter == Verdict::kUnknown) return;
+  const bool empty = look.matter == Verdict::kEmpty || (depth_may_tell && footprints.IsBeforeAll(middle, radius_mu));
+  const bool shown = !empty && look.object != Verdict::kEmpty;
+  for (int z = first.z(); z < first.z() + side; ++z) {
+    for (int y = first.y(); y < first.y() + side; ++y) {
+      for (size_t i = CellIndexOf(first.x(), y, z), end = i + static_cast<size_t>(side); i < end; ++i) {
         seen_[i] = static_cast<uint8_t>(seen_[i] + sign);
         if (empty) against_[i] = static_cast<uint8_t>(against_[i] + sign);
-        if (!empty && look.object != Verdict::kEmpty) shown_[i] = static_cast<uint8_t>(shown_[i] + sign);
+        if (shown) shown_[i] = static_cast<uint8_t>(shown_[i] + sign);
       }
     }
   }

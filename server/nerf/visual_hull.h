@@ -33,7 +33,7 @@ class VisualHull {
   struct Footprints;
   double CellRadius_mu() const;  // of a footprint
   void Vote(const ObjectView& view, int sign);
-  void VoteBlock(const Footprints& footprints, int bx, int by, int bz, int sign);
+  void VoteBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign);
 
   TrainingBox box_;
   bool carve_;
