@@ -22,6 +22,9 @@ endif()
 if(ROMAP_SANITIZER)
   add_compile_options(-fsanitize=${ROMAP_SANITIZER} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ROMAP_SANITIZER})
+  # Eigen has an allocator of its own under AddressSanitizer. The installed libraries (Ceres) do not, and their matrices
+  # are freed by our code.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 find_package(PkgConfig REQUIRED)
