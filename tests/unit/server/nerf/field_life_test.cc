@@ -72,7 +72,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
   EXPECT_EQ(snapshot.cameras.size(), 15u);
   const double right_error = BallSurfaceError(scene, right.Snapshot());
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.02);
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
 
   // Its pose is corrected: it counts again.
   ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
