@@ -65,9 +65,9 @@ bool PoseRefiner::IsDue(size_t views, uint64_t step) const {
   return config_.pose_prior_px > 0 && views >= kFewestViews && step >= next_step_;
 }
 
-double PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box,
-                           const RaySet& rays, const nerf::FieldModel& model, const nerf::RenderSpace& space,
-                           uint64_t step) {
+void PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box,
+                         const RaySet& rays, const nerf::FieldModel& model, const nerf::RenderSpace& space,
+                         uint64_t step) {
   const double prior_px = prior_px_ > 0 ? prior_px_ : config_.pose_prior_px;
   std::vector<SE3<Camera, Object>> before;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -92,7 +92,6 @@ double PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> w
   const double moved_px = std::sqrt(square / static_cast<double>(views.size()));
   if (moved_px < kStill_px) interval_steps_ *= 2;
   next_step_ = step + interval_steps_;
-  return moved_px;
 }
 
 // A view that is much further off than the others is not a little off but wrong. It must not be bent until it fits

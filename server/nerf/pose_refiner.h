@@ -30,9 +30,9 @@ class PoseRefiner {
   bool IsDue(size_t views, uint64_t step) const;
 
   // Moves the cameras of `views`, all of which OnView() knows, and on which `rays` was built. Common motion is judged
-  // by those whose weight is not 0. Returns how far the views' middles moved, root mean square, pixels.
-  double Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box, const RaySet& rays,
-                const nerf::FieldModel& model, const nerf::RenderSpace& space, uint64_t step);
+  // by those whose weight is not 0.
+  void Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box, const RaySet& rays,
+              const nerf::FieldModel& model, const nerf::RenderSpace& space, uint64_t step);
 
  private:
   void GiveUpOutliers(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;

@@ -22,11 +22,7 @@ using ::testing::Not;
 using testing::RawOnGrid;
 
 NerfConfig SmallConfig() {
-  NerfConfig config;
-  config.levels = 6;
-  config.log2_table_entries = 12;
-  config.finest_resolution = 128;
-  config.rays_per_step = 512;
+  NerfConfig config = testing::SmallFieldConfig();
   config.full_budget_steps = 150;
   return config;
 }

@@ -18,15 +18,7 @@ using testing::BallScene;
 using testing::BallSurfaceError;
 using ::testing::HasSubstr;
 using testing::RawOnGrid;
-
-NerfConfig FastConfig() {
-  NerfConfig config;
-  config.levels = 6;
-  config.log2_table_entries = 12;
-  config.finest_resolution = 128;
-  config.rays_per_step = 512;
-  return config;
-}
+using testing::SmallFieldConfig;
 
 ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t seed = 1) {
   ObjectField field(config, scene.object, seed);
@@ -78,7 +70,7 @@ TEST(ObjectFieldTest, DoesNotDependOnTheScaleOfTheMap) {
   for (const double radius : {0.5, 0.5 * 128, 0.5 / 128}) {  // powers of two scale without rounding
     BallScene scene;
     scene.radius_mu = radius;
-    ObjectField field = MakeField(scene, FastConfig());
+    ObjectField field = MakeField(scene, SmallFieldConfig());
     field.Train(15, 1);
     raws.push_back(RawOnGrid(field.Snapshot()));
   }
@@ -92,13 +84,13 @@ TEST(ObjectFieldTest, IsDeterministicForSeedAndThreadCount) {
   BallScene scene;
   scene.views = 5;
   for (const int threads : {1, 2}) {
-    ObjectField a = MakeField(scene, FastConfig()), b = MakeField(scene, FastConfig());
+    ObjectField a = MakeField(scene, SmallFieldConfig()), b = MakeField(scene, SmallFieldConfig());
     a.Train(12, threads);
     b.Train(5, threads);
     b.Train(7, threads);
     EXPECT_EQ(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot())) << threads << " threads";
   }
-  ObjectField a = MakeField(scene, FastConfig(), 1), b = MakeField(scene, FastConfig(), 2);
+  ObjectField a = MakeField(scene, SmallFieldConfig(), 1), b = MakeField(scene, SmallFieldConfig(), 2);
   a.Train(3, 1);
   b.Train(3, 1);
   EXPECT_NE(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot()));
@@ -110,7 +102,7 @@ TEST(ObjectFieldTest, EveryInstructionSetLearnsTheSame) {
   std::vector<double> losses;
   for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
     hwy::SetSupportedTargetsForTest(left & -left);
-    losses.push_back(MakeField(scene, FastConfig()).Train(25, 1).color_loss);
+    losses.push_back(MakeField(scene, SmallFieldConfig()).Train(25, 1).color_loss);
     hwy::SetSupportedTargetsForTest(0);
   }
   for (const double loss : losses) EXPECT_NEAR(loss, losses[0], 0.02 * losses[0]);
@@ -119,7 +111,7 @@ TEST(ObjectFieldTest, EveryInstructionSetLearnsTheSame) {
 TEST(ObjectFieldTest, SnapshotDoesNotChangeWhenTrainingGoesOn) {
   BallScene scene;
   scene.views = 4;
-  ObjectField field = MakeField(scene, FastConfig());
+  ObjectField field = MakeField(scene, SmallFieldConfig());
   field.Train(5, 1);
   const FieldSnapshot snapshot = field.Snapshot();
   const std::vector<float> before = RawOnGrid(snapshot);
@@ -130,7 +122,7 @@ TEST(ObjectFieldTest, SnapshotDoesNotChangeWhenTrainingGoesOn) {
 
 TEST(ObjectFieldTest, OutsideTheBoxThereIsNothing) {
   const BallScene scene;
-  const ObjectField field = MakeField(scene, FastConfig());
+  const ObjectField field = MakeField(scene, SmallFieldConfig());
   const std::vector<Eigen::Vector3f> points = {{2, 0, 0}, {0, 0, 0}, {0, NAN, 0}};
   std::vector<float> raw(3);
   std::vector<Rgb8> rgb(3);
@@ -143,7 +135,7 @@ TEST(ObjectFieldTest, OutsideTheBoxThereIsNothing) {
 TEST(ObjectFieldTest, RejectsViewsThatCannotBe) {
   const BallScene scene;
   const auto fault = [&](auto&& spoil) {
-    ObjectField field(FastConfig(), scene.object, 1);
+    ObjectField field(SmallFieldConfig(), scene.object, 1);
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     ObjectView view = scene.View(0);
     spoil(view);
@@ -178,7 +170,7 @@ TEST(ObjectFieldTest, RejectsViewsThatCannotBe) {
 
 TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
   const BallScene scene;
-  ObjectField field(FastConfig(), scene.object, 1);
+  ObjectField field(SmallFieldConfig(), scene.object, 1);
   EXPECT_EQ(field.AddView(scene.View(0)).code(), absl::StatusCode::kFailedPrecondition);
   Cuboid flat = scene.Box();
   flat.half_extents.z() = 0;
@@ -188,7 +180,7 @@ TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
 
 TEST(ObjectFieldTest, OnlyABoxWithLittleInCommonStartsAnew) {
   const BallScene scene;
-  ObjectField field = MakeField(scene, FastConfig());
+  ObjectField field = MakeField(scene, SmallFieldConfig());
   field.Train(10, 1);
   Cuboid box = scene.Box();
   box.half_extents *= 0.95;
@@ -213,7 +205,7 @@ TEST(ObjectFieldTest, OnlyABoxWithLittleInCommonStartsAnew) {
 
 TEST(ObjectFieldTest, CorrectedPoseReplacesTheView) {
   const BallScene scene;
-  NerfConfig config = FastConfig();
+  NerfConfig config = SmallFieldConfig();
   ObjectField field(config, scene.object, 1), clean(config, scene.object, 1);
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   ASSERT_TRUE(clean.SetBox(scene.Box()).ok());
@@ -233,7 +225,7 @@ TEST(ObjectFieldTest, CorrectedPoseReplacesTheView) {
 
 TEST(ObjectFieldTest, ViewBeyondTheLimitReplacesTheNearestOne) {
   BallScene scene;
-  NerfConfig config = FastConfig();
+  NerfConfig config = SmallFieldConfig();
   config.max_views = 6;
   const ObjectField field = MakeField(scene, config);
   EXPECT_EQ(field.views(), 6);

@@ -15,11 +15,7 @@ namespace {
 using testing::BallScene;
 
 NerfConfig FastConfig() {
-  NerfConfig config;
-  config.levels = 6;
-  config.log2_table_entries = 12;
-  config.finest_resolution = 128;
-  config.rays_per_step = 512;
+  NerfConfig config = testing::SmallFieldConfig();
   config.full_budget_steps = 200;
   config.max_extra_steps = 0;
   return config;

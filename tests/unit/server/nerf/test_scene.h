@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/messages.h"
+#include "server/nerf/nerf_config.h"
 
 namespace romap::testing {
 
@@ -21,6 +22,9 @@ struct BallScene {
   ObjectView View(int index) const;
   std::vector<ObjectView> Views() const;
 };
+
+// Small enough to learn the ball quickly.
+NerfConfig SmallFieldConfig();
 
 // Mean distance, in radii, of the learned surface (where raw first exceeds the surface level on the way from outside to
 // the centre, within the hull) from the ball, over evenly spread directions. A direction without surface counts as 1.

@@ -90,6 +90,15 @@ std::vector<ObjectView> BallScene::Views() const {
   return all;
 }
 
+NerfConfig SmallFieldConfig() {
+  NerfConfig config;
+  config.levels = 6;
+  config.log2_table_entries = 12;
+  config.finest_resolution = 128;
+  config.rays_per_step = 512;
+  return config;
+}
+
 std::vector<float> RawOnGrid(const FieldSnapshot& snapshot, float reach) {
   std::vector<Eigen::Vector3f> points;
   for (int i = 0; i < 1000; ++i) {
