@@ -260,7 +260,7 @@ struct SurfaceOptics {
 };
 
 // One training view, for those who ask what it saw of the object.
-struct FieldView {
+struct TrainingCamera {
   SE3<Camera, Object> T_camera_object;  // map units
   CameraModel camera;                   // of the full image, no distortion
   cv::Rect roi_px;                      // the crop in the full image; the view knows nothing of pixels outside it
@@ -291,8 +291,8 @@ struct FieldSnapshot {
   SurfaceOptics optics;
   // A component of inside cells that hangs together through values above this lower level is one piece (thin parts).
   float connect_level = 0;
-  OccupancyBits hull;              // visual hull of the masks: outside it nothing can be
-  std::vector<FieldView> cameras;  // the training views
+  OccupancyBits hull;                   // visual hull of the masks: outside it nothing can be
+  std::vector<TrainingCamera> cameras;  // the training views
   std::shared_ptr<const FieldSampler> field;
 };
 

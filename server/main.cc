@@ -38,8 +38,8 @@ struct Flags {
 };
 
 struct Config {
-  ServerConfig server;
-  TransportConfig transport;
+  session::ServerConfig server;
+  transport::TransportConfig transport;
 
   ConfigFields Fields() {
     ConfigFields fields;
@@ -98,7 +98,7 @@ void SetUpLogging(const std::string& level) {
   // Standard output is for what scripts wait for, so the log goes to standard error.
   spdlog::set_default_logger(spdlog::stderr_color_mt("romap-server"));
   spdlog::set_level(spdlog::level::from_str(level));
-  RouteGrpcLogToSpdlog();
+  transport::RouteGrpcLogToSpdlog();
 }
 
 // Signals are taken by WaitForStop() instead of by a handler. Threads inherit this, so it must come before any is made.
@@ -136,8 +136,8 @@ int Main(int argc, char** argv) {
 
   SetUpLogging(flags.log_level);
   const sigset_t signals = BlockStopSignals();
-  LocalMappingService service(config.server);
-  auto server = GrpcServer::Start(&service, config.transport);
+  session::LocalMappingService service(config.server);
+  auto server = transport::GrpcServer::Start(&service, config.transport);
   if (!server.ok()) {
     SayError(Message(server.status()));
     return absl::IsInvalidArgument(server.status()) ? kExitUsage : kExitFailure;

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr int kPanelWidth_px = 640, kPanelHeight_px = 520;
@@ -163,4 +163,4 @@ cv::Mat DrawConvergence(const PaperResults& results) {
   return picture;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

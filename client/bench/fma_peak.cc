@@ -13,7 +13,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace romap::HWY_NAMESPACE {
+namespace romap::bench::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -41,11 +41,11 @@ uint64_t RunFma(uint64_t rounds, float* sink) {
   return rounds * kSums * 2 * hn::Lanes(d);
 }
 
-}  // namespace romap::HWY_NAMESPACE
+}  // namespace romap::bench::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace romap {
+namespace romap::bench {
 
 HWY_EXPORT(RunFma);
 
@@ -76,5 +76,5 @@ double MeasureFmaPeakGflops(int threads, double seconds) {
   return sum;
 }
 
-}  // namespace romap
+}  // namespace romap::bench
 #endif

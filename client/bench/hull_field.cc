@@ -8,7 +8,7 @@
 #include "server/nerf/training_box.h"
 #include "server/nerf/visual_hull.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr float kOutside = -1e4f;
@@ -56,9 +56,10 @@ class HullField : public FieldSampler {
 
 }  // namespace
 
-FieldSnapshot MakeHullSnapshot(const NerfConfig& config, const Cuboid& cuboid, const std::vector<ObjectView>& views) {
-  const TrainingBox box = TrainingBox::Around(cuboid, config.box_enlargement);
-  VisualHull hull(config);
+FieldSnapshot MakeHullSnapshot(const nerf::NerfConfig& config, const Cuboid& cuboid,
+                               const std::vector<ObjectView>& views) {
+  const nerf::TrainingBox box = nerf::TrainingBox::Around(cuboid, config.box_enlargement);
+  nerf::VisualHull hull(config);
   hull.Reset(box);
   FieldSnapshot snapshot;
   for (const ObjectView& view : views) {
@@ -78,4 +79,4 @@ FieldSnapshot MakeHullSnapshot(const NerfConfig& config, const Cuboid& cuboid, c
   return snapshot;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -9,7 +9,7 @@
 #include "client/files/ply.h"
 #include "server/mesh/extract_mesh.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 namespace fs = std::filesystem;
@@ -20,45 +20,46 @@ constexpr double kMarks_s[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3.5, 
 absl::Status WriteWorldMesh(const FieldSnapshot& snapshot, Mesh mesh, const std::string& path) {
   for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
   for (Eigen::Vector3f& n : mesh.normals) n = (snapshot.T_world_object.rotation() * n.cast<double>()).cast<float>();
-  return WritePly(path, mesh);
+  return files::WritePly(path, mesh);
 }
 
-std::optional<PublishedQuality> QualityOf(const ObjectsReport& report) {
-  const ObjectsReport::Mean& mean = report.mean;
+std::optional<PublishedQuality> QualityOf(const eval::ObjectsReport& report) {
+  const eval::ObjectsReport::Mean& mean = report.mean;
   if (!mean.accuracy_seen_cm || !mean.completion_seen_cm || mean.ratios.size() != 2) return std::nullopt;
   return PublishedQuality{*mean.accuracy_seen_cm, *mean.completion_seen_cm, mean.ratios[0].seen_percent.value_or(0),
                           mean.ratios[1].seen_percent.value_or(0)};
 }
 
-double Sum(const TrainStats& stats, std::initializer_list<TrainPhase> phases) {
+double Sum(const nerf::TrainStats& stats, std::initializer_list<nerf::TrainPhase> phases) {
   double sum = 0;
-  for (const TrainPhase phase : phases) sum += stats.phase_cpu_s[static_cast<size_t>(phase)];
+  for (const nerf::TrainPhase phase : phases) sum += stats.phase_cpu_s[static_cast<size_t>(phase)];
   return sum;
 }
 
 void FillIn(const TimedTraining& training, ObjectTraining& row) {
-  const TrainStats& stats = training.stats;
+  const nerf::TrainStats& stats = training.stats;
   row.steps = stats.steps;
   row.samples = stats.samples;
   row.train_s = training.train_s;
   row.wall_s = training.wall_s;
   row.setup_s = training.setup_s;
   row.limited = training.limited;
-  row.sampling_s = Sum(stats, {TrainPhase::kSampling});
-  row.forward_s = Sum(stats, {TrainPhase::kEncode, TrainPhase::kMlp, TrainPhase::kRender});
-  row.backward_s = Sum(stats, {TrainPhase::kMlpBackward, TrainPhase::kEncodeBackward, TrainPhase::kOptimise});
+  row.sampling_s = Sum(stats, {nerf::TrainPhase::kSampling});
+  row.forward_s = Sum(stats, {nerf::TrainPhase::kEncode, nerf::TrainPhase::kMlp, nerf::TrainPhase::kRender});
+  row.backward_s =
+      Sum(stats, {nerf::TrainPhase::kMlpBackward, nerf::TrainPhase::kEncodeBackward, nerf::TrainPhase::kOptimise});
 }
 
 }  // namespace
 
 struct MethodRunner::Trained {
   ObjectTraining row;
-  const ObjectRecord* object = nullptr;
+  const files::ObjectRecord* object = nullptr;
   FieldSnapshot snapshot;  // without field when training failed
   std::vector<FieldSnapshot> at_marks;
 };
 
-MethodRunner::MethodRunner(const Sequence& sequence, std::string scratch_dir, int threads, BenchClock clock)
+MethodRunner::MethodRunner(const files::Sequence& sequence, std::string scratch_dir, int threads, BenchClock clock)
     : sequence_(&sequence), scratch_dir_(std::move(scratch_dir)), threads_(threads), clock_(clock) {}
 
 void MethodRunner::SetFrames(TrueFrames frames) {
@@ -66,13 +67,13 @@ void MethodRunner::SetFrames(TrueFrames frames) {
   views_.clear();
 }
 
-const std::vector<ObjectView>& MethodRunner::ViewsOf(const ObjectRecord& object, bool with_depth) {
+const std::vector<ObjectView>& MethodRunner::ViewsOf(const files::ObjectRecord& object, bool with_depth) {
   const auto [place, is_new] = views_.try_emplace({object.id, with_depth});
   if (is_new) place->second = MakeTrueViews(frames_, object, with_depth);
   return place->second;
 }
 
-absl::StatusOr<MethodRunner::Trained> MethodRunner::Train(const MethodRun& run, const ObjectRecord& object,
+absl::StatusOr<MethodRunner::Trained> MethodRunner::Train(const MethodRun& run, const files::ObjectRecord& object,
                                                           double limit_s, const std::function<bool()>& stop) {
   const std::vector<ObjectView>& views = ViewsOf(object, run.method.with_depth);
   const Cuboid cuboid{object.T_world_object, object.half_extents, 1.0};
@@ -119,7 +120,7 @@ absl::StatusOr<Evaluation> MethodRunner::Evaluate(const MethodRun& run, const st
     ObjectTraining& row = evaluation.objects.emplace_back(one.row);
     if (!one.snapshot.field) continue;
     Stopwatch watch(clock_, /*threads=*/1);
-    absl::StatusOr<Mesh> mesh = watch.Time([&] { return ExtractMesh(one.snapshot, run.config.mesh); });
+    absl::StatusOr<Mesh> mesh = watch.Time([&] { return mesh::ExtractMesh(one.snapshot, run.config.mesh); });
     row.mesh_s = watch.total_s();
     if (!mesh.ok()) {
       row.fault = Message(mesh.status());
@@ -128,7 +129,7 @@ absl::StatusOr<Evaluation> MethodRunner::Evaluate(const MethodRun& run, const st
     const std::string path = fmt::format("{}/objects/{}_{}.ply", dir, one.object->id, one.object->name);
     ROMAP_RETURN_IF_ERROR(WriteWorldMesh(one.snapshot, *std::move(mesh), path));
   }
-  const RunReport report = EvaluateRun(dir, sequence_->dir(), /*poses_given=*/true);
+  const eval::RunReport report = eval::EvaluateRun(dir, sequence_->dir(), /*poses_given=*/true);
   if (report.objects) {
     evaluation.quality = QualityOf(*report.objects);
     evaluation.matched = report.objects->matched;
@@ -168,7 +169,7 @@ absl::StatusOr<MethodOutcome> MethodRunner::Run(const MethodRun& run,
     const bool last = limit + 1 == run.limits_s.size();
     bool changed = false;
     size_t index = 0;
-    for (const ObjectRecord& object : sequence_->objects()->objects) {
+    for (const files::ObjectRecord& object : sequence_->objects()->objects) {
       const size_t at = index++;
       if (at < trained.size() && !trained[at].row.limited) continue;  // its plan ended within an earlier limit
       report(object.name);
@@ -198,4 +199,4 @@ absl::StatusOr<MethodOutcome> MethodRunner::Run(const MethodRun& run,
   return outcome;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -9,7 +9,7 @@
 #include "client/bench/paper_results.h"
 #include "client/bench/true_views.h"
 
-namespace romap {
+namespace romap::bench {
 
 // What one method is run with.
 struct MethodRun {
@@ -31,7 +31,7 @@ struct MethodOutcome {
 // and shared by all methods.
 class MethodRunner {
  public:
-  MethodRunner(const Sequence& sequence, std::string scratch_dir, int threads, BenchClock clock);
+  MethodRunner(const files::Sequence& sequence, std::string scratch_dir, int threads, BenchClock clock);
 
   // From now on on these frames.
   void SetFrames(TrueFrames frames);
@@ -43,14 +43,14 @@ class MethodRunner {
  private:
   struct Trained;
 
-  const std::vector<ObjectView>& ViewsOf(const ObjectRecord& object, bool with_depth);
-  absl::StatusOr<Trained> Train(const MethodRun& run, const ObjectRecord& object, double limit_s,
+  const std::vector<ObjectView>& ViewsOf(const files::ObjectRecord& object, bool with_depth);
+  absl::StatusOr<Trained> Train(const MethodRun& run, const files::ObjectRecord& object, double limit_s,
                                 const std::function<bool()>& stop);
   absl::StatusOr<Evaluation> Evaluate(const MethodRun& run, const std::vector<Trained>& trained, double limit_s,
                                       const std::string& dir) const;
   absl::StatusOr<std::vector<CurvePoint>> Curve(const MethodRun& run, const std::vector<Trained>& trained) const;
 
-  const Sequence* sequence_;
+  const files::Sequence* sequence_;
   std::string scratch_dir_;
   int threads_;
   BenchClock clock_;
@@ -59,4 +59,4 @@ class MethodRunner {
   std::map<std::string, double> seconds_per_step_;  // by method and object
 };
 
-}  // namespace romap
+}  // namespace romap::bench

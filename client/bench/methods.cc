@@ -7,7 +7,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 // A plain MLP on a frequency encoding, and rays through the whole box: what iMAP (Sucar et al., ICCV 2021) and vMAP
@@ -112,4 +112,4 @@ absl::StatusOr<BenchMethod> ParseMethod(const std::string& text) {
   return method;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -7,7 +7,7 @@
 #include "server/mesh/mesh_config.h"
 #include "server/nerf/nerf_config.h"
 
-namespace romap {
+namespace romap::bench {
 
 // A row of a table: one way to get from views to a surface, as settings of the engine.
 struct BenchMethod {
@@ -19,8 +19,8 @@ struct BenchMethod {
 };
 
 struct EngineConfig {
-  NerfConfig nerf;
-  MeshConfig mesh;
+  nerf::NerfConfig nerf;
+  mesh::MeshConfig mesh;
 };
 
 // The defaults, then `base`, then the method's own settings. INVALID_ARGUMENT: a field is unknown or out of range.
@@ -41,4 +41,4 @@ std::vector<BenchMethod> AblationMethods();
 // "ID: nerf.a=1 nerf.b=2" as a method of that id and title. INVALID_ARGUMENT says what it should look like.
 absl::StatusOr<BenchMethod> ParseMethod(const std::string& text);
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -12,7 +12,7 @@
 #include "client/bench/method_runner.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 namespace fs = std::filesystem;
@@ -77,7 +77,7 @@ absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& op
 
 class PaperBench {
  public:
-  PaperBench(const PaperBenchOptions& options, const Sequence& sequence,
+  PaperBench(const PaperBenchOptions& options, const files::Sequence& sequence,
              const std::function<void(double, const std::string&)>& progress, const std::function<bool()>& stop)
       : options_(options),
         sequence_(sequence),
@@ -178,17 +178,17 @@ class PaperBench {
   }
 
   absl::Status WriteReport() const {
-    ROMAP_RETURN_IF_ERROR(WriteFile(options_.out_dir + "/paper.md", ToMarkdown(results_)));
-    ROMAP_RETURN_IF_ERROR(WriteFile(options_.out_dir + "/paper.json", ToJsonText(results_)));
+    ROMAP_RETURN_IF_ERROR(files::WriteFile(options_.out_dir + "/paper.md", ToMarkdown(results_)));
+    ROMAP_RETURN_IF_ERROR(files::WriteFile(options_.out_dir + "/paper.json", ToJsonText(results_)));
     if (results_.curves.empty()) return absl::OkStatus();
     std::vector<uint8_t> png;
     cv::imencode(".png", DrawConvergence(results_), png);
-    return WriteFile(options_.out_dir + "/convergence.png",
-                     std::string_view(reinterpret_cast<const char*>(png.data()), png.size()));
+    return files::WriteFile(options_.out_dir + "/convergence.png",
+                            std::string_view(reinterpret_cast<const char*>(png.data()), png.size()));
   }
 
   const PaperBenchOptions& options_;
-  const Sequence& sequence_;
+  const files::Sequence& sequence_;
   const std::function<void(double, const std::string&)>& progress_;
   const std::function<bool()>& stop_;
   MethodRunner runner_;
@@ -212,7 +212,8 @@ absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
                                            const std::function<void(double, const std::string&)>& progress,
                                            const std::function<bool()>& stop) {
   ROMAP_RETURN_IF_ERROR(Validate(options));
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence_dir, {.use_depth = true}));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
+                         files::Sequence::Open(options.sequence_dir, {.use_depth = true}));
   if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence_dir);
   if (!fs::is_directory(options.sequence_dir + "/gt")) {
     return NotFound("{}: no folder gt with true surfaces", options.sequence_dir);
@@ -223,4 +224,4 @@ absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
   return PaperBench(options, sequence, progress, stop).Run();
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -7,7 +7,7 @@
 #include "client/bench/paper_results.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::bench {
 
 struct PaperBenchOptions {
   std::string sequence_dir;  // with objects.yaml, masks, poses and gt/
@@ -40,4 +40,4 @@ absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
                                            const std::function<void(double, const std::string&)>& progress,
                                            const std::function<bool()>& stop);
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -3,7 +3,7 @@
 
 #include "client/bench/paper_results.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -104,4 +104,4 @@ std::string ToJsonText(const PaperResults& r) {
   return json.dump(1) + "\n";
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -5,7 +5,7 @@
 
 #include "common/median.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 // Mean and standard deviation of one figure over evaluations that have it.
@@ -73,4 +73,4 @@ double FmaPeak(const PaperResults& results) {
   return peaks.empty() ? 0 : Median(peaks);
 }
 
-}  // namespace romap
+}  // namespace romap::bench

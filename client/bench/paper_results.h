@@ -9,7 +9,7 @@
 #include "client/bench/published.h"
 #include "client/bench/timed_training.h"
 
-namespace romap {
+namespace romap::bench {
 
 // How long an evaluation's training was allowed to take [s]; the last one stands for "to the end of the plan".
 inline constexpr double kToTheEnd_s = -1;
@@ -93,4 +93,4 @@ double FmaPeak(const PaperResults& results);
 std::string ToMarkdown(const PaperResults& results);
 std::string ToJsonText(const PaperResults& results);
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -4,7 +4,7 @@
 
 #include "client/bench/paper_results.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr const char* kNothing = "-";
@@ -199,4 +199,4 @@ std::string ToMarkdown(const PaperResults& r) {
   return text;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

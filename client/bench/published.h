@@ -3,7 +3,7 @@
 #include <optional>
 #include <string_view>
 
-namespace romap {
+namespace romap::bench {
 
 // What RO-MAP (Han et al., RA-L 2023) states, measured on an RTX 4090 with camera poses of its own SLAM, and meshes
 // laid over the truth by ICP. For comparison beside our own figures.
@@ -38,4 +38,4 @@ inline constexpr PublishedModelSize kPublishedTable4[] = {{14, 1, 0.435, 0.227, 
                                                           {18, 1, 0.451, 0.236, 0.921}, {20, 1, 0.450, 0.243, 1.495},
                                                           {16, 2, 0.409, 0.241, 0.862}, {16, 3, 0.442, 0.243, 1.052}};
 
-}  // namespace romap
+}  // namespace romap::bench

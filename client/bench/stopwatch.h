@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace romap {
+namespace romap::bench {
 
 // What a second is.
 enum class BenchClock {
@@ -47,4 +47,4 @@ class Stopwatch {
   double total_s_ = 0, wall_s_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -7,21 +7,21 @@
 #include "client/bench/stopwatch.h"
 #include "server/nerf/object_field.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr double kProbe_s = 0.15;
 constexpr double kLongestSlice_s = 0.25;
 
-absl::StatusOr<ObjectField> MakeField(const TrainingRequest& request, const NerfConfig& config) {
+absl::StatusOr<nerf::ObjectField> MakeField(const TrainingRequest& request, const nerf::NerfConfig& config) {
   if (request.views->empty()) return FailedPrecondition("an object without views cannot be trained");
-  ObjectField field(config, request.views->front().object, request.seed);
+  nerf::ObjectField field(config, request.views->front().object, request.seed);
   ROMAP_RETURN_IF_ERROR(field.SetBox(request.cuboid));
   for (const ObjectView& view : *request.views) ROMAP_RETURN_IF_ERROR(field.AddView(view));
   return field;
 }
 
-void AddTo(TrainStats& sum, const TrainStats& slice) {
+void AddTo(nerf::TrainStats& sum, const nerf::TrainStats& slice) {
   sum.steps += slice.steps;
   sum.rays += slice.rays;
   sum.samples += slice.samples;
@@ -34,12 +34,12 @@ void AddTo(TrainStats& sum, const TrainStats& slice) {
 }
 
 absl::StatusOr<double> ProbeSecondsPerStep(const TrainingRequest& request) {
-  ROMAP_ASSIGN_OR_RETURN(ObjectField field, MakeField(request, request.config));
+  ROMAP_ASSIGN_OR_RETURN(nerf::ObjectField field, MakeField(request, request.config));
   field.Train(1, request.threads);  // builds the ray lists
   Stopwatch watch(request.clock, request.threads);
   int steps = 0;
   while (watch.total_s() < kProbe_s && steps < request.config.full_budget_steps) {
-    const TrainStats stats = watch.Time([&] { return field.Train(2, request.threads); });
+    const nerf::TrainStats stats = watch.Time([&] { return field.Train(2, request.threads); });
     if (stats.steps == 0) break;
     steps += stats.steps;
   }
@@ -58,14 +58,14 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
     ROMAP_ASSIGN_OR_RETURN(seconds_per_step, ProbeSecondsPerStep(request));
   }
   TimedTraining result;
-  NerfConfig config = request.config;
+  nerf::NerfConfig config = request.config;
   const double fitting = request.limit_s / std::max(seconds_per_step, 1e-7);
   if (fitting < config.full_budget_steps) {
     config.full_budget_steps = std::max(1, static_cast<int>(fitting));
     result.limited = true;
   }
   Stopwatch setup(request.clock, request.threads), training(request.clock, request.threads);
-  ROMAP_ASSIGN_OR_RETURN(ObjectField field, setup.Time([&] { return MakeField(request, config); }));
+  ROMAP_ASSIGN_OR_RETURN(nerf::ObjectField field, setup.Time([&] { return MakeField(request, config); }));
   const auto marked = [&] { return result.at_marks.size() < request.marks_s.size(); };
   while (field.steps() < field.AllowedSteps(/*complete=*/true) && training.total_s() < request.limit_s) {
     if (request.stop && request.stop()) return absl::CancelledError("stopped");
@@ -74,7 +74,7 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
     const uint64_t left = field.AllowedSteps(true) - field.steps();
     const int steps = StepsUntil(target_s, training.total_s(), seconds_per_step);
     const int slice = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(steps)));
-    const TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
+    const nerf::TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
     if (stats.steps == 0) break;  // no pixel to learn from
     AddTo(result.stats, stats);
     while (marked() && training.total_s() >= request.marks_s[result.at_marks.size()]) {
@@ -90,4 +90,4 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
   return result;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

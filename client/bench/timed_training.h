@@ -11,10 +11,10 @@
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
 
-namespace romap {
+namespace romap::bench {
 
 struct TrainingRequest {
-  NerfConfig config;
+  nerf::NerfConfig config;
   Cuboid cuboid;
   const std::vector<ObjectView>* views = nullptr;  // of one object, all there from the start
   uint64_t seed = 1;
@@ -30,9 +30,9 @@ struct TimedTraining {
   std::vector<FieldSnapshot> at_marks;  // one per mark that was reached
   double train_s = 0;                   // by the clock; with the ray lists and the carving that training begins with
   double wall_s = 0;
-  double setup_s = 0;    // of taking the views in, by the clock
-  bool limited = false;  // the plan was longer than the limit allowed
-  TrainStats stats;      // sums; color_loss of the last slice
+  double setup_s = 0;      // of taking the views in, by the clock
+  bool limited = false;    // the plan was longer than the limit allowed
+  nerf::TrainStats stats;  // sums; color_loss of the last slice
 };
 
 // Trains one object from nothing to the end of its plan or to the limit. Where the whole plan does not fit, fewer steps
@@ -41,4 +41,4 @@ struct TimedTraining {
 // CANCELLED: stopped. INVALID_ARGUMENT, FAILED_PRECONDITION: as ObjectField says of box and views.
 absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double& seconds_per_step);
 
-}  // namespace romap
+}  // namespace romap::bench

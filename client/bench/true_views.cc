@@ -5,13 +5,13 @@
 
 #include "server/session/ingest.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr int kFewestPixels = 100;
 
 // Crop around the projected cuboid, half as large again, and the mask. Empty when a corner is behind the camera.
-cv::Rect Crop(const Frame& frame, const ObjectRecord& object, const cv::Mat& is_object) {
+cv::Rect Crop(const Frame& frame, const files::ObjectRecord& object, const cv::Mat& is_object) {
   const SE3<Camera, Object> T_camera_object = frame.T_world_camera->Inverse() * object.T_world_object;
   std::vector<cv::Point2f> corners;
   for (int corner = 0; corner < 8; ++corner) {
@@ -25,8 +25,8 @@ cv::Rect Crop(const Frame& frame, const ObjectRecord& object, const cv::Mat& is_
   return (cv::boundingRect(corners) | cv::boundingRect(is_object)) & image;
 }
 
-absl::Status CheckLabels(const Sequence& sequence, const FrameInput& input) {
-  for (const ObjectRecord& object : sequence.objects()->objects) {
+absl::Status CheckLabels(const files::Sequence& sequence, const FrameInput& input) {
+  for (const files::ObjectRecord& object : sequence.objects()->objects) {
     const auto named = std::ranges::find(input.instances, static_cast<uint32_t>(object.id), &Instance::label);
     if (named != input.instances.end() && named->class_name != object.class_name) {
       return InvalidArgument(
@@ -39,9 +39,9 @@ absl::Status CheckLabels(const Sequence& sequence, const FrameInput& input) {
 
 }  // namespace
 
-absl::StatusOr<TrueFrames> LoadTrueFrames(const Sequence& sequence, int every, int offset) {
+absl::StatusOr<TrueFrames> LoadTrueFrames(const files::Sequence& sequence, int every, int offset) {
   if (!sequence.objects()) return NotFound("{}: objects.yaml with the true cuboids is missing", sequence.dir());
-  Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
+  session::Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
   TrueFrames frames;
   for (size_t i = static_cast<size_t>(offset); i < sequence.size(); i += static_cast<size_t>(every)) {
     if (!sequence.has_mask(i)) continue;
@@ -55,7 +55,7 @@ absl::StatusOr<TrueFrames> LoadTrueFrames(const Sequence& sequence, int every, i
   return frames;
 }
 
-std::optional<ObjectView> MakeTrueView(const Frame& frame, const ObjectRecord& object, bool with_depth) {
+std::optional<ObjectView> MakeTrueView(const Frame& frame, const files::ObjectRecord& object, bool with_depth) {
   const cv::Mat is_object = frame.labels == static_cast<int>(object.id);
   if (cv::countNonZero(is_object) < kFewestPixels) return std::nullopt;
   const cv::Rect roi = Crop(frame, object, is_object);
@@ -74,7 +74,7 @@ std::optional<ObjectView> MakeTrueView(const Frame& frame, const ObjectRecord& o
   return view;
 }
 
-std::vector<ObjectView> MakeTrueViews(const TrueFrames& frames, const ObjectRecord& object, bool with_depth) {
+std::vector<ObjectView> MakeTrueViews(const TrueFrames& frames, const files::ObjectRecord& object, bool with_depth) {
   std::vector<ObjectView> views;
   for (const std::shared_ptr<const Frame>& frame : frames) {
     if (std::optional<ObjectView> view = MakeTrueView(*frame, object, with_depth)) views.push_back(std::move(*view));
@@ -82,4 +82,4 @@ std::vector<ObjectView> MakeTrueViews(const TrueFrames& frames, const ObjectReco
   return views;
 }
 
-}  // namespace romap
+}  // namespace romap::bench

@@ -9,30 +9,30 @@
 #include "client/cli/progress.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 struct Options {
-  PaperBenchOptions bench;
+  bench::PaperBenchOptions bench;
   std::vector<std::string> rows;
   bool quick = false;
 };
 
 absl::Status RunBench(const Options& options) {
-  PaperBenchOptions bench = options.bench;
+  bench::PaperBenchOptions bench = options.bench;
   for (const std::string& row : options.rows) {
-    ROMAP_ASSIGN_OR_RETURN(BenchMethod method, ParseMethod(row));
-    ROMAP_RETURN_IF_ERROR(Configure(method, bench.settings).status());
+    ROMAP_ASSIGN_OR_RETURN(bench::BenchMethod method, bench::ParseMethod(row));
+    ROMAP_RETURN_IF_ERROR(bench::Configure(method, bench.settings).status());
     bench.more_methods.push_back(std::move(method));
   }
-  if (options.quick) bench = Quick(std::move(bench));
+  if (options.quick) bench = bench::Quick(std::move(bench));
   Progress progress("bench paper");
   ROMAP_ASSIGN_OR_RETURN(
-      const PaperResults results,
-      RunPaperBench(
+      const bench::PaperResults results,
+      bench::RunPaperBench(
           bench, [&](double share, const std::string& text) { progress.Show(share, text); }, Interrupted));
   progress.Done();
-  fmt::print("{}\nreport: {}/paper.md and paper.json\n", ToMarkdown(results), bench.out_dir);
+  fmt::print("{}\nreport: {}/paper.md and paper.json\n", bench::ToMarkdown(results), bench.out_dir);
   if (results.runs_done == results.runs_planned) return absl::OkStatus();
   return absl::CancelledError(fmt::format("stopped after {} of {} runs; the report says what there is",
                                           results.runs_done, results.runs_planned));
@@ -40,7 +40,7 @@ absl::Status RunBench(const Options& options) {
 
 void AddPaperPart(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<Options>();
-  PaperBenchOptions& bench = options->bench;
+  bench::PaperBenchOptions& bench = options->bench;
   CLI::App* command = app.add_subcommand(
       "paper", "Tables 1, 3, 4, an ablation and the convergence plot (Fig. 8) of the paper on a sequence with truth");
   command->add_option("sequence", bench.sequence_dir, "Folder of the sequence, with objects.yaml and gt/")->required();
@@ -58,7 +58,8 @@ void AddPaperPart(CLI::App& app, Command* chosen) {
   command->add_option("--cap", bench.cap_s, "Longest training of one object [s]; longer plans are cut to fit")
       ->capture_default_str();
   command->add_option("--threads", bench.threads, "Threads that train one object")->capture_default_str();
-  const std::map<std::string, BenchClock> clocks = {{"cpu", BenchClock::kCpu}, {"wall", BenchClock::kWall}};
+  const std::map<std::string, bench::BenchClock> clocks = {{"cpu", bench::BenchClock::kCpu},
+                                                           {"wall", bench::BenchClock::kWall}};
   command->add_option("--clock", bench.clock, "Time is CPU time over threads (other work does not count), or wall time")
       ->transform(CLI::CheckedTransformer(clocks))
       ->option_text("cpu|wall [cpu]");
@@ -82,4 +83,4 @@ void AddBenchCommand(CLI::App& app, Command* chosen) {
   AddPaperPart(*command, chosen);
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -10,7 +10,7 @@
 #include "client/cli/interrupt.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 constexpr int kExitFailure = 1, kExitUsage = 2, kExitInterrupted = 130;
@@ -65,4 +65,4 @@ int RunCli(int argc, const char* const* argv) {
   return ExitCode(status);
 }
 
-}  // namespace romap
+}  // namespace romap::cli

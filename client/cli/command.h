@@ -8,7 +8,7 @@ namespace CLI {
 class App;
 }
 
-namespace romap {
+namespace romap::cli {
 
 // Each command adds itself to the command line; when it is the chosen one, it puts what to do into `chosen`.
 using Command = std::function<absl::Status()>;
@@ -25,4 +25,4 @@ void AddSessionsCommand(CLI::App& app, Command* chosen);
 // wrong, 1 anything else, 130 interrupted.
 int RunCli(int argc, const char* const* argv);
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -1,6 +1,6 @@
 #include "client/cli/cuboid_outline.h"
 
-namespace romap {
+namespace romap::cli {
 
 std::optional<cv::Rect2d> CuboidOutline(const Cuboid& cuboid, const CameraModel& camera,
                                         const SE3<World, Camera>& T_world_camera) {
@@ -18,4 +18,4 @@ std::optional<cv::Rect2d> CuboidOutline(const Cuboid& cuboid, const CameraModel&
   return cv::Rect2d(low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
 }
 
-}  // namespace romap
+}  // namespace romap::cli

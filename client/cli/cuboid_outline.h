@@ -5,11 +5,11 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::cli {
 
 // Bounding box of the cuboid's eight corners in the image, in pixels; nullopt unless the whole cuboid lies in front of
 // the camera and inside the image.
 std::optional<cv::Rect2d> CuboidOutline(const Cuboid& cuboid, const CameraModel& camera,
                                         const SE3<World, Camera>& T_world_camera);
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -9,17 +9,17 @@
 #include "client/eval/eval.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
-const std::map<std::string, Alignment> kAlignments = {
-    {"none", Alignment::kNone}, {"se3", Alignment::kSe3}, {"sim3", Alignment::kSim3}};
+const std::map<std::string, eval::Alignment> kAlignments = {
+    {"none", eval::Alignment::kNone}, {"se3", eval::Alignment::kSe3}, {"sim3", eval::Alignment::kSim3}};
 
 // Prints the table, and writes the figures as JSON where asked.
 template <class Report>
 absl::Status Show(const absl::StatusOr<Report>& report, const std::string& json_path) {
   if (!report.ok()) return report.status();
-  fmt::print("{}", FormatTable(*report));
+  fmt::print("{}", eval::FormatTable(*report));
   if (json_path.empty()) return absl::OkStatus();
   std::ofstream file(json_path);
   file << ToJson(*report).dump(1) << '\n';
@@ -46,22 +46,22 @@ void AddRunPart(CLI::App& app, Command* chosen) {
                     "The camera was tracked: align by the trajectories, then each mesh by ICP");
   command->callback([options, chosen] {
     *chosen = [options] {
-      const RunReport report = EvaluateRun(options->out, options->sequence, !options->poses_estimated);
+      const eval::RunReport report = eval::EvaluateRun(options->out, options->sequence, !options->poses_estimated);
       if (!report.objects && !report.boxes && !report.trajectory) {
         return NotFound("nothing to compare: {}", fmt::join(report.notes, "; "));
       }
-      return Show(absl::StatusOr<RunReport>(report), options->json);
+      return Show(absl::StatusOr<eval::RunReport>(report), options->json);
     };
   });
 }
 
 void AddObjectsPart(CLI::App& app, Command* chosen) {
   struct Options {
-    ObjectsEvalOptions eval;
+    eval::ObjectsEvalOptions eval;
     std::string json;
   };
   auto options = std::make_shared<Options>();
-  ObjectsEvalOptions& eval = options->eval;
+  eval::ObjectsEvalOptions& eval = options->eval;
   CLI::App* command = AddPart(app, "objects", "Accuracy, completion and completion ratio of meshes", &options->json);
   command->add_option("--pred", eval.predicted_dir, "Folder of meshes")->required();
   command->add_option("--gt", eval.ground_truth_dir, "Folder of true surfaces")->required();
@@ -74,12 +74,12 @@ void AddObjectsPart(CLI::App& app, Command* chosen) {
   command->add_flag("--no-cap", eval.no_cap, "Leave out the inferred undersides");
   command->add_option("--samples", eval.samples, "Points per mesh")->capture_default_str();
   command->callback(
-      [options, chosen] { *chosen = [options] { return Show(EvaluateObjects(options->eval), options->json); }; });
+      [options, chosen] { *chosen = [options] { return Show(eval::EvaluateObjects(options->eval), options->json); }; });
 }
 
 void AddBoxesPart(CLI::App& app, Command* chosen) {
   struct Options {
-    BoxesEvalOptions eval;
+    eval::BoxesEvalOptions eval;
     std::string json;
   };
   auto options = std::make_shared<Options>();
@@ -89,12 +89,12 @@ void AddBoxesPart(CLI::App& app, Command* chosen) {
   command->add_option("--est-traj", options->eval.estimated_trajectory, "Estimated trajectory that places the cuboids");
   command->add_option("--gt-traj", options->eval.true_trajectory, "True trajectory");
   command->callback(
-      [options, chosen] { *chosen = [options] { return Show(EvaluateBoxes(options->eval), options->json); }; });
+      [options, chosen] { *chosen = [options] { return Show(eval::EvaluateBoxes(options->eval), options->json); }; });
 }
 
 void AddTrajectoryPart(CLI::App& app, Command* chosen) {
   struct Options {
-    TrajectoryEvalOptions eval;
+    eval::TrajectoryEvalOptions eval;
     std::string json;
   };
   auto options = std::make_shared<Options>();
@@ -103,8 +103,9 @@ void AddTrajectoryPart(CLI::App& app, Command* chosen) {
   command->add_option("--gt", options->eval.ground_truth, "True trajectory, TUM format")->required();
   command->add_option("--align", options->eval.alignment, "none, se3 or sim3 (default)")
       ->transform(CLI::CheckedTransformer(kAlignments));
-  command->callback(
-      [options, chosen] { *chosen = [options] { return Show(EvaluateTrajectory(options->eval), options->json); }; });
+  command->callback([options, chosen] {
+    *chosen = [options] { return Show(eval::EvaluateTrajectory(options->eval), options->json); };
+  });
 }
 
 }  // namespace
@@ -118,4 +119,4 @@ void AddEvalCommand(CLI::App& app, Command* chosen) {
   AddTrajectoryPart(*command, chosen);
 }
 
-}  // namespace romap
+}  // namespace romap::cli

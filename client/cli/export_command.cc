@@ -9,7 +9,7 @@
 #include "client/cli/service_options.h"
 #include "client/files/tum.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 struct ExportOptions {
@@ -26,8 +26,8 @@ absl::Status RunExport(const ExportOptions& options) {
   for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", fault);
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
 
-  const std::vector<StampedPose> trajectory = TrajectoryOf(snapshot);
-  ROMAP_RETURN_IF_ERROR(WriteTum((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
+  const std::vector<files::StampedPose> trajectory = TrajectoryOf(snapshot);
+  ROMAP_RETURN_IF_ERROR(files::WriteTum((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
   fmt::print("{} objects and {} camera poses of session {} written to {}\n", objects.size(), trajectory.size(),
              snapshot.session_id, options.out);
   return absl::OkStatus();
@@ -44,4 +44,4 @@ void AddExportCommand(CLI::App& app, Command* chosen) {
   command->callback([options, chosen] { *chosen = [options] { return RunExport(*options); }; });
 }
 
-}  // namespace romap
+}  // namespace romap::cli

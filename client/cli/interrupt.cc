@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
@@ -21,4 +21,4 @@ void CatchInterrupts() {
 
 bool Interrupted() { return interrupted != 0; }
 
-}  // namespace romap
+}  // namespace romap::cli

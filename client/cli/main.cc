@@ -1,3 +1,3 @@
 #include "client/cli/command.h"
 
-int main(int argc, char** argv) { return romap::RunCli(argc, argv); }
+int main(int argc, char** argv) { return romap::cli::RunCli(argc, argv); }

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 constexpr size_t kFaultsKept = 5;
@@ -87,6 +87,6 @@ size_t MapCollector::ConfirmedObjects() const {
                        [](const auto& entry) { return entry.second.object.state != ObjectState::kProvisional; });
 }
 
-std::vector<StampedPose> MapCollector::Trajectory() const { return trajectory_; }
+std::vector<files::StampedPose> MapCollector::Trajectory() const { return trajectory_; }
 
-}  // namespace romap
+}  // namespace romap::cli

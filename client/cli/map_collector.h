@@ -11,7 +11,7 @@
 #include "client/sdk/map_copy.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::cli {
 
 // What a run keeps of its stream: a copy of the map, the answers to what was sent, and when things arrived. Times are
 // seconds on a steady clock, from construction.
@@ -32,7 +32,7 @@ class MapCollector {
   Arrival ArrivalOf(ObjectId id) const;
   size_t ConfirmedObjects() const;
   // Accepted frames with a pose, in the order they were acknowledged.
-  std::vector<StampedPose> Trajectory() const;
+  std::vector<files::StampedPose> Trajectory() const;
   const std::optional<Statistics>& statistics() const { return statistics_; }
   size_t sent() const { return sent_.size(); }
   size_t acknowledged() const { return acknowledged_; }
@@ -69,9 +69,9 @@ class MapCollector {
 
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<uint64_t, Sent> sent_;
-  MapCopy map_;
+  client::MapCopy map_;
   std::map<ObjectId, Arrival> arrivals_;
-  std::vector<StampedPose> trajectory_;
+  std::vector<files::StampedPose> trajectory_;
   std::vector<double> latencies_s_;
   std::vector<std::string> faults_;
   std::optional<Statistics> statistics_;
@@ -82,4 +82,4 @@ class MapCollector {
   double last_ack_s_ = 0, first_sent_s_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::cli

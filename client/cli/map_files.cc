@@ -11,7 +11,7 @@
 #include "client/files/ply.h"
 #include "common/mesh_codec.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -69,8 +69,8 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
   return decoded;
 }
 
-std::vector<StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
-  std::vector<StampedPose> trajectory;
+std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
+  std::vector<files::StampedPose> trajectory;
   for (size_t i = 0; i < snapshot.trajectory.size(); ++i) {
     if (snapshot.trajectory[i].T_world_camera) {
       trajectory.push_back({snapshot.timestamps_ns[i], *snapshot.trajectory[i].T_world_camera});
@@ -82,7 +82,7 @@ std::vector<StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects) {
   const fs::path folder = fs::path(dir) / "objects";
   ROMAP_RETURN_IF_ERROR(MakeEmptyFolder(folder));
-  ObjectsYaml cuboids;
+  files::ObjectsYaml cuboids;
   for (const MapObject& entry : objects) {
     const ObjectUpdate& object = entry.object;
     cuboids.up_world = object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();
@@ -93,10 +93,10 @@ absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>&
                                .half_extents = object.cuboid.half_extents,
                                .confidence = object.cuboid.confidence});
     if (entry.mesh_world.triangles.empty()) continue;
-    ROMAP_RETURN_IF_ERROR(WritePly((folder / (entry.file_stem + ".ply")).string(), entry.mesh_world));
-    ROMAP_RETURN_IF_ERROR(WriteGlb((folder / (entry.file_stem + ".glb")).string(), entry.mesh_world));
+    ROMAP_RETURN_IF_ERROR(files::WritePly((folder / (entry.file_stem + ".ply")).string(), entry.mesh_world));
+    ROMAP_RETURN_IF_ERROR(files::WriteGlb((folder / (entry.file_stem + ".glb")).string(), entry.mesh_world));
   }
-  return WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
+  return files::WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
 }
 
-}  // namespace romap
+}  // namespace romap::cli

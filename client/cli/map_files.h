@@ -8,7 +8,7 @@
 #include "common/messages.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 
 // One object of a finished map with its mesh decoded and placed in the world.
 struct MapObject {
@@ -24,10 +24,10 @@ struct MapObject {
 std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects, std::vector<std::string>* faults);
 
 // The camera's way as a map has it now, in the order of its frames.
-std::vector<StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
+std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
 
 // Writes objects/<id>_<class>.ply and .glb (World frame, map units) and cuboids.json below `dir`, which is made. Meshes
 // of an earlier run in the same folder are removed.
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects);
 
-}  // namespace romap
+}  // namespace romap::cli

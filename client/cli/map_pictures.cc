@@ -13,17 +13,17 @@
 #include "client/pictures/pictures.h"
 #include "common/lens.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
 constexpr size_t kCuboidFrames = 6;  // evenly over the sequence
 
-std::optional<MappedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
-                                    const std::vector<MappedFrame>& frames) {
+std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
+                                   const std::vector<PosedFrame>& frames) {
   double best_area_px = 0;
-  std::optional<MappedFrame> best;
-  for (const MappedFrame& frame : frames) {
+  std::optional<PosedFrame> best;
+  for (const PosedFrame& frame : frames) {
     const auto outline = CuboidOutline(cuboid, camera, frame.T_world_camera);
     if (outline && outline->area() > best_area_px) {
       best_area_px = outline->area();
@@ -33,7 +33,7 @@ std::optional<MappedFrame> BestView(const Cuboid& cuboid, const CameraModel& cam
   return best;
 }
 
-absl::StatusOr<cv::Mat> LoadImage(const Sequence& sequence, size_t index) {
+absl::StatusOr<cv::Mat> LoadImage(const files::Sequence& sequence, size_t index) {
   ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(index));
   const cv::Mat buffer(1, static_cast<int>(frame.image.size()), CV_8UC1, const_cast<char*>(frame.image.data()));
   cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
@@ -53,50 +53,52 @@ absl::Status WriteImage(const fs::path& path, const cv::Mat& image) {
 
 }  // namespace
 
-absl::Status WriteMapPictures(const std::string& dir, const Sequence& sequence,
-                              const std::vector<StampedPose>& trajectory, const std::vector<MapObject>& objects) {
+absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& sequence,
+                              const std::vector<files::StampedPose>& trajectory,
+                              const std::vector<MapObject>& objects) {
   const fs::path folder = fs::path(dir) / "pictures";
   std::error_code error;
   fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) return InvalidArgument("cannot make the folder {}: {}", folder.string(), error.message());
 
-  const std::vector<MappedFrame> frames = MappedFrames(sequence, trajectory);
+  const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
   CameraModel camera = sequence.camera();
   std::vector<ObjectUpdate> updates;
   for (const MapObject& entry : objects) {
     updates.push_back(entry.object);
-    const std::optional<MappedFrame> view = BestView(entry.object.cuboid, camera, frames);
+    const std::optional<PosedFrame> view = BestView(entry.object.cuboid, camera, frames);
     if (!view) continue;
     ROMAP_ASSIGN_OR_RETURN(const cv::Mat image, LoadImage(sequence, view->index));
-    ROMAP_RETURN_IF_ERROR(
-        WriteImage(folder / (entry.file_stem + ".png"),
-                   DrawMeshBesideView(entry.mesh_world, image, camera, view->T_world_camera, &entry.object.cuboid)));
+    ROMAP_RETURN_IF_ERROR(WriteImage(
+        folder / (entry.file_stem + ".png"),
+        pictures::DrawMeshBesideView(entry.mesh_world, image, camera, view->T_world_camera, &entry.object.cuboid)));
   }
   std::vector<Mesh> meshes;
   for (const MapObject& entry : objects) meshes.push_back(entry.mesh_world);
   const Eigen::Vector3d up_world =
       objects.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
                       : objects.front().object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();
-  ROMAP_RETURN_IF_ERROR(WriteImage(folder / "map.png", DrawOverview(meshes, updates, up_world)));
+  ROMAP_RETURN_IF_ERROR(WriteImage(folder / "map.png", pictures::DrawOverview(meshes, updates, up_world)));
   return WriteCuboidPictures(folder.string(), sequence, trajectory, updates);
 }
 
-absl::Status WriteCuboidPictures(const std::string& folder, const Sequence& sequence,
-                                 const std::vector<StampedPose>& trajectory, std::span<const ObjectUpdate> objects) {
+absl::Status WriteCuboidPictures(const std::string& folder, const files::Sequence& sequence,
+                                 const std::vector<files::StampedPose>& trajectory,
+                                 std::span<const ObjectUpdate> objects) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return InvalidArgument("cannot make the folder {}: {}", folder, error.message());
-  const std::vector<MappedFrame> frames = MappedFrames(sequence, trajectory);
+  const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
   const size_t count = std::min(kCuboidFrames, frames.size());
   for (size_t i = 0; i < count; ++i) {
-    const MappedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
+    const PosedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
     ROMAP_ASSIGN_OR_RETURN(cv::Mat image, LoadImage(sequence, frame.index));
-    DrawCuboids(image, sequence.camera(), frame.T_world_camera, objects);
+    pictures::DrawCuboids(image, sequence.camera(), frame.T_world_camera, objects);
     const std::string name = fmt::format("cuboids_{:06d}.jpg", frame.index + 1);
     ROMAP_RETURN_IF_ERROR(WriteImage(fs::path(folder) / name, image));
   }
   return absl::OkStatus();
 }
 
-}  // namespace romap
+}  // namespace romap::cli

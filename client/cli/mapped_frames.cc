@@ -2,12 +2,13 @@
 
 #include <unordered_map>
 
-namespace romap {
+namespace romap::cli {
 
-std::vector<MappedFrame> MappedFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory) {
-  std::unordered_map<int64_t, const StampedPose*> pose_at;
-  for (const StampedPose& pose : trajectory) pose_at[pose.timestamp_ns] = &pose;
-  std::vector<MappedFrame> frames;
+std::vector<PosedFrame> MappedFrames(const files::Sequence& sequence,
+                                     const std::vector<files::StampedPose>& trajectory) {
+  std::unordered_map<int64_t, const files::StampedPose*> pose_at;
+  for (const files::StampedPose& pose : trajectory) pose_at[pose.timestamp_ns] = &pose;
+  std::vector<PosedFrame> frames;
   for (size_t i = 0; i < sequence.size(); ++i) {
     const auto it = pose_at.find(sequence.timestamp_ns(i));
     if (it != pose_at.end()) frames.push_back({i, it->second->T_world_camera});
@@ -15,4 +16,4 @@ std::vector<MappedFrame> MappedFrames(const Sequence& sequence, const std::vecto
   return frames;
 }
 
-}  // namespace romap
+}  // namespace romap::cli

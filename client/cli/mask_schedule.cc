@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace romap {
+namespace romap::cli {
 
 // The first frame with masks in each period of the rate gets its turn.
 bool MaskSchedule::DetectorRuns(int64_t timestamp_ns) {
@@ -37,4 +37,4 @@ std::optional<MaskSchedule::LateMasks> MaskSchedule::TakeDueBy(int64_t timestamp
   return due;
 }
 
-}  // namespace romap
+}  // namespace romap::cli

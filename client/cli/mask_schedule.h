@@ -6,7 +6,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::cli {
 
 // Plays a detector that is slower than the camera: of the masks that frames carry it keeps so many a second, and holds
 // them back for a while. All times are those of the frames' timestamps.
@@ -34,4 +34,4 @@ class MaskSchedule {
   std::deque<LateMasks> held_back_;
 };
 
-}  // namespace romap
+}  // namespace romap::cli

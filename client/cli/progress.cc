@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <utility>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 constexpr int kBarWidth = 24;
@@ -45,4 +45,4 @@ void Progress::Done() {
   shown_ = false;
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <string>
 
-namespace romap {
+namespace romap::cli {
 
 // A line on stderr that a person can follow: rewritten in place on a terminal, printed now and then elsewhere.
 class Progress {
@@ -28,4 +28,4 @@ class Progress {
   Clock::time_point last_;
 };
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -17,7 +17,7 @@
 #include "common/status.h"
 #include "common/wire/recording.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -93,9 +93,9 @@ absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& re
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
-  ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
+  ROMAP_RETURN_IF_ERROR(files::WriteTum((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
   const nlohmann::json summary = ToJson(recording, snapshot.statistics, objects, faults);
-  ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), summary.dump(1) + "\n"));
+  ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), summary.dump(1) + "\n"));
   fmt::print("{} frames replayed ({} keyframes): {} objects and {} camera poses written to {}\n", recording.frames(),
              snapshot.statistics.keyframes, objects.size(), snapshot.trajectory.size(), options.out);
   return absl::OkStatus();
@@ -134,4 +134,4 @@ void AddReplayCommand(CLI::App& app, Command* chosen) {
   command->callback([options, chosen] { *chosen = [options] { return RunReplay(*options); }; });
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -16,7 +16,7 @@
 #include "client/files/text_file.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,7 +28,7 @@ struct RunOptions {
   std::string sequence_dir;
   std::string out;
   PoseUse poses = PoseUse::kGiven;
-  SequenceOptions sequence;
+  files::SequenceOptions sequence;
   StreamOptions stream;
   ServiceOptions service;
   bool no_pictures = false;
@@ -44,8 +44,8 @@ absl::Status PrepareOutput(const std::string& out) {
   return absl::OkStatus();
 }
 
-SequenceOptions ToSequenceOptions(const RunOptions& options) {
-  SequenceOptions sequence = options.sequence;
+files::SequenceOptions ToSequenceOptions(const RunOptions& options) {
+  files::SequenceOptions sequence = options.sequence;
   if (options.poses == PoseUse::kIgnore) sequence.poses.clear();
   if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
   return sequence;
@@ -59,14 +59,15 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
 
 // Adds the figures against ground truth, where the sequence has any, to the summary and prints them.
 void Evaluate(const RunOptions& options, bool poses_given, nlohmann::json& summary) {
-  const RunReport report = EvaluateRun(options.out, options.sequence_dir, poses_given);
+  const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence_dir, poses_given);
   summary["evaluation"] = ToJson(report);
   if (!report.objects && !report.boxes) return;  // the sequence has no ground truth
-  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, FormatTable(report));
+  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, eval::FormatTable(report));
 }
 
 absl::Status RunSequence(const RunOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence_dir, ToSequenceOptions(options)));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
+                         files::Sequence::Open(options.sequence_dir, ToSequenceOptions(options)));
   ROMAP_RETURN_IF_ERROR(PrepareOutput(options.out));
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
 
@@ -75,9 +76,9 @@ absl::Status RunSequence(const RunOptions& options) {
 
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
-  const std::vector<StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
+  const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
-  ROMAP_RETURN_IF_ERROR(WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
+  ROMAP_RETURN_IF_ERROR(files::WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
   RunSummary summary = Summarise(sequence, result, collector, objects);
   summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
   if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));
@@ -87,9 +88,8 @@ absl::Status RunSequence(const RunOptions& options) {
   if (options.stream.keep_session) json["session"] = result.session_id;
   const bool poses_given = options.poses == PoseUse::kGiven && sequence.has_poses();
   if (!objects.empty()) Evaluate(options, poses_given, json);
-  ROMAP_RETURN_IF_ERROR(WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
-  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures\nfigures: {0}/summary.json\n",
-             options.out);
+  ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
+  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures\nfigures: {0}/summary.json\n", options.out);
   if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
   if (!result.status.ok()) {
     return absl::Status(result.status.code(), fmt::format("{} (the map until then is written; session {} is left for "
@@ -157,4 +157,4 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   });
 }
 
-}  // namespace romap
+}  // namespace romap::cli

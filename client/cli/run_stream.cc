@@ -15,7 +15,7 @@
 #include "client/cli/progress.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -30,7 +30,7 @@ double SecondsSince(Clock::time_point start) { return std::chrono::duration<doub
 // Loads and sends frames on a thread of its own, because Send() waits while the server pushes back.
 class Sender {
  public:
-  Sender(const Sequence& sequence, const StreamOptions& options, MapStream& stream, MapCollector& collector,
+  Sender(const files::Sequence& sequence, const StreamOptions& options, MapStream& stream, MapCollector& collector,
          std::mutex& collector_mutex)
       : sequence_(sequence),
         options_(options),
@@ -89,7 +89,7 @@ class Sender {
         start_ + std::chrono::nanoseconds(timestamp_ns - sequence_.timestamp_ns(options_.first_frame)));
   }
 
-  const Sequence& sequence_;
+  const files::Sequence& sequence_;
   const StreamOptions& options_;
   MapStream& stream_;
   MapCollector& collector_;
@@ -104,7 +104,7 @@ class Sender {
 
 class Run {
  public:
-  Run(const Sequence& sequence, MappingService& service, const StreamOptions& options, MapCollector& collector)
+  Run(const files::Sequence& sequence, MappingService& service, const StreamOptions& options, MapCollector& collector)
       : sequence_(sequence), service_(service), options_(options), collector_(collector) {}
 
   absl::StatusOr<StreamResult> Go() {
@@ -217,7 +217,7 @@ class Run {
         fmt::format("{} objects, {} still training", collector_.ConfirmedObjects(), statistics.objects_training));
   }
 
-  const Sequence& sequence_;
+  const files::Sequence& sequence_;
   MappingService& service_;
   const StreamOptions& options_;
   MapCollector& collector_;
@@ -229,7 +229,7 @@ class Run {
 
 }  // namespace
 
-absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingService& service,
+absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector) {
   if (options.first_frame >= sequence.size()) {
     return InvalidArgument("--first {}: the sequence has only {} frames", options.first_frame, sequence.size());
@@ -237,4 +237,4 @@ absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingSer
   return Run(sequence, service, options, collector).Go();
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -10,7 +10,7 @@
 #include "client/files/tum.h"
 #include "common/mapping_service.h"
 
-namespace romap {
+namespace romap::cli {
 
 struct StreamOptions {
   PoseUse pose_use = PoseUse::kGiven;
@@ -29,7 +29,7 @@ struct StreamResult {
   absl::Status status;  // not OK: the stream broke; the collector holds what came until then
   // The map's, with all corrections that came after the frames were acknowledged. nullopt: the stream broke, or the map
   // could not be fetched.
-  std::optional<std::vector<StampedPose>> trajectory;
+  std::optional<std::vector<files::StampedPose>> trajectory;
   bool interrupted = false;
   bool training_complete = false;
   double mapping_s = 0;   // from the first frame sent to the last acknowledged
@@ -40,7 +40,7 @@ struct StreamResult {
 // all are acknowledged, finishes the session and waits for the training. Ctrl-C ends the sending, and the training:
 // what there is by then is the map. Shows a progress bar. Fails only when there is no session to begin with; what goes
 // wrong later is in the result, and then the session is left on the server.
-absl::StatusOr<StreamResult> StreamSequence(const Sequence& sequence, MappingService& service,
+absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);
 
-}  // namespace romap
+}  // namespace romap::cli

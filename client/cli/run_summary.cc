@@ -8,7 +8,7 @@
 
 #include "client/cli/trackable.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 uint64_t PeakBytes() {
@@ -29,7 +29,7 @@ nlohmann::json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; 
 
 }  // namespace
 
-RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
+RunSummary Summarise(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
                      const std::vector<MapObject>& objects) {
   RunSummary summary;
   summary.sequence = sequence.dir();
@@ -158,4 +158,4 @@ std::string FormatSummary(const RunSummary& summary) {
   return text;
 }
 
-}  // namespace romap
+}  // namespace romap::cli

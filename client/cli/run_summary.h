@@ -10,7 +10,7 @@
 #include "client/cli/run_stream.h"
 #include "client/files/sequence.h"
 
-namespace romap {
+namespace romap::cli {
 
 // What one run came to: the figures behind summary.json and the table at its end.
 struct RunSummary {
@@ -41,10 +41,10 @@ struct RunSummary {
   std::vector<std::string> faults;
 };
 
-RunSummary Summarise(const Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
+RunSummary Summarise(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
                      const std::vector<MapObject>& objects);
 nlohmann::json ToJson(const RunSummary& summary);
 // The closing lines for a person.
 std::string FormatSummary(const RunSummary& summary);
 
-}  // namespace romap
+}  // namespace romap::cli

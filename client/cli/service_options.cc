@@ -8,11 +8,11 @@
 #include "common/status.h"
 #include "server/session/local_mapping_service.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
-absl::StatusOr<ServerConfig> LoadConfig(const ServiceOptions& options) {
-  ServerConfig config;
+absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) {
+  session::ServerConfig config;
   ConfigFields fields;
   config.Fields(fields);
   if (!options.config_file.empty()) {
@@ -41,11 +41,11 @@ void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
 absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
   if (!local) {
     if (server.find(':') == std::string::npos) return InvalidArgument("--server '{}': expected HOST:PORT", server);
-    ROMAP_ASSIGN_OR_RETURN(auto remote, RemoteMappingService::Connect(server));
+    ROMAP_ASSIGN_OR_RETURN(auto remote, client::RemoteMappingService::Connect(server));
     return std::unique_ptr<MappingService>(std::move(remote));
   }
-  ROMAP_ASSIGN_OR_RETURN(const ServerConfig config, LoadConfig(*this));
-  return std::unique_ptr<MappingService>(std::make_unique<LocalMappingService>(config));
+  ROMAP_ASSIGN_OR_RETURN(const session::ServerConfig config, LoadConfig(*this));
+  return std::unique_ptr<MappingService>(std::make_unique<session::LocalMappingService>(config));
 }
 
-}  // namespace romap
+}  // namespace romap::cli

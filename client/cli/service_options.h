@@ -10,7 +10,7 @@ namespace CLI {
 class App;
 }
 
-namespace romap {
+namespace romap::cli {
 
 // Where a command finds its mapping service: a server (the default) or this process.
 struct ServiceOptions {
@@ -25,4 +25,4 @@ struct ServiceOptions {
   absl::StatusOr<std::unique_ptr<MappingService>> Connect() const;
 };
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -7,7 +7,7 @@
 #include "client/cli/service_options.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 struct SessionsOptions {
@@ -57,4 +57,4 @@ void AddSessionsCommand(CLI::App& app, Command* chosen) {
   command->callback([options, chosen] { *chosen = [options] { return RunSessions(*options); }; });
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -8,7 +8,7 @@
 #include "client/cli/progress.h"
 #include "client/synth/synth.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 struct SynthCommandOptions {
@@ -98,4 +98,4 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
   command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -7,7 +7,7 @@
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/mapped_frames.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 // A mask fits the cuboid when the boxes around both overlap by this much (intersection over union): the outline of a
@@ -19,7 +19,7 @@ struct Region {
   int area_px = 0;
 };
 
-std::map<int, Region> MaskRegions(const Sequence& sequence, size_t index) {
+std::map<int, Region> MaskRegions(const files::Sequence& sequence, size_t index) {
   std::map<int, Region> regions;
   if (!sequence.has_mask(index)) return regions;
   const auto frame = sequence.Load(index);
@@ -49,11 +49,12 @@ bool Fits(const Region& region, const cv::Rect2d& outline) {
 
 }  // namespace
 
-std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory,
+std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
+                                                const std::vector<files::StampedPose>& trajectory,
                                                 const std::vector<MapObject>& objects) {
   std::map<ObjectId, size_t> first;
   std::map<ObjectId, std::vector<Eigen::Vector3d>> directions;  // from which each object was seen so far, unit length
-  for (const MappedFrame& frame : MappedFrames(sequence, trajectory)) {
+  for (const PosedFrame& frame : MappedFrames(sequence, trajectory)) {
     if (first.size() == objects.size()) break;
     const std::map<int, Region> regions = MaskRegions(sequence, frame.index);
     for (const MapObject& entry : objects) {
@@ -76,4 +77,4 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const Sequence& sequence, const 
   return first;
 }
 
-}  // namespace romap
+}  // namespace romap::cli

@@ -6,7 +6,7 @@
 
 #include "client/files/associate.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using PointMatrix = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>;
@@ -16,10 +16,10 @@ PointMatrix AsMatrix(const Points& points) {
   return {points.front().data(), 3, static_cast<Eigen::Index>(points.size())};
 }
 
-std::vector<int64_t> TimestampsOf(std::span<const StampedPose> poses, int64_t offset_ns) {
+std::vector<int64_t> TimestampsOf(std::span<const files::StampedPose> poses, int64_t offset_ns) {
   std::vector<int64_t> timestamps_ns;
   timestamps_ns.reserve(poses.size());
-  for (const StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns + offset_ns);
+  for (const files::StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns + offset_ns);
   return timestamps_ns;
 }
 
@@ -68,34 +68,34 @@ std::string ToString(Alignment alignment) {
   return "unknown";
 }
 
-Points Similarity::operator*(const Points& points) const {
+Points FittedSimilarity::operator*(const Points& points) const {
   Points moved;
   moved.reserve(points.size());
   for (const Eigen::Vector3d& point : points) moved.push_back(*this * point);
   return moved;
 }
 
-double Similarity::RotationAngle_rad() const { return Eigen::AngleAxisd(rotation).angle(); }
+double FittedSimilarity::RotationAngle_rad() const { return Eigen::AngleAxisd(rotation).angle(); }
 
-std::optional<Similarity> FitSimilarity(const Points& x, const Points& y, bool with_scale) {
+std::optional<FittedSimilarity> FitSimilarity(const Points& x, const Points& y, bool with_scale) {
   if (x.empty()) return std::nullopt;
   const PointMatrix from = AsMatrix(x);
   const Eigen::Vector3d mean = from.rowwise().mean();
   if ((from.colwise() - mean).squaredNorm() / static_cast<double>(x.size()) < 1e-18) return std::nullopt;
   const Eigen::Matrix4d matrix = Eigen::umeyama(from, AsMatrix(y), with_scale);
-  Similarity similarity;
+  FittedSimilarity similarity;
   similarity.scale = with_scale ? matrix.topLeftCorner<3, 1>().norm() : 1.0;
   similarity.rotation = matrix.topLeftCorner<3, 3>() / similarity.scale;
   similarity.translation = matrix.topRightCorner<3, 1>();
   return similarity;
 }
 
-absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const StampedPose> estimated,
-                                                std::span<const StampedPose> ground_truth, Alignment alignment,
+absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
+                                                std::span<const files::StampedPose> ground_truth, Alignment alignment,
                                                 double max_dt_s, double offset_s) {
   TrajectoryFit fit;
-  fit.pairs = AssociateTimestamps(TimestampsOf(estimated, std::llround(offset_s * 1e9)), TimestampsOf(ground_truth, 0),
-                                  std::llround(max_dt_s * 1e9));
+  fit.pairs = files::AssociateTimestamps(TimestampsOf(estimated, std::llround(offset_s * 1e9)),
+                                         TimestampsOf(ground_truth, 0), std::llround(max_dt_s * 1e9));
   const size_t needed = alignment == Alignment::kNone ? 1 : 3;
   if (fit.pairs.size() < needed) {
     return InvalidArgument("only {} of {} estimated poses have a ground-truth pose within {:.3f} s, {} are needed",
@@ -107,7 +107,7 @@ absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const StampedPose> est
     x.push_back(estimated[i].T_world_camera.translation());
     y.push_back(ground_truth[j].T_world_camera.translation());
   }
-  const std::optional<Similarity> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
+  const std::optional<FittedSimilarity> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
   if (!similarity) return InvalidArgument("trajectories cannot be aligned: all estimated positions coincide");
   fit.gt_from_est = *similarity;
   return fit;
@@ -125,7 +125,7 @@ std::optional<IcpResult> Icp(const Points& source, const Points& target, const P
     const bool settled = result.rms - pairs.rms < options.tolerance;
     result.rms = std::min(result.rms, pairs.rms);
     if (settled) return result;
-    const std::optional<Similarity> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
+    const std::optional<FittedSimilarity> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
     if (!fit || fit->scale <= 0.2 || fit->scale >= 5) return std::nullopt;
     result.target_from_source = *fit;
   }
@@ -133,4 +133,4 @@ std::optional<IcpResult> Icp(const Points& source, const Points& target, const P
   return result;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -11,7 +11,7 @@
 #include "client/files/tum.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 enum class Alignment { kNone, kSe3, kSim3 };
 
@@ -19,7 +19,7 @@ enum class Alignment { kNone, kSe3, kSim3 };
 std::string ToString(Alignment alignment);
 
 // y = scale * rotation * x + translation.
-struct Similarity {
+struct FittedSimilarity {
   double scale = 1;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -31,19 +31,19 @@ struct Similarity {
 
 // Least-squares similarity (or rigid motion) that takes x[i] to y[i]: Umeyama, PAMI 1991. Same lengths. nullopt when
 // there are no points or all of them coincide.
-std::optional<Similarity> FitSimilarity(const Points& x, const Points& y, bool with_scale);
+std::optional<FittedSimilarity> FitSimilarity(const Points& x, const Points& y, bool with_scale);
 
 // How two trajectories were laid over each other.
 struct TrajectoryFit {
-  Similarity gt_from_est;                        // estimated world to ground-truth world
+  FittedSimilarity gt_from_est;                  // estimated world to ground-truth world
   std::vector<std::pair<size_t, size_t>> pairs;  // (estimated, true) poses that belong together, by time
 };
 
 // Pairs the poses of two trajectories (sorted by time) that lie at most max_dt_s apart, one to one, after adding
 // offset_s to the estimated times, and aligns their positions. INVALID_ARGUMENT when fewer than three pairs (kNone:
 // one) are left, or the positions coincide.
-absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const StampedPose> estimated,
-                                                std::span<const StampedPose> ground_truth, Alignment alignment,
+absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
+                                                std::span<const files::StampedPose> ground_truth, Alignment alignment,
                                                 double max_dt_s, double offset_s = 0);
 
 struct IcpOptions {
@@ -54,7 +54,7 @@ struct IcpOptions {
 };
 
 struct IcpResult {
-  Similarity target_from_source;
+  FittedSimilarity target_from_source;
   double rms = 0;  // distance of the pairs at the end, in the unit of the points
   int iterations = 0;
 };
@@ -65,4 +65,4 @@ struct IcpResult {
 std::optional<IcpResult> Icp(const Points& source, const Points& target, const Points& symmetric_target,
                              const IcpOptions& options);
 
-}  // namespace romap
+}  // namespace romap::eval

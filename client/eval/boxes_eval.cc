@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/assignment.h"
 #include "client/files/objects_yaml.h"
+#include "common/assignment.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
@@ -16,7 +16,7 @@ constexpr double kDegPerRad = 180 / std::numbers::pi;
 using Polygon = std::vector<Eigen::Vector2d>;
 
 // Corners of the footprint, counter-clockwise.
-Polygon Footprint(const UprightBox& box) {
+Polygon Footprint(const YawBox& box) {
   Polygon corners;
   const Eigen::Rotation2Dd turn(box.yaw_rad);
   for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
@@ -50,10 +50,10 @@ double Area(const Polygon& polygon) {
   return std::abs(doubled) / 2;
 }
 
-std::vector<UprightBox> ToUpright(const ObjectsYaml& objects, const Eigen::Quaterniond& z_from_up,
-                                  const Similarity& gt_from_est) {
-  std::vector<UprightBox> boxes;
-  for (const ObjectRecord& object : objects.objects) {
+std::vector<YawBox> ToUpright(const files::ObjectsYaml& objects, const Eigen::Quaterniond& z_from_up,
+                              const FittedSimilarity& gt_from_est) {
+  std::vector<YawBox> boxes;
+  for (const files::ObjectRecord& object : objects.objects) {
     const Eigen::Matrix3d rotation = z_from_up * (gt_from_est.rotation * object.T_world_object.RotationMatrix());
     boxes.push_back(MakeUpright(rotation, z_from_up * (gt_from_est * object.T_world_object.translation()),
                                 gt_from_est.scale * object.half_extents));
@@ -61,7 +61,7 @@ std::vector<UprightBox> ToUpright(const ObjectsYaml& objects, const Eigen::Quate
   return boxes;
 }
 
-BoxFigures Compare(const UprightBox& predicted, const UprightBox& truth, double iou) {
+BoxFigures Compare(const YawBox& predicted, const YawBox& truth, double iou) {
   BoxFigures figures;
   figures.iou = iou;
   figures.center_cm = 100 * (predicted.center - truth.center).norm();
@@ -91,13 +91,13 @@ void AddMeans(BoxesReport* report) {
   report->yaw_deg /= count;
 }
 
-absl::StatusOr<Similarity> WorldAlignment(const BoxesEvalOptions& options) {
+absl::StatusOr<FittedSimilarity> WorldAlignment(const BoxesEvalOptions& options) {
   if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
     return InvalidArgument("the estimated and the true trajectory go together; one is missing");
   }
-  if (options.estimated_trajectory.empty()) return Similarity{};
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> estimated, ReadTum(options.estimated_trajectory));
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(options.true_trajectory));
+  if (options.estimated_trajectory.empty()) return FittedSimilarity{};
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.true_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
   return fit.gt_from_est;
@@ -105,13 +105,13 @@ absl::StatusOr<Similarity> WorldAlignment(const BoxesEvalOptions& options) {
 
 }  // namespace
 
-UprightBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
-                       const Eigen::Vector3d& half_extents) {
+YawBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
+                   const Eigen::Vector3d& half_extents) {
   Eigen::Index vertical = 0;
   rotation.row(2).cwiseAbs().maxCoeff(&vertical);
   const Eigen::Index x = (vertical + 1) % 3;
   const Eigen::Index y = (vertical + 2) % 3;
-  UprightBox box;
+  YawBox box;
   box.center = center;
   box.yaw_rad = std::atan2(rotation(1, x), rotation(0, x));
   box.half_extents = {half_extents[x], half_extents[y], half_extents[vertical]};
@@ -119,7 +119,7 @@ UprightBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& c
   return box;
 }
 
-double IntersectionOverUnion(const UprightBox& a, const UprightBox& b) {
+double IntersectionOverUnion(const YawBox& a, const YawBox& b) {
   Polygon overlap = Footprint(a);
   const Polygon edges = Footprint(b);
   for (size_t k = 0; k < edges.size() && !overlap.empty(); ++k) {
@@ -132,14 +132,14 @@ double IntersectionOverUnion(const UprightBox& a, const UprightBox& b) {
 }
 
 absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const ObjectsYaml predicted, ReadObjects(options.predicted));
-  ROMAP_ASSIGN_OR_RETURN(const ObjectsYaml truth, ReadObjects(options.ground_truth));
+  ROMAP_ASSIGN_OR_RETURN(const files::ObjectsYaml predicted, files::ReadObjects(options.predicted));
+  ROMAP_ASSIGN_OR_RETURN(const files::ObjectsYaml truth, files::ReadObjects(options.ground_truth));
   if (predicted.objects.empty()) return InvalidArgument("{}: no objects in it", options.predicted);
   if (truth.objects.empty()) return InvalidArgument("{}: no objects in it", options.ground_truth);
-  ROMAP_ASSIGN_OR_RETURN(const Similarity gt_from_est, WorldAlignment(options));
+  ROMAP_ASSIGN_OR_RETURN(const FittedSimilarity gt_from_est, WorldAlignment(options));
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
-  const std::vector<UprightBox> p = ToUpright(predicted, z_from_up, gt_from_est);
-  const std::vector<UprightBox> g = ToUpright(truth, z_from_up, {});
+  const std::vector<YawBox> p = ToUpright(predicted, z_from_up, gt_from_est);
+  const std::vector<YawBox> g = ToUpright(truth, z_from_up, {});
 
   Eigen::MatrixXd distance(g.size(), p.size()), iou(g.size(), p.size());
   for (size_t i = 0; i < g.size(); ++i) {
@@ -172,4 +172,4 @@ absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
   return report;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -9,7 +9,7 @@
 #include "client/eval/alignment.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 struct BoxesEvalOptions {
   std::string predicted;     // cuboids, .json or .yaml
@@ -52,7 +52,7 @@ struct BoxesReport {
 absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options);
 
 // A box whose vertical axis is z.
-struct UprightBox {
+struct YawBox {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double yaw_rad = 0;
   Eigen::Vector3d half_extents = Eigen::Vector3d::Zero();
@@ -60,9 +60,8 @@ struct UprightBox {
 };
 
 // The axis of the box closest to z becomes its vertical one.
-UprightBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
-                       const Eigen::Vector3d& half_extents);
+YawBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center, const Eigen::Vector3d& half_extents);
 
-double IntersectionOverUnion(const UprightBox& a, const UprightBox& b);
+double IntersectionOverUnion(const YawBox& a, const YawBox& b);
 
-}  // namespace romap
+}  // namespace romap::eval

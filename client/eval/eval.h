@@ -9,7 +9,7 @@
 #include "client/eval/objects_eval.h"
 #include "client/eval/trajectory_eval.h"
 
-namespace romap {
+namespace romap::eval {
 
 // All that can be measured of one run against the ground truth its sequence has.
 struct RunReport {
@@ -37,4 +37,4 @@ nlohmann::ordered_json ToJson(const BoxesReport& report);
 nlohmann::ordered_json ToJson(const TrajectoryReport& report);
 nlohmann::ordered_json ToJson(const RunReport& report);
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -6,7 +6,7 @@
 
 #include "client/eval/eval.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 constexpr int kNumberWidth = 10;
@@ -137,4 +137,4 @@ std::string FormatTable(const RunReport& report) {
   return fmt::format("{}", fmt::join(parts, "\n"));
 }
 
-}  // namespace romap
+}  // namespace romap::eval

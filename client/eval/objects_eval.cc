@@ -5,14 +5,14 @@
 #include <map>
 #include <numbers>
 
-#include "common/assignment.h"
 #include "client/eval/pcg64.h"
 #include "client/eval/points.h"
 #include "client/eval/seen_frames.h"
 #include "client/files/mesh_file.h"
 #include "client/files/tum.h"
+#include "common/assignment.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 constexpr double kCmPerM = 100;
@@ -73,7 +73,7 @@ void DropCap(const std::vector<double>& source, Surface* surface) {
 
 absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const ObjectsEvalOptions& options,
                                                   uint32_t seed, bool no_cap) {
-  ROMAP_ASSIGN_OR_RETURN(const auto files, ReadMeshFolder(dir));
+  ROMAP_ASSIGN_OR_RETURN(const auto files, files::ReadMeshFolder(dir));
   std::vector<Surface> surfaces;
   for (const auto& [name, file] : files) {
     Surface surface{name, {}, {}, file.mesh.triangles.size()};
@@ -94,8 +94,8 @@ absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const 
 // Moves all predicted surfaces into the ground truth's world; returns the scale of that.
 absl::StatusOr<double> MoveByTrajectories(const ObjectsEvalOptions& options, std::vector<Surface>* predicted) {
   if (options.estimated_trajectory.empty()) return 1.0;
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> estimated, ReadTum(options.estimated_trajectory));
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(options.true_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated_trajectory));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.true_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
   for (Surface& surface : *predicted) surface.points = fit.gt_from_est * surface.points;
@@ -325,4 +325,4 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
   return report;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

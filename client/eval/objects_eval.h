@@ -9,7 +9,7 @@
 #include "client/eval/alignment.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 // Which correspondences per-object ICP uses: those of the predicted points (as CloudCompare does), or also those of the
 // true points that were seen.
@@ -103,4 +103,4 @@ struct ObjectsReport {
 // or no predicted mesh is near any true object (another world frame?).
 absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& options);
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 // Spreads one seed over 256 bits as NumPy's SeedSequence does (after O'Neill, "Developing a seed_seq alternative",
@@ -92,4 +92,4 @@ std::vector<uint32_t> Pcg64::Choose(uint32_t size, uint32_t count) {
   return {numbers.end() - count, numbers.end()};
 }
 
-}  // namespace romap
+}  // namespace romap::eval

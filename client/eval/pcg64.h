@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace romap {
+namespace romap::eval {
 
 // The generator PCG64 (XSL-RR 128/64; O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good
 // Algorithms for Random Number Generation", 2014), seeded as NumPy's `default_rng(seed)` is. Evaluation scripts in the
@@ -31,4 +31,4 @@ class Pcg64 {
   uint32_t half_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::eval

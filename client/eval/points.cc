@@ -11,7 +11,7 @@
 
 #include "client/eval/pcg64.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 std::array<Eigen::Vector3d, 3> Corners(const Mesh& mesh, size_t triangle) {
@@ -109,4 +109,4 @@ Neighbours NearestIndex::Query(const Points& queries) const {
   return result;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

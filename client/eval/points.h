@@ -9,7 +9,7 @@
 #include "common/mesh.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 using Points = std::vector<Eigen::Vector3d>;
 
@@ -45,4 +45,4 @@ class NearestIndex {
   std::unique_ptr<Tree> tree_;
 };
 
-}  // namespace romap
+}  // namespace romap::eval

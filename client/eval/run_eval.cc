@@ -4,7 +4,7 @@
 #include "client/eval/eval.h"
 #include "client/files/objects_yaml.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,13 +28,13 @@ bool MasksTellWhatWasSeen(const std::string& sequence_dir) {
       Exists(sequence_dir + "/detections.csv")) {
     return false;
   }
-  const auto objects = ReadObjects(sequence_dir + "/objects.yaml");
+  const auto objects = files::ReadObjects(sequence_dir + "/objects.yaml");
   if (!objects.ok()) return false;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(sequence_dir + "/gt", error)) {
     const std::string name = entry.path().stem().string();
     if (std::none_of(objects->objects.begin(), objects->objects.end(),
-                     [&](const ObjectRecord& object) { return object.name == name; })) {
+                     [&](const files::ObjectRecord& object) { return object.name == name; })) {
       return false;
     }
   }
@@ -94,4 +94,4 @@ RunReport EvaluateRun(const std::string& out_dir, const std::string& sequence_di
   return report;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -7,7 +7,7 @@
 
 #include "client/files/sequence.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 constexpr double kMaxBehind_m = 0.02;
@@ -30,12 +30,13 @@ int ValueAt(const cv::Mat& image, int u_px, int v_px) {
 }  // namespace
 
 absl::StatusOr<SeenFrames> SeenFrames::Load(const std::string& sequence_dir, int every) {
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(sequence_dir, {.detections = "", .use_depth = true}));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
+                         files::Sequence::Open(sequence_dir, {.detections = "", .use_depth = true}));
   if (!sequence.objects()) return NotFound("{}: no objects.yaml there, which says whose label is whose", sequence_dir);
   SeenFrames frames;
   frames.camera_ = sequence.camera();
   frames.depth_scale_m_ = sequence.depth_scale();
-  for (const ObjectRecord& object : sequence.objects()->objects) frames.labels_[object.name] = object.id;
+  for (const files::ObjectRecord& object : sequence.objects()->objects) frames.labels_[object.name] = object.id;
   int masks = 0;
   for (size_t k = 0; k < sequence.size(); ++k) {
     if (!sequence.has_mask(k) || masks++ % every != 0) continue;
@@ -83,4 +84,4 @@ std::vector<bool> SeenFrames::Seen(const Points& points, int64_t label) const {
   return {seen.begin(), seen.end()};
 }
 
-}  // namespace romap
+}  // namespace romap::eval

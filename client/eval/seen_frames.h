@@ -12,7 +12,7 @@
 #include "common/geometry.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 // Frames of a sequence with true masks, depths and poses, which tell what part of an object some camera saw.
 class SeenFrames {
@@ -42,4 +42,4 @@ class SeenFrames {
   std::map<std::string, int64_t> labels_;
 };
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -2,7 +2,7 @@
 
 #include "client/eval/eval.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -118,4 +118,4 @@ Json ToJson(const RunReport& report) {
   return json;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

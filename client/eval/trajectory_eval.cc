@@ -6,7 +6,7 @@
 
 #include "client/files/tum.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
@@ -25,8 +25,8 @@ double RootMeanSquare(std::vector<double> values) {
 }  // namespace
 
 absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> estimated, ReadTum(options.estimated));
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(options.ground_truth));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.ground_truth));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.alignment, options.max_dt_s, options.offset_s));
   TrajectoryReport report{.alignment = options.alignment,
@@ -54,4 +54,4 @@ absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions&
   return report;
 }
 
-}  // namespace romap
+}  // namespace romap::eval

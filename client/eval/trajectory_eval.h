@@ -6,7 +6,7 @@
 #include "client/eval/alignment.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::eval {
 
 struct TrajectoryEvalOptions {
   std::string estimated;     // TUM file
@@ -35,4 +35,4 @@ struct TrajectoryReport {
 // NOT_FOUND / INVALID_ARGUMENT as ReadTum and AlignTrajectories.
 absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options);
 
-}  // namespace romap
+}  // namespace romap::eval

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <tuple>
 
-namespace romap {
+namespace romap::files {
 
 std::vector<std::pair<size_t, size_t>> AssociateTimestamps(std::span<const int64_t> a, std::span<const int64_t> b,
                                                            int64_t max_dt_ns) {
@@ -28,4 +28,4 @@ std::vector<std::pair<size_t, size_t>> AssociateTimestamps(std::span<const int64
   return pairs;
 }
 
-}  // namespace romap
+}  // namespace romap::files

@@ -6,7 +6,7 @@
 #include "client/files/text_file.h"
 #include "client/files/yaml_value.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 absl::Status ReadOptionalNumber(const YAML::Node& root, const std::string& key, const std::string& path,
@@ -89,4 +89,4 @@ absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& value) {
   return WriteFile(path, text);
 }
 
-}  // namespace romap
+}  // namespace romap::files

@@ -5,7 +5,7 @@
 #include "common/camera_model.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // What a sequence says about its camera.
 struct CameraYaml {
@@ -21,4 +21,4 @@ absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path);
 
 absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& camera);
 
-}  // namespace romap
+}  // namespace romap::files

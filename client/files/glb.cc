@@ -10,7 +10,7 @@
 #include "client/files/mesh_file.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "glTF is little endian and so must be the bytes copied");
@@ -152,4 +152,4 @@ absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const std::stri
   return WriteFile(path, bytes);
 }
 
-}  // namespace romap
+}  // namespace romap::files

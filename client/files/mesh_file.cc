@@ -7,7 +7,7 @@
 #include "client/files/obj.h"
 #include "client/files/ply.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 std::string LowerExtension(const std::filesystem::path& path) {
@@ -61,4 +61,4 @@ void AppendFan(const std::vector<uint32_t>& polygon, std::vector<std::array<uint
   for (size_t k = 1; k + 1 < polygon.size(); ++k) triangles->push_back({polygon[0], polygon[k], polygon[k + 1]});
 }
 
-}  // namespace romap
+}  // namespace romap::files

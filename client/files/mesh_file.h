@@ -7,7 +7,7 @@
 #include "common/mesh.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // A mesh, or a point cloud (no triangles), with the further numbers its file holds for each vertex.
 struct MeshFile {
@@ -30,4 +30,4 @@ absl::Status ValidateMesh(const Mesh& mesh, const std::string& name);
 // Adds the triangles of a convex polygon as a fan around its first corner.
 void AppendFan(const std::vector<uint32_t>& polygon, std::vector<std::array<uint32_t, 3>>* triangles);
 
-}  // namespace romap
+}  // namespace romap::files

@@ -6,7 +6,7 @@
 #include "client/files/mesh_file.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 std::optional<Eigen::Vector3f> ParseVertex(const std::vector<std::string>& fields) {
@@ -56,4 +56,4 @@ absl::StatusOr<Mesh> ReadObj(const std::string& path) {
   return mesh;
 }
 
-}  // namespace romap
+}  // namespace romap::files

@@ -6,7 +6,7 @@
 #include "client/files/text_file.h"
 #include "client/files/yaml_value.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 absl::StatusOr<SE3<World, Object>> ReadPose(const YAML::Node& node, const std::string& path) {
@@ -115,4 +115,4 @@ absl::Status WriteObjects(const std::string& path, const ObjectsYaml& objects) {
   return WriteFile(path, path.ends_with(".json") ? ToJson(objects) : ToYaml(objects));
 }
 
-}  // namespace romap
+}  // namespace romap::files

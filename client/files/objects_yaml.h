@@ -9,7 +9,7 @@
 #include "common/geometry.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // One cuboid of objects.yaml or cuboids.json.
 struct ObjectRecord {
@@ -35,4 +35,4 @@ absl::StatusOr<ObjectsYaml> ReadObjects(const std::string& path);
 // Writes the same as YAML (the layout of a sequence's objects.yaml) or, where the path ends in .json, as JSON.
 absl::Status WriteObjects(const std::string& path, const ObjectsYaml& objects);
 
-}  // namespace romap
+}  // namespace romap::files

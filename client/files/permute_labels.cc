@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 template <class Pixel>
@@ -44,4 +44,4 @@ absl::Status PermuteLabels(uint64_t seed, std::string* label_png, std::vector<In
   return absl::OkStatus();
 }
 
-}  // namespace romap
+}  // namespace romap::files

@@ -9,7 +9,7 @@
 #include "common/mesh.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // Reads a PLY file (Turk 1994): ASCII, binary little or big endian; any scalar types and orders. x y z become vertices,
 // nx ny nz normals, red green blue (0..255) colours, `vertex_indices` polygons fans of triangles; all further scalars
@@ -26,4 +26,4 @@ absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& nam
 absl::Status WritePly(const std::string& path, const Mesh& mesh,
                       const std::map<std::string, std::vector<double>>& scalars = {});
 
-}  // namespace romap
+}  // namespace romap::files

@@ -10,7 +10,7 @@
 #include "client/files/ply.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
@@ -302,4 +302,4 @@ absl::StatusOr<MeshFile> ReadPly(const std::string& path) {
   return ParsePly(bytes, path);
 }
 
-}  // namespace romap
+}  // namespace romap::files

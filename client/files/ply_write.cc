@@ -5,7 +5,7 @@
 #include "client/files/ply.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the writers copy native bytes");
@@ -82,4 +82,4 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
   return WriteFile(path, bytes);
 }
 
-}  // namespace romap
+}  // namespace romap::files

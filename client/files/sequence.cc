@@ -9,7 +9,7 @@
 #include "client/files/text_file.h"
 #include "common/utf8.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 constexpr int64_t kMaxPoseDistance_ns = 20'000'000;
@@ -216,4 +216,4 @@ absl::StatusOr<FrameInput> Sequence::Load(size_t index) const {
   return frame;
 }
 
-}  // namespace romap
+}  // namespace romap::files

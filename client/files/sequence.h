@@ -13,7 +13,7 @@
 #include "common/messages.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // Which parts of a sequence folder to read. A file left at its default name may be missing; one that was named must
 // exist.
@@ -77,4 +77,4 @@ class Sequence {
   std::optional<uint64_t> permute_labels_seed_;
 };
 
-}  // namespace romap
+}  // namespace romap::files

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <system_error>
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\v\f";
@@ -107,4 +107,4 @@ std::string FormatSeconds(int64_t timestamp_ns) {
                      std::abs(timestamp_ns % kNsPerSecond));
 }
 
-}  // namespace romap
+}  // namespace romap::files

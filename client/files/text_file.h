@@ -8,7 +8,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // Whole file as bytes. NOT_FOUND: no such file; INVALID_ARGUMENT: it is there but cannot be read (e.g. a folder).
 absl::StatusOr<std::string> ReadFile(const std::string& path);
@@ -36,4 +36,4 @@ std::optional<int64_t> ParseSeconds(std::string_view text);
 // Nanoseconds as decimal seconds with nine decimals: the inverse of ParseSeconds.
 std::string FormatSeconds(int64_t timestamp_ns);
 
-}  // namespace romap
+}  // namespace romap::files

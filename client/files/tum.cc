@@ -7,7 +7,7 @@
 
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 // Between poses farther apart than this a camera may have done anything.
@@ -87,4 +87,4 @@ std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int
   return Interpolate(*before, *after, timestamp_ns);
 }
 
-}  // namespace romap
+}  // namespace romap::files

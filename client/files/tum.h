@@ -9,7 +9,7 @@
 #include "common/geometry.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // One line of a trajectory in the format of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 struct StampedPose {
@@ -28,4 +28,4 @@ absl::Status WriteTum(const std::string& path, std::span<const StampedPose> pose
 // otherwise the nearest. nullopt when no pose lies within max_dt_ns.
 std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int64_t timestamp_ns, int64_t max_dt_ns);
 
-}  // namespace romap
+}  // namespace romap::files

@@ -2,7 +2,7 @@
 
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 int LineOf(const YAML::Node& node) { return node.Mark().line + 1; }
@@ -55,4 +55,4 @@ std::string YamlText(const YAML::Node& map, const std::string& key, const std::s
   return node && node.IsScalar() ? node.Scalar() : fallback;
 }
 
-}  // namespace romap
+}  // namespace romap::files

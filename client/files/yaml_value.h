@@ -7,7 +7,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::files {
 
 // yaml-cpp throws; these turn its exceptions into statuses that name file and line.
 
@@ -24,4 +24,4 @@ absl::StatusOr<std::vector<double>> YamlNumbers(const YAML::Node& map, const std
 // map[key] as text; `fallback` when it is not there or not a scalar.
 std::string YamlText(const YAML::Node& map, const std::string& key, const std::string& fallback);
 
-}  // namespace romap
+}  // namespace romap::files

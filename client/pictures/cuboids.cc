@@ -13,7 +13,7 @@
 
 #include "client/pictures/pictures.h"
 
-namespace romap {
+namespace romap::pictures {
 namespace {
 
 // Corners that differ in one bit of their number are joined by an edge.
@@ -130,4 +130,4 @@ void DrawCuboids(cv::Mat& image_bgr, const CameraModel& camera, const SE3<World,
   }
 }
 
-}  // namespace romap
+}  // namespace romap::pictures

@@ -8,7 +8,7 @@
 #include "common/camera_model.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::pictures {
 
 // Corner i lies at +half_extents along x, y, z of the Object frame where bit 0, 1, 2 of i is set, else at
 // -half_extents. World frame, map units.
@@ -20,4 +20,4 @@ std::vector<cv::Point> DrawCuboidEdges(cv::Mat& image_bgr, const CameraModel& ca
                                        const SE3<World, Camera>& T_world_camera, const Cuboid& cuboid,
                                        const cv::Scalar& color_bgr);
 
-}  // namespace romap
+}  // namespace romap::pictures

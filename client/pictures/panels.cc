@@ -9,7 +9,7 @@
 #include "client/pictures/pictures.h"
 #include "client/render/mesh_view.h"
 
-namespace romap {
+namespace romap::pictures {
 namespace {
 
 const cv::Scalar kWhite(255, 255, 255);
@@ -79,11 +79,12 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
 
   cv::Mat photo = CutOut(view_bgr, square, panel_side_px);
   if (cuboid != nullptr) DrawCuboidEdges(photo, panel_camera, T_world_camera, *cuboid, cv::Scalar(60, 200, 255));
-  const std::array<MeshInstance, 1> instances = {{{&mesh_world, 1}}};
+  const std::array<render::MeshInstance, 1> instances = {{{&mesh_world, 1}}};
   cv::Mat picture;
   cv::hconcat(
-      std::vector<cv::Mat>{photo, RenderMeshes(instances, panel_camera, T_world_camera, MeshPaint::kShaded).color_bgr,
-                           RenderMeshes(instances, panel_camera, T_world_camera, MeshPaint::kColored).color_bgr},
+      std::vector<cv::Mat>{
+          photo, render::RenderMeshes(instances, panel_camera, T_world_camera, render::MeshPaint::kShaded).color_bgr,
+          render::RenderMeshes(instances, panel_camera, T_world_camera, render::MeshPaint::kColored).color_bgr},
       picture);
   return picture;
 }
@@ -91,7 +92,7 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
 cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectUpdate> objects,
                      const Eigen::Vector3d& up_world, const cv::Size& size_px) {
   Eigen::AlignedBox3d bounds;
-  std::vector<MeshInstance> instances;
+  std::vector<render::MeshInstance> instances;
   for (const Mesh& mesh : meshes_world) {
     for (const Eigen::Vector3f& vertex : mesh.vertices) bounds.extend(vertex.cast<double>());
     instances.push_back({&mesh, 1});
@@ -119,9 +120,9 @@ cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectU
   const double distance_mu = std::max(0.5 * bounds.diagonal().norm(), 1e-6) / std::sin(half_view_rad);
   const SE3<World, Camera> T_world_camera(rotation, bounds.center() - distance_mu * forward);
 
-  cv::Mat picture = RenderMeshes(instances, camera, T_world_camera, MeshPaint::kColored).color_bgr;
+  cv::Mat picture = render::RenderMeshes(instances, camera, T_world_camera, render::MeshPaint::kColored).color_bgr;
   DrawCuboids(picture, camera, T_world_camera, objects);
   return picture;
 }
 
-}  // namespace romap
+}  // namespace romap::pictures

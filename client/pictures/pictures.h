@@ -8,7 +8,7 @@
 #include "common/mesh.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::pictures {
 
 // Pictures of maps for people to look at. Cameras are free of distortion, images are CV_8UC3 in BGR, meshes are in the
 // World frame, lengths in map units.
@@ -34,4 +34,4 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
 cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectUpdate> objects,
                      const Eigen::Vector3d& up_world, const cv::Size& size_px = {960, 720});
 
-}  // namespace romap
+}  // namespace romap::pictures

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-namespace romap {
+namespace romap::render {
 namespace {
 
 constexpr int kSamplesAcross = 2;
@@ -108,4 +108,4 @@ RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraMode
   return view;
 }
 
-}  // namespace romap
+}  // namespace romap::render

@@ -7,7 +7,7 @@
 #include "client/render/rasterizer.h"
 #include "common/mesh.h"
 
-namespace romap {
+namespace romap::render {
 
 enum class MeshPaint {
   kShaded,   // grey, lit from the camera: shows shape
@@ -33,4 +33,4 @@ RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraMode
                           const SE3<World, Camera>& T_world_camera, MeshPaint paint,
                           const cv::Scalar& background_bgr = cv::Scalar(255, 255, 255));
 
-}  // namespace romap
+}  // namespace romap::render

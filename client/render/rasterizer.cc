@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::render {
 namespace {
 
 constexpr int kTileSide_px = 64;
@@ -211,4 +211,4 @@ Eigen::Vector3f Barycentrics(const std::array<Eigen::Vector3f, 3>& corners_world
   return (weights / sum).cast<float>();
 }
 
-}  // namespace romap
+}  // namespace romap::render

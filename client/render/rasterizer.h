@@ -9,7 +9,7 @@
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::render {
 
 // Triangles in the World frame (map units), counter-clockwise seen from outside. Views: the owner keeps the arrays.
 struct TriangleSoup {
@@ -56,4 +56,4 @@ CameraModel Supersampled(const CameraModel& camera, int factor);
 Eigen::Vector3f Barycentrics(const std::array<Eigen::Vector3f, 3>& corners_world, const Eigen::Vector3d& origin_world,
                              const Eigen::Vector3d& direction_world);
 
-}  // namespace romap
+}  // namespace romap::render

@@ -18,7 +18,7 @@
 #include "common/wire/events.h"
 #include "common/wire/status.h"
 
-namespace romap::sdk {
+namespace romap::client {
 
 // The receiving half of a stream: keeps a few events for Next() and stops reading while nobody takes them, so that
 // HTTP/2 pushes back to the server, which coalesces what waits.
@@ -178,4 +178,4 @@ class EventReactor : public Reactor {
   absl::Status status_;
 };
 
-}  // namespace romap::sdk
+}  // namespace romap::client

@@ -4,7 +4,7 @@
 #include <optional>
 #include <variant>
 
-namespace romap {
+namespace romap::client {
 
 void MapCopy::Apply(const MapEvent& event) {
   if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
@@ -24,4 +24,4 @@ void MapCopy::Apply(const MapEvent& event) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::client

@@ -5,7 +5,7 @@
 #include "common/mapping_service.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::client {
 
 // A client's copy of a session's objects. Begun empty with a stream (Map or Watch) and given all its events in order,
 // it holds the server's objects, the provisional ones included. A new stream tells of the objects there are, not of
@@ -22,4 +22,4 @@ class MapCopy {
   std::map<ObjectId, ObjectSnapshot> objects_;
 };
 
-}  // namespace romap
+}  // namespace romap::client

@@ -14,7 +14,7 @@
 #include "common/wire/status.h"
 #include "romap/v1/mapping.grpc.pb.h"
 
-namespace romap {
+namespace romap::client {
 namespace {
 
 using std::chrono::system_clock;
@@ -116,12 +116,12 @@ absl::Status RemoteMappingService::DeleteSession(const std::string& session_id) 
 }
 
 absl::StatusOr<std::unique_ptr<MapStream>> RemoteMappingService::OpenMap(const std::string& session_id) {
-  return sdk::RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
-                                    connection_->options.max_message_bytes);
+  return client::RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
+                                       connection_->options.max_message_bytes);
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> RemoteMappingService::Watch(const std::string& session_id) {
-  return sdk::RemoteWatchStream::Open(connection_->stub, session_id, connection_->options.call_timeout);
+  return client::RemoteWatchStream::Open(connection_->stub, session_id, connection_->options.call_timeout);
 }
 
 absl::StatusOr<MapSnapshot> RemoteMappingService::ExportMap(const std::string& session_id) {
@@ -139,4 +139,4 @@ absl::StatusOr<MapSnapshot> RemoteMappingService::ExportMap(const std::string& s
   return assembler.Take();
 }
 
-}  // namespace romap
+}  // namespace romap::client

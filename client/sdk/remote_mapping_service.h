@@ -9,7 +9,7 @@
 
 #include "common/mapping_service.h"
 
-namespace romap {
+namespace romap::client {
 
 struct RemoteOptions {
   std::chrono::milliseconds connect_timeout{3000};
@@ -49,4 +49,4 @@ class RemoteMappingService : public MappingService {
   std::unique_ptr<Connection> connection_;
 };
 
-}  // namespace romap
+}  // namespace romap::client

@@ -5,7 +5,7 @@
 #include "common/status.h"
 #include "common/wire/frame.h"
 
-namespace romap::sdk {
+namespace romap::client {
 
 absl::StatusOr<std::unique_ptr<EventStream>> RemoteWatchStream::Open(std::shared_ptr<v1::Mapping::Stub> stub,
                                                                      const std::string& session_id,
@@ -104,4 +104,4 @@ absl::Status RemoteMapStream::Reactor::WaitForWrite() {
   return status.ok() ? FailedPrecondition("the server has ended the stream and takes no more frames") : status;
 }
 
-}  // namespace romap::sdk
+}  // namespace romap::client

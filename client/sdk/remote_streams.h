@@ -14,7 +14,7 @@
 #include "common/mapping_service.h"
 #include "romap/v1/mapping.grpc.pb.h"
 
-namespace romap::sdk {
+namespace romap::client {
 
 // Streams keep the stub, because it keeps the channel that their call runs on.
 
@@ -94,4 +94,4 @@ class RemoteMapStream : public MapStream {
   Reactor reactor_;
 };
 
-}  // namespace romap::sdk
+}  // namespace romap::client

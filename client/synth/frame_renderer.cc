@@ -37,10 +37,10 @@ bool ShareVertex(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>
 
 // Whether the samples of a pixel see one smooth piece of surface, so that one colour will do for all of them.
 bool SameSurface(const Scene& scene, const std::array<int32_t, kSamples>& hits) {
-  if (hits[0] == VisibilityImage::kNothing) return false;
+  if (hits[0] == render::VisibilityImage::kNothing) return false;
   for (const int32_t hit : hits) {
     if (hit == hits[0]) continue;
-    if (hit == VisibilityImage::kNothing) return false;
+    if (hit == render::VisibilityImage::kNothing) return false;
     const auto a = static_cast<size_t>(hits[0]);
     const auto b = static_cast<size_t>(hit);
     if (scene.surface_of_triangle[a] != scene.surface_of_triangle[b]) return false;
@@ -60,20 +60,20 @@ Eigen::Vector3d RayThrough(const CameraModel& camera, const std::vector<Eigen::V
 }  // namespace
 
 FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera)
-    : scene_(scene), camera_(camera), fine_camera_(Supersampled(camera, kSamplesAcross)) {
+    : scene_(scene), camera_(camera), fine_camera_(render::Supersampled(camera, kSamplesAcross)) {
   if (!camera.HasDistortion()) return;
   bvh_ = std::make_unique<Bvh>(scene.positions_world, scene.triangles);
   center_rays_ = LensRays(camera, 1);
   fine_rays_ = LensRays(camera, kSamplesAcross);
 }
 
-VisibilityImage FrameRenderer::Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
-                                    const SE3<World, Camera>& T_world_camera) const {
-  if (!bvh_) return Rasterize(camera, T_world_camera, scene_.Soup(), {.cull_back_faces = true});
-  VisibilityImage image;
+render::VisibilityImage FrameRenderer::Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
+                                            const SE3<World, Camera>& T_world_camera) const {
+  if (!bvh_) return render::Rasterize(camera, T_world_camera, scene_.Soup(), {.cull_back_faces = true});
+  render::VisibilityImage image;
   image.width_px = camera.width_px;
   image.height_px = camera.height_px;
-  image.triangle.assign(lens_rays.size(), VisibilityImage::kNothing);
+  image.triangle.assign(lens_rays.size(), render::VisibilityImage::kNothing);
   image.inverse_depth_mu.assign(lens_rays.size(), 0.0F);
   const Eigen::Vector3f origin_m = T_world_camera.translation().cast<float>();
   const Eigen::Matrix3d rotation = T_world_camera.RotationMatrix();
@@ -98,7 +98,7 @@ Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
                                                 scene_.positions_world[corner[2]]};
   const Eigen::Vector3d ray = T_world_camera.rotation() * ray_camera;
   // A pixel's centre may lie just outside the triangle that one of its samples hit.
-  Eigen::Vector3f weights = Barycentrics(world, T_world_camera.translation(), ray).cwiseMax(0.0F);
+  Eigen::Vector3f weights = render::Barycentrics(world, T_world_camera.translation(), ray).cwiseMax(0.0F);
   weights /= weights.sum();
   const auto blend = [&](const auto& attribute) -> Eigen::Vector3f {
     return weights.x() * attribute[corner[0]] + weights.y() * attribute[corner[1]] + weights.z() * attribute[corner[2]];
@@ -116,7 +116,7 @@ Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
 }
 
 // Mean colour of pixel (u, v) from the samples of the finer image inside it.
-Rgb FrameRenderer::PixelColor(const VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
+Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
                               int v_px) const {
   std::array<int32_t, kSamples> hits;
   std::array<float, kSamples> inverse_depths;
@@ -132,7 +132,7 @@ Rgb FrameRenderer::PixelColor(const VisibilityImage& fine, const SE3<World, Came
   }
   Rgb sum = Rgb::Zero();
   for (int k = 0; k < kSamples; ++k) {
-    if (hits[k] == VisibilityImage::kNothing) continue;
+    if (hits[k] == render::VisibilityImage::kNothing) continue;
     const Eigen::Vector3d ray = RayThrough(fine_camera_, fine_rays_, u_px * kSamplesAcross + k % kSamplesAcross,
                                            v_px * kSamplesAcross + k / kSamplesAcross);
     sum += Radiance(hits[k], ray, T_world_camera, inverse_depths[k], 1.0F / kSamplesAcross);
@@ -141,8 +141,8 @@ Rgb FrameRenderer::PixelColor(const VisibilityImage& fine, const SE3<World, Came
 }
 
 TrueFrame FrameRenderer::Render(const SE3<World, Camera>& T_world_camera) const {
-  const VisibilityImage centers = Look(camera_, center_rays_, T_world_camera);
-  const VisibilityImage fine = Look(fine_camera_, fine_rays_, T_world_camera);
+  const render::VisibilityImage centers = Look(camera_, center_rays_, T_world_camera);
+  const render::VisibilityImage fine = Look(fine_camera_, fine_rays_, T_world_camera);
   TrueFrame frame;
   frame.color_bgr.create(camera_.height_px, camera_.width_px, CV_8UC3);
   frame.labels.create(camera_.height_px, camera_.width_px, CV_8UC1);
@@ -152,7 +152,7 @@ TrueFrame FrameRenderer::Render(const SE3<World, Camera>& T_world_camera) const 
       const int32_t triangle = centers.triangle[centers.Index(u, v)];
       frame.depth_m.at<float>(v, u) = centers.Depth(u, v);
       frame.labels.at<uint8_t>(v, u) =
-          triangle == VisibilityImage::kNothing
+          triangle == render::VisibilityImage::kNothing
               ? uint8_t{0}
               : scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].label;
       const Rgb color = PixelColor(fine, T_world_camera, u, v);

@@ -32,9 +32,10 @@ class FrameRenderer {
 
  private:
   // The rays of one sampling of the image and what they meet.
-  VisibilityImage Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
-                       const SE3<World, Camera>& T_world_camera) const;
-  Rgb PixelColor(const VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px, int v_px) const;
+  render::VisibilityImage Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
+                               const SE3<World, Camera>& T_world_camera) const;
+  Rgb PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
+                 int v_px) const;
   Rgb Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera, const SE3<World, Camera>& T_world_camera,
                float inverse_depth, float pixel_share) const;
 

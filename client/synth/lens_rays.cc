@@ -34,7 +34,7 @@ Eigen::Vector2d Polish(const CameraModel& camera, const Eigen::Vector2d& pixel_p
 
 std::vector<Eigen::Vector2d> LensRays(const CameraModel& camera, int samples_across) {
   constexpr double kTolerance_px = 1e-6;
-  const CameraModel fine = Supersampled(camera, samples_across);
+  const CameraModel fine = render::Supersampled(camera, samples_across);
   std::vector<Eigen::Vector2d> rays(static_cast<size_t>(fine.width_px) * static_cast<size_t>(fine.height_px));
   tbb::parallel_for(0, fine.height_px, [&](int v) {
     std::vector<Eigen::Vector2f> pixels_px;

@@ -63,7 +63,7 @@ struct Scene {
   std::vector<uint16_t> surface_of_triangle;
   std::vector<SceneSurface> surfaces;
 
-  TriangleSoup Soup() const { return {positions_world, triangles}; }
+  render::TriangleSoup Soup() const { return {positions_world, triangles}; }
 };
 
 // Adds a mesh of one material to what is drawn. Vertices are shared by triangles that meet at less than 40 degrees and

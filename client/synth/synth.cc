@@ -45,7 +45,7 @@ absl::Status WriteImage(const std::string& path, const cv::Mat& image, const std
   } catch (const cv::Exception& e) {
     return Internal("{}: cannot encode the image: {}", path, e.what());
   }
-  return WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return files::WriteFile(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 cv::Mat DepthUnits(const cv::Mat& depth_m) {
@@ -92,31 +92,31 @@ class SequenceMaker {
   }
 
   absl::Status WriteTables() const {
-    ROMAP_RETURN_IF_ERROR(WriteCameraYaml(dir_ + "/camera.yaml", {camera_, options_.fps, kDepthUnit_m}));
+    ROMAP_RETURN_IF_ERROR(files::WriteCameraYaml(dir_ + "/camera.yaml", {camera_, options_.fps, kDepthUnit_m}));
     ROMAP_RETURN_IF_ERROR(WriteList("rgb", ImageExtension()));
     ROMAP_RETURN_IF_ERROR(WriteList("mask", ".png"));
     ROMAP_RETURN_IF_ERROR(WriteList("depth", ".png"));
-    std::vector<StampedPose> poses;
+    std::vector<files::StampedPose> poses;
     std::string detections = "timestamp,label,class,score\n";
     for (size_t i = 0; i < path_.size(); ++i) {
       const FramePlan& plan = plans_[i];
       if (plan.missing) continue;
       poses.push_back({Timestamp_ns(i), path_[plan.shown]});
       for (const SynthDetection& detection : detections_[plan.shown]) {
-        detections += fmt::format("{},{},{},{:.3f}\n", FormatSeconds(Timestamp_ns(i)), detection.label,
+        detections += fmt::format("{},{},{},{:.3f}\n", files::FormatSeconds(Timestamp_ns(i)), detection.label,
                                   scene_.objects[detection.object - 1U].solid.class_name, detection.score);
       }
     }
-    ROMAP_RETURN_IF_ERROR(WriteFile(dir_ + "/detections.csv", detections));
-    return WriteTum(dir_ + "/groundtruth.txt", poses);
+    ROMAP_RETURN_IF_ERROR(files::WriteFile(dir_ + "/detections.csv", detections));
+    return files::WriteTum(dir_ + "/groundtruth.txt", poses);
   }
 
   absl::Status WriteObjectTruth() const {
-    ObjectsYaml records;
+    files::ObjectsYaml records;
     for (const SceneObject& object : scene_.objects) {
       records.objects.push_back(
           {object.label, object.name, object.solid.class_name, object.T_world_object, object.half_extents_m, {}});
-      ROMAP_RETURN_IF_ERROR(WritePly(dir_ + "/gt_mesh/" + object.name + ".ply", TrueMesh(object)));
+      ROMAP_RETURN_IF_ERROR(files::WritePly(dir_ + "/gt_mesh/" + object.name + ".ply", TrueMesh(object)));
       const SurfacePoints& surface = *surfaces_[object.label - 1U];
       Mesh cloud;
       cloud.vertices = surface.positions_world();
@@ -127,9 +127,9 @@ class SequenceMaker {
         source[i] = surface.underside(i) ? 2 : 0;
       }
       ROMAP_RETURN_IF_ERROR(
-          WritePly(dir_ + "/gt/" + object.name + ".ply", cloud, {{"seen", seen}, {"source", source}}));
+          files::WritePly(dir_ + "/gt/" + object.name + ".ply", cloud, {{"seen", seen}, {"source", source}}));
     }
-    return WriteObjects(dir_ + "/objects.yaml", records);
+    return files::WriteObjects(dir_ + "/objects.yaml", records);
   }
 
  private:
@@ -192,10 +192,10 @@ class SequenceMaker {
     std::string lines = fmt::format("# {} images, synthetic, seed {}\n# timestamp filename\n", folder, options_.seed);
     for (size_t i = 0; i < plans_.size(); ++i) {
       if (plans_[i].missing) continue;
-      lines += fmt::format("{} {}\n", FormatSeconds(Timestamp_ns(i)),
+      lines += fmt::format("{} {}\n", files::FormatSeconds(Timestamp_ns(i)),
                            FrameFile(folder, static_cast<int>(plans_[i].shown), extension));
     }
-    return WriteFile(fmt::format("{}/{}.txt", dir_, folder), lines);
+    return files::WriteFile(fmt::format("{}/{}.txt", dir_, folder), lines);
   }
 
   const SynthOptions& options_;

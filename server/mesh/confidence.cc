@@ -9,7 +9,7 @@
 
 #include "server/mesh/view_pixels.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Size of the box in a view from which on that view counts as sharp, about what a field of this kind can resolve.
@@ -63,7 +63,7 @@ struct FacingVertices {
   explicit FacingVertices(size_t capacity)
       : vertex(capacity), depth_mu(capacity), cosine(capacity), u_px(capacity), v_px(capacity) {}
 
-  void Collect(const VertexArrays& arrays, const FieldView& view) {
+  void Collect(const VertexArrays& arrays, const TrainingCamera& view) {
     const Eigen::Matrix3f R = view.T_camera_object.RotationMatrix().cast<float>();
     const Eigen::Vector3f t = view.T_camera_object.translation().cast<float>();
     const Eigen::Vector3f center = -(R.transpose() * t);
@@ -144,7 +144,7 @@ class Observation {
         facing_(static_cast<size_t>(arrays_.blocks * kBlock)) {}
 
   // Adds the view's weights to those of the vertices it observes.
-  void Add(const FieldView& view, std::vector<float>& weights) {
+  void Add(const TrainingCamera& view, std::vector<float>& weights) {
     const auto focal_px = static_cast<float>(std::max(view.camera.fx_px, view.camera.fy_px));
     if (!view.T_camera_object.IsFinite() || !std::isfinite(focal_px)) return;
     facing_.Collect(arrays_, view);
@@ -174,7 +174,7 @@ class Observation {
 
 }  // namespace
 
-void SetConfidence(std::span<const FieldView> views, const Eigen::Vector3f& box_half_extents, float cell_mu,
+void SetConfidence(std::span<const TrainingCamera> views, const Eigen::Vector3f& box_half_extents, float cell_mu,
                    Mesh& mesh) {
   mesh.confidence.assign(mesh.vertices.size(), 0.0f);
   Observation observation(mesh, box_half_extents, cell_mu);
@@ -213,4 +213,4 @@ void TrimUnseen(float least, Mesh& mesh) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

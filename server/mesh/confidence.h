@@ -6,7 +6,7 @@
 #include "common/mesh.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Sets mesh.confidence: how well the views observed each vertex of a closed mesh with normals (Object frame).
 //
@@ -21,11 +21,11 @@ namespace romap {
 //
 // `cell_mu` is the longest distance between neighbouring vertices along an axis. Views whose pose or camera is not
 // finite observe nothing.
-void SetConfidence(std::span<const FieldView> views, const Eigen::Vector3f& box_half_extents, float cell_mu,
+void SetConfidence(std::span<const TrainingCamera> views, const Eigen::Vector3f& box_half_extents, float cell_mu,
                    Mesh& mesh);
 
 // Leaves out triangles all of whose vertices have a confidence below `least`, and vertices without triangles. What is
 // left may be open, or empty. mesh.confidence must be set.
 void TrimUnseen(float least, Mesh& mesh);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -8,7 +8,7 @@
 
 #include "server/mesh/view_pixels.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // What is thinner is no matter and hides nothing: e^-6 of the surface's density.
@@ -28,10 +28,10 @@ struct Tally {
 
 class Census {
  public:
-  explicit Census(std::span<const FieldView> views) {
+  explicit Census(std::span<const TrainingCamera> views) {
     const size_t asked = std::min(views.size(), kMostViews);
     for (size_t i = 0; i < asked; ++i) {
-      const FieldView& view = views[i * views.size() / asked];
+      const TrainingCamera& view = views[i * views.size() / asked];
       if (!view.T_camera_object.IsFinite()) continue;
       const auto fx_px = static_cast<float>(view.camera.fx_px), fy_px = static_cast<float>(view.camera.fy_px);
       const auto cx_px = static_cast<float>(view.camera.cx_px), cy_px = static_cast<float>(view.camera.cy_px);
@@ -63,7 +63,7 @@ class Census {
     Eigen::Matrix3f KR;  // Object frame to pixels times depth
     Eigen::Vector3f Kt;
     float right_px, bottom_px;  // where the image ends
-    const FieldView* view;
+    const TrainingCamera* view;
   };
   std::vector<Camera> cameras_;
 };
@@ -114,7 +114,7 @@ void EmptyCell(const Census& census, const Eigen::Vector3i& first, double least_
 
 }  // namespace
 
-void EmptyUnconfirmed(std::span<const FieldView> views, double least_share, FieldGrid& grid) {
+void EmptyUnconfirmed(std::span<const TrainingCamera> views, double least_share, FieldGrid& grid) {
   if (!(least_share > 0)) return;
   const Census census(views);
   const Lattice lattice = LookAround(census, grid);
@@ -128,4 +128,4 @@ void EmptyUnconfirmed(std::span<const FieldView> views, double least_share, Fiel
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 #include "common/messages.h"
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Empties matter, and what surrounds it thinly, that too few views confirm: nodes where, of the views whose image holds
 // the place, less than `least_share` show the object. Nodes that no image holds stay. `least_share` <= 0 empties
@@ -17,6 +17,6 @@ namespace romap {
 //
 // Most objects have no such space. So views are first asked at every sixth node, and only where more than half of them
 // show neither the object nor background there, each node is looked at. Of more than 32 views, 32 stand for all.
-void EmptyUnconfirmed(std::span<const FieldView> views, double least_share, FieldGrid& grid);
+void EmptyUnconfirmed(std::span<const TrainingCamera> views, double least_share, FieldGrid& grid);
 
-}  // namespace romap
+}  // namespace romap::mesh

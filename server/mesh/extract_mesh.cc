@@ -20,7 +20,7 @@
 #include "server/mesh/surface_probe.h"
 #include "server/mesh/vertex_normals.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
@@ -68,7 +68,7 @@ SightLimits SightOf(const FieldSnapshot& snapshot, const MeshConfig& config) {
   SightLimits limits{.view_centers = {},
                      .surface_density_per_mu = snapshot.optics.surface_density_per_mu,
                      .max_optical_depth = static_cast<float>(config.unseen_optical_depth)};
-  for (const FieldView& view : snapshot.cameras) {
+  for (const TrainingCamera& view : snapshot.cameras) {
     limits.view_centers.push_back(view.T_camera_object.Inverse().translation().cast<float>());
   }
   return limits;
@@ -127,4 +127,4 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   return mesh;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -9,7 +9,7 @@
 #include "common/messages.h"
 #include "server/mesh/mesh_config.h"
 
-namespace romap {
+namespace romap::mesh {
 
 inline constexpr std::array kMeshPhaseNames = {"sample", "confirm", "hidden",  "support", "floaters",
                                                "march",  "refine",  "normals", "colors",  "confidence"};
@@ -34,4 +34,4 @@ struct MeshStats {
 // its resolution says, levels or optics that are not finite).
 absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig& config, MeshStats* stats = nullptr);
 
-}  // namespace romap
+}  // namespace romap::mesh

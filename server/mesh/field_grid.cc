@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace romap {
+namespace romap::mesh {
 
 FieldGrid MakeEmptyGrid(const Eigen::Vector3i& box_nodes, const Eigen::Vector3f& half_extents) {
   FieldGrid grid;
@@ -17,4 +17,4 @@ FieldGrid MakeEmptyGrid(const Eigen::Vector3i& box_nodes, const Eigen::Vector3f&
   return grid;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 
 // A node that holds nothing for sure: outside the hull, outside the box, or where the field has no finite answer.
 inline constexpr float kEmpty = -1e4f;
@@ -51,4 +51,4 @@ struct FieldGrid {
 // A grid of `box_nodes` (each >= 2) empty nodes over the box |p| <= half_extents, and the ring.
 FieldGrid MakeEmptyGrid(const Eigen::Vector3i& box_nodes, const Eigen::Vector3f& half_extents);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Neighbouring nodes of one row of the grid (along x) that hang together.
@@ -113,4 +113,4 @@ size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share) {
   return remaining;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

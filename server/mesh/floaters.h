@@ -4,7 +4,7 @@
 
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Empties all matter but that of the largest piece, and of pieces with at least `min_share` of its nodes. What hangs
 // together through nodes above `connect_value` (<= 0), over edges or corners of cells, is one piece, so that a stem
@@ -12,4 +12,4 @@ namespace romap {
 // surface. Returns how many of them remain.
 size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -6,7 +6,7 @@
 
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Index steps to the six neighbours of a node.
 inline std::array<ptrdiff_t, 6> NeighbourSteps(const FieldGrid& grid) {
@@ -29,4 +29,4 @@ void Flood(const FieldGrid& grid, std::vector<size_t> stack, Enter enter) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // The sharpest views are few and the farthest tell nothing new: three quarters of the views are no better than this.
@@ -13,7 +13,7 @@ constexpr double kGoodViewShare = 0.75;
 // How long the box's longest side would be in a good view if it faced it, in pixels; 0 without views.
 double LongestSide_px(const FieldSnapshot& snapshot) {
   std::vector<double> sides_px;
-  for (const FieldView& view : snapshot.cameras) {
+  for (const TrainingCamera& view : snapshot.cameras) {
     const double distance_mu = view.T_camera_object.translation().norm();
     const double side_px = 2.0 * snapshot.box_half_extents.maxCoeff() * view.camera.fx_px / distance_mu;
     if (std::isfinite(side_px) && side_px > 0) sides_px.push_back(side_px);
@@ -43,4 +43,4 @@ Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& con
   return nodes;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

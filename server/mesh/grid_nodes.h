@@ -5,7 +5,7 @@
 #include "common/messages.h"
 #include "server/mesh/mesh_config.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // How many nodes the grid over a snapshot's box gets along each axis, each >= 2. The longest side gets
 // config.resolution, or when that adapts, half to twice as many: one for each config.pixels_per_node that the side is
@@ -14,4 +14,4 @@ namespace romap {
 // config.min_side_nodes.
 Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& config);
 
-}  // namespace romap
+}  // namespace romap::mesh

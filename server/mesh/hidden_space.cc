@@ -6,7 +6,7 @@
 
 #include "server/mesh/grid_flood.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 enum State : uint8_t { kUntouched, kOpen, kClosed };
@@ -56,4 +56,4 @@ class HiddenSpace {
 
 void FillHiddenSpace(FieldGrid& grid, SightTester& sight) { HiddenSpace(grid, sight).Fill(); }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -3,7 +3,7 @@
 #include "server/mesh/field_grid.h"
 #include "server/mesh/sight_tester.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Makes empty space solid that is hidden: all nodes outside the surface that cannot be reached from outside the box by
 // steps over the six neighbours through space that is open to sight. A node is open when the optical depth towards some
@@ -12,4 +12,4 @@ namespace romap {
 // without views everything is open, and only closed cavities fill.
 void FillHiddenSpace(FieldGrid& grid, SightTester& sight);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -10,7 +10,7 @@
 
 #include "server/mesh/marching_cubes_table.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Below, a value means "nothing here" and says nothing about where the surface is.
@@ -129,4 +129,4 @@ float EdgeCrossing(float from, float to) {
 
 GridSurface MarchingCubes(const FieldGrid& grid) { return Marcher(grid).Run(); }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -6,7 +6,7 @@
 #include "common/mesh.h"
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // A mesh whose vertices know the grid edges they sit on.
 struct GridSurface {
@@ -27,4 +27,4 @@ float EdgeCrossing(float from, float to);
 // the grid must be outside, and no value NaN.
 GridSurface MarchingCubes(const FieldGrid& grid);
 
-}  // namespace romap
+}  // namespace romap::mesh

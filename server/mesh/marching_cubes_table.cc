@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // The corners of the six faces, counter-clockwise seen from outside the cell.
@@ -144,4 +144,4 @@ const MarchingCubesTable& GetMarchingCubesTable() {
   return table;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace romap {
+namespace romap::mesh {
 
 // Numbering of a grid cell. Corner c lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge e runs along axis e / 4 from corner
 // EdgeCorner(e) to the corner with that axis' bit set.
@@ -60,4 +60,4 @@ using MarchingCubesTable = std::array<CellTriangles, 256>;
 // the surface over any grid is a closed 2-manifold.
 const MarchingCubesTable& GetMarchingCubesTable();
 
-}  // namespace romap
+}  // namespace romap::mesh

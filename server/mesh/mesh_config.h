@@ -2,7 +2,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // How a trained field becomes a triangle mesh.
 struct MeshConfig {
@@ -45,4 +45,4 @@ struct MeshConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 constexpr int kSteps = 2;
@@ -76,4 +76,4 @@ void RefineVertices(const FieldGrid& grid, const SurfaceProbe& probe, GridSurfac
   for (size_t i = 0; i < brackets.size(); ++i) surface.mesh.vertices[brackets[i].vertex] = points[i];
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

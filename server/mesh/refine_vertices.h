@@ -1,13 +1,13 @@
 #pragma once
 
-#include "server/mesh/surface_probe.h"
 #include "server/mesh/marching_cubes.h"
+#include "server/mesh/surface_probe.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Moves vertices along their grid edges to where the field itself crosses the surface: between two nodes it may be far
 // from even. Two steps of false position (the Illinois variant, Dowell and Jarratt 1971), each of which asks the field
 // once for every vertex. Vertices on edges to an edited node or to the ring stay, and none leaves its edge.
 void RefineVertices(const FieldGrid& grid, const SurfaceProbe& probe, GridSurface& surface);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -10,7 +10,7 @@
 
 #include "server/mesh/grid_flood.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Large enough for the sampler's SIMD loops, small enough to stay in the cache.
@@ -181,4 +181,4 @@ SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& prob
   return Sampling(snapshot, probe, box_nodes).Run();
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

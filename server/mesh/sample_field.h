@@ -7,7 +7,7 @@
 #include "server/mesh/field_grid.h"
 #include "server/mesh/surface_probe.h"
 
-namespace romap {
+namespace romap::mesh {
 
 struct SampledField {
   FieldGrid grid;
@@ -25,4 +25,4 @@ struct SampledField {
 // found where it fades into its surroundings, and followed to its end where any of it was found.
 SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // e^-12 of the surface's density adds nothing over the few steps through a box.
@@ -107,4 +107,4 @@ size_t SightTester::NodeNear(const Eigen::Vector3f& shifted) const {
          static_cast<size_t>(static_cast<int>(shifted.x()));
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

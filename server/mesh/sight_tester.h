@@ -7,7 +7,7 @@
 
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Where to look from and how far sight reaches.
 struct SightLimits {
@@ -51,4 +51,4 @@ class SightTester {
   size_t last_view_ = 0;  // that saw something
 };
 
-}  // namespace romap
+}  // namespace romap::mesh

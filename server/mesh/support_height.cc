@@ -9,7 +9,7 @@
 #include "common/mesh.h"
 #include "server/mesh/marching_cubes.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Surface that is grazed more flatly than this does not count as seen: walls of what no view reached run along the
@@ -95,4 +95,4 @@ void CutBelow(FieldGrid& grid, float height) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 #include "server/mesh/field_grid.h"
 #include "server/mesh/sight_tester.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Height (z in the Object frame, map units) of the lowest part of the surface that some view sees from the front, with
 // a small share of the visible area allowed below it for noise. nullopt: the views see no walls that could end
@@ -21,4 +21,4 @@ std::optional<float> FindSupportHeight(const FieldGrid& grid, SightTester& sight
 // Ends all matter below `height` in a flat face at that height.
 void CutBelow(FieldGrid& grid, float height);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 
 #include "server/mesh/field_grid.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // Beyond any trained value; keeps differences of values finite.
@@ -20,7 +20,7 @@ SurfaceProbe::SurfaceProbe(const FieldSnapshot& snapshot)
       connect_value_(std::clamp((snapshot.connect_level - level_) * per_raw_, -kMost, 0.0f)) {}
 
 void SurfaceProbe::Sample(std::span<const Eigen::Vector3f> points, std::span<float> values,
-                        std::span<Rgb8> colors) const {
+                          std::span<Rgb8> colors) const {
   field_.Sample(points, values, colors);
   for (float& value : values) {
     const float above = (value - level_) * per_raw_;
@@ -28,4 +28,4 @@ void SurfaceProbe::Sample(std::span<const Eigen::Vector3f> points, std::span<flo
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,7 +5,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Asks a snapshot's field in the terms of this folder: the logarithm of the density over that at the surface. The only
 // place that knows raw values. The snapshot must have a field and outlive the probe.
@@ -27,4 +27,4 @@ class SurfaceProbe {
   float connect_value_;
 };
 
-}  // namespace romap
+}  // namespace romap::mesh

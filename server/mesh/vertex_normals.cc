@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 // More passes follow the true surface a little better still, but round its edges ever wider.
@@ -44,4 +44,4 @@ void SetVertexNormals(Mesh& mesh) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

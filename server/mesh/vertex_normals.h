@@ -2,7 +2,7 @@
 
 #include "common/mesh.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Sets unit normals of a mesh whose triangles are counter-clockwise seen from outside: the mean of the adjoining
 // triangles' normals, weighted by area, then twice the mean over the triangles around.
@@ -12,4 +12,4 @@ namespace romap {
 // off by 20.
 void SetVertexNormals(Mesh& mesh);
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -5,11 +5,11 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // What a view's mask shows at a pixel of the full image; none outside the view's crop. The pixel's coordinates must be
 // finite and fit an int.
-inline std::optional<RayKind> KindAt(const FieldView& view, float u_px, float v_px) {
+inline std::optional<RayKind> KindAt(const TrainingCamera& view, float u_px, float v_px) {
   // Shifted by a pixel, so that truncation does not take what is left of the crop for its first column.
   const int x = static_cast<int>(u_px - static_cast<float>(view.roi_px.x) + 1.5f) - 1;
   const int y = static_cast<int>(v_px - static_cast<float>(view.roi_px.y) + 1.5f) - 1;
@@ -17,4 +17,4 @@ inline std::optional<RayKind> KindAt(const FieldView& view, float u_px, float v_
   return static_cast<RayKind>(view.ray_kind.ptr<uint8_t>(y)[x]);
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

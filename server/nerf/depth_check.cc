@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kProbesPerView = 60;
@@ -129,4 +129,4 @@ bool DepthsFit(std::span<const ObjectView> views) {
   });
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

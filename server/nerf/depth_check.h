@@ -4,7 +4,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // The share of the dense depths, all multiplied by `scale`, that other views contradict: put into space, the point lies
 // on background of at least one of them, or before what that one measured. Looks at a sample of the object's pixels. 0
@@ -15,4 +15,4 @@ double MisplacedShare(std::span<const ObjectView> views, double scale);
 // most of them do. Holes and outliers are no misfit. True without dense depth.
 bool DepthsFit(std::span<const ObjectView> views);
 
-}  // namespace romap
+}  // namespace romap::nerf

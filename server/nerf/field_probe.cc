@@ -4,7 +4,7 @@
 
 #include "server/nerf/math/ray.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr size_t kProbesPerTile = 1;
@@ -97,4 +97,4 @@ ProbeReport FieldProbe::Look(const nerf::FieldModel& model, const NerfConfig& co
   return report;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -7,7 +7,7 @@
 #include "server/nerf/cpu/ray_renderer.h"
 #include "server/nerf/ray_set.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // How far what a field shows is from what a view saw, means over the view's probes.
 struct ViewResidual {
@@ -52,4 +52,4 @@ class FieldProbe {
   std::vector<Place> places_;  // of each ray
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

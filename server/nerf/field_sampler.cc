@@ -5,7 +5,7 @@
 
 #include "server/nerf/cpu/kernels.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kBatch = 512;
@@ -51,4 +51,4 @@ void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<f
   }
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

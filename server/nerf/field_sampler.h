@@ -4,7 +4,7 @@
 #include "server/nerf/cpu/field_model.h"
 #include "server/nerf/training_box.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // A frozen copy of a field; see FieldSampler.
 class TrainedField : public FieldSampler {
@@ -18,4 +18,4 @@ class TrainedField : public FieldSampler {
   const TrainingBox box_;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

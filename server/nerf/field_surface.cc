@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr double kConnectDistance = 0.01;  // box sides: parts of a signed-distance field as near as twice this are one
@@ -26,4 +26,4 @@ void DescribeSurface(const NerfConfig& config, const nerf::FieldModel& model, co
   snapshot.connect_level = static_cast<float>(config.surface_level - config.connect_margin);
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

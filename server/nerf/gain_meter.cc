@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 
 void GainMeter::Record(uint64_t step, double loss) {
   if (!(loss > 0) || !std::isfinite(loss)) return;
@@ -27,4 +27,4 @@ std::optional<double> GainMeter::FallPer100Steps() const {
   return 1 - std::exp(100 * covariance / variance);
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

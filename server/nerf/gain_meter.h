@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace romap {
+namespace romap::nerf {
 
 // How fast a loss still falls. The losses are taken at the same places again and again (FieldProbe), so the slope of
 // their logarithm over the last few looks is told from noise after few steps.
@@ -28,4 +28,4 @@ class GainMeter {
   size_t count_ = 0;                // ever recorded
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -6,7 +6,7 @@
 
 #include "server/nerf/math/types.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kSide = nerf::kOccupancyResolution;
@@ -52,4 +52,4 @@ std::vector<float> DistanceToBorder(std::span<const uint8_t> inside, const Eigen
   return distance;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

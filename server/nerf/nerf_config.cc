@@ -2,7 +2,7 @@
 
 #include "server/nerf/presets.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 void FieldFields(NerfConfig& c, ConfigFields& fields) {
@@ -180,4 +180,4 @@ void NerfConfig::Fields(ConfigFields& fields) {
   ScheduleFields(*this, fields);
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

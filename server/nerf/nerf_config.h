@@ -4,7 +4,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // One object's field and its training. The defaults are the fast recipe measured on two CPU cores; where the paper
 // gives a number of its own, `help` names it.
@@ -97,4 +97,4 @@ struct NerfConfig {
   void Fields(ConfigFields& fields);
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -19,7 +19,7 @@
 #include "server/nerf/math/random.h"
 #include "server/nerf/view_check.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kMostDivergences = 3;
@@ -316,4 +316,4 @@ FieldSnapshot ObjectField::Snapshot() const {
   return snapshot;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -22,7 +22,7 @@
 #include "server/nerf/view_trust.h"
 #include "server/nerf/visual_hull.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // One object's neural field with its views and its training (paper, section on the NeRF model). Not thread-safe: one
 // owner at a time. Snapshots are independent of it.
@@ -129,4 +129,4 @@ class ObjectField {
   double loss_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

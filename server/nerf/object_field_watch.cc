@@ -10,7 +10,7 @@
 #include "server/nerf/depth_check.h"
 #include "server/nerf/object_field.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr double kLeastVoteShift = 0.01;  // of the box's side, two thirds of a hull's cell: views so far off vote anew
@@ -116,4 +116,4 @@ std::string ObjectField::Concern() const {
   return fmt::format("{}", fmt::join(concerns, "; "));
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -6,7 +6,7 @@
 
 #include "server/nerf/math/random.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 // A full training reads about 100 000 object pixels besides partners; more than this are thinned out evenly.
@@ -192,4 +192,4 @@ PixelSampler::Choice PixelSampler::At(uint64_t step, int index) const {
   return {paired ? pixel.Partner() : pixel, true, paired ? -1 : 0};
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -9,7 +9,7 @@
 #include "common/messages.h"
 #include "server/nerf/nerf_config.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // An object pixel near another one of the same view.
 struct PartnerPixel {
@@ -114,4 +114,4 @@ class PixelSampler {
   Line object_, background_, sparse_;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

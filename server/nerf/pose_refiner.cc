@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr size_t kFewestViews = 6;  // fewer do not tell who is wrong
@@ -158,4 +158,4 @@ void PoseRefiner::RemoveCommonMotion(std::span<ObjectView> views, std::span<cons
   }
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

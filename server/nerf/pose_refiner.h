@@ -11,7 +11,7 @@
 #include "server/nerf/training_box.h"
 #include "server/nerf/view_alignment.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // Where a field is trained on cameras that are a little off, it blurs. The refiner moves each camera, in turns with
 // training, to where its view fits what the field has learned from all. It never moves them all alike: that would be a
@@ -47,4 +47,4 @@ class PoseRefiner {
   uint64_t interval_steps_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

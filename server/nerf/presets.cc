@@ -1,6 +1,6 @@
 #include "server/nerf/presets.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 NerfConfig PaperPreset() {
@@ -54,4 +54,4 @@ std::optional<NerfConfig> NerfPreset(const std::string& name) {
   return std::nullopt;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

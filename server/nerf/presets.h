@@ -6,7 +6,7 @@
 
 #include "server/nerf/nerf_config.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // Names of whole configurations of the field engine, the default first.
 std::vector<std::string> NerfPresetNames();
@@ -19,4 +19,4 @@ std::vector<std::string> NerfPresetNames();
 //          for hash grids (Mueller et al., 2022): 16 levels, Adam with betas 0.9 and 0.99.
 std::optional<NerfConfig> NerfPreset(const std::string& name);
 
-}  // namespace romap
+}  // namespace romap::nerf

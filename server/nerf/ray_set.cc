@@ -2,7 +2,7 @@
 
 #include "server/nerf/math/random.h"
 
-namespace romap {
+namespace romap::nerf {
 
 void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth) {
   sampler_.Build(views, use_depth);
@@ -51,4 +51,4 @@ nerf::Ray RaySet::Get(uint64_t step, int index) const {
   return ray;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -10,7 +10,7 @@
 #include "server/nerf/pixel_sampler.h"
 #include "server/nerf/training_box.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // The rays an object is trained on: through the pixels that a PixelSampler chooses.
 class RaySet {
@@ -48,4 +48,4 @@ class RaySet {
   PixelSampler sampler_;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <numeric>
 
-namespace romap {
+namespace romap::nerf {
 
 // Parts of an optimisation step, for profiles.
 enum class TrainPhase { kSampling, kEncode, kMlp, kRender, kMlpBackward, kEncodeBackward, kOptimise, kCount };
@@ -31,4 +31,4 @@ struct TrainStats {
   double BusySeconds() const { return StepCpuSeconds() > 0 ? CpuSeconds() : wall_s; }
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

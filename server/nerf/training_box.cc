@@ -4,7 +4,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr double kSmallestMargin = 0.02;  // of the longest side: room for the surface of sheets
@@ -90,4 +90,4 @@ absl::Status ValidateCuboid(const Cuboid& cuboid) {
   return absl::OkStatus();
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

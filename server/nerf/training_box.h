@@ -6,7 +6,7 @@
 #include "common/messages.h"
 #include "server/nerf/math/types.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // The region in which one object is learned: its cuboid, enlarged. Unit space is the Object frame shifted so that the
 // box's lowest corner is 0, and divided by the longest side that the object's first box had: the first box is
@@ -49,4 +49,4 @@ struct TrainingBox {
 // INVALID_ARGUMENT when pose or size are not finite, or a half extent is not positive.
 absl::Status ValidateCuboid(const Cuboid& cuboid);
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr double kLeastOfNewBox = 0.2;  // of a whole training
@@ -68,4 +68,4 @@ double TrainingPlan::Progress(uint64_t step) const {
   return 1 - std::min(1.0, left / config_.full_budget_steps);
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -5,7 +5,7 @@
 
 #include "server/nerf/nerf_config.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // How long an object is trained and how fast it learns, as views arrive one by one.
 //
@@ -45,4 +45,4 @@ class TrainingPlan {
   uint64_t extra_steps_ = 0;  // of these, those that the falling loss has earned since something was new
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

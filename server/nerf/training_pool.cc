@@ -11,7 +11,7 @@
 #include "common/status.h"
 #include "common/thread_priority.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // One object of one client. The field belongs to whoever holds the lease, the rest to the mutex.
 struct TrainingPool::Job {
@@ -336,4 +336,4 @@ bool TrainingPool::ShouldSend(const Job& job, bool budget_used) const {
   return threads_ > 0 && age.count() >= config_.snapshot_interval_s;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

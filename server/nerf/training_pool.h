@@ -17,7 +17,7 @@
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/object_field.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // The server's workers that train the objects of all clients (paper: one thread pool trains all models). An object is
 // leased to one worker for a slice of steps and queued again: clients take turns, and within a client the object goes
@@ -96,4 +96,4 @@ class TrainingPool {
   std::vector<std::jthread> workers_;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

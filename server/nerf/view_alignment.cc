@@ -7,7 +7,7 @@
 
 #include "server/nerf/math/random.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kReach_px = 5;           // the outline is looked at on both sides so far
@@ -253,4 +253,4 @@ ObjectMotion ViewAlignment::Align(std::span<const RenderedPixel> rendered, const
   return best;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

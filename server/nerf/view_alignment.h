@@ -9,7 +9,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // A small rigid motion of an object before a camera: p goes to center + R(turn) (p - center) + shift, all in the Camera
 // frame, with the object's centre. The six are turn (rotation vector, rad) and shift (map units).
@@ -62,4 +62,4 @@ class ViewAlignment {
   cv::Mat doubtful_;          // CV_8UC1, not 0 where an occluder is near
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -7,7 +7,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kFewestObjectPixels = 16;
@@ -58,4 +58,4 @@ absl::Status ValidateView(const ObjectView& view, const TrainingBox& box) {
   return InvalidArgument("view of {} in {}: {}", view.object.ToString(), view.keyframe.ToString(), fault);
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

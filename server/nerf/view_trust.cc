@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr size_t kFewestViews = 6;        // below, what is odd may just as well be right
@@ -82,4 +82,4 @@ std::vector<float> ViewTrust::Weights() const {
   return weights;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

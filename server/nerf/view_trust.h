@@ -6,7 +6,7 @@
 
 #include "server/nerf/field_probe.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // Which views of an object can be believed. A view with a wrong pose, or with the mask of something else, shows what
 // all others contradict, and its residual does not fall as theirs do; it is left out for as long as that is so. Nothing
@@ -36,4 +36,4 @@ class ViewTrust {
   std::vector<State> views_;
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

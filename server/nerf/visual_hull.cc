@@ -6,7 +6,7 @@
 
 #include "server/nerf/cpu/kernels.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kCells = nerf::kOccupancyResolution;
@@ -159,4 +159,4 @@ std::vector<uint8_t> VisualHull::Carve() const {
   return cells;
 }
 
-}  // namespace romap
+}  // namespace romap::nerf

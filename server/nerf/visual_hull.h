@@ -7,7 +7,7 @@
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/training_box.h"
 
-namespace romap {
+namespace romap::nerf {
 
 // The cells of the training box that the masks leave possible (Laurentini, 1994). A view votes against a cell when the
 // cell's whole footprint is background in it. A cell outside the crop, or before which an occluder stands, is unknown
@@ -48,4 +48,4 @@ class VisualHull {
   std::vector<uint8_t> shown_;    // views that show the object under it
 };
 
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace romap {
+namespace romap::objects {
 
 inline constexpr double kRadPerDeg = std::numbers::pi / 180;
 
@@ -13,4 +13,4 @@ inline double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -2,7 +2,7 @@
 
 #include "common/assignment.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Rows and columns that hang together through pairs that may be joined.
@@ -66,4 +66,4 @@ std::vector<int> AssignMaximal(const Eigen::MatrixXd& scores, double min_score) 
   return column_of;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

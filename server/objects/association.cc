@@ -8,7 +8,7 @@
 #include "server/objects/assignment.h"
 #include "server/objects/projection.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr uint64_t kRecentFrames = 15;
@@ -356,4 +356,4 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
   return association;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

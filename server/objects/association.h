@@ -11,7 +11,7 @@
 #include "server/objects/landmark.h"
 #include "server/objects/objects_config.h"
 
-namespace romap {
+namespace romap::objects {
 
 // What one detection of a frame shows.
 struct Match {
@@ -51,4 +51,4 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
                       const std::vector<std::unique_ptr<Landmark>>& landmarks, uint64_t frame_index,
                       double scene_depth_mu, const ObjectsConfig& config);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Costs of a map unit that an outline falls short of a mask or reaches farther: 19 masks in 20 are to be covered.
@@ -185,4 +185,4 @@ double BoxSearch::Looseness(const UprightBox& box) const {
   return count > 0 ? static_cast<double>(sum) / (count * criteria_.object_size_mu) : 0;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

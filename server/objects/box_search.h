@@ -9,7 +9,7 @@
 #include "server/objects/silhouette.h"
 #include "server/objects/silhouette_hull.h"
 
-namespace romap {
+namespace romap::objects {
 
 // An upright box in a Grid frame: its own frame is the Grid frame turned by `yaw_rad` about z.
 struct UprightBox {
@@ -72,4 +72,4 @@ class BoxSearch {
   std::vector<Target> targets_;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

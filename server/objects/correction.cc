@@ -6,7 +6,7 @@
 
 #include "server/objects/projection.h"
 
-namespace romap {
+namespace romap::objects {
 
 std::optional<Sim3<World, World>> MeanMotion(std::span<const KeyframeId> seen_in, const Eigen::Vector3d& center_world,
                                              const KeyframeCorrections& corrections) {
@@ -53,4 +53,4 @@ double LargestShift_px(const Cuboid& cuboid, const CameraModel& camera, const SE
   return largest;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

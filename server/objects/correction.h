@@ -7,7 +7,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::objects {
 
 // A MapCorrection's keyframes by id. What is not in it did not move noticeably.
 using KeyframeCorrections = std::unordered_map<KeyframeId, KeyframeCorrection>;
@@ -27,4 +27,4 @@ Cuboid Upright(Cuboid cuboid, const Eigen::Vector3d& up_world);
 double LargestShift_px(const Cuboid& cuboid, const CameraModel& camera, const SE3<World, Camera>& T_world_camera_a,
                        const SE3<World, Camera>& T_world_camera_b);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -8,7 +8,7 @@
 #include "server/objects/box_search.h"
 #include "server/objects/footprint.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -303,4 +303,4 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
   return usable ? std::optional(fit) : std::nullopt;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -8,7 +8,7 @@
 #include "server/objects/silhouette.h"
 #include "server/objects/silhouette_hull.h"
 
-namespace romap {
+namespace romap::objects {
 
 // All that speaks for the box of one object. Points and cells are in the Grid frame of `region`.
 struct CuboidEvidence {
@@ -45,4 +45,4 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
 // none is there.
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 struct Extent {
@@ -89,4 +89,4 @@ std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig
   return detections;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -11,7 +11,7 @@
 #include "common/messages.h"
 #include "server/objects/objects_config.h"
 
-namespace romap {
+namespace romap::objects {
 
 // One instance mask of one frame.
 struct Detection {
@@ -35,4 +35,4 @@ struct Detection {
 // label image does not fit the frame.
 std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig& config);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 
 std::optional<YawEstimate> EdgeYaw(std::span<const Silhouette> silhouettes, const Eigen::Matrix3d& R_world_grid) {
   std::vector<LineView> views;
@@ -14,4 +14,4 @@ std::optional<YawEstimate> EdgeYaw(std::span<const Silhouette> silhouettes, cons
   return YawFromLines(R_world_grid, views);
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 double Need(const FitRequest& request) {
@@ -29,4 +29,4 @@ std::vector<LandmarkKey> OrderByNeed(const std::vector<FitRequest>& requests) {
   return keys;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

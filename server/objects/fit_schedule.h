@@ -5,7 +5,7 @@
 
 #include "server/objects/point_registry.h"
 
-namespace romap {
+namespace romap::objects {
 
 // A landmark whose box is out of date.
 struct FitRequest {
@@ -23,4 +23,4 @@ bool IsWorthAFit(const FitRequest& request);
 // the more the longer it waits, so that everyone's turn comes. Ties go to the older landmark.
 std::vector<LandmarkKey> OrderByNeed(const std::vector<FitRequest>& requests);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kQuarterTurn = std::numbers::pi / 2;
@@ -86,4 +86,4 @@ double YawInGrid(const Cuboid& cuboid, const Eigen::Matrix3d& R_world_grid) {
   return std::atan2(x_grid.y(), x_grid.x());
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -6,7 +6,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::objects {
 
 // The rectangle an upright object covers, in the horizontal plane of a Grid frame (see HullRegion).
 struct Footprint {
@@ -27,4 +27,4 @@ std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells,
 // Yaw of an upright cuboid in a Grid frame.
 double YawInGrid(const Cuboid& cuboid, const Eigen::Matrix3d& R_world_grid);
 
-}  // namespace romap
+}  // namespace romap::objects

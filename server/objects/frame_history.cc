@@ -6,7 +6,7 @@
 
 #include "common/label_image.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Ids of stand-ins must not meet those that the camera's map gives, which count from 1.
@@ -128,4 +128,4 @@ void FrameHistory::Clear() {
   stand_ins_.clear();
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -9,7 +9,7 @@
 #include "server/objects/correction.h"
 #include "server/objects/point_registry.h"
 
-namespace romap {
+namespace romap::objects {
 
 // The newest frames, as long as masks may still come for them, and what to do about keyframes without masks.
 //
@@ -66,4 +66,4 @@ class FrameHistory {
   uint64_t stand_ins_made_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numeric>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Random numbers by counter: splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
@@ -181,4 +181,4 @@ std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, con
   return IsolationForest(points, options).Scores(points);
 }
 
-}  // namespace romap
+}  // namespace romap::objects

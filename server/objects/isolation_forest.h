@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 
 // Extended Isolation Forest: finds lonely points by how few random cuts part them from all others. Source: S. Hariri,
 // M. Carrasco Kind, R. J. Brunner, "Extended Isolation Forest", IEEE TKDE 2021, on F. T. Liu, K. M. Ting, Z.-H. Zhou,
@@ -69,4 +69,4 @@ class IsolationForest {
 // equal output; the order of the points matters to the random draw only.
 std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options);
 
-}  // namespace romap
+}  // namespace romap::objects

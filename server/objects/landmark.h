@@ -12,7 +12,7 @@
 #include "server/objects/point_registry.h"
 #include "server/objects/view_picker.h"
 
-namespace romap {
+namespace romap::objects {
 
 // An object of the map, or what may become one.
 struct Landmark {
@@ -74,4 +74,4 @@ struct Landmark {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::objects

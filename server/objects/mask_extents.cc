@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace romap {
+namespace romap::objects {
 
 Eigen::Vector2d ExtentDirection(int k) {
   const double angle = 2 * std::numbers::pi * k / kExtentDirections;
@@ -41,4 +41,4 @@ MaskExtents MeasureExtents(const cv::Mat& labels, const Detection& detection) {
   return extents;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -7,7 +7,7 @@
 
 #include "server/objects/detections.h"
 
-namespace romap {
+namespace romap::objects {
 
 // Direction k of an extent has the angle 2 pi k / kExtentDirections in the image, u right and v down, so that opposite
 // directions are half the count apart.
@@ -26,4 +26,4 @@ struct MaskExtents {
 // between its last pixels and the next ones.
 MaskExtents MeasureExtents(const cv::Mat& labels, const Detection& detection);
 
-}  // namespace romap
+}  // namespace romap::objects

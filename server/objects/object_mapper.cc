@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 bool HasUsablePose(TrackingState state, const SE3<World, Camera>& T_world_camera) {
@@ -259,4 +259,4 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
   scene_depth_mu_ = depths[depths.size() / 2];
 }
 
-}  // namespace romap
+}  // namespace romap::objects

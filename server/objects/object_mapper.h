@@ -16,7 +16,7 @@
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"
 
-namespace romap {
+namespace romap::objects {
 
 // Maps objects: follows instance masks from frame to frame, decides which are things, says where they are and how
 // large, and picks the pictures their fields train on. Source: section "Lightweight Object SLAM" of the RO-MAP paper;
@@ -128,4 +128,4 @@ class ObjectMapper {
   uint64_t last_id_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -5,7 +5,7 @@
 #include "common/map_motion.h"
 #include "server/objects/object_mapper.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // A place that stands for all of a landmark.
@@ -57,4 +57,4 @@ void ObjectMapper::CorrectLandmark(Landmark& landmark, const KeyframeCorrections
   landmark.views.Correct(*S_new_old, keyframes);
 }
 
-}  // namespace romap
+}  // namespace romap::objects

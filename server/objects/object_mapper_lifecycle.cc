@@ -12,7 +12,7 @@
 #include "server/objects/object_mapper.h"
 #include "server/objects/two_sample_test.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Share of `points` inside the cuboid, its half extents enlarged a little.
@@ -315,4 +315,4 @@ ObjectMapper::Output ObjectMapper::Reset() {
   return output;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

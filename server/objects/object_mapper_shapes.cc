@@ -7,7 +7,7 @@
 #include "server/objects/lines/line_segments.h"
 #include "server/objects/object_mapper.h"
 
-namespace romap {
+namespace romap::objects {
 
 void ObjectMapper::CollectSilhouettes(const KeyframeView& view) {
   if (current_.detections.empty()) return;
@@ -156,4 +156,4 @@ bool ObjectMapper::FitShape(Landmark& landmark, const PointGroups& groups,
   return true;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

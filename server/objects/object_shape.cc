@@ -12,7 +12,7 @@
 #include "server/objects/point_cuboid.h"
 #include "server/objects/projection.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
@@ -323,4 +323,4 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   return fit;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

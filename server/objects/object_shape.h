@@ -12,7 +12,7 @@
 #include "server/objects/silhouette.h"
 #include "server/objects/silhouette_hull.h"
 
-namespace romap {
+namespace romap::objects {
 
 // What an object is made of according to its masks and points: its silhouettes, the hull they carve, and the box.
 class ObjectShape {
@@ -87,4 +87,4 @@ class ObjectShape {
   size_t points_when_grown_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -4,7 +4,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::objects {
 
 // Object mapping: from masks and sparse points to landmarks, cuboids and training views.
 struct ObjectsConfig {
@@ -123,4 +123,4 @@ struct ObjectsConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::objects

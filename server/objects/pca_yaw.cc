@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace romap {
+namespace romap::objects {
 
 std::optional<double> PcaYaw(std::span<const Eigen::Vector3d> points) {
   constexpr size_t kFewestPoints = 8;
@@ -41,4 +41,4 @@ std::optional<double> PcaYaw(std::span<const Eigen::Vector3d> points) {
   return std::atan2(main.x() < 0 ? -main.y() : main.y(), std::abs(main.x()));
 }
 
-}  // namespace romap
+}  // namespace romap::objects

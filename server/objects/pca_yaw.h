@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-namespace romap {
+namespace romap::objects {
 
 // Yaw of the main axis of points as seen from above, in [-pi/2, pi/2] from the x axis of their frame, whose z is up.
 // Distant points lose weight (the scatter matrix of a multivariate Cauchy distribution), so that a few strays do not
@@ -13,4 +13,4 @@ namespace romap {
 // multivariate location and scatter", Annals of Statistics 1991.
 std::optional<double> PcaYaw(std::span<const Eigen::Vector3d> points);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -4,7 +4,7 @@
 
 #include "server/objects/pca_yaw.h"
 
-namespace romap {
+namespace romap::objects {
 
 std::optional<Cuboid> CuboidOfPoints(const HullRegion& region, std::span<const Eigen::Vector3d> points,
                                      std::optional<double> edge_yaw_rad) {
@@ -22,4 +22,4 @@ std::optional<Cuboid> CuboidOfPoints(const HullRegion& region, std::span<const E
   return cuboid;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -7,7 +7,7 @@
 #include "common/messages.h"
 #include "server/objects/silhouette_hull.h"
 
-namespace romap {
+namespace romap::objects {
 
 // The paper's box, from an object's map points alone: its sides are the extreme points (equations (1) and (4)), its yaw
 // that of the straight edges where given, else of the points' main axis as seen from above. It is what our own fit is
@@ -15,4 +15,4 @@ namespace romap {
 std::optional<Cuboid> CuboidOfPoints(const HullRegion& region, std::span<const Eigen::Vector3d> points,
                                      std::optional<double> edge_yaw_rad);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-namespace romap {
+namespace romap::objects {
 
 size_t PointRegistry::IndexOf(MapPointId point) const {
   const auto entry = std::lower_bound(points_.begin(), points_.end(), point,
@@ -104,4 +104,4 @@ std::map<LandmarkKey, std::vector<PointRegistry::Member>> PointRegistry::GroupBy
   return groups;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -9,7 +9,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::objects {
 
 // Key of a landmark inside the object mapper. 0 is the background.
 using LandmarkKey = uint32_t;
@@ -52,4 +52,4 @@ class PointRegistry {
   std::vector<Entry> points_;  // by id: all of them are looked through at every keyframe
 };
 
-}  // namespace romap
+}  // namespace romap::objects

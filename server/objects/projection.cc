@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::objects {
 
 std::optional<cv::Point> ProjectToPixel(const Eigen::Vector3d& p_camera, const CameraModel& camera) {
   if (!(p_camera.z() > 1e-9)) return std::nullopt;
@@ -57,4 +57,4 @@ cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraMod
   return BoundProjections(corners, camera);
 }
 
-}  // namespace romap
+}  // namespace romap::objects

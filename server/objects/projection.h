@@ -8,7 +8,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::objects {
 
 // The pixel nearest to the projection of a point of the camera frame; nullopt behind the camera or outside the image.
 std::optional<cv::Point> ProjectToPixel(const Eigen::Vector3d& p_camera, const CameraModel& camera);
@@ -27,4 +27,4 @@ std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, Wor
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,
                        const SE3<World, Camera>& T_world_camera);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -6,7 +6,7 @@
 
 #include "server/objects/angles.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr int kThinnedColumns = 320;
@@ -223,4 +223,4 @@ double ParallaxRad(const std::vector<Silhouette>& silhouettes, const Eigen::Vect
   return largest;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -13,7 +13,7 @@
 #include "server/objects/mask_extents.h"
 #include "server/objects/point_registry.h"
 
-namespace romap {
+namespace romap::objects {
 
 // A keyframe's masks, thinned: they serve all objects of the keyframe and are kept long after the frame is gone.
 struct KeyframeMasks {
@@ -110,4 +110,4 @@ std::optional<Eigen::Vector3d> IntersectCenterRays(const std::vector<Silhouette>
 // Largest angle between the directions from `p_world` to the cameras of the silhouettes.
 double ParallaxRad(const std::vector<Silhouette>& silhouettes, const Eigen::Vector3d& p_world);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // What one silhouette shows under the cells of a grid, a row of cells at a time and in single precision: carving is the
@@ -169,4 +169,4 @@ bool SilhouetteHull::Contains(const Eigen::Vector3d& p_grid, const HullVotes& vo
   return Passes(index, votes);
 }
 
-}  // namespace romap
+}  // namespace romap::objects

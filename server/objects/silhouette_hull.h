@@ -7,7 +7,7 @@
 
 #include "server/objects/silhouette.h"
 
-namespace romap {
+namespace romap::objects {
 
 // An upright box of space. The Grid frame has its origin in the middle and z along up_world, from which corrections of
 // the map may tilt it a little.
@@ -67,4 +67,4 @@ class SilhouetteHull {
   std::vector<int16_t> outside_;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

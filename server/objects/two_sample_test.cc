@@ -6,7 +6,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 #include <utility>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr int kDimensions = 3;
@@ -129,4 +129,4 @@ std::optional<bool> SamePlace(std::span<const Eigen::Vector3d> a, std::span<cons
   return test->p_value >= alpha;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-namespace romap {
+namespace romap::objects {
 
 // Are two sets of sparse points from the same object? Tests of equal means that do not suppose equal covariances,
 // because two looks at a thing scatter differently.
@@ -75,4 +75,4 @@ std::optional<MeanTest> HotellingTestBeyond(const PointMoments& a, const PointMo
 std::optional<bool> SamePlace(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
                               double min_shift_mu, double point_sigma_mu);
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -10,7 +10,7 @@
 #include "server/objects/angles.h"
 #include "server/objects/projection.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Why the candidate's mask does not fit what is known of the object, or nullptr. A body point must lie in the mask
@@ -244,4 +244,4 @@ void ViewPicker::RenameNeighbour(LandmarkKey from, LandmarkKey into) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::objects

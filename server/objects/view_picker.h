@@ -12,7 +12,7 @@
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"
 
-namespace romap {
+namespace romap::objects {
 
 // A keyframe in which an object was seen, before it is decided whether the field of the object trains on it.
 struct ViewCandidate {
@@ -91,4 +91,4 @@ class ViewPicker {
   std::vector<Taken> taken_;
 };
 
-}  // namespace romap
+}  // namespace romap::objects

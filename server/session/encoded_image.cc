@@ -9,7 +9,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 struct Size {
@@ -178,4 +178,4 @@ absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& 
   return depth_mu;
 }
 
-}  // namespace romap
+}  // namespace romap::session

@@ -10,7 +10,7 @@
 #include "common/camera_model.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::session {
 
 // Decodes a frame's colour image to CV_8UC3, BGR. The size is read from the header before anything is decoded, so a
 // small file cannot claim a huge image. INVALID_ARGUMENT: truncated, not of the stated encoding, not the camera's size.
@@ -23,4 +23,4 @@ absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraMode
 // Decodes a frame's depth to CV_32FC1 in map units, 0 = unknown; empty Mat when the frame has none.
 absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera);
 
-}  // namespace romap
+}  // namespace romap::session

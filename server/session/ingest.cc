@@ -9,7 +9,7 @@
 #include "common/utf8.h"
 #include "server/session/encoded_image.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 constexpr size_t kMaxClassNameBytes = 100;
@@ -160,4 +160,4 @@ void Ingest::UndistortNearest(cv::Mat& image) const {
   image = undistorted;
 }
 
-}  // namespace romap
+}  // namespace romap::session

@@ -9,7 +9,7 @@
 #include "common/lens.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::session {
 
 // First step of a frame's life: decodes, validates and undistorts. Remembers the last accepted id and time, so that
 // frames cannot go back, and which of the newest frames may still get masks. One per session, used by its tracking
@@ -46,4 +46,4 @@ class Ingest {
   std::deque<AcceptedFrame> accepted_;  // by id and time; the newest, and those at most the patience behind it
 };
 
-}  // namespace romap
+}  // namespace romap::session

@@ -10,7 +10,7 @@
 #include "common/status.h"
 #include "common/wire/recording.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 constexpr size_t kMaxNameLength = 200;
@@ -177,4 +177,4 @@ absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& se
   return session->Export();
 }
 
-}  // namespace romap
+}  // namespace romap::session

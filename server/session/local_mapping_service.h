@@ -13,7 +13,7 @@
 #include "server/session/server_config.h"
 #include "server/session/session.h"
 
-namespace romap {
+namespace romap::session {
 
 // The mapping service in this process: owns the sessions, the training pool and the mesh thread. Thread-safe. Streams
 // must be gone before the service is destroyed.
@@ -36,11 +36,11 @@ class LocalMappingService : public MappingService {
   std::string NewId();
 
   const ServerConfig config_;
-  TrainingPool pool_;
+  nerf::TrainingPool pool_;
   Mesher mesher_;
   mutable std::mutex mutex_;
   std::mt19937_64 random_{std::random_device{}()};
   std::map<std::string, std::shared_ptr<Session>> sessions_;
 };
 
-}  // namespace romap
+}  // namespace romap::session

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace romap {
+namespace romap::session {
 
 void MapState::Send(const MapEvent& event) {
   for (const auto& outbox : outboxes_) outbox->Put(event);
@@ -170,4 +170,4 @@ uint64_t MapState::ConfirmedObjects() const {
                        [](const auto& entry) { return entry.second.object.state != ObjectState::kProvisional; });
 }
 
-}  // namespace romap
+}  // namespace romap::session

@@ -14,7 +14,7 @@
 #include "server/session/mesh_place.h"
 #include "server/session/outbox.h"
 
-namespace romap {
+namespace romap::session {
 
 // The map as clients see it: the newest cuboid and mesh of every object, the trajectory, and who listens. Every change
 // gets its revision here and goes to all outboxes. Corrections move meshes and frames that are there already; the mesh
@@ -81,4 +81,4 @@ class MapState {
   std::optional<absl::Status> closed_;
 };
 
-}  // namespace romap
+}  // namespace romap::session

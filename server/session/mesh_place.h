@@ -2,7 +2,7 @@
 
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::session {
 
 // Where the mesh of a field snapshot stands, in the world as it was when the snapshot was taken. Meshing takes a while;
 // the map may be corrected meanwhile.
@@ -11,4 +11,4 @@ struct MeshPlace {
   Sim3<World, World> S_new_first;  // of the snapshot: the corrections of the object it knows of
 };
 
-}  // namespace romap
+}  // namespace romap::session

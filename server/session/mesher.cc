@@ -9,11 +9,11 @@
 #include "common/thread_priority.h"
 #include "server/mesh/extract_mesh.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
-absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const MeshConfig& config) {
-  ROMAP_ASSIGN_OR_RETURN(const Mesh mesh, ExtractMesh(snapshot, config));
+absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const mesh::MeshConfig& config) {
+  ROMAP_ASSIGN_OR_RETURN(const Mesh mesh, mesh::ExtractMesh(snapshot, config));
   MeshUpdate update;
   update.id = snapshot.object;
   update.steps = snapshot.steps;
@@ -27,7 +27,7 @@ absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const MeshCon
 
 }  // namespace
 
-Mesher::Mesher(const MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
+Mesher::Mesher(const mesh::MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
   if (threading == Threading::kOwnThread) thread_ = std::thread([this] { Run(); });
 }
 
@@ -114,4 +114,4 @@ void Mesher::Run() {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::session

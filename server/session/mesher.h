@@ -11,7 +11,7 @@
 #include "server/mesh/mesh_config.h"
 #include "server/session/mesh_place.h"
 
-namespace romap {
+namespace romap::session {
 
 // The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits. Without a
 // thread of its own it makes each mesh in Offer().
@@ -21,7 +21,7 @@ class Mesher {
 
   enum class Threading { kOwnThread, kCaller };
 
-  explicit Mesher(const MeshConfig& config, Threading threading = Threading::kOwnThread);
+  explicit Mesher(const mesh::MeshConfig& config, Threading threading = Threading::kOwnThread);
   ~Mesher();
 
   uint64_t Register(Sink sink);
@@ -38,7 +38,7 @@ class Mesher {
   void Run();
   void Serve(const Sink& sink, const FieldSnapshot& snapshot) const;
 
-  const MeshConfig config_;
+  const mesh::MeshConfig config_;
   const Threading threading_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
@@ -51,4 +51,4 @@ class Mesher {
   std::thread thread_;  // kOwnThread only
 };
 
-}  // namespace romap
+}  // namespace romap::session

@@ -4,7 +4,7 @@
 #include <utility>
 #include <variant>
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 bool IsAck(const MapEvent& event) {
@@ -176,4 +176,4 @@ absl::Status Outbox::status() const {
   return status_;
 }
 
-}  // namespace romap
+}  // namespace romap::session

@@ -13,7 +13,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::session {
 
 // Events on their way to one subscriber. Never blocks the sender: what a slow reader has not taken yet is coalesced, so
 // that per object only the newest cuboid and the newest mesh wait. Order is kept otherwise, and
@@ -78,4 +78,4 @@ class Outbox {
   absl::Status status_;
 };
 
-}  // namespace romap
+}  // namespace romap::session

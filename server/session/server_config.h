@@ -7,14 +7,14 @@
 #include "server/session/session_config.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::session {
 
 // The whole configuration of a mapping service, one struct per stage. Frozen once the service is made.
 struct ServerConfig {
-  SlamConfig slam;
-  ObjectsConfig objects;
-  NerfConfig nerf;
-  MeshConfig mesh;
+  slam::SlamConfig slam;
+  objects::ObjectsConfig objects;
+  nerf::NerfConfig nerf;
+  mesh::MeshConfig mesh;
   SessionConfig session;
   int training_threads = 0;
 
@@ -34,4 +34,4 @@ struct ServerConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::session

@@ -6,7 +6,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 int64_t UnixNow_ns() {
@@ -18,13 +18,13 @@ int64_t UnixNow_ns() {
 constexpr int kSlicesPerKeyframe = 4;
 
 // Does the local map that tracking works with change by this frame?
-bool ChangesMap(const TrackedImage& image) {
+bool ChangesMap(const slam::TrackedImage& image) {
   return !image.pose_given && (image.tracked.is_keyframe || image.start || image.tracked.state == TrackingState::kLost);
 }
 
 }  // namespace
 
-Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool,
+Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
                  Mesher* mesher, std::unique_ptr<wire::RecordingWriter> recorder)
     : id_(std::move(id)),
       options_(options),
@@ -102,7 +102,7 @@ void Session::TrackFrame(const Arrival& arrival) {
   auto frame = ingest_.Accept(std::get<FrameInput>(arrival.input));
   if (!frame.ok()) return Reject(arrival, Message(frame.status()));
   Record(arrival.input);
-  TrackedImage image = tracker_.Track(*frame);
+  slam::TrackedImage image = tracker_.Track(*frame);
   Acknowledge(arrival, image.tracked);
   if (config_.session.single_thread) {
     MapFrame(image);
@@ -124,7 +124,7 @@ void Session::TakeMasks(const Arrival& arrival) {
 
 // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
 // objects.
-void Session::QueueLive(TrackedImage image) {
+void Session::QueueLive(slam::TrackedImage image) {
   if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
   const bool must_be_mapped = image.tracked.is_keyframe || image.start;
   MappingTask task = std::move(image);
@@ -137,7 +137,7 @@ void Session::QueueLive(TrackedImage image) {
 }
 
 // A recording can wait: what changes the map is mapped before the next frame is tracked.
-void Session::QueueReplay(TrackedImage image) {
+void Session::QueueReplay(slam::TrackedImage image) {
   const bool changes_map = ChangesMap(image);
   if (changes_map) CountMapChange(1);
   if (!tracked_.Push(std::move(image)) || !changes_map) return;
@@ -176,7 +176,7 @@ void Session::Map(const MappingTask& task) {
     if (!stopping_) MapMasks(*masks);
     return;
   }
-  const TrackedImage& image = std::get<TrackedImage>(task);
+  const slam::TrackedImage& image = std::get<slam::TrackedImage>(task);
   if (options_.mode == FrameMode::kLive && image.tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
   if (!stopping_) MapFrame(image);
   if (ChangesMap(image)) CountMapChange(-1);
@@ -188,8 +188,8 @@ void Session::MapMasks(const FrameMasks& masks) {
   Settle();
 }
 
-void Session::MapFrame(const TrackedImage& image) {
-  const MappedFrame mapped = sparse_mapper_.Process(image);
+void Session::MapFrame(const slam::TrackedImage& image) {
+  const slam::MappedFrame mapped = sparse_mapper_.Process(image);
   if (mapped.begun_anew) Publish(object_mapper_.Reset());
   if (mapped.correction) Correct(*mapped.correction);
   Publish(object_mapper_.ObserveFrame(mapped.tracked));
@@ -207,7 +207,7 @@ void Session::Correct(const MapCorrection& correction) {
   Publish(object_mapper_.Correct(correction));
 }
 
-void Session::Publish(ObjectMapper::Output output) {
+void Session::Publish(objects::ObjectMapper::Output output) {
   // Before the updates that tell clients of it, and before the fields make meshes in the corrected world.
   for (const ObjectViews& views : output.views) {
     if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);
@@ -243,4 +243,4 @@ void Session::TrainToTheEnd() {
   map_.Close(absl::OkStatus());
 }
 
-}  // namespace romap
+}  // namespace romap::session

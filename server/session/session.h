@@ -25,7 +25,7 @@
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 
-namespace romap {
+namespace romap::session {
 
 // One client's map. Owns the stages and wires the data path; two threads of its own:
 //
@@ -41,8 +41,8 @@ namespace romap {
 class Session {
  public:
   // `pool` and `mesher` outlive the session. `recorder` is told all that is accepted; none = not recorded.
-  Session(std::string id, const SessionOptions& options, const ServerConfig& config, TrainingPool* pool, Mesher* mesher,
-          std::unique_ptr<wire::RecordingWriter> recorder = nullptr);
+  Session(std::string id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
+          Mesher* mesher, std::unique_ptr<wire::RecordingWriter> recorder = nullptr);
   ~Session();
 
   SessionInfo Info() const;
@@ -72,7 +72,7 @@ class Session {
     SessionInput input;
     Clock::time_point time;
   };
-  using MappingTask = std::variant<TrackedImage, FrameMasks>;
+  using MappingTask = std::variant<slam::TrackedImage, FrameMasks>;
 
   void RunTracking();
   void RunMapping();
@@ -82,15 +82,15 @@ class Session {
   void Record(const SessionInput& input);
   void TrackFrame(const Arrival& arrival);
   void TakeMasks(const Arrival& arrival);
-  void QueueLive(TrackedImage image);
-  void QueueReplay(TrackedImage image);
+  void QueueLive(slam::TrackedImage image);
+  void QueueReplay(slam::TrackedImage image);
   void CountMapChange(int change);
   void Acknowledge(const Arrival& arrival, const TrackedFrame& tracked);
   void Map(const MappingTask& task);
-  void MapFrame(const TrackedImage& image);
+  void MapFrame(const slam::TrackedImage& image);
   void MapMasks(const FrameMasks& masks);
   void Correct(const MapCorrection& correction);
-  void Publish(ObjectMapper::Output output);
+  void Publish(objects::ObjectMapper::Output output);
   void TrainToTheEnd();
   void PublishStatistics();
   void Settle();
@@ -105,7 +105,7 @@ class Session {
   const SessionOptions options_;
   const ServerConfig config_;
   const int64_t created_unix_ns_;
-  TrainingPool* const pool_;
+  nerf::TrainingPool* const pool_;
   Mesher* const mesher_;
 
   MapState map_;
@@ -114,12 +114,12 @@ class Session {
 
   std::unique_ptr<wire::RecordingWriter> recorder_;  // tracking thread
 
-  Ingest ingest_;                      // tracking thread
-  LocalMapSlot local_map_;             // from the mapping thread to the tracking thread
-  Tracker tracker_;                    // tracking thread
-  SparseMapper sparse_mapper_;         // mapping thread
-  ObjectMapper object_mapper_;         // mapping thread
-  Clock::time_point next_statistics_;  // mapping thread
+  Ingest ingest_;                        // tracking thread
+  slam::LocalMapSlot local_map_;         // from the mapping thread to the tracking thread
+  slam::Tracker tracker_;                // tracking thread
+  slam::SparseMapper sparse_mapper_;     // mapping thread
+  objects::ObjectMapper object_mapper_;  // mapping thread
+  Clock::time_point next_statistics_;    // mapping thread
 
   BoundedQueue<Arrival> inputs_;
   BoundedQueue<MappingTask> tracked_;
@@ -144,4 +144,4 @@ class Session {
   std::thread mapping_thread_;
 };
 
-}  // namespace romap
+}  // namespace romap::session

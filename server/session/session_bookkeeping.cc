@@ -10,7 +10,7 @@
 #include "common/status.h"
 #include "server/session/session.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 uint64_t ResidentBytes() {
@@ -158,7 +158,7 @@ void Session::PublishStatistics() {
 }
 
 Statistics Session::CurrentStatistics() const {
-  const TrainingPool::Progress progress = pool_->GetProgress(pool_client_);
+  const nerf::TrainingPool::Progress progress = pool_->GetProgress(pool_client_);
   Statistics statistics;
   statistics.frames_received = frames_received_;
   statistics.frames_processed = frames_processed_;
@@ -195,4 +195,4 @@ MapSnapshot Session::Export() const {
   return snapshot;
 }
 
-}  // namespace romap
+}  // namespace romap::session

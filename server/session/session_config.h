@@ -4,7 +4,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::session {
 
 struct SessionConfig {
   int max_sessions = 16;
@@ -37,4 +37,4 @@ struct SessionConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::session

@@ -6,7 +6,7 @@
 
 #include "common/median.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // A third of a pixel for a camera of 600 px focal length.
@@ -70,4 +70,4 @@ void CorrectionLog::Forget() {
   points_.clear();
 }
 
-}  // namespace romap
+}  // namespace romap::slam

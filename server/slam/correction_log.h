@@ -7,7 +7,7 @@
 #include "common/messages.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Remembers what later stages were told of keyframes and points, and tells what has moved since. Small motions add up
 // until they are worth a word.
@@ -33,4 +33,4 @@ class CorrectionLog {
   std::map<MapPointId, ToldPoint> points_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

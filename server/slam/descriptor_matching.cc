@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <limits>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 struct Best {
@@ -77,4 +77,4 @@ std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first,
   return matches;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

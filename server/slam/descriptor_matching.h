@@ -5,7 +5,7 @@
 
 #include "server/slam/features/feature.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct DescriptorMatch {
   int first = 0;   // index
@@ -19,4 +19,4 @@ struct DescriptorMatch {
 std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               int max_distance, double ratio);
 
-}  // namespace romap
+}  // namespace romap::slam

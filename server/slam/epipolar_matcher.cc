@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kSigmas = 2.5;              // width of the search band on either side of the epipolar plane
@@ -130,4 +130,4 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
   return matches;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -5,7 +5,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct FeatureMatch {
   int first = 0;   // feature of the first keyframe
@@ -20,4 +20,4 @@ struct FeatureMatch {
 std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, const MapKeyframe& second,
                                                    const SlamConfig& config);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 
 #include "common/label_image.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kCell_px = 16;
@@ -125,4 +125,4 @@ std::vector<Feature> SeenFeatures(const FrameFeatures& sight) {
   return features;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 #include "server/slam/mask_places.h"
 #include "server/slam/optimise/radial_correction.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Finds features near a pixel.
 class FeatureGrid {
@@ -57,4 +57,4 @@ std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& sight, const
 // The features where the picture shows them.
 std::vector<Feature> SeenFeatures(const FrameFeatures& sight);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace romap {
+namespace romap::slam {
 
 TrackedFrame GivenPoseTracker::Take(std::shared_ptr<const Frame> frame) {
   TrackedFrame tracked;
@@ -14,4 +14,4 @@ TrackedFrame GivenPoseTracker::Take(std::shared_ptr<const Frame> frame) {
   return tracked;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/up_estimator.h"
 
-namespace romap {
+namespace romap::slam {
 
 // For frames that bring their camera pose: takes Frame::T_world_camera as it is, however far it jumps, and chooses the
 // keyframes.
@@ -23,4 +23,4 @@ class GivenPoseTracker {
   UpEstimator up_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr size_t kSharpnessWindowFrames = 15;
@@ -104,4 +104,4 @@ bool KeyframeSelector::IsGood(const Frame& frame, double sharpness) {
   return has_what_comes && sharpness >= config_.keyframe_sharpness_ratio * sorted[sorted.size() / 2];
 }
 
-}  // namespace romap
+}  // namespace romap::slam

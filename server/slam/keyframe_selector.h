@@ -7,7 +7,7 @@
 #include "server/slam/scene_depth.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // How well a frame was tracked from its image.
 struct TrackingQuality {
@@ -48,4 +48,4 @@ class KeyframeSelector {
   std::deque<double> recent_sharpness_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

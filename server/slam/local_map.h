@@ -14,7 +14,7 @@
 #include "server/slam/features/feature.h"
 #include "server/slam/optimise/radial_correction.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What is needed to find a map point in a frame.
 struct LocalPoint {
@@ -69,4 +69,4 @@ class LocalMapSlot {
   std::shared_ptr<const LocalMap> map_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

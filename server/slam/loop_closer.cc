@@ -11,7 +11,7 @@
 #include "server/slam/optimise/pose_graph.h"
 #include "server/slam/point_maker.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinSharedPoints = 15;
@@ -115,4 +115,4 @@ bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, 
   return drifted;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinSharedPoints = 15;
@@ -171,4 +171,4 @@ void ApplyWhole(const MapProblem& problem, SlamMap& map) {
   for (auto& [id, track] : map.points()) map.Refresh(track);
 }
 
-}  // namespace romap
+}  // namespace romap::slam

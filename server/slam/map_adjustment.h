@@ -7,7 +7,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A part of the map as a bundle problem, and which keyframe and point each entry is. A value: it can be solved on
 // another thread while the map goes on.
@@ -33,4 +33,4 @@ void ApplyWindow(const MapProblem& problem, SlamMap& map);
 // the keyframe they hang on.
 void ApplyWhole(const MapProblem& problem, SlamMap& map);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kRedundantShare = 0.97;
@@ -85,4 +85,4 @@ std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyfram
   return gone;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

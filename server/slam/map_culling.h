@@ -5,7 +5,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Points whose trial is over without enough observations, and beyond the allowed number those seen longest ago.
 void CullPoints(const SlamConfig& config, SlamMap& map);
@@ -14,4 +14,4 @@ void CullPoints(const SlamConfig& config, SlamMap& map);
 // well or better (Mur-Artal et al. 2015, section VI-E). Returns those that went.
 std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kShrink = 8;           // masks are shrunk so many times to tell what is close to one
@@ -54,4 +54,4 @@ void MaskVotes::Add(const MaskVotes& other) {
   far += other.far;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 
-namespace romap {
+namespace romap::slam {
 
 // How a place of a picture lies to the picture's instance masks.
 enum class MaskPlace : uint8_t {
@@ -40,4 +40,4 @@ struct MaskVotes {
   void Add(const MaskVotes& other);
 };
 
-}  // namespace romap
+}  // namespace romap::slam

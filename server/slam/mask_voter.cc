@@ -6,7 +6,7 @@
 
 #include "common/label_image.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // More frames than any camera takes while masks are waited for.
@@ -72,4 +72,4 @@ void MaskVoter::Vote(const PassedFrame& frame, const cv::Mat& labels, SlamMap& m
   }
 }
 
-}  // namespace romap
+}  // namespace romap::slam

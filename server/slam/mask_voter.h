@@ -7,7 +7,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Ties masks to map points where the labels of keyframes' features do not: a slow detector's masks come after their
 // frame, and mostly of frames that are no keyframes. Masks of a keyframe label its features. Those of another frame
@@ -39,4 +39,4 @@ class MaskVoter {
   std::deque<PassedFrame> passed_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 
 #include "common/median.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinFeatures = 100;
@@ -131,4 +131,4 @@ std::optional<MapStart> MonocularStart::Try(const FollowedView& view, const std:
   return start;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

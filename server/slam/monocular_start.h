@@ -10,7 +10,7 @@
 #include "server/slam/geometry/two_view.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // From what a map begins: two views without depth, or one with depth.
 struct MapStart {
@@ -57,4 +57,4 @@ class MonocularStart {
   std::vector<FollowedView> followed_;  // oldest first
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -12,7 +12,7 @@
 #include "server/slam/point_maker.h"
 #include "server/slam/projection_search.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kCandidates = 5;
@@ -166,4 +166,4 @@ std::optional<LoopMatch> PlaceRecogniser::MakeLoop(const MapKeyframe& keyframe, 
   return loop;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -8,7 +8,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A loop whose ends lie closer together than this, in the newest keyframe's image, has not drifted.
 inline constexpr double kNoDrift_px = 4;
@@ -57,4 +57,4 @@ class PlaceRecogniser {
   PlaceIndex index_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -13,7 +13,7 @@
 #include "server/slam/projection_search.h"
 #include "server/slam/triangulation.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
@@ -202,4 +202,4 @@ void PointMaker::FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyf
   }
 }
 
-}  // namespace romap
+}  // namespace romap::slam

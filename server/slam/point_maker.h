@@ -6,7 +6,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
-namespace romap {
+namespace romap::slam {
 
 LocalPoint LooksOf(const PointTrack& track);
 
@@ -41,4 +41,4 @@ class PointMaker {
   SlamMap* const map_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 
 #include "server/slam/descriptor_matching.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kMaxSizeRatio = 1.7;  // between predicted and found octave scale
@@ -97,4 +97,4 @@ std::vector<PointMatch> MatchByLooks(std::span<const LocalPoint> points, const F
   return matches;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

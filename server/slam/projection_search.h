@@ -9,7 +9,7 @@
 #include "server/slam/local_map.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // How far and how strictly known points are looked for around their projection.
 struct ProjectionSearch {
@@ -62,4 +62,4 @@ class ProjectionMatcher {
 std::vector<PointMatch> MatchByLooks(std::span<const LocalPoint> points, const FrameFeatures& frame, int max_distance,
                                      double ratio);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 
 #include "common/median.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kWidth_px = 160;
@@ -137,4 +137,4 @@ std::optional<double> SceneDepth(const DepthView& first, const DepthView& second
   return Median(std::move(votes));
 }
 
-}  // namespace romap
+}  // namespace romap::slam

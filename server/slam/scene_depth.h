@@ -5,7 +5,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A small grey copy of a frame with what is needed to measure depth against another one, and its sharpness.
 struct DepthView {
@@ -24,4 +24,4 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
 // without texture.
 std::optional<double> SceneDepth(const DepthView& first, const DepthView& second);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -2,7 +2,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // When a frame becomes a keyframe, and how keyframes become a sparse map.
 struct SlamConfig {
@@ -125,4 +125,4 @@ struct SlamConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::slam

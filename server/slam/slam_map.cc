@@ -6,7 +6,7 @@
 #include <limits>
 #include <unordered_map>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 size_t FeatureOf(const PointTrack& track, KeyframeId keyframe) {
@@ -224,4 +224,4 @@ void SlamMap::Transform(const Sim3<World, World>& S_new_old) {
   }
 }
 
-}  // namespace romap
+}  // namespace romap::slam

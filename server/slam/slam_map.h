@@ -14,7 +14,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/triangulation.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A keyframe of the sparse map.
 struct MapKeyframe {
@@ -143,4 +143,4 @@ class SlamMap {
   uint64_t point_count_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

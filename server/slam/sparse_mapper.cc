@@ -13,7 +13,7 @@
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinSharedPoints = 15;
@@ -448,4 +448,4 @@ void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Re
   slot_->Put(std::move(local));
 }
 
-}  // namespace romap
+}  // namespace romap::slam

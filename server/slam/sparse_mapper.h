@@ -20,7 +20,7 @@
 #include "server/slam/tracker.h"
 #include "server/slam/world_up.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What became of one frame in the map.
 struct MappedFrame {
@@ -118,4 +118,4 @@ class SparseMapper {
   std::atomic<bool> hurry_ = false;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

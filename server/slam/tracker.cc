@@ -10,7 +10,7 @@
 #include "server/slam/geometry/pnp.h"
 #include "server/slam/projection_search.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinFeatures = 50;
@@ -411,4 +411,4 @@ void Tracker::Lose(const std::string& why, TrackedImage& image) {
   motion_.reset();
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -17,7 +17,7 @@
 #include "server/slam/monocular_start.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What tracking says of one frame, for the mapping thread.
 struct TrackedImage {
@@ -98,4 +98,4 @@ class Tracker {
   double motion_s_ = 0;                        // the time it took
 };
 
-}  // namespace romap
+}  // namespace romap::slam

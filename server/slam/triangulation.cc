@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMaxIterations = 5;
@@ -112,4 +112,4 @@ Eigen::Vector3d RefinePoint(const std::vector<Sight>& sights, const Eigen::Vecto
   return best;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 
 // One sight of a point: a ray with its uncertainty, and where a depth image was there, how far the point was.
 struct Sight {
@@ -35,4 +35,4 @@ std::optional<Eigen::Vector3d> IntersectRays(const Sight& a, const Sight& b);
 // bounds above), poses held fixed. Starts at and falls back to `p_world` when a step fails to improve.
 Eigen::Vector3d RefinePoint(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world);
 
-}  // namespace romap
+}  // namespace romap::slam

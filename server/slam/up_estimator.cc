@@ -5,7 +5,7 @@
 
 #include "common/median.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr size_t kWindowFrames = 150;
@@ -42,4 +42,4 @@ void UpEstimator::Turn(const Eigen::Quaterniond& R_new_old) {
   up_world_ = R_new_old * up_world_;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

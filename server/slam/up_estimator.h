@@ -6,7 +6,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Which way is up in the world: world z, unless frames bring gravity.
 class UpEstimator {
@@ -24,4 +24,4 @@ class UpEstimator {
   Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
 };
 
-}  // namespace romap
+}  // namespace romap::slam

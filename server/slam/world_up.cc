@@ -10,7 +10,7 @@
 
 #include "server/slam/places/support_plane.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kWorthTurning_rad = 0.3 * std::numbers::pi / 180;
@@ -99,4 +99,4 @@ std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map, bool is_l
 
 void WorldUp::Turned(const Eigen::Quaterniond& R_new_old) { gravity_.Turn(R_new_old); }
 
-}  // namespace romap
+}  // namespace romap::slam

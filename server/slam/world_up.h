@@ -8,7 +8,7 @@
 #include "server/slam/slam_map.h"
 #include "server/slam/up_estimator.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Which way is up in a map that was begun from images alone: against the client's gravity where it sends one, else the
 // normal of the plane that the objects stand on (support_plane.h), else, at the very beginning, the camera's own up.
@@ -36,4 +36,4 @@ class WorldUp {
   uint64_t next_try_;  // keyframes
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -18,7 +18,7 @@
 #include "server/transport/call_host.h"
 #include "server/transport/mapping_rpcs.h"
 
-namespace romap {
+namespace romap::transport {
 namespace {
 
 using std::chrono::system_clock;
@@ -126,4 +126,4 @@ void RouteGrpcLogToSpdlog() {
   gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });
 }
 
-}  // namespace romap
+}  // namespace romap::transport

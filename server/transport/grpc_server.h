@@ -8,7 +8,7 @@
 #include "common/mapping_service.h"
 #include "server/transport/transport_config.h"
 
-namespace romap {
+namespace romap::transport {
 
 // Serves a MappingService over gRPC (proto/romap/v1/mapping.proto), with the standard health service (overall and as
 // "romap.v1.Mapping") and server reflection. Calls of the service come from many threads at once.
@@ -37,4 +37,4 @@ class GrpcServer {
 // Sends gRPC's own log, which goes to stderr unasked, to spdlog at debug level. For main(): it holds for the process.
 void RouteGrpcLogToSpdlog();
 
-}  // namespace romap
+}  // namespace romap::transport

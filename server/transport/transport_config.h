@@ -4,7 +4,7 @@
 
 #include "common/config.h"
 
-namespace romap {
+namespace romap::transport {
 
 struct TransportConfig {
   std::string listen_address = "127.0.0.1:50051";
@@ -26,4 +26,4 @@ struct TransportConfig {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::transport

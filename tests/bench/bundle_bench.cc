@@ -15,18 +15,18 @@
 #include "tests/bench/user_seconds.h"
 #include "tests/unit/server/slam/optimise/bundle_world.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
-void Measure(const std::string& name, const BundleWorldOptions& world_options, const BundleOptions& options,
+void Measure(const std::string& name, const slam::BundleWorldOptions& world_options, const slam::BundleOptions& options,
              int repeats) {
-  const BundleWorld world = MakeBundleWorld(world_options);
-  BundleSummary summary;
+  const slam::BundleWorld world = slam::MakeBundleWorld(world_options);
+  slam::BundleSummary summary;
   double least_s = 1e300;
   for (int i = 0; i < repeats; ++i) {
-    BundleProblem problem = world.problem;
+    slam::BundleProblem problem = world.problem;
     const double start_s = UserSeconds();
-    summary = AdjustBundle(problem, options);
+    summary = slam::AdjustBundle(problem, options);
     least_s = std::min(least_s, UserSeconds() - start_s);
   }
   fmt::print("{:<28} {:4d} cameras {:6d} points {:7d} observations {:8.1f} ms {:3d} iterations {:7.2f} -> {:5.2f} px\n",
@@ -34,8 +34,8 @@ void Measure(const std::string& name, const BundleWorldOptions& world_options, c
              1e3 * least_s, summary.iterations, summary.initial_rms_px, summary.final_rms_px);
 }
 
-BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int sights) {
-  BundleWorldOptions options;
+slam::BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int sights) {
+  slam::BundleWorldOptions options;
   options.cameras = cameras;
   options.fixed_cameras = fixed_cameras;
   options.points = points;
@@ -50,26 +50,26 @@ BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int sights
 }
 
 void MeasureAll(int repeats) {
-  BundleOptions local;
+  slam::BundleOptions local;
   local.dense = true;
   local.max_iterations = 8;
-  BundleOptions local_sparse = local;
+  slam::BundleOptions local_sparse = local;
   local_sparse.dense = false;
   // Eight sights of each point: seven cameras before the free ones still see some of their points.
   for (const int points : {1000, 1500, 2500}) {
     for (const int free : {10, 20}) {
-      const BundleWorldOptions window = Window(free + 7, 7, points, 8);
+      const slam::BundleWorldOptions window = Window(free + 7, 7, points, 8);
       Measure(fmt::format("window {} free, dense", free), window, local, repeats);
       Measure(fmt::format("window {} free, sparse", free), window, local_sparse, repeats);
     }
   }
-  BundleWorldOptions depth = Window(17, 7, 1500, 8);
+  slam::BundleWorldOptions depth = Window(17, 7, 1500, 8);
   depth.with_depth = true;
   Measure("window with depth, dense", depth, local, repeats);
 
-  BundleOptions global;
+  slam::BundleOptions global;
   global.max_iterations = 20;
-  BundleWorldOptions whole = Window(200, 2, 15000, 7);
+  slam::BundleWorldOptions whole = Window(200, 2, 15000, 7);
   whole.step_rad = 0.03;
   Measure("whole map, sparse", whole, global, std::min(repeats, 2));
   global.dense = true;
@@ -77,9 +77,9 @@ void MeasureAll(int repeats) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
 int main(int argc, char** argv) {
-  romap::MeasureAll(argc > 1 ? std::max(1, std::atoi(argv[1])) : 5);
+  romap::measure::MeasureAll(argc > 1 ? std::max(1, std::atoi(argv[1])) : 5);
   return 0;
 }

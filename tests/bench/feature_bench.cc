@@ -29,7 +29,7 @@
 #include "server/slam/features/feature_extractor.h"
 #include "tests/bench/user_seconds.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 constexpr std::array<size_t, 4> kGaps{1, 5, 10, 20};
@@ -41,7 +41,7 @@ cv::Mat Decode(const std::string& bytes, int flags) {
   return cv::imdecode(raw, flags);
 }
 
-std::optional<Frame> LoadFrame(const Sequence& sequence, size_t index) {
+std::optional<Frame> LoadFrame(const files::Sequence& sequence, size_t index) {
   const auto input = sequence.Load(index);
   if (!input.ok() || input->depth.empty() || !input->T_world_camera) return std::nullopt;
   Frame frame;
@@ -56,22 +56,22 @@ std::optional<Frame> LoadFrame(const Sequence& sequence, size_t index) {
 }
 
 // OpenCV's own, as the yardstick.
-std::vector<Feature> OpenCvOrb(const Frame& frame, const SlamConfig& config) {
+std::vector<slam::Feature> OpenCvOrb(const Frame& frame, const slam::SlamConfig& config) {
   static const cv::Ptr<cv::ORB> orb =
-      cv::ORB::create(config.scene_features, static_cast<float>(kOctaveFactor), kOctaves, 31, 0, 2,
+      cv::ORB::create(config.scene_features, static_cast<float>(slam::kOctaveFactor), slam::kOctaves, 31, 0, 2,
                       cv::ORB::HARRIS_SCORE, 31, config.scene_fast_threshold);
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat grey, descriptors;
   cv::cvtColor(frame.image_bgr, grey, cv::COLOR_BGR2GRAY);
   orb->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
-  std::vector<Feature> features(keypoints.size());
+  std::vector<slam::Feature> features(keypoints.size());
   for (size_t i = 0; i < keypoints.size(); ++i) {
-    const auto scale = static_cast<float>(std::pow(kOctaveFactor, keypoints[i].octave));
+    const auto scale = static_cast<float>(std::pow(slam::kOctaveFactor, keypoints[i].octave));
     const float shift_px = 0.5F * (scale - 1);  // to pixel centres at integer coordinates
     features[i].pixel_px = {keypoints[i].pt.x + shift_px, keypoints[i].pt.y + shift_px};
     features[i].octave = keypoints[i].octave;
     features[i].octave_scale = scale;
-    std::memcpy(features[i].descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(Descriptor));
+    std::memcpy(features[i].descriptor.data(), descriptors.ptr(static_cast<int>(i)), sizeof(slam::Descriptor));
   }
   return features;
 }
@@ -82,10 +82,10 @@ struct Nearest {
   int second_distance = 257;
 };
 
-Nearest FindNearest(const Feature& feature, const std::vector<Feature>& others) {
+Nearest FindNearest(const slam::Feature& feature, const std::vector<slam::Feature>& others) {
   Nearest nearest;
   for (size_t i = 0; i < others.size(); ++i) {
-    const int distance = HammingDistance(feature.descriptor, others[i].descriptor);
+    const int distance = slam::HammingDistance(feature.descriptor, others[i].descriptor);
     if (distance < nearest.distance) {
       nearest = {static_cast<int>(i), distance, nearest.distance};
     } else {
@@ -96,7 +96,7 @@ Nearest FindNearest(const Feature& feature, const std::vector<Feature>& others) 
 }
 
 // Where a feature of `from` is in `to`; none where its depth is unknown, or outside, or hidden.
-std::optional<Eigen::Vector2d> TruePixel(const Feature& feature, const Frame& from, const Frame& to) {
+std::optional<Eigen::Vector2d> TruePixel(const slam::Feature& feature, const Frame& from, const Frame& to) {
   const cv::Rect image(0, 0, from.depth_mu.cols, from.depth_mu.rows);
   const auto depth_at = [&](const Frame& frame, double u, double v) -> double {
     const cv::Point pixel(static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v)));
@@ -126,8 +126,8 @@ struct Score {
   double error_px = 0;
 };
 
-void Judge(const std::vector<Feature>& first, const Frame& first_frame, const std::vector<Feature>& second,
-           const Frame& second_frame, const SlamConfig& config, Score& score) {
+void Judge(const std::vector<slam::Feature>& first, const Frame& first_frame, const std::vector<slam::Feature>& second,
+           const Frame& second_frame, const slam::SlamConfig& config, Score& score) {
   std::set<std::pair<int, int>> cells;
   for (size_t i = 0; i < first.size(); ++i) {
     const std::optional<Eigen::Vector2d> true_px = TruePixel(first[i], first_frame, second_frame);
@@ -137,7 +137,7 @@ void Judge(const std::vector<Feature>& first, const Frame& first_frame, const st
         there.distance >= config.descriptor_ratio * there.second_distance) {
       continue;
     }
-    const Feature& other = second[static_cast<size_t>(there.index)];
+    const slam::Feature& other = second[static_cast<size_t>(there.index)];
     if (FindNearest(other, first).index != static_cast<int>(i)) continue;
     score.matches += 1;
     if (!true_px) continue;
@@ -153,16 +153,16 @@ void Judge(const std::vector<Feature>& first, const Frame& first_frame, const st
   score.pairs += 1;
 }
 
-using Extract = std::function<std::vector<Feature>(const Frame&)>;
+using Extract = std::function<std::vector<slam::Feature>(const Frame&)>;
 
 struct Cost {
   double images = 0;
   double features = 0;
   double user_s = 0;
 
-  std::vector<Feature> Of(const Extract& extract, const Frame& frame) {
+  std::vector<slam::Feature> Of(const Extract& extract, const Frame& frame) {
     const double start_s = UserSeconds();
-    std::vector<Feature> result = extract(frame);
+    std::vector<slam::Feature> result = extract(frame);
     user_s += UserSeconds() - start_s;
     images += 1;
     features += static_cast<double>(result.size());
@@ -173,14 +173,14 @@ struct Cost {
   }
 };
 
-void RunPairs(const char* name, const Sequence& sequence, size_t every, const SlamConfig& config,
+void RunPairs(const char* name, const files::Sequence& sequence, size_t every, const slam::SlamConfig& config,
               const Extract& extract) {
   std::map<size_t, Score> scores;
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {
     const std::optional<Frame> first = LoadFrame(sequence, i);
     if (!first) continue;
-    const std::vector<Feature> features = cost.Of(extract, *first);
+    const std::vector<slam::Feature> features = cost.Of(extract, *first);
     for (const size_t gap : kGaps) {
       const std::optional<Frame> second = i + gap < sequence.size() ? LoadFrame(sequence, i + gap) : std::nullopt;
       if (second) Judge(features, *first, cost.Of(extract, *second), *second, config, scores[gap]);
@@ -195,12 +195,12 @@ void RunPairs(const char* name, const Sequence& sequence, size_t every, const Sl
 }
 
 // What a keyframe costs on top of its scene features.
-void RunObjects(const Sequence& sequence, size_t every, FeatureExtractor& extractor) {
+void RunObjects(const files::Sequence& sequence, size_t every, slam::FeatureExtractor& extractor) {
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {
     const std::optional<Frame> frame = LoadFrame(sequence, i);
     if (!frame || !frame->has_masks) continue;
-    const std::vector<Feature> scene = extractor.ExtractScene(*frame);
+    const std::vector<slam::Feature> scene = extractor.ExtractScene(*frame);
     cost.Of([&](const Frame& f) { return extractor.ExtractObjects(f, scene); }, *frame);
   }
   if (cost.images > 0) cost.Print("romap objects");
@@ -211,7 +211,7 @@ int Main(int argc, char** argv) {
     std::fprintf(stderr, "usage: feature_bench DIR [--every N] [--set slam.FIELD=VALUE]...\n");
     return 2;
   }
-  SlamConfig config;
+  slam::SlamConfig config;
   ConfigFields fields;
   fields.Section("slam");
   config.Fields(fields);
@@ -222,13 +222,13 @@ int Main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--set") == 0) assignments.emplace_back(argv[i + 1]);
   }
   const absl::Status status = fields.Set(assignments);
-  const auto sequence = Sequence::Open(argv[1], {.use_depth = true});
+  const auto sequence = files::Sequence::Open(argv[1], {.use_depth = true});
   if (!status.ok() || !sequence.ok()) {
     std::fprintf(stderr, "feature_bench: %s\n", Message(status.ok() ? sequence.status() : status).c_str());
     return 1;
   }
   cv::setNumThreads(1);
-  FeatureExtractor extractor(config);
+  slam::FeatureExtractor extractor(config);
   RunPairs("OpenCV", *sequence, every, config, [&](const Frame& frame) { return OpenCvOrb(frame, config); });
   RunPairs("romap", *sequence, every, config, [&](const Frame& frame) { return extractor.ExtractScene(frame); });
   RunObjects(*sequence, every, extractor);
@@ -236,6 +236,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Main(argc, argv); }
+int main(int argc, char** argv) { return romap::measure::Main(argc, argv); }

@@ -24,7 +24,7 @@
 #include "tests/bench/frame_noise.h"
 #include "tests/bench/run_configured.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 struct Options {
@@ -43,20 +43,20 @@ struct Options {
   double first_yaw_deg = 0;
   bool depth = false;
   FrameNoise noise;
-  NerfConfig nerf;
-  MeshConfig mesh;
+  nerf::NerfConfig nerf;
+  mesh::MeshConfig mesh;
 };
 
-absl::Status WriteMesh(const FieldSnapshot& snapshot, const ObjectRecord& object, const Options& options) {
-  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ExtractMesh(snapshot, options.mesh));
+absl::Status WriteMesh(const FieldSnapshot& snapshot, const files::ObjectRecord& object, const Options& options) {
+  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, mesh::ExtractMesh(snapshot, options.mesh));
   for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
   for (Eigen::Vector3f& n : mesh.normals) n = (snapshot.T_world_object.rotation() * n.cast<double>()).cast<float>();
   const std::string dir = options.out + "/objects";
   std::filesystem::create_directories(dir);
-  return WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
+  return files::WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
 }
 
-void PrintRow(const std::string& name, int views, const TrainStats& stats, double setup_s) {
+void PrintRow(const std::string& name, int views, const nerf::TrainStats& stats, double setup_s) {
   const double samples = static_cast<double>(std::max<uint64_t>(1, stats.samples));
   std::printf("%-10s %5d %5d %8.3f %8.3f %8.3f %7.2f %6.2f %7.4f |", name.c_str(), views, stats.steps, setup_s,
               stats.CpuSeconds(), stats.wall_s, samples / stats.CpuSeconds() * 1e-6,
@@ -67,7 +67,7 @@ void PrintRow(const std::string& name, int views, const TrainStats& stats, doubl
 }
 
 // The box of the first steps.
-Cuboid FirstBox(const ObjectRecord& object, const Options& options) {
+Cuboid FirstBox(const files::ObjectRecord& object, const Options& options) {
   const Eigen::Vector3d scale(options.first_scale[0], options.first_scale[1], options.first_scale[2]);
   const Eigen::Vector3d half = object.half_extents.cwiseProduct(scale);
   const Eigen::AngleAxisd turn(options.first_yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
@@ -75,13 +75,14 @@ Cuboid FirstBox(const ObjectRecord& object, const Options& options) {
   return {object.T_world_object * T_object_first, half, 1.0};
 }
 
-absl::Status BenchObject(const TrueFrames& frames, ObjectRecord object, const Options& options) {
+absl::Status BenchObject(const bench::TrueFrames& frames, files::ObjectRecord object, const Options& options) {
   object.half_extents *= 1.0 + options.loosen;
-  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
+  nerf::ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)},
+                          static_cast<uint64_t>(options.seed));
   const Cuboid right{object.T_world_object, object.half_extents, 1.0};
   ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : right));
   const auto start = std::chrono::steady_clock::now();
-  for (ObjectView& view : MakeTrueViews(frames, object, options.depth)) {
+  for (ObjectView& view : bench::MakeTrueViews(frames, object, options.depth)) {
     ROMAP_RETURN_IF_ERROR(field.AddView(std::move(view)));
   }
   if (field.views() == 0) return absl::OkStatus();
@@ -100,25 +101,26 @@ absl::Status BenchObject(const TrueFrames& frames, ObjectRecord object, const Op
 }
 
 absl::Status Run(const Options& options) {
-  SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, sequence_options));
-  ROMAP_ASSIGN_OR_RETURN(const TrueFrames true_frames, LoadTrueFrames(sequence, options.every, options.offset));
-  const TrueFrames frames = WithNoise(true_frames, options.noise);
+  files::SequenceOptions sequence_options{.masks = options.masks, .use_depth = options.depth};
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(options.sequence, sequence_options));
+  ROMAP_ASSIGN_OR_RETURN(const bench::TrueFrames true_frames,
+                         bench::LoadTrueFrames(sequence, options.every, options.offset));
+  const bench::TrueFrames frames = WithNoise(true_frames, options.noise);
   std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
               "Msam/s", "active", "loss");
   for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);
   std::printf("  [ns/sample]\n");
-  for (const ObjectRecord& object : sequence.objects()->objects) {
+  for (const files::ObjectRecord& object : sequence.objects()->objects) {
     ROMAP_RETURN_IF_ERROR(BenchObject(frames, object, options));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
 int main(int argc, char** argv) {
-  romap::Options options;
+  romap::measure::Options options;
   CLI::App app("Trains the objects of a sequence and reports cost");
   app.add_option("sequence", options.sequence)->required();
   app.add_option("out", options.out);
@@ -139,5 +141,5 @@ int main(int argc, char** argv) {
   app.add_option("--mask-noise-px", options.noise.mask_px)->check(CLI::NonNegativeNumber);
   app.add_option("--noise-seed", options.noise.seed);
   CLI11_PARSE(app, argc, argv);
-  return romap::RunConfigured(options, romap::Run);
+  return romap::measure::RunConfigured(options, romap::measure::Run);
 }

@@ -22,7 +22,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/bench/run_configured.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 struct Options {
@@ -30,8 +30,8 @@ struct Options {
   std::vector<std::string> assignments, scenarios;
   int every = 4, offset = 0, seed = 1, threads = 2;
   bool depth = false;
-  NerfConfig nerf;
-  MeshConfig mesh;
+  nerf::NerfConfig nerf;
+  mesh::MeshConfig mesh;
 };
 
 using Views = std::vector<ObjectView>;
@@ -87,17 +87,17 @@ const std::map<std::string, Spoiler> kSpoilers = {{"clean", [](Views&, const Vie
                                                   {"depth_noise", SpoilDepth},
                                                   {"arrivals", [](Views&, const Views&) {}}};
 
-absl::Status WriteMesh(const FieldSnapshot& snapshot, const ObjectRecord& object, const std::string& dir,
-                       const MeshConfig& config) {
-  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ExtractMesh(snapshot, config));
+absl::Status WriteMesh(const FieldSnapshot& snapshot, const files::ObjectRecord& object, const std::string& dir,
+                       const mesh::MeshConfig& config) {
+  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, mesh::ExtractMesh(snapshot, config));
   for (Eigen::Vector3f& v : mesh.vertices) v = (snapshot.T_world_object * v.cast<double>()).cast<float>();
   for (Eigen::Vector3f& n : mesh.normals) n = (snapshot.T_world_object.rotation() * n.cast<double>()).cast<float>();
   std::filesystem::create_directories(dir);
-  return WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
+  return files::WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
 }
 
 // Gives the field all it is allowed, as the pool does.
-void TrainAllowed(ObjectField& field, bool complete, const Options& options) {
+void TrainAllowed(nerf::ObjectField& field, bool complete, const Options& options) {
   while (field.AllowedSteps(complete) > field.steps()) {
     const uint64_t left = field.AllowedSteps(complete) - field.steps();
     field.Train(static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(options.nerf.slice_steps))),
@@ -105,9 +105,10 @@ void TrainAllowed(ObjectField& field, bool complete, const Options& options) {
   }
 }
 
-absl::Status TrainObject(const ObjectRecord& object, const Views& views, const std::string& scenario,
+absl::Status TrainObject(const files::ObjectRecord& object, const Views& views, const std::string& scenario,
                          const Options& options) {
-  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, static_cast<uint64_t>(options.seed));
+  nerf::ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)},
+                          static_cast<uint64_t>(options.seed));
   ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
   for (const ObjectView& view : views) {
     if (const absl::Status status = field.AddView(view); !status.ok()) std::printf("%s\n", Message(status).c_str());
@@ -122,12 +123,16 @@ absl::Status TrainObject(const ObjectRecord& object, const Views& views, const s
 }
 
 absl::Status Run(const Options& options) {
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(options.sequence, {.use_depth = options.depth}));
-  ROMAP_ASSIGN_OR_RETURN(const TrueFrames frames, LoadTrueFrames(sequence, options.every, options.offset));
-  const std::vector<ObjectRecord>& objects = sequence.objects()->objects;
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
+                         files::Sequence::Open(options.sequence, {.use_depth = options.depth}));
+  ROMAP_ASSIGN_OR_RETURN(const bench::TrueFrames frames,
+                         bench::LoadTrueFrames(sequence, options.every, options.offset));
+  const std::vector<files::ObjectRecord>& objects = sequence.objects()->objects;
   for (const std::string& scenario : options.scenarios) {
     for (size_t i = 0; i < objects.size(); ++i) {
-      const auto views_of = [&](const ObjectRecord& object) { return MakeTrueViews(frames, object, options.depth); };
+      const auto views_of = [&](const files::ObjectRecord& object) {
+        return bench::MakeTrueViews(frames, object, options.depth);
+      };
       Views views = views_of(objects[i]);
       if (views.empty()) continue;
       kSpoilers.at(scenario)(views, views_of(objects[(i + 1) % objects.size()]));
@@ -138,10 +143,10 @@ absl::Status Run(const Options& options) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
 int main(int argc, char** argv) {
-  romap::Options options;
+  romap::measure::Options options;
   CLI::App app("Trains fields on input that is not as it should be");
   std::vector<std::string> names;
   for (const auto& [name, spoiler] : romap::kSpoilers) names.push_back(name);
@@ -156,5 +161,5 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed);
   app.add_flag("--depth", options.depth);
   CLI11_PARSE(app, argc, argv);
-  return romap::RunConfigured(options, romap::Run);
+  return romap::measure::RunConfigured(options, romap::measure::Run);
 }

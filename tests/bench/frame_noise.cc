@@ -7,7 +7,7 @@
 #include "client/synth/random.h"
 #include "tests/support/mask_damage.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 SE3<World, Camera> Shaken(const SE3<World, Camera>& T_world_camera, const FrameNoise& noise, uint64_t frame_id) {
@@ -24,9 +24,9 @@ SE3<World, Camera> Shaken(const SE3<World, Camera>& T_world_camera, const FrameN
 
 }  // namespace
 
-TrueFrames WithNoise(const TrueFrames& frames, const FrameNoise& noise) {
+bench::TrueFrames WithNoise(const bench::TrueFrames& frames, const FrameNoise& noise) {
   MaskDamager damager({.border_px = noise.mask_px, .seed = noise.seed}, {});
-  TrueFrames noisy;
+  bench::TrueFrames noisy;
   for (const std::shared_ptr<const Frame>& frame : frames) {
     Frame changed = noise.mask_px > 0 ? *damager.Damage(*frame) : *frame;
     if (noise.pose_deg > 0 || noise.pose_cm > 0) {
@@ -37,4 +37,4 @@ TrueFrames WithNoise(const TrueFrames& frames, const FrameNoise& noise) {
   return noisy;
 }
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -4,7 +4,7 @@
 
 #include "client/bench/true_views.h"
 
-namespace romap {
+namespace romap::measure {
 
 // How wrong the poses and masks of frames are made. All off by default.
 struct FrameNoise {
@@ -15,6 +15,6 @@ struct FrameNoise {
 };
 
 // The frames with noise on every one. What happens to a frame follows from the seed and the frame's id alone.
-TrueFrames WithNoise(const TrueFrames& frames, const FrameNoise& noise);
+bench::TrueFrames WithNoise(const bench::TrueFrames& frames, const FrameNoise& noise);
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -24,7 +24,7 @@
 #include "server/slam/features/image_pyramid.h"
 #include "server/slam/features/steered_brief.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 constexpr int kPictures = 60;
@@ -78,19 +78,21 @@ cv::Mat WithNoise(const cv::Mat& picture, uint64_t seed) {
 }
 
 // The grey values around a corner, turned upright.
-constexpr int kSide_px = 2 * kPatchRadius_px + 1;
+constexpr int kSide_px = 2 * slam::kPatchRadius_px + 1;
 using Patch = std::array<uint8_t, kSide_px * kSide_px>;
 
-Patch CutPatch(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction, const cv::Matx22d& warp) {
+Patch CutPatch(const cv::Mat& smooth, int x_px, int y_px, const slam::PatchDirection& direction,
+               const cv::Matx22d& warp) {
   const cv::Matx22d turn(direction.cosine, -direction.sine, direction.sine, direction.cosine);
   const cv::Matx22d to_image = warp * turn;
   Patch patch;
-  for (int y = -kPatchRadius_px; y <= kPatchRadius_px; ++y) {
-    for (int x = -kPatchRadius_px; x <= kPatchRadius_px; ++x) {
+  for (int y = -slam::kPatchRadius_px; y <= slam::kPatchRadius_px; ++y) {
+    for (int x = -slam::kPatchRadius_px; x <= slam::kPatchRadius_px; ++x) {
       const cv::Vec2d at = to_image * cv::Vec2d(x, y);
       const int u = std::clamp(x_px + static_cast<int>(std::lround(at[0])), 0, smooth.cols - 1);
       const int v = std::clamp(y_px + static_cast<int>(std::lround(at[1])), 0, smooth.rows - 1);
-      patch[static_cast<size_t>((y + kPatchRadius_px) * kSide_px + x + kPatchRadius_px)] = smooth.at<uint8_t>(v, u);
+      patch[static_cast<size_t>((y + slam::kPatchRadius_px) * kSide_px + x + slam::kPatchRadius_px)] =
+          smooth.at<uint8_t>(v, u);
     }
   }
   return patch;
@@ -102,37 +104,38 @@ struct Sights {
 };
 
 void AddSights(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Sights& sights) {
-  constexpr int kMargin_px = kPatchBorder_px + 4;  // for the second sight's shift
-  ImagePyramid one, other;
+  constexpr int kMargin_px = slam::kPatchBorder_px + 4;  // for the second sight's shift
+  slam::ImagePyramid one, other;
   const cv::Mat one_grey = WithNoise(picture, 2 * seed), other_grey = WithNoise(picture, 2 * seed + 1);
   one.Build(one_grey, 64);
   other.Build(other_grey, 64);
   for (int octave = 0; octave < one.octaves(); ++octave) {
     const cv::Mat& image = one.sharp(octave);
     const cv::Rect part(kMargin_px, kMargin_px, image.cols - 2 * kMargin_px, image.rows - 2 * kMargin_px);
-    for (const cv::KeyPoint& corner : SpreadEvenly(DetectCorners(image, part, 15), image.size(), kCornersPerOctave)) {
+    for (const cv::KeyPoint& corner :
+         slam::SpreadEvenly(slam::DetectCorners(image, part, 15), image.size(), kCornersPerOctave)) {
       const auto x_px = static_cast<int>(corner.pt.x), y_px = static_cast<int>(corner.pt.y);
       const auto shift = [&] { return std::clamp(static_cast<int>(std::lround(kShift_px * Normal(random))), -3, 3); };
       const int other_x_px = x_px + shift(), other_y_px = y_px + shift();
       const cv::Matx22d warp(1 + kWarp * Normal(random), kWarp * Normal(random), kWarp * Normal(random),
                              1 + kWarp * Normal(random));
       sights.first.push_back(
-          CutPatch(one.smooth(octave), x_px, y_px, IntensityCentroid(image, x_px, y_px), cv::Matx22d::eye()));
+          CutPatch(one.smooth(octave), x_px, y_px, slam::IntensityCentroid(image, x_px, y_px), cv::Matx22d::eye()));
       sights.second.push_back(CutPatch(other.smooth(octave), other_x_px, other_y_px,
-                                       IntensityCentroid(other.sharp(octave), other_x_px, other_y_px), warp));
+                                       slam::IntensityCentroid(other.sharp(octave), other_x_px, other_y_px), warp));
     }
   }
 }
 
 // Two different points of the circle.
-BriefTest DrawTest(std::mt19937& random) {
+slam::BriefTest DrawTest(std::mt19937& random) {
   const auto draw = [&](int8_t& x_px, int8_t& y_px) {
     do {
-      x_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * kPatchRadius_px));
-      y_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * kPatchRadius_px));
-    } while (x_px * x_px + y_px * y_px > (kPatchRadius_px - 0.5) * (kPatchRadius_px - 0.5));
+      x_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * slam::kPatchRadius_px));
+      y_px = static_cast<int8_t>(std::lround((2 * Uniform(random) - 1) * slam::kPatchRadius_px));
+    } while (x_px * x_px + y_px * y_px > (slam::kPatchRadius_px - 0.5) * (slam::kPatchRadius_px - 0.5));
   };
-  BriefTest test;
+  slam::BriefTest test;
   do {
     draw(test.first_x_px, test.first_y_px);
     draw(test.second_x_px, test.second_y_px);
@@ -143,9 +146,9 @@ BriefTest DrawTest(std::mt19937& random) {
 // A test's outcomes on all corners, one bit each.
 using Bits = std::vector<uint64_t>;
 
-Bits Outcomes(const BriefTest& test, const std::vector<Patch>& patches) {
+Bits Outcomes(const slam::BriefTest& test, const std::vector<Patch>& patches) {
   const auto index = [](int x_px, int y_px) {
-    return static_cast<size_t>((y_px + kPatchRadius_px) * kSide_px + x_px + kPatchRadius_px);
+    return static_cast<size_t>((y_px + slam::kPatchRadius_px) * kSide_px + x_px + slam::kPatchRadius_px);
   };
   const size_t first = index(test.first_x_px, test.first_y_px), second = index(test.second_x_px, test.second_y_px);
   Bits bits((patches.size() + 63) / 64, 0);
@@ -162,7 +165,7 @@ double ShareDiffering(const Bits& a, const Bits& b, size_t count) {
 }
 
 struct Candidate {
-  BriefTest test;
+  slam::BriefTest test;
   Bits bits;
   double merit = 0;
 };
@@ -188,27 +191,27 @@ std::vector<Candidate> RankCandidates(const Sights& sights, std::mt19937& random
   return candidates;
 }
 
-std::vector<BriefTest> TakeUncorrelated(const std::vector<Candidate>& candidates, size_t corners) {
+std::vector<slam::BriefTest> TakeUncorrelated(const std::vector<Candidate>& candidates, size_t corners) {
   std::vector<const Candidate*> taken;
-  for (double limit = kFirstCorrelation; taken.size() < BriefTests().size(); limit += kCorrelationStep) {
+  for (double limit = kFirstCorrelation; taken.size() < slam::BriefTests().size(); limit += kCorrelationStep) {
     taken.clear();
     for (const Candidate& candidate : candidates) {
       const bool is_new = std::none_of(taken.begin(), taken.end(), [&](const Candidate* other) {
         return std::abs(1 - 2 * ShareDiffering(candidate.bits, other->bits, corners)) > limit;
       });
       if (is_new) taken.push_back(&candidate);
-      if (taken.size() == BriefTests().size()) break;
+      if (taken.size() == slam::BriefTests().size()) break;
     }
     std::fprintf(stderr, "correlation up to %.2f: %zu tests\n", limit, taken.size());
   }
-  std::vector<BriefTest> tests;
+  std::vector<slam::BriefTest> tests;
   for (const Candidate* candidate : taken) tests.push_back(candidate->test);
   return tests;
 }
 
-void PrintTable(const std::vector<BriefTest>& tests) {
+void PrintTable(const std::vector<slam::BriefTest>& tests) {
   for (size_t i = 0; i < tests.size(); ++i) {
-    const BriefTest& t = tests[i];
+    const slam::BriefTest& t = tests[i];
     std::printf("%s{%d, %d, %d, %d},%s", i % 6 == 0 ? "    " : "", t.first_x_px, t.first_y_px, t.second_x_px,
                 t.second_y_px, i % 6 == 5 || i + 1 == tests.size() ? "\n" : " ");
   }
@@ -224,6 +227,6 @@ int Main() {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main() { return romap::Main(); }
+int main() { return romap::measure::Main(); }

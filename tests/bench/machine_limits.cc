@@ -15,7 +15,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace romap::HWY_NAMESPACE {
+namespace romap::measure::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -47,11 +47,11 @@ void UpdateAll(float* array, size_t count) {
   for (size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::LoadU(d, array + i) + summand, d, array + i);
 }
 
-}  // namespace romap::HWY_NAMESPACE
+}  // namespace romap::measure::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace romap {
+namespace romap::measure {
 
 HWY_EXPORT(LoadAt);
 HWY_EXPORT(UpdateAt);
@@ -108,7 +108,7 @@ double RandomAccessSeconds(size_t table_bytes, const Access& access) {
 
 }  // namespace
 
-double PeakFlopPerSecond() { return 1e9 * MeasureFmaPeakGflops(1); }
+double PeakFlopPerSecond() { return 1e9 * bench::MeasureFmaPeakGflops(1); }
 
 double RandomLoadSeconds(size_t table_bytes) {
   return RandomAccessSeconds(table_bytes, [](const float* table, const std::vector<uint32_t>& places) {
@@ -131,5 +131,5 @@ double StreamBytesPerSecond(size_t array_bytes) {
   return 2.0 * kPasses * static_cast<double>(array_bytes) / seconds;
 }
 
-}  // namespace romap
+}  // namespace romap::measure
 #endif

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-namespace romap {
+namespace romap::measure {
 
 // What one core of this machine can do at best, measured: the yardsticks of a roofline (Williams, Waterman, Patterson:
 // "Roofline: an insightful visual performance model for multicore architectures", 2009).
@@ -21,4 +21,4 @@ double RandomUpdateSeconds(size_t table_bytes);
 // as read and once as written].
 double StreamBytesPerSecond(size_t array_bytes);
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -23,7 +23,7 @@
 #include "tests/bench/run_configured.h"
 #include "tests/bench/training_scene.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 struct Options {
@@ -31,8 +31,8 @@ struct Options {
   std::vector<std::string> assignments;
   int steps = 200;
   int repeats = 7;
-  NerfConfig nerf;
-  MeshConfig mesh;
+  nerf::NerfConfig nerf;
+  mesh::MeshConfig mesh;
 };
 
 double Milliseconds(std::chrono::steady_clock::duration time) {
@@ -41,7 +41,7 @@ double Milliseconds(std::chrono::steady_clock::duration time) {
 
 // Time to ask the field at all nodes of a cube of nodes.
 double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
-  const FieldGrid grid = MakeEmptyGrid(Eigen::Vector3i::Constant(resolution), snapshot.box_half_extents);
+  const mesh::FieldGrid grid = mesh::MakeEmptyGrid(Eigen::Vector3i::Constant(resolution), snapshot.box_half_extents);
   std::vector<Eigen::Vector3f> points;
   for (int z = 1; z <= resolution; ++z) {
     for (int y = 1; y <= resolution; ++y) {
@@ -56,12 +56,12 @@ double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
 
 // Share of the nodes within the hull that sampling put on the wrong side of the surface.
 double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
-  const SurfaceProbe probe(snapshot);
-  const FieldGrid grid = SampleField(snapshot, probe, nodes).grid;
+  const mesh::SurfaceProbe probe(snapshot);
+  const mesh::FieldGrid grid = mesh::SampleField(snapshot, probe, nodes).grid;
   std::vector<Eigen::Vector3f> points;
   std::vector<bool> inside;
   for (size_t node = 0; node < grid.value.size(); ++node) {
-    if (grid.value[node] <= kEmpty || grid.edited[node] != 0) continue;
+    if (grid.value[node] <= mesh::kEmpty || grid.edited[node] != 0) continue;
     points.push_back(grid.Position(grid.NodeAt(node)));
     inside.push_back(grid.value[node] > 0);
   }
@@ -72,23 +72,23 @@ double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
   return static_cast<double>(wrong) / static_cast<double>(std::max<size_t>(1, values.size()));
 }
 
-absl::Status BenchObject(const TrainingScene& scene, const ObjectRecord& object, const Options& options) {
-  ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, 1);
+absl::Status BenchObject(const TrainingScene& scene, const files::ObjectRecord& object, const Options& options) {
+  nerf::ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)}, 1);
   ROMAP_RETURN_IF_ERROR(field.SetBox({object.T_world_object, object.half_extents, 1.0}));
-  for (ObjectView& view : MakeTrueViews(scene.frames, object, /*with_depth=*/false)) {
+  for (ObjectView& view : bench::MakeTrueViews(scene.frames, object, /*with_depth=*/false)) {
     ROMAP_RETURN_IF_ERROR(field.AddView(std::move(view)));
   }
   if (field.views() == 0) return absl::OkStatus();
   field.Train(options.steps, 2);
   const FieldSnapshot snapshot = field.Snapshot();
 
-  MeshStats best;
+  mesh::MeshStats best;
   double best_s = std::numeric_limits<double>::infinity();
   double all_nodes_ms = best_s;
   Mesh mesh;
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
-    MeshStats stats;
-    ROMAP_ASSIGN_OR_RETURN(mesh, ExtractMesh(snapshot, options.mesh, &stats));
+    mesh::MeshStats stats;
+    ROMAP_ASSIGN_OR_RETURN(mesh, mesh::ExtractMesh(snapshot, options.mesh, &stats));
     const double total_s = std::accumulate(stats.phase_cpu_s.begin(), stats.phase_cpu_s.end(), 0.0);
     if (total_s < best_s) best = stats;
     best_s = std::min(best_s, total_s);
@@ -106,22 +106,22 @@ absl::Status BenchObject(const TrainingScene& scene, const ObjectRecord& object,
 absl::Status Run(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(options.sequence));
   std::printf("%-10s %11s %8s %8s %7s |", "object", "nodes", "asked", "vertices", "signs");
-  for (const char* name : kMeshPhaseNames) std::printf(" %10s", name);
+  for (const char* name : mesh::kMeshPhaseNames) std::printf(" %10s", name);
   std::printf(" | %7s %9s %6s  [ms]\n", "sum", "all nodes", "ratio");
-  for (const ObjectRecord& object : scene.objects) ROMAP_RETURN_IF_ERROR(BenchObject(scene, object, options));
+  for (const files::ObjectRecord& object : scene.objects) ROMAP_RETURN_IF_ERROR(BenchObject(scene, object, options));
   return absl::OkStatus();
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
 int main(int argc, char** argv) {
-  romap::Options options;
+  romap::measure::Options options;
   CLI::App app("Meshes trained fields and reports cost");
   app.add_option("sequence", options.sequence);
   app.add_option("--set", options.assignments)->allow_extra_args(false);
   app.add_option("--steps", options.steps)->check(CLI::PositiveNumber);
   app.add_option("--repeats", options.repeats)->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  return romap::RunConfigured(options, romap::Run);
+  return romap::measure::RunConfigured(options, romap::measure::Run);
 }

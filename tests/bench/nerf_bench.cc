@@ -26,10 +26,10 @@
 #include "tests/bench/machine_limits.h"
 #include "tests/bench/training_scene.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
-constexpr int kPhases = static_cast<int>(TrainPhase::kCount);
+constexpr int kPhases = static_cast<int>(nerf::TrainPhase::kCount);
 
 struct Options {
   std::string sequence;
@@ -42,31 +42,32 @@ struct Options {
 
 // One object, ready to be trained on.
 struct Subject {
-  TrainingBox box;
+  nerf::TrainingBox box;
   std::vector<ObjectView> views;
 };
 
 absl::StatusOr<std::vector<Subject>> LoadSubjects(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(path));
   std::vector<Subject> subjects;
-  for (const ObjectRecord& object : scene.objects) {
+  for (const files::ObjectRecord& object : scene.objects) {
     Subject subject;
-    subject.box = TrainingBox::Around({object.T_world_object, object.half_extents, 1.0}, NerfConfig().box_enlargement);
-    subject.views = MakeTrueViews(scene.frames, object, /*with_depth=*/false);
+    subject.box = nerf::TrainingBox::Around({object.T_world_object, object.half_extents, 1.0},
+                                            nerf::NerfConfig().box_enlargement);
+    subject.views = bench::MakeTrueViews(scene.frames, object, /*with_depth=*/false);
     if (!subject.views.empty()) subjects.push_back(std::move(subject));
   }
   return subjects;
 }
 
 // Trains a new field on the subject.
-TrainStats TrainOnce(const Subject& subject, const NerfConfig& config, const nerf::KernelTable& kernels, int steps,
-                     int threads) {
-  VisualHull hull(config);
+nerf::TrainStats TrainOnce(const Subject& subject, const nerf::NerfConfig& config, const nerf::KernelTable& kernels,
+                           int steps, int threads) {
+  nerf::VisualHull hull(config);
   hull.Reset(subject.box);
   for (const ObjectView& view : subject.views) hull.Add(view);
   nerf::Occupancy occupancy(config);
   occupancy.SetHull(hull.Carve());
-  RaySet rays(config, 1);
+  nerf::RaySet rays(config, 1);
   rays.Build(subject.views, subject.box);
   nerf::FieldTrainer trainer(config, 1, kernels);
   const Eigen::Vector3f extent = subject.box.ExtentUnit();
@@ -83,11 +84,11 @@ TrainStats TrainOnce(const Subject& subject, const NerfConfig& config, const ner
 }
 
 // Sums over subjects.
-TrainStats TrainAll(const std::vector<Subject>& subjects, const NerfConfig& config, const nerf::KernelTable& kernels,
-                    int steps, int threads) {
-  TrainStats total;
+nerf::TrainStats TrainAll(const std::vector<Subject>& subjects, const nerf::NerfConfig& config,
+                          const nerf::KernelTable& kernels, int steps, int threads) {
+  nerf::TrainStats total;
   for (const Subject& subject : subjects) {
-    const TrainStats stats = TrainOnce(subject, config, kernels, steps, threads);
+    const nerf::TrainStats stats = TrainOnce(subject, config, kernels, steps, threads);
     total.steps += stats.steps;
     total.rays += stats.rays;
     total.samples += stats.samples;
@@ -98,7 +99,7 @@ TrainStats TrainAll(const std::vector<Subject>& subjects, const NerfConfig& conf
   return total;
 }
 
-double Rate(const TrainStats& stats) { return static_cast<double>(stats.samples) / stats.wall_s; }
+double Rate(const nerf::TrainStats& stats) { return static_cast<double>(stats.samples) / stats.wall_s; }
 
 // Peaks of one core for a model of some size.
 struct Limits {
@@ -113,7 +114,8 @@ Limits MeasureLimits(const nerf::GridLayout& layout) {
 }
 
 // Least time of each phase per sample [s], of one thread working alone.
-std::array<double, kPhases> PhaseLimits(const NerfConfig& config, const TrainStats& stats, const Limits& limits) {
+std::array<double, kPhases> PhaseLimits(const nerf::NerfConfig& config, const nerf::TrainStats& stats,
+                                        const Limits& limits) {
   const nerf::GridLayout layout = nerf::MakeGridLayout(config);
   const double samples = static_cast<double>(stats.samples);
   const double active = static_cast<double>(stats.active_samples) / samples;
@@ -140,7 +142,7 @@ std::array<double, kPhases> PhaseLimits(const NerfConfig& config, const TrainSta
           2 * bytes * limits.byte_s};
 }
 
-void PrintPhases(const TrainStats& one, const TrainStats& many, const std::array<double, kPhases>& limits) {
+void PrintPhases(const nerf::TrainStats& one, const nerf::TrainStats& many, const std::array<double, kPhases>& limits) {
   double limit_sum = 0;
   std::printf("  %-12s %10s %10s %10s %7s\n", "phase", "1 thread", "all", "limit", "share");
   const auto row = [&](const char* name, double one_s, double many_s, double limit_s) {
@@ -155,11 +157,11 @@ void PrintPhases(const TrainStats& one, const TrainStats& many, const std::array
   row("all", one.CpuSeconds(), many.CpuSeconds(), limit_sum);
 }
 
-void BenchPreset(const char* name, const NerfConfig& config, int default_steps, const std::vector<Subject>& subjects,
-                 const Options& options) {
+void BenchPreset(const char* name, const nerf::NerfConfig& config, int default_steps,
+                 const std::vector<Subject>& subjects, const Options& options) {
   const int steps = options.steps > 0 ? options.steps : default_steps;
-  const auto faster = [](const TrainStats& a, const TrainStats& b) { return Rate(a) > Rate(b) ? a : b; };
-  TrainStats one, many, plain, short_run;
+  const auto faster = [](const nerf::TrainStats& a, const nerf::TrainStats& b) { return Rate(a) > Rate(b) ? a : b; };
+  nerf::TrainStats one, many, plain, short_run;
   one.wall_s = many.wall_s = plain.wall_s = short_run.wall_s = 1;
   const int plain_steps = std::max(1, steps / 20);
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
@@ -184,8 +186,8 @@ void BenchPreset(const char* name, const NerfConfig& config, int default_steps, 
 
 absl::Status Run(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(const std::vector<Subject> subjects, LoadSubjects(options.sequence));
-  NerfConfig fast, paper = *NerfPreset("paper");
-  for (NerfConfig* config : {&fast, &paper}) {
+  nerf::NerfConfig fast, paper = *nerf::NerfPreset("paper");
+  for (nerf::NerfConfig* config : {&fast, &paper}) {
     ConfigFields fields;
     fields.Section("nerf");
     config->Fields(fields);
@@ -198,10 +200,10 @@ absl::Status Run(const Options& options) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
 int main(int argc, char** argv) {
-  romap::Options options;
+  romap::measure::Options options;
   CLI::App app("Cost of training by phase, against this machine's own limits");
   app.add_option("sequence", options.sequence);
   app.add_option("--preset", options.preset)->check(CLI::IsMember({"fast", "paper", "both"}));
@@ -210,7 +212,7 @@ int main(int argc, char** argv) {
   app.add_option("--repeats", options.repeats)->check(CLI::PositiveNumber);
   app.add_option("--threads", options.threads)->check(CLI::Range(1, 64));
   CLI11_PARSE(app, argc, argv);
-  const absl::Status status = romap::Run(options);
+  const absl::Status status = romap::measure::Run(options);
   if (!status.ok()) std::fprintf(stderr, "error: %s\n", romap::Message(status).c_str());
   return status.ok() ? 0 : 1;
 }

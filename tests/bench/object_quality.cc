@@ -31,7 +31,7 @@
 #include "tests/bench/object_score.h"
 #include "tests/bench/object_tables.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 struct DamageKind {
@@ -70,35 +70,36 @@ struct Options {
   bool list = false;
   std::string draw;
   std::vector<std::string> assignments;
-  SequenceOptions files;
+  files::SequenceOptions files;
   int jobs = 1;
 };
 
 // One run of many that do not depend on each other.
 struct Job {
-  const Sequence* sequence = nullptr;
+  const files::Sequence* sequence = nullptr;
   ObjectRunOptions options;
   std::string picture_dir;  // empty = no pictures
   ScoredRun* result = nullptr;
   absl::Status status = absl::OkStatus();
 };
 
-absl::StatusOr<Similarity> TrueFromMap(const Sequence& sequence, const ObjectRun& run) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<StampedPose> truth, ReadTum(sequence.dir() + "/groundtruth.txt"));
-  ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
-                         AlignTrajectories(run.trajectory, truth, Alignment::kSim3, /*max_dt_s=*/0.02));
+absl::StatusOr<eval::FittedSimilarity> TrueFromMap(const files::Sequence& sequence, const ObjectRun& run) {
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth,
+                         files::ReadTum(sequence.dir() + "/groundtruth.txt"));
+  ROMAP_ASSIGN_OR_RETURN(const eval::TrajectoryFit fit,
+                         eval::AlignTrajectories(run.trajectory, truth, eval::Alignment::kSim3, /*max_dt_s=*/0.02));
   return fit.gt_from_est;
 }
 
 absl::Status Execute(const Job& job) {
   ROMAP_ASSIGN_OR_RETURN(const ObjectRun run, RunObjects(*job.sequence, job.options));
   job.result->tracked_share = static_cast<double>(run.trajectory.size()) / run.frames;
-  const ObjectsYaml& truth = *job.sequence->objects();
+  const files::ObjectsYaml& truth = *job.sequence->objects();
   const std::vector<ObjectUpdate> objects = run.Confirmed();
   if (!job.picture_dir.empty()) {
-    ROMAP_RETURN_IF_ERROR(WriteCuboidPictures(job.picture_dir, *job.sequence, run.trajectory, objects));
+    ROMAP_RETURN_IF_ERROR(cli::WriteCuboidPictures(job.picture_dir, *job.sequence, run.trajectory, objects));
   }
-  absl::StatusOr<Similarity> true_from_map = Similarity{};
+  absl::StatusOr<eval::FittedSimilarity> true_from_map = eval::FittedSimilarity{};
   if (job.options.poses == PoseUse::kIgnore) true_from_map = TrueFromMap(*job.sequence, run);
   if (!true_from_map.ok()) {
     // Not tracked: nothing was found.
@@ -139,7 +140,7 @@ class Measurement {
 
   absl::Status Open() {
     for (const std::string& dir : options_.sequences) {
-      ROMAP_ASSIGN_OR_RETURN(Sequence sequence, Sequence::Open(dir, options_.files));
+      ROMAP_ASSIGN_OR_RETURN(files::Sequence sequence, files::Sequence::Open(dir, options_.files));
       if (!sequence.objects()) return NotFound("{}: there is no objects.yaml", dir);
       sequences_.push_back(std::move(sequence));
     }
@@ -148,7 +149,7 @@ class Measurement {
 
   absl::Status Measure(PoseUse poses) {
     std::vector<SequenceRuns> results;
-    for (const Sequence& sequence : sequences_) {
+    for (const files::Sequence& sequence : sequences_) {
       // Without the slash that a folder's name may end with.
       SequenceRuns runs{(std::filesystem::path(sequence.dir()) / ".").parent_path().filename().string(), {}};
       for (const DamageKind& kind : kinds_) {
@@ -224,7 +225,7 @@ class Measurement {
   Options options_;
   ObjectRunOptions base_;
   std::vector<DamageKind> kinds_;
-  std::vector<Sequence> sequences_;
+  std::vector<files::Sequence> sequences_;
 };
 
 absl::Status MeasureAll(const Options& options) {
@@ -272,6 +273,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Main(argc, argv); }
+int main(int argc, char** argv) { return romap::measure::Main(argc, argv); }

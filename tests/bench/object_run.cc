@@ -13,7 +13,7 @@
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 double UserSeconds() {
@@ -22,17 +22,17 @@ double UserSeconds() {
   return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
 }
 
-std::vector<std::string> ClassNames(const Sequence& sequence) {
+std::vector<std::string> ClassNames(const files::Sequence& sequence) {
   std::set<std::string> names;
   if (sequence.objects()) {
-    for (const ObjectRecord& record : sequence.objects()->objects) names.insert(record.class_name);
+    for (const files::ObjectRecord& record : sequence.objects()->objects) names.insert(record.class_name);
   }
   return {names.begin(), names.end()};
 }
 
 class Runner {
  public:
-  Runner(const Sequence& sequence, const ObjectRunOptions& options)
+  Runner(const files::Sequence& sequence, const ObjectRunOptions& options)
       : ingest_(sequence.camera(), options.objects.mask_patience_s),
         damager_(options.damage, ClassNames(sequence)),
         tracker_(options.slam, options.poses, &local_map_),
@@ -41,7 +41,7 @@ class Runner {
 
   absl::Status Take(const FrameInput& input) {
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest_.Accept(input));
-    const MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
+    const slam::MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
     if (mapped.begun_anew) {
       Record(object_mapper_.Reset());
       tracked_.clear();
@@ -106,7 +106,7 @@ class Runner {
     return reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
   }
 
-  void Record(const ObjectMapper::Output& output) {
+  void Record(const objects::ObjectMapper::Output& output) {
     const auto frame = static_cast<size_t>(run_.frames);
     for (const MapEvent& event : output.events) {
       if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
@@ -131,12 +131,12 @@ class Runner {
     run_.objects.erase(id);
   }
 
-  Ingest ingest_;
+  session::Ingest ingest_;
   MaskDamager damager_;
-  LocalMapSlot local_map_;
-  Tracker tracker_;
-  SparseMapper sparse_mapper_;
-  ObjectMapper object_mapper_;
+  slam::LocalMapSlot local_map_;
+  slam::Tracker tracker_;
+  slam::SparseMapper sparse_mapper_;
+  objects::ObjectMapper object_mapper_;
   std::vector<Tracked> tracked_;
   ObjectRun run_;
 };
@@ -151,7 +151,7 @@ std::vector<ObjectUpdate> ObjectRun::Confirmed() const {
   return confirmed;
 }
 
-absl::StatusOr<ObjectRun> RunObjects(const Sequence& sequence, const ObjectRunOptions& options) {
+absl::StatusOr<ObjectRun> RunObjects(const files::Sequence& sequence, const ObjectRunOptions& options) {
   Runner runner(sequence, options);
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
@@ -160,4 +160,4 @@ absl::StatusOr<ObjectRun> RunObjects(const Sequence& sequence, const ObjectRunOp
   return runner.Finish();
 }
 
-}  // namespace romap
+}  // namespace romap::measure

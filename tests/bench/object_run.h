@@ -17,11 +17,11 @@
 #include "server/slam/slam_config.h"
 #include "tests/support/mask_damage.h"
 
-namespace romap {
+namespace romap::measure {
 
 struct ObjectRunOptions {
-  SlamConfig slam;
-  ObjectsConfig objects;
+  slam::SlamConfig slam;
+  objects::ObjectsConfig objects;
   PoseUse poses = PoseUse::kGiven;
   MaskDamage damage;
 };
@@ -35,9 +35,9 @@ struct ToldObject {
 };
 
 struct ObjectRun {
-  std::map<ObjectId, ToldObject> objects;  // those that are left at the end, in any state
-  std::vector<std::string> gone;           // a line for each that was merged or removed
-  std::vector<StampedPose> trajectory;     // of the frames that were tracked, as the map has them at the end
+  std::map<ObjectId, ToldObject> objects;      // those that are left at the end, in any state
+  std::vector<std::string> gone;               // a line for each that was merged or removed
+  std::vector<files::StampedPose> trajectory;  // of the frames that were tracked, as the map has them at the end
   int frames = 0;
   int keyframes = 0;
   // User time of the object mapper.
@@ -50,6 +50,6 @@ struct ObjectRun {
 
 // `sequence` hands out its own labels: the damage may permute them. Errors: what Sequence::Load and the decoding of
 // frames say.
-absl::StatusOr<ObjectRun> RunObjects(const Sequence& sequence, const ObjectRunOptions& options);
+absl::StatusOr<ObjectRun> RunObjects(const files::Sequence& sequence, const ObjectRunOptions& options);
 
-}  // namespace romap
+}  // namespace romap::measure

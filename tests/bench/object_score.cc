@@ -7,13 +7,13 @@
 #include "client/eval/boxes_eval.h"
 #include "common/assignment.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
-ObjectErrors Compare(const UprightBox& box, const UprightBox& truth) {
+ObjectErrors Compare(const eval::UprightBox& box, const eval::UprightBox& truth) {
   const Eigen::Vector3d shift_cm = 100 * (box.center - truth.center);
   ObjectErrors errors;
-  errors.iou = IntersectionOverUnion(box, truth);
+  errors.iou = eval::IntersectionOverUnion(box, truth);
   errors.center_cm = shift_cm.norm();
   errors.in_plane_cm = shift_cm.head<2>().norm();
   errors.yaw_deg = std::abs(std::remainder((box.yaw_rad - truth.yaw_rad) * 180 / std::numbers::pi, 90.0));
@@ -21,13 +21,13 @@ ObjectErrors Compare(const UprightBox& box, const UprightBox& truth) {
 }
 
 // Which true object each box is matched with, -1 = none.
-std::vector<int> Match(const std::vector<UprightBox>& boxes, const std::vector<UprightBox>& truth) {
+std::vector<int> Match(const std::vector<eval::UprightBox>& boxes, const std::vector<eval::UprightBox>& truth) {
   constexpr double kNever = 1e6;  // more than all admissible pairs together
   Eigen::MatrixXd cost(boxes.size(), truth.size());
   for (size_t i = 0; i < boxes.size(); ++i) {
     for (size_t j = 0; j < truth.size(); ++j) {
       const double distance = (boxes[i].center - truth[j].center).norm() / truth[j].half_extents.norm();
-      const bool admissible = distance <= 1 && IntersectionOverUnion(boxes[i], truth[j]) > 0;
+      const bool admissible = distance <= 1 && eval::IntersectionOverUnion(boxes[i], truth[j]) > 0;
       cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = admissible ? distance : kNever;
     }
   }
@@ -39,12 +39,12 @@ std::vector<int> Match(const std::vector<UprightBox>& boxes, const std::vector<U
 }
 
 // Name of the found object that the box shares the most volume with; empty when it touches none.
-std::string MostOverlapped(const UprightBox& box, const std::vector<UprightBox>& truth,
+std::string MostOverlapped(const eval::UprightBox& box, const std::vector<eval::UprightBox>& truth,
                            const std::vector<TrueObject>& objects) {
   double most = 0;
   std::string name;
   for (size_t j = 0; j < truth.size(); ++j) {
-    const double iou = IntersectionOverUnion(box, truth[j]);
+    const double iou = eval::IntersectionOverUnion(box, truth[j]);
     if (!objects[j].found || iou <= most) continue;
     most = iou;
     name = objects[j].name;
@@ -61,20 +61,21 @@ size_t MapScore::Found() const {
 
 size_t MapScore::Extra() const { return mapped.size() - Found(); }
 
-MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> objects, const Similarity& true_from_map) {
+MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
+                  const eval::FittedSimilarity& true_from_map) {
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
-  std::vector<UprightBox> true_boxes, boxes;
+  std::vector<eval::UprightBox> true_boxes, boxes;
   MapScore score;
-  for (const ObjectRecord& record : truth.objects) {
-    true_boxes.push_back(MakeUpright((z_from_up * record.T_world_object.rotation()).toRotationMatrix(),
-                                     z_from_up * record.T_world_object.translation(), record.half_extents));
+  for (const files::ObjectRecord& record : truth.objects) {
+    true_boxes.push_back(eval::MakeUpright((z_from_up * record.T_world_object.rotation()).toRotationMatrix(),
+                                           z_from_up * record.T_world_object.translation(), record.half_extents));
     score.objects.push_back({.name = record.name, .errors = {}});
   }
   for (const ObjectUpdate& object : objects) {
     const SE3<World, Object>& T = object.cuboid.T_world_object;
     const Eigen::Vector3d center_m = true_from_map * T.translation();
-    boxes.push_back(MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()), z_from_up * center_m,
-                                true_from_map.scale * object.cuboid.half_extents));
+    boxes.push_back(eval::MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()), z_from_up * center_m,
+                                      true_from_map.scale * object.cuboid.half_extents));
     score.mapped.push_back({object, center_m, "", ""});
   }
   if (boxes.empty() || true_boxes.empty()) return score;
@@ -93,4 +94,4 @@ MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> object
   return score;
 }
 
-}  // namespace romap
+}  // namespace romap::measure

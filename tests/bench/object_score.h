@@ -9,7 +9,7 @@
 #include "client/files/objects_yaml.h"
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::measure {
 
 // How well one true object was mapped.
 struct ObjectErrors {
@@ -46,6 +46,7 @@ struct MapScore {
 // Pairs the objects of a map one to one with the true ones, such that the sum of the distances of their centres is the
 // least. A pair overlaps, and its centres lie no farther apart than half the true box's diagonal; everything else is
 // missing or extra. `true_from_map` takes the map's world to the true one; lengths there are metres.
-MapScore ScoreMap(const ObjectsYaml& truth, std::span<const ObjectUpdate> objects, const Similarity& true_from_map);
+MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
+                  const eval::FittedSimilarity& true_from_map);
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 struct Range {
@@ -184,4 +184,4 @@ std::string FaultList(std::span<const SequenceRuns> sequences) {
   return list;
 }
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -6,7 +6,7 @@
 
 #include "tests/bench/object_score.h"
 
-namespace romap {
+namespace romap::measure {
 
 // One run over a sequence.
 struct ScoredRun {
@@ -42,4 +42,4 @@ std::string MapTable(const MapScore& score);
 // first few are named.
 std::string FaultList(std::span<const SequenceRuns> sequences);
 
-}  // namespace romap
+}  // namespace romap::measure

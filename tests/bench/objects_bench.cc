@@ -21,14 +21,14 @@
 #include "tests/bench/object_run.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
-const ObjectRecord* NearestTrue(const Sequence& sequence, const Cuboid& cuboid) {
-  const ObjectRecord* nearest = nullptr;
+const files::ObjectRecord* NearestTrue(const files::Sequence& sequence, const Cuboid& cuboid) {
+  const files::ObjectRecord* nearest = nullptr;
   double best = 0;
   if (!sequence.objects()) return nullptr;
-  for (const ObjectRecord& record : sequence.objects()->objects) {
+  for (const files::ObjectRecord& record : sequence.objects()->objects) {
     const double distance = (record.T_world_object.translation() - cuboid.T_world_object.translation()).norm();
     if (nearest != nullptr && distance >= best) continue;
     nearest = &record;
@@ -44,14 +44,14 @@ double YawErrorDeg(const SE3<World, Object>& a, const SE3<World, Object>& b) {
   return std::abs(std::remainder(degrees, 90.0));
 }
 
-std::vector<Eigen::Vector3d> TrueSurface(const Sequence& sequence, const ObjectRecord& record) {
+std::vector<Eigen::Vector3d> TrueSurface(const files::Sequence& sequence, const files::ObjectRecord& record) {
   std::vector<Eigen::Vector3d> points;
   std::error_code error;
   for (const auto& file : std::filesystem::directory_iterator(sequence.dir() + "/gt", error)) {
     const std::string name = file.path().stem().string();
     const std::string suffix = "_" + record.name;
     if (name != record.name && !name.ends_with(suffix)) continue;
-    const auto ply = ReadPly(file.path().string());
+    const auto ply = files::ReadPly(file.path().string());
     if (!ply.ok()) continue;
     const auto seen = ply->scalars.find("seen");
     for (size_t i = 0; i < ply->mesh.vertices.size(); ++i) {
@@ -61,7 +61,7 @@ std::vector<Eigen::Vector3d> TrueSurface(const Sequence& sequence, const ObjectR
   return points;
 }
 
-void Print(const Sequence& sequence, const ObjectRun& run) {
+void Print(const files::Sequence& sequence, const ObjectRun& run) {
   for (const std::string& line : run.gone) std::printf("%s\n", line.c_str());
   double iou_sum = 0;
   for (const auto& [id, told] : run.objects) {
@@ -73,7 +73,7 @@ void Print(const Sequence& sequence, const ObjectRun& run) {
         id.ToString().c_str(), told.last.class_name.c_str(), told.last.class_score, static_cast<int>(told.last.state),
         told.first_frame, told.last.observations, told.last.revision, told.cuboid_changes, told.views, half_cm.x(),
         half_cm.y(), half_cm.z());
-    if (const ObjectRecord* truth = NearestTrue(sequence, cuboid)) {
+    if (const files::ObjectRecord* truth = NearestTrue(sequence, cuboid)) {
       const Cuboid true_cuboid{.T_world_object = truth->T_world_object, .half_extents = truth->half_extents};
       const Eigen::Vector3d true_half_cm = 100 * truth->half_extents;
       const Eigen::Vector3d shift_cm =
@@ -101,7 +101,7 @@ int Main(int argc, char** argv) {
   fields.Section("slam");
   run_options.slam.Fields(fields);
   run_options.objects.Fields(fields);
-  SequenceOptions options;
+  files::SequenceOptions options;
   std::vector<std::string> assignments;
   std::string dir;
   for (int i = 1; i < argc; ++i) {
@@ -122,7 +122,7 @@ int Main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", Message(status).c_str());
     return 2;
   }
-  const auto sequence = Sequence::Open(dir, options);
+  const auto sequence = files::Sequence::Open(dir, options);
   if (!sequence.ok()) {
     std::fprintf(stderr, "%s\n", Message(sequence.status()).c_str());
     return 2;
@@ -137,6 +137,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Main(argc, argv); }
+int main(int argc, char** argv) { return romap::measure::Main(argc, argv); }

@@ -5,7 +5,7 @@
 #include "common/config.h"
 #include "common/status.h"
 
-namespace romap {
+namespace romap::measure {
 
 // Runs a bench of fields and meshes whose `options` hold their configuration in `nerf` and `mesh`, after the
 // `assignments` of the command line. Returns the exit status; an error is one line on stderr.
@@ -22,4 +22,4 @@ int RunConfigured(Options& options, absl::Status (*run)(const Options&)) {
   return status.ok() ? 0 : 1;
 }
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -20,7 +20,7 @@
 #include "server/slam/tracker.h"
 #include "tests/bench/user_seconds.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 cv::Mat Decode(const std::string& bytes, int flags) {
@@ -94,7 +94,7 @@ uint16_t MostSeenLabel(const PointRecord& record) {
       ->first;
 }
 
-void Report(const Run& run, const SparseMapper& mapper) {
+void Report(const Run& run, const slam::SparseMapper& mapper) {
   const auto keyframes = static_cast<double>(mapper.keyframes());
   std::printf("frames %zu keyframes %zu (one per %.1f frames) points %zu\n", run.frames, mapper.keyframes(),
               static_cast<double>(run.frames) / keyframes, mapper.points());
@@ -121,11 +121,11 @@ void Report(const Run& run, const SparseMapper& mapper) {
   }
 }
 
-absl::Status Bench(const std::string& dir, SlamConfig config, bool sensor_depth) {
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(dir, {.use_depth = true}));
-  LocalMapSlot local_map;
-  Tracker tracker(config, PoseUse::kGiven, &local_map);
-  SparseMapper mapper(config, &local_map, /*inline_adjustment=*/true);
+absl::Status Bench(const std::string& dir, slam::SlamConfig config, bool sensor_depth) {
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(dir, {.use_depth = true}));
+  slam::LocalMapSlot local_map;
+  slam::Tracker tracker(config, PoseUse::kGiven, &local_map);
+  slam::SparseMapper mapper(config, &local_map, /*inline_adjustment=*/true);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(FrameInput input, sequence.Load(i));
@@ -133,11 +133,11 @@ absl::Status Bench(const std::string& dir, SlamConfig config, bool sensor_depth)
     if (!sensor_depth) input.depth.clear();
     const auto frame = DecodeFrame(input, sequence.camera());
     const double start_s = UserSeconds();
-    const TrackedImage image = tracker.Track(frame);
+    const slam::TrackedImage image = tracker.Track(frame);
     const double tracked_s = UserSeconds();
     run.track_s += tracked_s - start_s;
     ++run.frames;
-    const MappedFrame mapped = mapper.Process(image);
+    const slam::MappedFrame mapped = mapper.Process(image);
     if (!mapped.view) continue;
     const double mapped_s = UserSeconds();
     run.map_s += mapped_s - tracked_s;
@@ -153,7 +153,7 @@ int Main(int argc, char** argv) {
     std::fprintf(stderr, "usage: slam_bench DIR [--sensor-depth] [--set slam.FIELD=VALUE]...\n");
     return 2;
   }
-  SlamConfig config;
+  slam::SlamConfig config;
   ConfigFields fields;
   fields.Section("slam");
   config.Fields(fields);
@@ -170,6 +170,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Main(argc, argv); }
+int main(int argc, char** argv) { return romap::measure::Main(argc, argv); }

@@ -36,14 +36,14 @@
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-double Quantile(std::vector<double> values, double share) {
+double eval::Quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
   std::sort(values.begin(), values.end());
   return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
@@ -52,7 +52,7 @@ double Quantile(std::vector<double> values, double share) {
 struct Options {
   std::string sequence;
   std::string out;
-  SlamConfig slam;
+  slam::SlamConfig slam;
   bool depth = false;
   PoseUse poses = PoseUse::kIgnore;
   size_t cut_begin = 0, cut_end = 0;
@@ -127,17 +127,17 @@ class Run {
         queue_(8) {}
 
   int operator()() {
-    auto sequence = Sequence::Open(options_.sequence, {.use_depth = options_.depth});
+    auto sequence = files::Sequence::Open(options_.sequence, {.use_depth = options_.depth});
     if (!sequence.ok()) {
       std::fprintf(stderr, "track_bench: %s\n", Message(sequence.status()).c_str());
       return 2;
     }
     cv::setNumThreads(1);
-    Ingest ingest(sequence->camera(), /*mask_patience_s=*/0);
+    session::Ingest ingest(sequence->camera(), /*mask_patience_s=*/0);
     std::thread mapping;
     if (!options_.one_thread) {
       mapping = std::thread([this] {
-        while (std::optional<TrackedImage> image = queue_.Pop()) Map(*image);
+        while (std::optional<slam::TrackedImage> image = queue_.Pop()) Map(*image);
       });
     }
     const cv::Ptr<cv::ORB> orb = cv::ORB::create(options_.slam.scene_features);
@@ -182,7 +182,7 @@ class Run {
 
   void Track(const std::shared_ptr<const Frame>& frame) {
     const Clock::time_point begin = Clock::now();
-    TrackedImage image = tracker_.Track(frame);
+    slam::TrackedImage image = tracker_.Track(frame);
     const TrackingState state = image.tracked.state;
     ++frames_;
     if (state == TrackingState::kInitialising) {
@@ -210,10 +210,10 @@ class Run {
     queue_.Push(std::move(image));
   }
 
-  void Map(const TrackedImage& image) {
+  void Map(const slam::TrackedImage& image) {
     if (image.tracked.is_keyframe) mapper_.Hurry(--waiting_ > 0);
     const Clock::time_point begin = Clock::now();
-    const MappedFrame mapped = mapper_.Process(image);
+    const slam::MappedFrame mapped = mapper_.Process(image);
     if (mapped.begun_anew) ++begun_anew_;
     if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
     const TrackedFrame& tracked = mapped.tracked;
@@ -251,13 +251,13 @@ class Run {
         "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
         mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, begun_anew_,
         figures.up_confidence);
-    const double orb_ms = 1e3 * Quantile(orb_s_, 0.5);
+    const double orb_ms = 1e3 * eval::Quantile(orb_s_, 0.5);
     fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
-               1e3 * Quantile(track_s_, 0.5), 1e3 * Quantile(track_s_, 0.99), 1e3 * Quantile(track_s_, 0.5) / orb_ms,
-               orb_ms);
+               1e3 * eval::Quantile(track_s_, 0.5), 1e3 * eval::Quantile(track_s_, 0.99),
+               1e3 * eval::Quantile(track_s_, 0.5) / orb_ms, orb_ms);
     fmt::print("keyframe mapping: median {:.0f} ms, p99 {:.0f} ms; local adjustment: median {:.0f} ms, p99 {:.0f} ms\n",
-               1e3 * Quantile(map_s_, 0.5), 1e3 * Quantile(map_s_, 0.99), 1e3 * Quantile(figures.window_s, 0.5),
-               1e3 * Quantile(figures.window_s, 0.99));
+               1e3 * eval::Quantile(map_s_, 0.5), 1e3 * eval::Quantile(map_s_, 0.99),
+               1e3 * eval::Quantile(figures.window_s, 0.5), 1e3 * eval::Quantile(figures.window_s, 0.99));
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     fmt::print("peak memory {} MB\n", usage.ru_maxrss / 1024);
@@ -267,9 +267,10 @@ class Run {
   void ReportError(size_t keyframes_kept) const {
     if (options_.out.empty() || final_.empty()) return;
     const std::string truth = options_.sequence + "/groundtruth.txt";
-    const auto report = EvaluateTrajectory({.estimated = options_.out + "/trajectory.txt",
-                                            .ground_truth = truth,
-                                            .alignment = options_.depth ? Alignment::kSe3 : Alignment::kSim3});
+    const auto report =
+        eval::EvaluateTrajectory({.estimated = options_.out + "/trajectory.txt",
+                                  .ground_truth = truth,
+                                  .alignment = options_.depth ? eval::Alignment::kSe3 : eval::Alignment::kSim3});
     if (!report.ok()) return;
     fmt::print("ATE rmse {:.3f} cm, {:.3f} % of the way of {:.2f} m, aligned by {}; scale {:.4f}; {} keyframes\n",
                100 * report->ate_rmse_m, 100 * report->ate_rmse_m / report->path_length_m, report->path_length_m,
@@ -279,11 +280,11 @@ class Run {
 
   // Angle between the map's z and the true one, by the orientations of all cameras.
   void ReportUp(const std::string& truth_path) const {
-    const auto truth = ReadTum(truth_path);
+    const auto truth = files::ReadTum(truth_path);
     if (!truth.ok()) return;
     Eigen::Vector3d up_sum = Eigen::Vector3d::Zero();
     for (const Said& said : final_) {
-      for (const StampedPose& pose : *truth) {
+      for (const files::StampedPose& pose : *truth) {
         if (std::abs(1e-9 * static_cast<double>(pose.timestamp_ns) - said.time_s) > 0.005) continue;
         const Eigen::Quaterniond R_map_truth =
             said.tracked.T_world_camera.rotation() * pose.T_world_camera.rotation().conjugate();
@@ -296,10 +297,10 @@ class Run {
   }
 
   Options options_;
-  LocalMapSlot slot_;
-  SparseMapper mapper_;
-  Tracker tracker_;
-  BoundedQueue<TrackedImage> queue_;
+  slam::LocalMapSlot slot_;
+  slam::SparseMapper mapper_;
+  slam::Tracker tracker_;
+  BoundedQueue<slam::TrackedImage> queue_;
   std::atomic<int> waiting_ = 0;
   std::vector<Said> live_, final_;
   std::vector<double> orb_s_, track_s_, map_s_;
@@ -311,6 +312,6 @@ class Run {
 };
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Run(romap::Parse(argc, argv))(); }
+int main(int argc, char** argv) { return romap::measure::Run(romap::measure::Parse(argc, argv))(); }

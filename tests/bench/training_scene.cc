@@ -5,7 +5,7 @@
 
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 constexpr int kViews = 25;
@@ -30,7 +30,7 @@ TrainingScene SyntheticTrainingScene() {
   }
   for (size_t i = 0; i < world.objects().size(); ++i) {
     const Cuboid cuboid = world.TrueCuboid(static_cast<int>(i));
-    ObjectRecord record;
+    files::ObjectRecord record;
     record.id = static_cast<int64_t>(i) + 1;
     record.name = record.class_name = world.objects()[i].class_name;
     record.T_world_object = cuboid.T_world_object;
@@ -42,9 +42,9 @@ TrainingScene SyntheticTrainingScene() {
 
 absl::StatusOr<TrainingScene> LoadTrainingScene(const std::string& path) {
   if (path.empty()) return SyntheticTrainingScene();
-  ROMAP_ASSIGN_OR_RETURN(const Sequence sequence, Sequence::Open(path, {}));
-  ROMAP_ASSIGN_OR_RETURN(TrueFrames frames, LoadTrueFrames(sequence, 4, 0));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(path, {}));
+  ROMAP_ASSIGN_OR_RETURN(bench::TrueFrames frames, bench::LoadTrueFrames(sequence, 4, 0));
   return TrainingScene{std::move(frames), sequence.objects()->objects};
 }
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -2,7 +2,7 @@
 
 #include <sys/resource.h>
 
-namespace romap {
+namespace romap::measure {
 
 double UserSeconds() {
   rusage usage{};
@@ -10,4 +10,4 @@ double UserSeconds() {
   return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
 }
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -1,8 +1,8 @@
 #pragma once
 
-namespace romap {
+namespace romap::measure {
 
 // CPU time that this process has spent outside the kernel [s]: what benchmarks on shared machines compare.
 double UserSeconds();
 
-}  // namespace romap
+}  // namespace romap::measure

@@ -24,13 +24,13 @@
 #include "server/slam/tracker.h"
 #include "tests/bench/user_seconds.h"
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 // What was seen of one object.
 struct Seen {
   std::vector<Eigen::Matrix3d> R_world_camera;
-  std::vector<std::vector<LineSegment>> segments;
+  std::vector<std::vector<objects::LineSegment>> segments;
   std::vector<Eigen::Vector3d> directions;
   std::map<MapPointId, int> points;  // and how often each lay on the mask
 };
@@ -43,23 +43,24 @@ struct Run {
   double crop_area_px2 = 0;
 };
 
-void Look(const KeyframeView& view, const ObjectsConfig& config, Run& run) {
+void Look(const KeyframeView& view, const objects::ObjectsConfig& config, Run& run) {
   const Frame& frame = *view.frame;
   for (const MapPoint& point : view.points) run.points[point.id] = point.position_world;
   for (const PointObservation& observation : view.observations) {
     if (observation.label != 0) ++run.objects[observation.label].points[observation.point];
   }
-  for (const Detection& detection : ExtractDetections(frame, config)) {
+  for (const objects::Detection& detection : objects::ExtractDetections(frame, config)) {
     Seen& seen = run.objects[detection.label];
     const Eigen::Vector2d middle_px = detection.BoxCenter();
     const Eigen::Vector3d direction =
         view.T_world_camera.rotation() * frame.camera.Unproject(middle_px.x(), middle_px.y());
     const bool redundant = std::any_of(seen.directions.begin(), seen.directions.end(), [&](const auto& other) {
-      return AngleBetween(other, direction) < config.silhouette_angle_deg * kRadPerDeg;
+      return objects::AngleBetween(other, direction) < config.silhouette_angle_deg * objects::kRadPerDeg;
     });
     if (redundant || seen.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
     const double start = UserSeconds();
-    seen.segments.push_back(FindLineSegments(frame.image_bgr, frame.labels, detection.label, detection.box_px));
+    seen.segments.push_back(
+        objects::FindLineSegments(frame.image_bgr, frame.labels, detection.label, detection.box_px));
     run.find_s += UserSeconds() - start;
     seen.directions.push_back(direction);
     seen.R_world_camera.push_back(view.T_world_camera.RotationMatrix());
@@ -68,58 +69,58 @@ void Look(const KeyframeView& view, const ObjectsConfig& config, Run& run) {
   }
 }
 
-absl::StatusOr<Run> LookAtSequence(const Sequence& sequence) {
-  const SlamConfig slam;
-  const ObjectsConfig objects;
-  LocalMapSlot local_map;
-  Tracker tracker(slam, PoseUse::kGiven, &local_map);
-  SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
-  Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
+absl::StatusOr<Run> LookAtSequence(const files::Sequence& sequence) {
+  const slam::SlamConfig slam;
+  const objects::ObjectsConfig objects;
+  slam::LocalMapSlot local_map;
+  slam::Tracker tracker(slam, PoseUse::kGiven, &local_map);
+  slam::SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
+  session::Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest.Accept(input));
-    const MappedFrame mapped = sparse.Process(tracker.Track(frame));
+    const slam::MappedFrame mapped = sparse.Process(tracker.Track(frame));
     if (mapped.view) Look(*mapped.view, objects, run);
   }
   return run;
 }
 
-void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::span<const LineView> views) {
+void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
   const double start = UserSeconds();
-  const auto yaw = YawFromLines(R_world_reference, views);
+  const auto yaw = objects::YawFromLines(R_world_reference, views);
   const double spent_ms = 1e3 * (UserSeconds() - start);
   if (!yaw) {
     std::printf(" %s none", name);
     return;
   }
-  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / kRadPerDeg, yaw->confidence, yaw->edges,
-              spent_ms);
+  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence,
+              yaw->edges, spent_ms);
 }
 
-void PrintRuns(const Eigen::Matrix3d& R_world_reference, std::span<const LineView> views) {
+void PrintRuns(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
   for (const size_t count : {1, 3, 6, 12}) {
     std::printf("    by %2zu:", count);
     for (size_t first = 0; first + count <= views.size(); first += count) {
-      const auto yaw = YawFromLines(R_world_reference, views.subspan(first, count));
-      if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / kRadPerDeg, yaw->confidence);
+      const auto yaw = objects::YawFromLines(R_world_reference, views.subspan(first, count));
+      if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence);
     }
     std::printf("\n");
   }
 }
 
-void PrintObject(const Sequence& sequence, const Run& run, const ObjectRecord& truth) {
+void PrintObject(const files::Sequence& sequence, const Run& run, const files::ObjectRecord& truth) {
   const auto found = run.objects.find(truth.id);
   if (found == run.objects.end()) return;
   const Seen& seen = found->second;
-  std::vector<LineView> views;
+  std::vector<objects::LineView> views;
   for (size_t i = 0; i < seen.segments.size(); ++i) {
     views.push_back({sequence.camera(), seen.R_world_camera[i], seen.segments[i]});
   }
   const Eigen::Matrix3d R_true = truth.T_world_object.RotationMatrix();
   std::printf("%-10s %2zu views", truth.name.c_str(), views.size());
   PrintYaw("|", R_true, views);
-  const double tilt_rad = 2 * kRadPerDeg;
+  const double tilt_rad = 2 * objects::kRadPerDeg;
   PrintYaw("| tilted", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX()) * R_true, views);
   PrintYaw("|", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()) * R_true, views);
   std::vector<Eigen::Vector3d> points;
@@ -127,16 +128,16 @@ void PrintObject(const Sequence& sequence, const Run& run, const ObjectRecord& t
     const auto position = run.points.find(id);
     if (count >= 2 && position != run.points.end()) points.push_back(truth.T_world_object.Inverse() * position->second);
   }
-  const auto pca_rad = PcaYaw(points);
+  const auto pca_rad = objects::PcaYaw(points);
   std::printf(" | PCA of %zu points", points.size());
-  if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / kRadPerDeg, 90));
+  if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / objects::kRadPerDeg, 90));
   std::printf("\n");
   PrintRuns(R_true, views);
 }
 
 int Main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
-    const auto sequence = Sequence::Open(argv[i]);
+    const auto sequence = files::Sequence::Open(argv[i]);
     if (!sequence.ok() || !sequence->objects()) {
       std::fprintf(stderr, "%s: %s\n", argv[i], sequence.ok() ? "no objects.yaml" : Message(sequence.status()).c_str());
       return 2;
@@ -149,12 +150,12 @@ int Main(int argc, char** argv) {
     std::printf("%s: %d crops of %.0f x %.0f px on average, %.3f ms each\n", argv[i], run->crops,
                 std::sqrt(run->crop_area_px2 / run->crops), std::sqrt(run->crop_area_px2 / run->crops),
                 1e3 * run->find_s / run->crops);
-    for (const ObjectRecord& truth : sequence->objects()->objects) PrintObject(*sequence, *run, truth);
+    for (const files::ObjectRecord& truth : sequence->objects()->objects) PrintObject(*sequence, *run, truth);
   }
   return 0;
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure
 
-int main(int argc, char** argv) { return romap::Main(argc, argv); }
+int main(int argc, char** argv) { return romap::measure::Main(argc, argv); }

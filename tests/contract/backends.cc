@@ -23,9 +23,9 @@ std::vector<Backend> AllBackends() {
       {"Fake", [] { return std::make_unique<testing::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
       {"Local",
        [] {
-         ServerConfig config;
+         session::ServerConfig config;
          config.training_threads = 1;
-         return std::make_unique<LocalMappingService>(config);
+         return std::make_unique<session::LocalMappingService>(config);
        },
        /*objects_from_one_frame=*/false},
   };
@@ -41,10 +41,10 @@ std::vector<Backend> AllBackends() {
 
 RunningBackend::RunningBackend(const Backend& backend) : local_(backend.make()) {
   if (!backend.over_grpc) return;
-  TransportConfig config;
+  transport::TransportConfig config;
   config.listen_address = "127.0.0.1:0";
-  server_ = Must(GrpcServer::Start(local_.get(), config));
-  remote_ = Must(RemoteMappingService::Connect(server_->address()));
+  server_ = Must(transport::GrpcServer::Start(local_.get(), config));
+  remote_ = Must(client::RemoteMappingService::Connect(server_->address()));
 }
 
 }  // namespace romap::contract

@@ -36,7 +36,7 @@ class RunningBackend {
  private:
   // In the order in which they need each other.
   std::unique_ptr<MappingService> local_;
-  std::unique_ptr<GrpcServer> server_;
+  std::unique_ptr<transport::GrpcServer> server_;
   std::unique_ptr<MappingService> remote_;
 };
 

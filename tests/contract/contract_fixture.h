@@ -28,7 +28,7 @@ class MappingServiceContract : public ::testing::TestWithParam<Backend> {
   std::string NewSession(const std::string& name = "") {
     SessionOptions options;
     options.name = name;
-    options.camera = SmallCamera();
+    options.camera = testing::SmallCamera();
     const auto info = service().CreateSession(options);
     EXPECT_TRUE(info.ok()) << Message(info.status());
     return info.ok() ? info->id : "";
@@ -43,7 +43,7 @@ class MappingServiceContract : public ::testing::TestWithParam<Backend> {
   // A stream on a session whose last stream may not have been given back yet.
   std::unique_ptr<MapStream> Reopen(const std::string& session_id) {
     std::unique_ptr<MapStream> reopened;
-    EXPECT_TRUE(Eventually([&] {
+    EXPECT_TRUE(testing::Eventually([&] {
       auto stream = service().OpenMap(session_id);
       if (stream.ok()) reopened = *std::move(stream);
       return stream.ok();

@@ -21,26 +21,26 @@ using testing::RandomMap;
 
 class OutboxStream : public EventStream {
  public:
-  explicit OutboxStream(std::shared_ptr<Outbox> outbox) : outbox_(std::move(outbox)) {}
+  explicit OutboxStream(std::shared_ptr<session::Outbox> outbox) : outbox_(std::move(outbox)) {}
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
   bool Done() const override { return outbox_->Done(); }
   absl::Status status() const override { return outbox_->status(); }
   void Cancel() override { outbox_->Close(absl::CancelledError("the stream was cancelled")); }
 
  private:
-  const std::shared_ptr<Outbox> outbox_;
+  const std::shared_ptr<session::Outbox> outbox_;
 };
 
 // Whoever watches any session watches one map.
 class OneMapService : public testing::FakeMappingService {
  public:
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& /*session_id*/) override {
-    return std::make_unique<OutboxStream>(map.Subscribe(Outbox::Acks::kNewest, 1, /*with_snapshot=*/true));
+    return std::make_unique<OutboxStream>(map.Subscribe(session::Outbox::Acks::kNewest, 1, /*with_snapshot=*/true));
   }
-  MapState map;
+  session::MapState map;
 };
 
-void ReadToEnd(EventStream& stream, CheckedCopy& copy, std::chrono::microseconds pause) {
+void testing::ReadToEnd(EventStream& stream, testing::CheckedCopy& copy, std::chrono::microseconds pause) {
   while (!stream.Done()) {
     if (const auto event = stream.Next(std::chrono::milliseconds(100))) copy.Apply(*event);
     std::this_thread::sleep_for(pause);
@@ -49,24 +49,24 @@ void ReadToEnd(EventStream& stream, CheckedCopy& copy, std::chrono::microseconds
 
 TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
   OneMapService service;
-  TransportConfig config;
+  transport::TransportConfig config;
   config.listen_address = "127.0.0.1:0";
-  const auto server = GrpcServer::Start(&service, config).value();
-  const auto remote = RemoteMappingService::Connect(server->address()).value();
-  CheckedCopy fast, slow, latecomer, truth;
+  const auto server = transport::GrpcServer::Start(&service, config).value();
+  const auto remote = client::RemoteMappingService::Connect(server->address()).value();
+  testing::CheckedCopy fast, slow, latecomer, truth;
   const auto fast_stream = remote->Watch("any").value(), slow_stream = remote->Watch("any").value();
-  std::thread fast_reader([&] { ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
-  std::thread slow_reader([&] { ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
-  RandomMap random(7, &service.map);
+  std::thread fast_reader([&] { testing::ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
+  std::thread slow_reader([&] { testing::ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
+  testing::RandomMap random(7, &service.map);
   for (int step = 0; step < 6000; ++step) random.Step();
   const auto late_stream = remote->Watch("any").value();
-  std::thread late_reader([&] { ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
+  std::thread late_reader([&] { testing::ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
   for (int step = 0; step < 2000; ++step) random.Step();
-  const auto all = service.map.Subscribe(Outbox::Acks::kAll, 16, /*with_snapshot=*/true);
+  const auto all = service.map.Subscribe(session::Outbox::Acks::kAll, 16, /*with_snapshot=*/true);
   service.map.Close(absl::OkStatus());
   for (std::thread* reader : {&fast_reader, &slow_reader, &late_reader}) reader->join();
   OutboxStream truth_stream(all);
-  ReadToEnd(truth_stream, truth, std::chrono::microseconds(0));
+  testing::ReadToEnd(truth_stream, truth, std::chrono::microseconds(0));
   EXPECT_FALSE(truth.Bytes().empty());
   EXPECT_EQ(fast.Bytes(), truth.Bytes());
   EXPECT_EQ(slow.Bytes(), truth.Bytes());

@@ -25,7 +25,7 @@ TEST_P(SessionContract, SessionsAreMadeListedAndDeleted) {
 TEST_P(SessionContract, ASessionRemembersHowItWasMade) {
   SessionOptions options;
   options.name = "Küche, zweiter Versuch";
-  options.camera = SmallCamera();
+  options.camera = testing::SmallCamera();
   options.camera.distortion = {0.1, -0.2, 0.001, 0.002, 0.05};
   options.mode = FrameMode::kLive;
   const auto made = service().CreateSession(options);
@@ -55,13 +55,13 @@ TEST_P(SessionContract, AnErrorSaysWhichSessionItIsAbout) {
 
 TEST_P(SessionContract, AnImpossibleCameraIsRefused) {
   SessionOptions options;
-  options.camera = SmallCamera();
+  options.camera = testing::SmallCamera();
   options.camera.fx_px = -1;
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
-  options.camera = SmallCamera();
+  options.camera = testing::SmallCamera();
   options.camera.width_px = 0;
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
-  options.camera = SmallCamera();
+  options.camera = testing::SmallCamera();
   options.camera.distortion[2] = std::nan("");
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
   EXPECT_THAT(service().ListSessions().value(), SizeIs(0));
@@ -72,7 +72,7 @@ TEST_P(SessionContract, AFinishedSessionStaysUntilItIsDeleted) {
   const auto finishing = service().FinishSession(session);
   ASSERT_TRUE(finishing.ok());
   EXPECT_NE(finishing->state, SessionState::kOpen);
-  EXPECT_TRUE(Eventually([&] { return service().GetSession(session)->state == SessionState::kFinished; }));
+  EXPECT_TRUE(testing::Eventually([&] { return service().GetSession(session)->state == SessionState::kFinished; }));
   EXPECT_OK(service().FinishSession(session).status());
   EXPECT_OK(service().ExportMap(session).status());
   EXPECT_OK(service().DeleteSession(session));
@@ -82,9 +82,9 @@ TEST_P(SessionContract, AFinishedSessionStaysUntilItIsDeleted) {
 TEST_P(SessionContract, AnExportHoldsTheTrajectory) {
   const std::string session = NewSession();
   const auto stream = Open(session);
-  for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+  for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
   EXPECT_OK(stream->CloseSend());
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   const auto map = service().ExportMap(session);
   ASSERT_TRUE(map.ok()) << Message(map.status());
   EXPECT_EQ(map->session_id, session);
@@ -92,7 +92,7 @@ TEST_P(SessionContract, AnExportHoldsTheTrajectory) {
   ASSERT_THAT(map->timestamps_ns, SizeIs(5));
   for (uint64_t i = 0; i < 5; ++i) {
     EXPECT_EQ(map->trajectory[i].frame_id, i + 1);
-    EXPECT_EQ(map->timestamps_ns[i], MakeFrame(i + 1).timestamp_ns);
+    EXPECT_EQ(map->timestamps_ns[i], testing::MakeFrame(i + 1).timestamp_ns);
     ASSERT_TRUE(map->trajectory[i].T_world_camera.has_value());
     EXPECT_NEAR(map->trajectory[i].T_world_camera->translation().x(), 0.01 * (i + 1), 1e-12);
   }
@@ -103,10 +103,10 @@ TEST_P(SessionContract, AnExportHoldsTheObjects) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
-  EXPECT_OK(stream->Send(MakeFrame(2, "book")));
+  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(testing::MakeFrame(2, "book")));
   EXPECT_OK(stream->CloseSend());
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   const auto map = service().ExportMap(session);
   ASSERT_TRUE(map.ok());
   ASSERT_THAT(map->objects, SizeIs(2));

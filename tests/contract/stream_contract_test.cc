@@ -18,9 +18,9 @@ INSTANTIATE_TEST_SUITE_P(All, StreamContract, ::testing::ValuesIn(AllBackends())
 TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsCleanly) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 40;
-  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id)).ok());
+  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id)).ok());
   EXPECT_OK(stream->CloseSend());
-  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(kFrames));
   for (uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(acks[i].frame_id, i + 1);
@@ -32,14 +32,14 @@ TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsCleanly) {
 
 TEST_P(StreamContract, ABadFrameIsRefusedAndTheStreamLivesOn) {
   const auto stream = Open(NewSession());
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  FrameInput bad = MakeFrame(2);
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  FrameInput bad = testing::MakeFrame(2);
   bad.image.clear();
   EXPECT_OK(stream->Send(bad));
-  EXPECT_OK(stream->Send(MakeFrame(3)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(3)));
   EXPECT_OK(stream->CloseSend());
   std::map<uint64_t, FrameAck> acks;
-  for (const FrameAck& ack : Only<FrameAck>(ReadToEnd(*stream))) acks[ack.frame_id] = ack;
+  for (const FrameAck& ack : testing::Only<FrameAck>(testing::ReadToEnd(*stream))) acks[ack.frame_id] = ack;
   ASSERT_THAT(acks, SizeIs(3));
   EXPECT_TRUE(acks[1].accepted);
   EXPECT_FALSE(acks[2].accepted);
@@ -51,7 +51,7 @@ TEST_P(StreamContract, ABadFrameIsRefusedAndTheStreamLivesOn) {
 MasksInput MasksOf(uint64_t frame_id, const std::string& class_name) {
   MasksInput masks;
   masks.frame_id = frame_id;
-  static_cast<EncodedMasks&>(masks) = MakeFrame(frame_id, class_name);
+  static_cast<EncodedMasks&>(masks) = testing::MakeFrame(frame_id, class_name);
   return masks;
 }
 
@@ -59,13 +59,13 @@ TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 20, kDelay = 5;
   for (uint64_t id = 1; id <= kFrames + kDelay; ++id) {
-    if (id <= kFrames) EXPECT_OK(stream->Send(MakeFrame(id)));
+    if (id <= kFrames) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
     if (id > kDelay) EXPECT_OK(stream->SendMasks(MasksOf(id - kDelay, "mug")));
   }
   EXPECT_OK(stream->CloseSend());
-  const auto events = ReadToEnd(*stream);
-  EXPECT_THAT(Only<FrameAck>(events), SizeIs(kFrames));
-  const auto acks = Only<MasksAck>(events);
+  const auto events = testing::ReadToEnd(*stream);
+  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(kFrames));
+  const auto acks = testing::Only<MasksAck>(events);
   ASSERT_THAT(acks, SizeIs(kFrames)) << "the stream ends when the last masks are mapped, too";
   for (uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(acks[i].frame_id, i + 1);
@@ -78,22 +78,22 @@ TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
 TEST_P(StreamContract, MasksThatFitNoFrameAreRefusedAndTheStreamLivesOn) {
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
-  EXPECT_OK(stream->Send(MakeFrame(2)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(testing::MakeFrame(2)));
   EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));  // it brought its own
   EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));
   EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));  // twice
   EXPECT_OK(stream->SendMasks(MasksOf(9, "mug")));  // not sent yet
-  EXPECT_OK(stream->Send(MakeFrame(3)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(3)));
   EXPECT_OK(stream->CloseSend());
-  const auto events = ReadToEnd(*stream);
-  const auto acks = Only<MasksAck>(events);
+  const auto events = testing::ReadToEnd(*stream);
+  const auto acks = testing::Only<MasksAck>(events);
   ASSERT_THAT(acks, SizeIs(4));
   for (size_t i = 0; i < acks.size(); ++i) {
     EXPECT_EQ(acks[i].accepted, i == 1) << i;
     EXPECT_EQ(acks[i].error.empty(), i == 1) << i;
   }
-  EXPECT_THAT(Only<FrameAck>(events), SizeIs(3));
+  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(3));
   EXPECT_OK(stream->status());
   EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 3u) << "masks are no frames";
 }
@@ -101,36 +101,36 @@ TEST_P(StreamContract, MasksThatFitNoFrameAreRefusedAndTheStreamLivesOn) {
 TEST_P(StreamContract, LateMasksMakeObjects) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
   const auto stream = Open(NewSession());
-  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));
-  const auto object = NextOf<ObjectUpdate>(*stream);
+  const auto object = testing::NextOf<ObjectUpdate>(*stream);
   ASSERT_TRUE(object.has_value());
   EXPECT_EQ(object->class_name, "mug");
 }
 
 TEST_P(StreamContract, ALiveSessionAnswersAllFramesAndMasks) {
   SessionOptions options;
-  options.camera = SmallCamera();
+  options.camera = testing::SmallCamera();
   options.mode = FrameMode::kLive;
   const auto stream = Open(service().CreateSession(options)->id);
   constexpr uint64_t kFrames = 60;
   for (uint64_t id = 1; id <= kFrames; ++id) {
-    EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->Send(testing::MakeFrame(id)));
     EXPECT_OK(stream->SendMasks(MasksOf(id, "mug")));
   }
   EXPECT_OK(stream->CloseSend());
-  const auto events = ReadToEnd(*stream);
-  EXPECT_THAT(Only<FrameAck>(events), SizeIs(kFrames)) << "accepted or dropped";
-  EXPECT_THAT(Only<MasksAck>(events), SizeIs(kFrames));
+  const auto events = testing::ReadToEnd(*stream);
+  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(kFrames)) << "accepted or dropped";
+  EXPECT_THAT(testing::Only<MasksAck>(events), SizeIs(kFrames));
 }
 
 TEST_P(StreamContract, AFrameWithAPoseThatIsNoneIsRefused) {
   const auto stream = Open(NewSession());
-  FrameInput frame = MakeFrame(1);
+  FrameInput frame = testing::MakeFrame(1);
   frame.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(std::nan(""), 0, 0));
   EXPECT_OK(stream->Send(frame));
   EXPECT_OK(stream->CloseSend());
-  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
   if (acks.empty() || acks[0].accepted) {
     // The fake does not look at poses; over the wire such a frame does not get as far as the fake.
     EXPECT_EQ(GetParam().name, "Fake");
@@ -142,8 +142,8 @@ TEST_P(StreamContract, ASecondMapStreamIsRefused) {
   const auto stream = Open(session);
   EXPECT_TRUE(service().GetSession(session)->stream_open);
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kFailedPrecondition);
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
 TEST_P(StreamContract, AStreamMayFollowAnother) {
@@ -151,9 +151,9 @@ TEST_P(StreamContract, AStreamMayFollowAnother) {
   for (uint64_t id = 1; id <= 3; ++id) {
     const auto stream = Reopen(session);
     ASSERT_NE(stream, nullptr);
-    EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->Send(testing::MakeFrame(id)));
     EXPECT_OK(stream->CloseSend());
-    ReadToEnd(*stream);
+    testing::ReadToEnd(*stream);
     EXPECT_OK(stream->status());
   }
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(3));
@@ -168,10 +168,10 @@ TEST_P(StreamContract, AFinishedSessionTakesNoStream) {
 TEST_P(StreamContract, NothingIsSentAfterCloseSend) {
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->CloseSend());
-  EXPECT_CODE(stream->Send(MakeFrame(1)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->Send(testing::MakeFrame(1)), StatusCode::kFailedPrecondition);
   EXPECT_CODE(stream->SendMasks(MasksOf(1, "mug")), StatusCode::kFailedPrecondition);
   EXPECT_CODE(stream->CloseSend(), StatusCode::kFailedPrecondition);
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   EXPECT_OK(stream->status());
 }
 
@@ -179,15 +179,15 @@ TEST_P(StreamContract, DisconnectingKeepsTheSession) {
   const std::string session = NewSession();
   {
     const auto stream = Open(session);
-    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
-    for (int i = 0; i < 3; ++i) EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
   }
   EXPECT_EQ(service().GetSession(session)->state, SessionState::kOpen);
   const auto stream = Reopen(session);
   ASSERT_NE(stream, nullptr);
-  EXPECT_OK(stream->Send(MakeFrame(4)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(4)));
   EXPECT_OK(stream->CloseSend());
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(4));
 }
 
@@ -196,14 +196,14 @@ TEST_P(StreamContract, FinishingEndsTheOpenStreams) {
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
   EXPECT_OK(service().FinishSession(session).status());
-  ReadToEnd(*stream);
-  ReadToEnd(**watch);
+  testing::ReadToEnd(*stream);
+  testing::ReadToEnd(**watch);
   EXPECT_OK(stream->status());
   EXPECT_OK((*watch)->status());
-  EXPECT_CODE(stream->Send(MakeFrame(2)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->Send(testing::MakeFrame(2)), StatusCode::kFailedPrecondition);
 }
 
 TEST_P(StreamContract, DeletingEndsTheOpenStreams) {
@@ -211,13 +211,13 @@ TEST_P(StreamContract, DeletingEndsTheOpenStreams) {
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   EXPECT_OK(service().DeleteSession(session));
-  ReadToEnd(*stream);
-  ReadToEnd(**watch);
+  testing::ReadToEnd(*stream);
+  testing::ReadToEnd(**watch);
   EXPECT_CODE((*watch)->status(), StatusCode::kNotFound);
   EXPECT_FALSE(stream->status().ok());
-  EXPECT_FALSE(stream->Send(MakeFrame(2)).ok());
+  EXPECT_FALSE(stream->Send(testing::MakeFrame(2)).ok());
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kNotFound);
 }
 
@@ -225,24 +225,24 @@ TEST_P(StreamContract, DeletingWhileFramesAreSentHangsNobody) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   std::thread sender([&] {
-    for (uint64_t id = 1; stream->Send(MakeFrame(id)).ok(); ++id) {
+    for (uint64_t id = 1; stream->Send(testing::MakeFrame(id)).ok(); ++id) {
     }
   });
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
   EXPECT_OK(service().DeleteSession(session));
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   sender.join();
   EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
 }
 
 TEST_P(StreamContract, CancelWakesTheReader) {
   const auto stream = Open(NewSession());
-  std::thread reader([&] { ReadToEnd(*stream); });
+  std::thread reader([&] { testing::ReadToEnd(*stream); });
   stream->Cancel();
   reader.join();
   EXPECT_TRUE(stream->Done());
   EXPECT_CODE(stream->status(), StatusCode::kCancelled);
-  EXPECT_FALSE(stream->Send(MakeFrame(1)).ok());
+  EXPECT_FALSE(stream->Send(testing::MakeFrame(1)).ok());
 }
 
 TEST_P(StreamContract, AWatcherFollowsTheClient) {
@@ -250,8 +250,8 @@ TEST_P(StreamContract, AWatcherFollowsTheClient) {
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  const auto ack = NextOf<FrameAck>(**watch);
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  const auto ack = testing::NextOf<FrameAck>(**watch);
   ASSERT_TRUE(ack.has_value());
   EXPECT_EQ(ack->frame_id, 1u);
   EXPECT_TRUE(ack->T_world_camera.has_value());
@@ -262,7 +262,7 @@ TEST_P(StreamContract, AWatchOfAFinishedSessionEndsByItself) {
   EXPECT_OK(service().FinishSession(session).status());
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  ReadToEnd(**watch);
+  testing::ReadToEnd(**watch);
   EXPECT_OK((*watch)->status());
 }
 
@@ -270,19 +270,19 @@ TEST_P(StreamContract, AWatchBeginsWithTheObjectsThereAre) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
-  ASSERT_TRUE(NextOf<MeshUpdate>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
+  ASSERT_TRUE(testing::NextOf<MeshUpdate>(*stream).has_value());
 
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  const auto object = NextOf<ObjectUpdate>(**watch);
-  const auto mesh = NextOf<MeshUpdate>(**watch);
+  const auto object = testing::NextOf<ObjectUpdate>(**watch);
+  const auto mesh = testing::NextOf<MeshUpdate>(**watch);
   ASSERT_TRUE(object && mesh);
   EXPECT_EQ(object->class_name, "mug");
   EXPECT_EQ(mesh->id, object->id);
 
-  EXPECT_OK(stream->Send(MakeFrame(2, "mug")));
-  const auto newer = NextOf<ObjectUpdate>(**watch);
+  EXPECT_OK(stream->Send(testing::MakeFrame(2, "mug")));
+  const auto newer = testing::NextOf<ObjectUpdate>(**watch);
   ASSERT_TRUE(newer.has_value());
   EXPECT_EQ(newer->id, object->id);
   EXPECT_GT(newer->revision, object->revision);
@@ -293,9 +293,9 @@ TEST_P(StreamContract, TwoSessionsDoNotMix) {
   const auto run = [&](uint64_t first_id, std::vector<FrameAck>* acks) {
     const std::string session = NewSession();
     const auto stream = Open(session);
-    for (uint64_t id = first_id; id < first_id + kFrames; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+    for (uint64_t id = first_id; id < first_id + kFrames; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
     EXPECT_OK(stream->CloseSend());
-    *acks = Only<FrameAck>(ReadToEnd(*stream));
+    *acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
     EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(kFrames));
   };
   std::vector<FrameAck> a, b;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace romap {
+namespace romap::house {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST(HouseTest, HeadersAreGuarded) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::house

@@ -33,7 +33,8 @@ void MakeSmallSequence(const std::string& dir) {
   ASSERT_TRUE(synth::MakeSequence(options, dir).ok());
 }
 
-std::vector<std::string> BenchPaper(const TemporaryFolder& folder, const std::vector<std::string>& more) {
+std::vector<std::string> BenchPaper(const testing_support::TemporaryFolder& folder,
+                                    const std::vector<std::string>& more) {
   std::vector<std::string> command = {
       ROMAP_CLIENT, "bench", "paper", folder / "sequence",         "--out", folder / "out",
       "--threads",  "1",     "--set", "nerf.full_budget_steps=60", "--set", "mesh.resolution=32"};
@@ -44,9 +45,10 @@ std::vector<std::string> BenchPaper(const TemporaryFolder& folder, const std::ve
 nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
 
 TEST(BenchCommandTest, AQuickBenchWritesTablesAndPicture) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  const ProcessResult run = RunProcess(BenchPaper(folder, {"--quick", "--row", "narrow: nerf.hidden_width=16"}));
+  const testing_support::ProcessResult run =
+      testing_support::RunProcess(BenchPaper(folder, {"--quick", "--row", "narrow: nerf.hidden_width=16"}));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("## Table 1"));
   EXPECT_THAT(run.out, HasSubstr("## Table 3"));
@@ -62,21 +64,22 @@ TEST(BenchCommandTest, AQuickBenchWritesTablesAndPicture) {
   EXPECT_GT(fs::file_size(folder / "out/convergence.png"), 1000u);
   EXPECT_TRUE(fs::exists(folder / "out/meshes/fast/objects"));
 
-  const ProcessResult wrong = RunProcess(BenchPaper(folder, {"--methods", "fats"}));
+  const testing_support::ProcessResult wrong = testing_support::RunProcess(BenchPaper(folder, {"--methods", "fats"}));
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("method 'fats' is not one of"));
 }
 
 TEST(BenchCommandTest, InterruptedItLeavesWhatThereIs) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  BackgroundProcess bench(BenchPaper(folder, {"--methods", "fast", "--tables", "1", "--seeds", "500"}));
+  testing_support::BackgroundProcess bench(
+      BenchPaper(folder, {"--methods", "fast", "--tables", "1", "--seeds", "500"}));
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   while (!fs::exists(folder / "out/paper.json") && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   bench.Signal(SIGINT);
-  const ProcessResult end = bench.Wait();
+  const testing_support::ProcessResult end = bench.Wait();
   EXPECT_EQ(end.exit_code, 130) << end.err;
   EXPECT_THAT(end.err, HasSubstr("of 1500 runs"));
   EXPECT_THAT(end.out, HasSubstr("Stopped before the end"));

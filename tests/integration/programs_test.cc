@@ -25,9 +25,9 @@ using testing_support::TemporaryFolder;
 
 namespace fs = std::filesystem;
 
-ProcessResult Romap(std::vector<std::string> arguments) {
+testing_support::ProcessResult Romap(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), ROMAP_CLIENT);
-  return RunProcess(arguments);
+  return testing_support::RunProcess(arguments);
 }
 
 nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
@@ -65,21 +65,22 @@ void ExpectMapOfThree(const std::string& out) {
 }
 
 TEST(ProgramsTest, AServerAndAClientMapASequence) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
+  testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
 
-  const ProcessResult run = Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map",
-                                   "--keep-session", "--name", "three things"});
+  const testing_support::ProcessResult run = Romap({"run", folder / "sequence", "--server", address, "--out",
+                                                    folder / "map", "--keep-session", "--name", "three things"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   ExpectMapOfThree(folder / "map");
 
-  const ProcessResult sessions = Romap({"sessions", "--server", address});
+  const testing_support::ProcessResult sessions = Romap({"sessions", "--server", address});
   EXPECT_THAT(sessions.out, AllOf(HasSubstr("finished"), HasSubstr("three things")));
   const std::string id = ReadJson(folder / "map/summary.json")["session"];
-  const ProcessResult exported = Romap({"export", id, "--server", address, "--out", folder / "export"});
+  const testing_support::ProcessResult exported =
+      Romap({"export", id, "--server", address, "--out", folder / "export"});
   EXPECT_EQ(exported.exit_code, 0) << exported.err;
   EXPECT_EQ(CountFiles(folder / "export/objects", ".ply"), 3u);
   EXPECT_THAT(Romap({"sessions", "--server", address, "--delete", id}).out, HasSubstr("(no sessions)"));
@@ -89,12 +90,12 @@ TEST(ProgramsTest, AServerAndAClientMapASequence) {
 }
 
 TEST(ProgramsTest, TracksTheCameraFromTheImagesAndFollowsItsOwnCorrections) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   synth::SynthOptions options = SmallScene();
   options.frames = 80;
   options.rounds = 0.4;
   ASSERT_TRUE(synth::MakeSequence(options, folder / "sequence").ok());
-  const ProcessResult run =
+  const testing_support::ProcessResult run =
       Romap({"run", folder / "sequence", "--local", "--poses", "none", "--out", folder / "map", "--no-pictures"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const nlohmann::json summary = ReadJson(folder / "map/summary.json");
@@ -104,29 +105,30 @@ TEST(ProgramsTest, TracksTheCameraFromTheImagesAndFollowsItsOwnCorrections) {
   EXPECT_EQ(summary["tracking"]["lost"], 0);
   EXPECT_EQ(summary["tracking"]["tracked"], 80 - initialising);
   // The written trajectory is that of the map at its end, up to a similarity.
-  const auto report = EvaluateTrajectory({.estimated = folder / "map/trajectory.txt",
-                                          .ground_truth = folder / "sequence/groundtruth.txt",
-                                          .alignment = Alignment::kSim3});
+  const auto report = eval::EvaluateTrajectory({.estimated = folder / "map/trajectory.txt",
+                                                .ground_truth = folder / "sequence/groundtruth.txt",
+                                                .alignment = eval::Alignment::kSim3});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_LT(report->ate_rmse_m, 0.01 * report->path_length_m);
 }
 
 TEST(ProgramsTest, LocalMappingNeedsNoServer) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  const ProcessResult run = Romap({"run", folder / "sequence", "--local", "--out", folder / "map"});
+  const testing_support::ProcessResult run = Romap({"run", folder / "sequence", "--local", "--out", folder / "map"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   ExpectMapOfThree(folder / "map");
 }
 
 TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   // At the recorded rate the sequence takes more than two seconds: time enough to interrupt it.
-  BackgroundProcess run({ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
+  testing_support::BackgroundProcess run(
+      {ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
   std::this_thread::sleep_for(std::chrono::milliseconds(1500));
   run.Signal(SIGINT);
-  const ProcessResult result = run.Wait();
+  const testing_support::ProcessResult result = run.Wait();
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("interrupted"));
   const nlohmann::json summary = ReadJson(folder / "map/summary.json");
@@ -137,20 +139,24 @@ TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
 TEST(ProgramsTest, TheConfigurationInDeployIsWhatTheServerHas) {
   std::ifstream file(ROMAP_SOURCE_DIR "/deploy/server.yaml");
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  EXPECT_EQ(RunProcess({ROMAP_SERVER, "--dump-config"}).out, text) << "romap-server --dump-config > deploy/server.yaml";
-  EXPECT_EQ(RunProcess({ROMAP_SERVER, "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--dump-config"}).out, text);
+  EXPECT_EQ(testing_support::RunProcess({ROMAP_SERVER, "--dump-config"}).out, text)
+      << "romap-server --dump-config > deploy/server.yaml";
+  EXPECT_EQ(
+      testing_support::RunProcess({ROMAP_SERVER, "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--dump-config"})
+          .out,
+      text);
 }
 
 // ------------------------------------------------------------------------------------------------ bad input
 
-void ExpectOneLine(const ProcessResult& result, int exit_code, const std::string& what) {
+void ExpectOneLine(const testing_support::ProcessResult& result, int exit_code, const std::string& what) {
   EXPECT_EQ(result.exit_code, exit_code) << result.err;
   EXPECT_THAT(result.err, HasSubstr(what));
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
 TEST(BadInputTest, SequenceFoldersThatAreNot) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   ExpectOneLine(Romap({"run", folder / "nowhere", "--local", "--out", folder / "map"}), 2, "nowhere");
   fs::create_directory(folder / "empty");
   ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2, "rgb.txt");
@@ -159,7 +165,7 @@ TEST(BadInputTest, SequenceFoldersThatAreNot) {
 }
 
 TEST(BadInputTest, UnreadableImage) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   for (const auto& entry : fs::directory_iterator(folder / "sequence/rgb")) {
     if (entry.path().filename().string().find("12") != std::string::npos) fs::remove(entry.path());
@@ -168,25 +174,25 @@ TEST(BadInputTest, UnreadableImage) {
 }
 
 TEST(BadInputTest, UnknownFlagCommandAndConfigKey) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   ExpectOneLine(Romap({"run", "x", "--frobnicate"}), 2, "frobnicate");
   ExpectOneLine(Romap({"frobnicate"}), 2, "frobnicate");
   MakeSmallSequence(folder / "sequence");
   ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--set", "nerf.rays=1", "--out", folder / "map"}), 2,
                 "unknown key 'nerf.rays', did you mean 'nerf.");
   std::ofstream(folder / "bad.yaml") << "mesh:\n  resolutoin: 64\n";
-  ExpectOneLine(RunProcess({ROMAP_SERVER, "--config", folder / "bad.yaml"}), 2,
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "bad.yaml"}), 2,
                 "bad.yaml:2: unknown key 'mesh.resolutoin', did you mean 'mesh.resolution'?");
-  ExpectOneLine(RunProcess({ROMAP_SERVER, "--frobnicate"}), 2, "frobnicate");
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--frobnicate"}), 2, "frobnicate");
 }
 
 TEST(BadInputTest, NoServerAndPortInUse) {
-  const TemporaryFolder folder;
+  const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
+  testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
-  ExpectOneLine(RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);
   ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 1,

@@ -22,10 +22,10 @@ using testing_support::TemporaryFolder;
 
 namespace fs = std::filesystem;
 
-ProcessResult Romap(const std::vector<std::string>& arguments) {
+testing_support::ProcessResult Romap(const std::vector<std::string>& arguments) {
   std::vector<std::string> command(1, ROMAP_CLIENT);
   command.insert(command.end(), arguments.begin(), arguments.end());
-  return RunProcess(command);
+  return testing_support::RunProcess(command);
 }
 
 std::string Bytes(const fs::path& path) {
@@ -52,7 +52,7 @@ class ReplayTest : public ::testing::Test {
         "run",   folder_ / "sequence", "--local",      "--set", "session.record_dir=" + (folder_ / "recordings"),
         "--out", folder_ / "map",      "--no-pictures"};
     arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
-    const ProcessResult run = Romap(arguments);
+    const testing_support::ProcessResult run = Romap(arguments);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const auto files = AllFiles(folder_ / "recordings");
     EXPECT_EQ(files.size(), 1U);
@@ -61,7 +61,7 @@ class ReplayTest : public ::testing::Test {
 
   void ExpectTwoEqualReplays(const std::string& recording) const {
     for (const char* out : {"first", "second"}) {
-      const ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
+      const testing_support::ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
       ASSERT_EQ(replay.exit_code, 0) << replay.err;
       EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
     }
@@ -72,7 +72,7 @@ class ReplayTest : public ::testing::Test {
     for (const auto& [name, bytes] : first) EXPECT_TRUE(second.at(name) == bytes) << name << " differs";
   }
 
-  TemporaryFolder folder_;
+  testing_support::TemporaryFolder folder_;
 };
 
 TEST_F(ReplayTest, TwoReplaysWriteTheSameBytes) { ExpectTwoEqualReplays(Record()); }
@@ -91,7 +91,7 @@ TEST_F(ReplayTest, TwoReplaysWithLateMasksWriteTheSameBytes) {
 TEST_F(ReplayTest, ACutOffRecordingIsReplayedAsFarAsItGoes) {
   const std::string recording = Record();
   fs::resize_file(recording, fs::file_size(recording) - 1000);
-  const ProcessResult replay = Romap({"replay", recording, "--threads", "--out", folder_ / "out"});
+  const testing_support::ProcessResult replay = Romap({"replay", recording, "--threads", "--out", folder_ / "out"});
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
   EXPECT_THAT(replay.err, HasSubstr("the last record is cut off"));
   EXPECT_THAT(replay.out, HasSubstr("39 frames replayed"));
@@ -105,7 +105,7 @@ TEST_F(ReplayTest, WhatIsNoRecordingIsRefusedInOneLine) {
        {std::pair{text, "should begin with ROMAPREC"},
         std::pair{folder_ / "old.romaprec", "of version 9, this program reads versions 1 to 2"},
         std::pair{folder_ / "missing.romaprec", "no such file"}}) {
-    const ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
+    const testing_support::ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
     EXPECT_EQ(replay.exit_code, 2);
     EXPECT_THAT(replay.err, HasSubstr(fault));
     EXPECT_EQ(std::count(replay.err.begin(), replay.err.end(), '\n'), 1) << replay.err;
@@ -115,8 +115,9 @@ TEST_F(ReplayTest, WhatIsNoRecordingIsRefusedInOneLine) {
 TEST_F(ReplayTest, AFolderThatIsNotThereIsSaidBeforeAnyFrameIsSent) {
   synth::SynthOptions options{.seed = 3, .objects = 1, .frames = 2, .width_px = 64, .height_px = 48};
   ASSERT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
-  const ProcessResult run = Romap({"run", folder_ / "sequence", "--local", "--set",
-                                   "session.record_dir=" + (folder_ / "nowhere"), "--out", folder_ / "map"});
+  const testing_support::ProcessResult run =
+      Romap({"run", folder_ / "sequence", "--local", "--set", "session.record_dir=" + (folder_ / "nowhere"), "--out",
+             folder_ / "map"});
   EXPECT_EQ(run.exit_code, 1);
   EXPECT_THAT(run.err, HasSubstr("nowhere"));
 }

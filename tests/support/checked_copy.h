@@ -55,7 +55,7 @@ class CheckedCopy {
     EXPECT_TRUE(copy_.objects().contains(id)) << what << ": " << id << " is not known";
   }
 
-  MapCopy copy_;
+  client::MapCopy copy_;
   std::map<ObjectId, uint64_t> revision_, mesh_revision_;
   std::set<ObjectId> gone_;
 };

@@ -14,7 +14,7 @@ namespace romap::testing {
 // removed, get meshes and are moved by corrections. Now and then something comes late, of an object that is gone.
 class RandomMap {
  public:
-  RandomMap(uint64_t seed, MapState* map) : random_(seed), map_(map) {}
+  RandomMap(uint64_t seed, session::MapState* map) : random_(seed), map_(map) {}
 
   // One thing happens.
   void Step() {
@@ -110,7 +110,7 @@ class RandomMap {
   }
 
   std::mt19937_64 random_;
-  MapState* const map_;
+  session::MapState* const map_;
   std::set<uint64_t> live_;
   std::vector<uint64_t> gone_;
   uint64_t last_id_ = 0, frames_ = 0;

@@ -28,7 +28,7 @@ absl::Status Probe() {
   if (count == 0) return absl::UnavailableError("CUDA: there is no device");
   ROMAP_RETURN_IF_ERROR(ToStatus(cudaSetDevice(0), "use device 0"));
   // A device that counts may still be unable to run our code: too old, or out of order. A field of zeros shows it.
-  FieldView field{};
+  DeviceField field{};
   field.grid.features = 16;
   field.hidden = 16;
   const std::vector<float> zeros(16 * 16 + kOutputs * 16);

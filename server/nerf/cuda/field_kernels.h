@@ -33,7 +33,7 @@ enum class MlpPath {
 };
 
 // A FieldModel whose arrays lie on the device.
-struct FieldView {
+struct DeviceField {
   GridLayout grid;
   const float* table;       // [grid.entries][2]
   const float* parameters;  // of the MLP: [grid.features][hidden], then [kOutputs][hidden]
@@ -43,7 +43,7 @@ struct FieldView {
 
 // Values of the field at `count` points of the grid's Unit space.
 struct EvaluateParams {
-  FieldView field;
+  DeviceField field;
   int count;
   const float* x;  // [count]
   const float* y;
@@ -74,7 +74,7 @@ struct OccupancyPlan {
 // Rays to gradients: sampling, encoding, MLP, rendering, losses, and all of their adjoints. A block takes tiles of
 // whole rays, one tile after another, and keeps everything between rays and gradients in shared memory.
 struct StepParams {
-  FieldView field;
+  DeviceField field;
   SliceState* slice;
   StepCounters* counters;
   const Ray* rays;    // [steps of the upload][rays_per_step]
@@ -132,7 +132,7 @@ struct StepLaunch {
 int StepBlocks(int rays_per_step, int most_samples);
 
 // Dynamic shared memory of a block.
-size_t StepSharedBytes(const FieldView& field, const SampleBudget& budget, MlpPath path);
+size_t StepSharedBytes(const DeviceField& field, const SampleBudget& budget, MlpPath path);
 
 // To be called once for a shape before LaunchStep, not while a stream captures: asks for the shared memory.
 // cudaErrorInvalidValue when the device has too little of it.

@@ -13,15 +13,15 @@ struct FloatMlp {
   using Factor = float;
   using DenseMode = plain::DenseMode;
 
-  __device__ static const float* OutWeights(const FieldView& field) {
+  __device__ static const float* OutWeights(const DeviceField& field) {
     return field.parameters + field.grid.features * field.hidden;
   }
 
   // Weights are read where they are.
-  __device__ static void Prepare(const FieldView&, Tile<float>&) {}
+  __device__ static void Prepare(const DeviceField&, Tile<float>&) {}
 
   // tile.feature -> tile.neuron, tile.raw; every warp its own rows.
-  __device__ static void Forward(const FieldView& field, Tile<float>& tile) {
+  __device__ static void Forward(const DeviceField& field, Tile<float>& tile) {
     const int s = threadIdx.x;
     const float* feature = tile.feature + s * tile.feature_row;
     float* neuron = tile.neuron + s * tile.hidden_row;
@@ -38,7 +38,7 @@ struct FloatMlp {
 
   // The adjoint, from the derivatives in tile.raw: adds to tile.weight_gradient and `table_gradient`. All threads of
   // the block take part, after a barrier. No scale is needed here.
-  __device__ static void Backward(const FieldView& field, Tile<float>& tile, float, float* table_gradient) {
+  __device__ static void Backward(const DeviceField& field, Tile<float>& tile, float, float* table_gradient) {
     const int s = threadIdx.x;
     float* out_gradient = tile.weight_gradient + tile.features * tile.hidden;
     for (int w = s; w < kOutputs * tile.hidden; w += kTileSamples) {

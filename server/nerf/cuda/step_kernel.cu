@@ -78,7 +78,7 @@ __device__ uint32_t PlaceSample(const StepParams& p, const TileRays& in, Tile<T>
 }
 
 template <class T>
-__device__ void Activate(const FieldView& field, Tile<T>& tile) {
+__device__ void Activate(const DeviceField& field, Tile<T>& tile) {
   const int s = threadIdx.x;
   const float* raw = tile.raw + s * kOutputs;
   tile.red[s] = plain::Sigmoid(raw[0]);
@@ -247,20 +247,20 @@ __global__ void __launch_bounds__(kTileSamples, 4) EvaluateKernel(EvaluateParams
 }
 
 template <class T>
-size_t StepBytes(const FieldView& field, const SampleBudget& budget) {
+size_t StepBytes(const DeviceField& field, const SampleBudget& budget) {
   Tile<T> tile;
   return LayOutTile<T>(field, budget.most, nullptr, tile);
 }
 
 template <class T>
-size_t EvaluateBytes(const FieldView& field) {
+size_t EvaluateBytes(const DeviceField& field) {
   Tile<T> tile;
   Arena arena(nullptr);
   LayOutMlp(field, arena, tile);
   return arena.bytes();
 }
 
-bool Fits(const FieldView& field) {
+bool Fits(const DeviceField& field) {
   return field.hidden <= kMaxHidden && field.hidden % kEdge == 0 && field.grid.features <= kMaxFeatures &&
          field.grid.features % kEdge == 0;
 }
@@ -295,7 +295,7 @@ int StepBlocks(int rays_per_step, int most_samples) {
   return tiles < kMaxStepBlocks ? tiles : kMaxStepBlocks;
 }
 
-size_t StepSharedBytes(const FieldView& field, const SampleBudget& budget, MlpPath path) {
+size_t StepSharedBytes(const DeviceField& field, const SampleBudget& budget, MlpPath path) {
   return path == MlpPath::kTensorCores ? StepBytes<__half>(field, budget) : StepBytes<float>(field, budget);
 }
 

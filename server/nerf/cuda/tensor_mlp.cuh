@@ -53,7 +53,7 @@ struct TensorMlp {
   }
 
   // Rounds the weights. To be followed by a barrier.
-  __device__ static void Prepare(const FieldView& field, Tile<__half>& tile) {
+  __device__ static void Prepare(const DeviceField& field, Tile<__half>& tile) {
     const int pairs = tile.hidden / 2;
     for (int i = threadIdx.x; i < tile.features * pairs; i += kTileSamples) {
       const float* from = field.parameters + 2 * i;
@@ -68,7 +68,7 @@ struct TensorMlp {
   }
 
   // tile.feature -> tile.neuron, tile.raw; every warp its own rows.
-  __device__ static void Forward(const FieldView&, Tile<__half>& tile) {
+  __device__ static void Forward(const DeviceField&, Tile<__half>& tile) {
     const int lane = threadIdx.x % kWarpThreads, first = threadIdx.x - lane;
     for (int row = first; row < first + kRowsOfWarp; row += kEdge) {
       for (int n = 0; n < tile.hidden; n += kEdge) {
@@ -96,7 +96,7 @@ struct TensorMlp {
 
   // The adjoint, from the derivatives in tile.raw, as FloatMlp::Backward. Derivatives are multiplied by `scale`, a
   // power of two, while they are halves, so that they neither vanish nor overflow.
-  __device__ static void Backward(const FieldView& field, Tile<__half>& tile, float scale, float* table_gradient) {
+  __device__ static void Backward(const DeviceField& field, Tile<__half>& tile, float scale, float* table_gradient) {
     const int warp = threadIdx.x / kWarpThreads;
     const int columns = tile.hidden / kEdge, sample_tiles = kTileSamples / kEdge;
     __half* d_output = tile.d_output + threadIdx.x * Tile<__half>::kOutputRow;
@@ -147,7 +147,7 @@ struct TensorMlp {
   }
 
   // Scatters the features' gradients, every warp those of its own rows.
-  __device__ static void BackwardToTable(const FieldView& field, const Tile<__half>& tile, float factor,
+  __device__ static void BackwardToTable(const DeviceField& field, const Tile<__half>& tile, float factor,
                                          float* table_gradient) {
     constexpr int kLevels = kEdge / kFeaturesPerLevel;  // of one tile of features
     const int lane = threadIdx.x % kWarpThreads, first = threadIdx.x - lane;

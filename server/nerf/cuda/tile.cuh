@@ -85,7 +85,7 @@ class Arena {
 
 // The part that evaluating points needs, too.
 template <class T>
-__host__ __device__ void LayOutMlp(const FieldView& field, Arena& arena, Tile<T>& tile) {
+__host__ __device__ void LayOutMlp(const DeviceField& field, Arena& arena, Tile<T>& tile) {
   tile.features = field.grid.features;
   tile.hidden = field.hidden;
   tile.feature_row = tile.features + Tile<T>::kPad;
@@ -100,7 +100,7 @@ __host__ __device__ void LayOutMlp(const FieldView& field, Arena& arena, Tile<T>
 }
 
 template <class T>
-__host__ __device__ size_t LayOutTile(const FieldView& field, int samples_per_ray, unsigned char* memory,
+__host__ __device__ size_t LayOutTile(const DeviceField& field, int samples_per_ray, unsigned char* memory,
                                       Tile<T>& tile) {
   Arena arena(memory);
   LayOutMlp(field, arena, tile);

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/ximgproc/edge_drawing.hpp>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // The detector smooths and leaves out the outermost pixels of an image.
@@ -83,4 +83,4 @@ std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Ma
   return segments;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -6,7 +6,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 
 // A straight edge in an image. Pixels of the whole pinhole image, pixel centres at integer coordinates.
 struct LineSegment {
@@ -31,4 +31,4 @@ struct LineSegmentOptions {
 std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Mat& labels, uint16_t label,
                                           const cv::Rect& box_px, const LineSegmentOptions& options = {});
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kQuarterTurn = std::numbers::pi / 2;
@@ -172,4 +172,4 @@ std::optional<YawEstimate> YawFromLines(const Eigen::Matrix3d& R_world_reference
   return estimate;
 }
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -7,7 +7,7 @@
 #include "common/camera_model.h"
 #include "server/objects/lines/line_segments.h"
 
-namespace romap {
+namespace romap::objects {
 
 // The straight edges of one object in one image. Only where the camera looks matters, not where it stands.
 struct LineView {
@@ -52,4 +52,4 @@ struct YawEstimate {
 std::optional<YawEstimate> YawFromLines(const Eigen::Matrix3d& R_world_reference, std::span<const LineView> views,
                                         const LineYawOptions& options = {});
 
-}  // namespace romap
+}  // namespace romap::objects

@@ -3,7 +3,7 @@
 
 #include "server/slam/features/steered_brief.h"
 
-namespace romap {
+namespace romap::slam {
 
 const std::array<BriefTest, 256>& BriefTests() {
   // clang-format off
@@ -56,4 +56,4 @@ const std::array<BriefTest, 256>& BriefTests() {
   return kTests;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

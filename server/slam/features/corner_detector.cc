@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/features2d.hpp>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Parts of the image this large should not have fewer corners ...
@@ -130,4 +130,4 @@ Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count) 
   return spread;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <opencv2/core/types.hpp>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 
 using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST score in grey levels
 
@@ -21,4 +21,4 @@ Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int 
 // Letters 2018). Strongest first.
 Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count);
 
-}  // namespace romap
+}  // namespace romap::slam

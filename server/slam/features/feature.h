@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-namespace romap {
+namespace romap::slam {
 
 // 256 bits of an ORB descriptor (Rublee et al., ICCV 2011).
 using Descriptor = std::array<uint64_t, 4>;
@@ -44,4 +44,4 @@ struct Feature {
   Descriptor descriptor{};
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 #include "common/lens.h"
 #include "server/slam/features/steered_brief.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinImageSide_px = 2 * kPatchBorder_px + 8;
@@ -158,4 +158,4 @@ std::vector<Feature> FeatureExtractor::Describe(const Frame& frame, const std::v
   return features;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

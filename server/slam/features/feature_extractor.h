@@ -13,7 +13,7 @@
 #include "server/slam/features/image_pyramid.h"
 #include "server/slam/slam_config.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Finds oriented FAST corners with steered BRIEF descriptors (ORB: Rublee et al., ICCV 2011). The same frame gives the
 // same features in the same order; an image that is too small or has no texture gives none. For one thread: keeps its
@@ -61,4 +61,4 @@ class FeatureExtractor {
   ImagePyramid pyramid_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

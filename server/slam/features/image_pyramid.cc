@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // The blur of the ORB paper's tests, which are on patches of 5 x 5 pixels.
@@ -57,4 +57,4 @@ cv::Rect ImagePyramid::Part(int octave, const cv::Rect& part_px) const {
   return {begin, end};
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 
 #include "server/slam/features/feature.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A grey image at the sizes of all octaves, sharp for finding corners and smoothed for describing them. Keeps its
 // buffers from image to image.
@@ -32,4 +32,4 @@ class ImagePyramid {
   std::array<bool, kOctaves> is_smoothed_{};
 };
 
-}  // namespace romap
+}  // namespace romap::slam

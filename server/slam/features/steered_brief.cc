@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr size_t kTests = 256;
@@ -86,4 +86,4 @@ Descriptor SteeredBrief(const cv::Mat& smooth, int x_px, int y_px, const PatchDi
   return descriptor;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 
 #include "server/slam/features/feature.h"
 
-namespace romap {
+namespace romap::slam {
 
 // How far from a corner its orientation and its descriptor look, rounding included; corners closer than this to the
 // image's edge cannot be described.
@@ -40,4 +40,4 @@ const std::array<BriefTest, 256>& BriefTests();
 // `smooth` is CV_8UC1, blurred; the pixel lies at least kPatchBorder_px inside it.
 Descriptor SteeredBrief(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction);
 
-}  // namespace romap
+}  // namespace romap::slam

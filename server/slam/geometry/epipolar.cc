@@ -9,7 +9,7 @@
 
 #include "server/slam/geometry/rotation.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kRefineRounds = 4;
@@ -184,4 +184,4 @@ RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::
   return refined;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

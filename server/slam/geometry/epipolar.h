@@ -8,7 +8,7 @@
 #include "server/slam/geometry/levenberg_marquardt.h"
 #include "server/slam/geometry/two_view.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A match as rays with z = 1, each in its camera's frame.
 struct RayMatch {
@@ -74,4 +74,4 @@ struct RefinedMotion {
 // a few times, over the five parameters of the motion.
 RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::span<const RayMatch> matches);
 
-}  // namespace romap
+}  // namespace romap::slam

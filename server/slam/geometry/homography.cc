@@ -8,7 +8,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kPolishRounds = 5;
@@ -137,4 +137,4 @@ Eigen::Matrix3d FitTurn(const CameraModel& camera, const Eigen::Matrix3d& homogr
   return turn;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 
 #include "server/slam/geometry/epipolar.h"
 
-namespace romap {
+namespace romap::slam {
 
 // 95 % bound of chi-square with two degrees of freedom: a match says two things about a homography or a turn.
 inline constexpr double kTransferChi2Bound = 5.991;
@@ -38,4 +38,4 @@ std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography);
 Eigen::Matrix3d FitTurn(const CameraModel& camera, const Eigen::Matrix3d& homography,
                         std::span<const RayMatch> matches);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::slam {
 
 // Huber's robust cost of a squared, normalised error, quadratic up to `bound` and linear in the error beyond; in the
 // units of chi2 (no factor 1/2).
@@ -61,4 +61,4 @@ NormalEquations<N> Minimise(int max_iterations, const Linearise& linearise, cons
   return here;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

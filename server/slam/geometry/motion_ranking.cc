@@ -7,7 +7,7 @@
 #include "common/median.h"
 #include "server/slam/geometry/homography.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180;
@@ -84,4 +84,4 @@ MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search,
   return ranking;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

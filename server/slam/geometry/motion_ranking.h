@@ -6,7 +6,7 @@
 #include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/motion_search.h"
 
-namespace romap {
+namespace romap::slam {
 
 // All motions that could explain the matches, refined, best first, no two the same.
 struct MotionRanking {
@@ -22,4 +22,4 @@ struct MotionRanking {
 // wrong maps begin.
 MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches);
 
-}  // namespace romap
+}  // namespace romap::slam

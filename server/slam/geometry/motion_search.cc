@@ -11,7 +11,7 @@
 #include "server/slam/geometry/homography.h"
 #include "server/slam/geometry/random_sample.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kSampleSize = 5;
@@ -167,4 +167,4 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
   return search;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

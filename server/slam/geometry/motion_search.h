@@ -8,7 +8,7 @@
 
 #include "server/slam/geometry/epipolar.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What RANSAC found: rough models, from minimal samples.
 struct MotionSearch {
@@ -26,4 +26,4 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
 // Do two motions differ by less than these angles?
 bool AreAlike(const Motion& a, const Motion& b, double rotation_rad, double direction_rad);
 
-}  // namespace romap
+}  // namespace romap::slam

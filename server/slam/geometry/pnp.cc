@@ -10,7 +10,7 @@
 #include "server/slam/geometry/random_sample.h"
 #include "server/slam/geometry/reprojection.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kSampleSize = 3;
@@ -98,4 +98,4 @@ std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const 
   return best;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

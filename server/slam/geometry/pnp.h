@@ -6,7 +6,7 @@
 
 #include "server/slam/geometry/pose_refiner.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct PnpOptions {
   int max_iterations = 300;
@@ -19,4 +19,4 @@ struct PnpOptions {
 std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const PoseObservation> observations,
                                      const PnpOptions& options);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -5,7 +5,7 @@
 #include "server/slam/geometry/levenberg_marquardt.h"
 #include "server/slam/geometry/reprojection.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kMinObservations = 4;
@@ -92,4 +92,4 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
   return estimate;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -8,7 +8,7 @@
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Sight of a known point.
 struct PoseObservation {
@@ -40,4 +40,4 @@ struct PoseRefinerOptions {
 PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& start,
                         std::span<const PoseObservation> observations, const PoseRefinerOptions& options = {});
 
-}  // namespace romap
+}  // namespace romap::slam

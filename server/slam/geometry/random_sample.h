@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-namespace romap {
+namespace romap::slam {
 
 // K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
 // libraries and the same seed is to give the same map everywhere.
@@ -32,4 +32,4 @@ inline int SamplesNeeded(double inlier_share, int size, int limit) {
   return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also when clean is 0: needed is infinite
 }
 
-}  // namespace romap
+}  // namespace romap::slam

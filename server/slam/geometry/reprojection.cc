@@ -4,7 +4,7 @@
 
 #include "server/slam/geometry/rotation.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // What a point costs that a step takes behind the camera: more than any step gains by it, but finite, so that one wrong
@@ -45,4 +45,4 @@ CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& 
   return {turn * pose.rotation, turn * pose.translation + step.head<3>()};
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include "server/slam/geometry/levenberg_marquardt.h"
 #include "server/slam/geometry/pose_refiner.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A camera's pose as the inner loops want it: p_camera = rotation * p_world + translation.
 struct CameraFromWorld {
@@ -54,4 +54,4 @@ void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, cons
 // p_camera' = Exp(turn) * p_camera + shift, with step = (shift, turn).
 CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& step);
 
-}  // namespace romap
+}  // namespace romap::slam

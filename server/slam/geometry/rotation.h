@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace romap {
+namespace romap::slam {
 
 // The matrix that takes the cross product: Skew(a) * b = a x b.
 inline Eigen::Matrix3d Skew(const Eigen::Vector3d& a) {
@@ -19,4 +19,4 @@ inline Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& turn_rad) {
   return Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad).toRotationMatrix();
 }
 
-}  // namespace romap
+}  // namespace romap::slam

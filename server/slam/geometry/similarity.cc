@@ -9,7 +9,7 @@
 #include "server/slam/geometry/random_sample.h"
 #include "server/slam/geometry/similarity_equations.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kSampleSize = 3;
@@ -130,4 +130,4 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
   return {ToSim3(similarity), std::move(active), inliers};
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 // p_to = scale * rotation * p_from + translation, without the names of the frames.
 struct PointAlignment {
@@ -64,4 +64,4 @@ std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std
 SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera, Camera>& start,
                                     std::span<const SimilarityMatch> matches, const SimilarityOptions& options);
 
-}  // namespace romap
+}  // namespace romap::slam

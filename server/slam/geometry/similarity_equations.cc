@@ -4,7 +4,7 @@
 
 #include "server/slam/geometry/rotation.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // What a match costs that a step takes behind a camera: see reprojection.cc.
@@ -77,4 +77,4 @@ Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquatio
           growth * (turn * similarity.translation) + step.head<3>()};
 }
 
-}  // namespace romap
+}  // namespace romap::slam

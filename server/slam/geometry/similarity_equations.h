@@ -6,7 +6,7 @@
 #include "server/slam/geometry/levenberg_marquardt.h"
 #include "server/slam/geometry/similarity.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A similarity as the inner loops want it: p_first = scale * rotation * p_second + translation.
 struct Similarity {
@@ -37,4 +37,4 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
 // p_first' = exp(growth) * Exp(turn) * p_first + shift, with step = (shift, turn, growth).
 Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 #include "server/slam/geometry/motion_ranking.h"
 #include "server/slam/geometry/motion_search.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180;
@@ -88,4 +88,4 @@ const char* Describe(TwoViewOutcome outcome) {
   return "unknown";
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct TwoViewMatch {
   Eigen::Vector2d first_px = Eigen::Vector2d::Zero();  // undistorted
@@ -61,4 +61,4 @@ TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMat
 // A few words for people: "too little parallax: the camera stood still or only turned".
 const char* Describe(TwoViewOutcome outcome);
 
-}  // namespace romap
+}  // namespace romap::slam

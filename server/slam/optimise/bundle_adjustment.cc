@@ -5,7 +5,7 @@
 
 #include "server/slam/optimise/bundle_solver.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 bool IsSound(const BundleProblem& problem, const BundleObservation& observation) {
@@ -117,4 +117,4 @@ BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options)
   return summary;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 #include "common/geometry.h"
 #include "server/slam/optimise/radial_correction.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What is believed of a pose from elsewhere (a client's tracker): a soft constraint.
 struct PosePrior {
@@ -87,4 +87,4 @@ struct BundleSummary {
 // camera). At the end all observations are judged, also those left out, unless the result is not usable.
 BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options);
 
-}  // namespace romap
+}  // namespace romap::slam

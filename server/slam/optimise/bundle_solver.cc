@@ -13,7 +13,7 @@
 #include "server/slam/optimise/bundle_state.h"
 #include "server/slam/optimise/reprojection_cost.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 class AbortCallback : public ceres::IterationCallback {
@@ -284,4 +284,4 @@ void RunBundle(BundleProblem& problem, const std::vector<uint8_t>& use, const Bu
   BundleSolver(problem, use).Run(options, max_iterations, run);
 }
 
-}  // namespace romap
+}  // namespace romap::slam

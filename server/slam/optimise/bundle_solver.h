@@ -5,7 +5,7 @@
 
 #include "server/slam/optimise/bundle_adjustment.h"
 
-namespace romap {
+namespace romap::slam {
 
 // The 95 % bounds of the chi-square distribution with two and three degrees of freedom.
 inline constexpr double kChi2Bound2 = 5.991;
@@ -29,4 +29,4 @@ struct BundleRun {
 void RunBundle(BundleProblem& problem, const std::vector<uint8_t>& use, const BundleOptions& options,
                int max_iterations, BundleRun& run);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -2,7 +2,7 @@
 
 #include "server/slam/optimise/lie.h"
 
-namespace romap {
+namespace romap::slam {
 
 CameraState::CameraState(const SE3<World, Camera>& start)
     : start_rotation(start.rotation()), R_start(start.RotationMatrix()), t_start(start.translation()) {
@@ -29,4 +29,4 @@ void RefreshCameras::PrepareForEvaluation(bool /*evaluate_jacobians*/, bool new_
   for (CameraState& camera : *cameras_) camera.Refresh();
 }
 
-}  // namespace romap
+}  // namespace romap::slam

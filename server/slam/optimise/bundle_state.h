@@ -8,7 +8,7 @@
 
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A camera in the optimisation: a start and an increment on it, R = R_start * Exp(w), t = t_start + R_start * v.
 // The increment is what Ceres varies. Being a plain vector of six it needs no Manifold, by whose Jacobian Ceres would
@@ -46,4 +46,4 @@ class RefreshCameras : public ceres::EvaluationCallback {
   std::vector<CameraState>* cameras_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

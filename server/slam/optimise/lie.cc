@@ -1,6 +1,6 @@
 #include "server/slam/optimise/lie.h"
 
-namespace romap {
+namespace romap::slam {
 
 Eigen::Matrix3d Hat(const Eigen::Vector3d& a) {
   Eigen::Matrix3d hat;
@@ -38,4 +38,4 @@ Sim3Matrix RightJacobianOfSim3(const Sim3Vector& v) {
   return IntegratedExponential<7>(-generator);
 }
 
-}  // namespace romap
+}  // namespace romap::slam

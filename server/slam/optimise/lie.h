@@ -7,7 +7,7 @@
 
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Exponentials of rotations and similarities and what optimisation needs of them (Sola et al., "A micro Lie theory for
 // state estimation in robotics", 2018; Strasdat, "Local accuracy and global consistency for efficient visual SLAM",
@@ -76,4 +76,4 @@ Sim3Matrix AdjointOfSim3(const Sim3<To, From>& S) {
   return adjoint;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

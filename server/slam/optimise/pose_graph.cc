@@ -10,7 +10,7 @@
 #include "common/median.h"
 #include "server/slam/optimise/pose_graph_cost.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kScaleComponent = 6;
@@ -150,4 +150,4 @@ PoseGraphSummary OptimisePoseGraph(std::vector<PoseGraphNode>& nodes, const std:
   return summary;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

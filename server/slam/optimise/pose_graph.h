@@ -4,7 +4,7 @@
 
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct PoseGraphNode {
   Sim3<World, Camera> S_world_camera;
@@ -37,4 +37,4 @@ struct PoseGraphSummary {
 PoseGraphSummary OptimisePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
                                    const PoseGraphOptions& options);
 
-}  // namespace romap
+}  // namespace romap::slam

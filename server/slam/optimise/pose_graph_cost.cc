@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::slam {
 
 NodeState::NodeState(const Sim3<World, Camera>& start) : start(start) { Refresh(); }
 
@@ -44,4 +44,4 @@ bool RelativePoseCost::Evaluate(double const* const* /*parameters*/, double* res
   return true;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -8,7 +8,7 @@
 
 #include "server/slam/optimise/lie.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A node in the optimisation: a start and an increment on it, S = S_start * Exp(increment). What edges need of it is
 // worked out once per evaluation (Refresh).
@@ -51,4 +51,4 @@ class RelativePoseCost final : public ceres::SizedCostFunction<7, 7, 7> {
   double root_weight_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

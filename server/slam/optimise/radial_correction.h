@@ -4,7 +4,7 @@
 
 #include "common/camera_model.h"
 
-namespace romap {
+namespace romap::slam {
 
 // What the calibration that comes with the frames leaves of the lens. Many cameras are calibrated as plain pinholes;
 // that they are not bends the whole map. Brown's first radial term says most of it: what a pinhole shows at
@@ -35,4 +35,4 @@ struct RadialCorrection {
   }
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 
 #include "server/slam/optimise/lie.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // In units of sigma, per residual; far beyond any bound, and Huber's loss makes it grow only linearly.
@@ -105,4 +105,4 @@ bool PosePriorCost::Evaluate(double const* const* /*parameters*/, double* residu
   return true;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

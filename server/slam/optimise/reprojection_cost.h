@@ -9,7 +9,7 @@
 #include "server/slam/optimise/bundle_adjustment.h"
 #include "server/slam/optimise/bundle_state.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Residuals of bundle adjustment, each divided by its standard deviation, with analytic Jacobians. Parameters: the
 // camera's increment (6, see CameraState) and the point (3, world). Each reads its camera's state, which must have been
@@ -111,4 +111,4 @@ class PosePriorCost final : public ceres::SizedCostFunction<6, 6> {
   PosePrior prior_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr size_t kBranching = 8;
@@ -130,4 +130,4 @@ size_t DescriptorTree::bytes() const {
   return bytes;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 
 #include "server/slam/features/feature.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A tree of binary descriptors that grows with what is put into it, so that it needs no vocabulary trained beforehand.
 // Every inner node has up to kBranching centres, a descriptor goes to the child with the nearest one, and a leaf that
@@ -64,4 +64,4 @@ class DescriptorTree {
   std::mt19937_64 random_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // ORB features of one corner differ by some 10-20 % of their 256 bits between views, those of different corners by
@@ -119,4 +119,4 @@ size_t PlaceIndex::bytes() const {
   return tree_.bytes() + slots_.capacity() * sizeof(Slot) + slots_of_.size() * (sizeof(KeyframeId) + 3 * sizeof(void*));
 }
 
-}  // namespace romap
+}  // namespace romap::slam

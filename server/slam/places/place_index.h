@@ -9,7 +9,7 @@
 #include "server/slam/features/feature.h"
 #include "server/slam/places/descriptor_tree.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A keyframe that looks like what was asked for.
 struct PlaceMatch {
@@ -57,4 +57,4 @@ class PlaceIndex {
   size_t removed_entries_ = 0;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

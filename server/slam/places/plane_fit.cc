@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Height over base of the flattest triangle whose normal is worth having.
@@ -63,4 +63,4 @@ std::optional<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, std::s
   return fit;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-namespace romap {
+namespace romap::slam {
 
 // normal . p = offset for the points p on it; normal has unit length.
 struct Plane {
@@ -29,4 +29,4 @@ std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3
 std::optional<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, std::span<const double> weights,
                                  const Eigen::Vector3d& up);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -11,7 +11,7 @@
 
 #include "server/slam/places/plane_fit.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -304,4 +304,4 @@ std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query) {
                       .inliers = static_cast<int>(inliers.size())};
 }
 
-}  // namespace romap
+}  // namespace romap::slam

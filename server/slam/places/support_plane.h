@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-namespace romap {
+namespace romap::slam {
 
 // A map point that may lie on what the objects stand on.
 struct SupportPoint {
@@ -33,4 +33,4 @@ struct SupportPlaneQuery {
 // The plane under the objects, and with it which way is up. nullopt: no plane that the objects could stand on.
 std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query);
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace romap {
+namespace romap::measure {
 namespace {
 
 SE3<World, Object> Pose(const Eigen::Vector3d& center, double yaw_rad = 0) {
@@ -13,10 +13,10 @@ SE3<World, Object> Pose(const Eigen::Vector3d& center, double yaw_rad = 0) {
 }
 
 // Two boxes of 20 x 10 x 10 cm, 30 cm apart.
-ObjectsYaml TwoBooks() {
-  ObjectsYaml truth;
+files::ObjectsYaml TwoBooks() {
+  files::ObjectsYaml truth;
   for (int i = 0; i < 2; ++i) {
-    ObjectRecord record;
+    files::ObjectRecord record;
     record.name = i == 0 ? "left" : "right";
     record.class_name = "book";
     record.T_world_object = Pose({0.3 * i, 0, 0.05});
@@ -72,7 +72,7 @@ TEST(ScoreMap, DoesNotTakeWhatIsFarForFound) {
 
 TEST(ScoreMap, MovesTheMapIntoTheTrueWorld) {
   // The map is half as large, turned by 90 degrees and shifted.
-  Similarity true_from_map;
+  eval::FittedSimilarity true_from_map;
   true_from_map.scale = 2;
   true_from_map.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   true_from_map.translation = {1, 2, 3};
@@ -94,4 +94,4 @@ TEST(ScoreMap, FindsNothingInAnEmptyMap) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::measure

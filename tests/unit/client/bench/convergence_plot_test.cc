@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 // Mean place of the pixels that have the colour of a line, in the left (accuracy) or the right (completion) panel; the
@@ -52,4 +52,4 @@ TEST(ConvergencePlotTest, ZeroTimesAndNoCurvesAreNoReasonToFail) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

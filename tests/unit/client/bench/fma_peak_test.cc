@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 // No speed is asserted; only that work was counted and timed in the right units.
@@ -17,4 +17,4 @@ TEST(FmaPeakTest, IsARateThatAMachineCanHave) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

@@ -8,14 +8,14 @@
 #include "server/mesh/extract_mesh.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 struct HullFieldTest : public ::testing::Test {
   HullFieldTest() {
-    const Sequence sequence = data.Open();
-    const ObjectRecord& object = sequence.objects()->objects.front();
-    NerfConfig config;
+    const files::Sequence sequence = data.Open();
+    const files::ObjectRecord& object = sequence.objects()->objects.front();
+    nerf::NerfConfig config;
     config.hull_margin = 0;
     views = MakeTrueViews(*LoadTrueFrames(sequence, 1, 0), object, false);
     snapshot = MakeHullSnapshot(config, {object.T_world_object, object.half_extents, 1.0}, views);
@@ -63,7 +63,7 @@ TEST_F(HullFieldTest, ValuesRunEvenlyBetweenCells) {
 
 // Cells count as empty where a cell's centre is seen as background, so the hull is the ball give or take a pixel.
 TEST_F(HullFieldTest, ItsSurfaceHugsTheBall) {
-  const absl::StatusOr<Mesh> mesh = ExtractMesh(snapshot, MeshConfig());
+  const absl::StatusOr<Mesh> mesh = mesh::ExtractMesh(snapshot, mesh::MeshConfig());
   ASSERT_TRUE(mesh.ok()) << Message(mesh.status());
   ASSERT_GT(mesh->vertices.size(), 500u);
   double sum = 0;
@@ -72,4 +72,4 @@ TEST_F(HullFieldTest, ItsSurfaceHugsTheBall) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

@@ -6,7 +6,7 @@
 
 #include "client/bench/published.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 using ::testing::ElementsAre;
@@ -79,7 +79,7 @@ TEST(MethodsTest, DepthIsUsedByWhomItSays) {
 
 TEST(MethodsTest, PlainMlpsHaveTheirPublishedSizes) {
   for (const auto& [id, width] : {std::pair("imap", 256), {"vmap", 32}}) {
-    const NerfConfig nerf = ConfigOf(id).nerf;
+    const nerf::NerfConfig nerf = ConfigOf(id).nerf;
     EXPECT_EQ(nerf.encoding, "frequency");
     EXPECT_EQ(nerf.hidden_width, width);
     EXPECT_EQ(nerf.hidden_layers, 4);
@@ -91,7 +91,7 @@ TEST(MethodsTest, ModelSizesAreThoseOfThePapersTable) {
   const std::vector<BenchMethod> methods = ModelSizeMethods();
   ASSERT_EQ(methods.size(), std::size(kPublishedTable4));
   for (size_t i = 0; i < methods.size(); ++i) {
-    const NerfConfig nerf = ConfigOf(methods[i].id).nerf;
+    const nerf::NerfConfig nerf = ConfigOf(methods[i].id).nerf;
     EXPECT_EQ(nerf.log2_table_entries, kPublishedTable4[i].log2_table_entries);
     EXPECT_EQ(nerf.hidden_layers, kPublishedTable4[i].hidden_layers);
   }
@@ -116,4 +116,4 @@ TEST(MethodsTest, RowsAreReadFromText) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

@@ -10,7 +10,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 namespace fs = std::filesystem;
@@ -57,7 +57,7 @@ TEST(PaperBenchTest, WritesReportPictureAndMeshes) {
     }
     EXPECT_EQ(meshes, 2u) << method;
   }
-  EXPECT_THAT(*ReadFile(options.out_dir + "/paper.md"), HasSubstr("| ours, fast | "));
+  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("| ours, fast | "));
   EXPECT_EQ(ReadJson(options.out_dir + "/paper.json")["runs"]["done"], 1);
   EXPECT_GT(fs::file_size(options.out_dir + "/convergence.png"), 1000u);
   EXPECT_FALSE(fs::exists(options.out_dir + "/scratch"));
@@ -118,7 +118,7 @@ TEST(PaperBenchTest, StoppedItKeepsWhatThereIs) {
   const nlohmann::json json = ReadJson(options.out_dir + "/paper.json");
   EXPECT_EQ(json["runs"]["done"], 1);
   EXPECT_EQ(json["runs"]["planned"], 3);
-  EXPECT_THAT(*ReadFile(options.out_dir + "/paper.md"), HasSubstr("Stopped before the end"));
+  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("Stopped before the end"));
   EXPECT_FALSE(fs::exists(options.out_dir + "/scratch"));
 }
 
@@ -176,4 +176,4 @@ TEST(PaperBenchTest, QuickIsASmallRun) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 using ::testing::AllOf;
@@ -141,4 +141,4 @@ TEST(PaperResultsTest, JsonHasTheSameFigures) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

@@ -6,7 +6,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 constexpr double kForever_s = 1e6;
@@ -14,7 +14,7 @@ constexpr double kForever_s = 1e6;
 // One object's views and a small field to learn them.
 struct TimedTrainingTest : public ::testing::Test {
   TimedTrainingTest() {
-    const Sequence sequence = data.Open();
+    const files::Sequence sequence = data.Open();
     object = sequence.objects()->objects.front();
     views = MakeTrueViews(*LoadTrueFrames(sequence, 4, 0), object, false);
     request.config.levels = 4;
@@ -40,7 +40,7 @@ struct TimedTrainingTest : public ::testing::Test {
   }
 
   testing::TinySequence data;
-  ObjectRecord object;
+  files::ObjectRecord object;
   std::vector<ObjectView> views;
   TrainingRequest request;
   double seconds_per_step = 0;
@@ -56,7 +56,7 @@ TEST_F(TimedTrainingTest, TrainsToTheEndOfThePlanAsTheEngineDoes) {
   EXPECT_GT(training->train_s, 0);
   EXPECT_GT(training->setup_s, 0);
   EXPECT_DOUBLE_EQ(seconds_per_step, training->train_s / 30);
-  ObjectField field(request.config, views.front().object, request.seed);
+  nerf::ObjectField field(request.config, views.front().object, request.seed);
   ASSERT_TRUE(field.SetBox(request.cuboid).ok());
   for (const ObjectView& view : views) ASSERT_TRUE(field.AddView(view).ok());
   field.Train(30, 1);
@@ -110,4 +110,4 @@ TEST_F(TimedTrainingTest, WithoutViewsThereIsNothingToTrain) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

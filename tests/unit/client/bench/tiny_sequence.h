@@ -24,7 +24,7 @@ class TinySequence {
 
   std::string dir() const { return folder_ / "sequence"; }
   std::string operator/(const std::string& name) const { return folder_ / name; }
-  Sequence Open() const;
+  files::Sequence Open() const;
 
   static const std::vector<TinyBall>& Balls();
 

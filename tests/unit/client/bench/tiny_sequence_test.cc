@@ -73,7 +73,7 @@ Mesh SurfacePoints(const TinyBall& ball) {
 
 void WriteFrames(const std::string& dir) {
   std::ofstream rgb(dir + "/rgb.txt"), mask(dir + "/mask.txt"), depth(dir + "/depth.txt");
-  std::vector<StampedPose> poses;
+  std::vector<files::StampedPose> poses;
   for (int frame = 0; frame < TinySequence::kFrames; ++frame) {
     poses.push_back({frame * int64_t{100'000'000}, PoseOf(frame)});
     Images images;
@@ -89,12 +89,12 @@ void WriteFrames(const std::string& dir) {
     write(mask, "mask", images.labels);
     write(depth, "depth", images.depth);
   }
-  EXPECT_TRUE(WriteTum(dir + "/groundtruth.txt", poses).ok());
+  EXPECT_TRUE(files::WriteTum(dir + "/groundtruth.txt", poses).ok());
 }
 
 TEST(TinySequenceTest, ShowsSomethingOfBothBallsInEveryFrame) {
   const TinySequence data;
-  const Sequence sequence = data.Open();
+  const files::Sequence sequence = data.Open();
   ASSERT_EQ(sequence.size(), static_cast<size_t>(TinySequence::kFrames));
   EXPECT_EQ(sequence.objects()->objects.size(), TinySequence::Balls().size());
   for (size_t i = 0; i < sequence.size(); ++i) {
@@ -111,8 +111,8 @@ TEST(TinySequenceTest, ShowsSomethingOfBothBallsInEveryFrame) {
 TinySequence::TinySequence() {
   for (const char* folder : {"rgb", "mask", "depth", "gt"}) fs::create_directories(dir() + "/" + folder);
   WriteFrames(dir());
-  EXPECT_TRUE(WriteCameraYaml(dir() + "/camera.yaml", {Camera(), 10, kDepthScale}).ok());
-  ObjectsYaml objects;
+  EXPECT_TRUE(files::WriteCameraYaml(dir() + "/camera.yaml", {Camera(), 10, kDepthScale}).ok());
+  files::ObjectsYaml objects;
   for (const TinyBall& ball : Balls()) {
     objects.objects.push_back({ball.id,
                                ball.name,
@@ -120,13 +120,13 @@ TinySequence::TinySequence() {
                                {Eigen::Quaterniond::Identity(), ball.center_world},
                                Eigen::Vector3d::Constant(ball.radius_m),
                                std::nullopt});
-    EXPECT_TRUE(WritePly(fmt::format("{}/gt/{}.ply", dir(), ball.name), SurfacePoints(ball)).ok());
+    EXPECT_TRUE(files::WritePly(fmt::format("{}/gt/{}.ply", dir(), ball.name), SurfacePoints(ball)).ok());
   }
-  EXPECT_TRUE(WriteObjects(dir() + "/objects.yaml", objects).ok());
+  EXPECT_TRUE(files::WriteObjects(dir() + "/objects.yaml", objects).ok());
 }
 
-Sequence TinySequence::Open() const {
-  absl::StatusOr<Sequence> sequence = Sequence::Open(dir(), {.use_depth = true});
+files::Sequence TinySequence::Open() const {
+  absl::StatusOr<files::Sequence> sequence = files::Sequence::Open(dir(), {.use_depth = true});
   EXPECT_TRUE(sequence.ok()) << Message(sequence.status());
   return *std::move(sequence);
 }

@@ -8,7 +8,7 @@
 
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap {
+namespace romap::bench {
 namespace {
 
 using ::testing::ElementsAre;
@@ -22,7 +22,7 @@ std::vector<uint64_t> Ids(const TrueFrames& frames) {
 
 TEST(TrueViewsTest, SubsetsShareNoFrame) {
   const testing::TinySequence data;
-  const Sequence sequence = data.Open();
+  const files::Sequence sequence = data.Open();
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 0)), ElementsAre(1, 9, 17));
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 3)), ElementsAre(4, 12, 20));
   EXPECT_EQ(LoadTrueFrames(sequence, 8, 24).status().code(), absl::StatusCode::kNotFound);
@@ -30,9 +30,9 @@ TEST(TrueViewsTest, SubsetsShareNoFrame) {
 
 TEST(TrueViewsTest, AViewShowsItsObjectAndWhatIsAroundIt) {
   const testing::TinySequence data;
-  const Sequence sequence = data.Open();
+  const files::Sequence sequence = data.Open();
   const TrueFrames frames = *LoadTrueFrames(sequence, 6, 0);
-  for (const ObjectRecord& object : sequence.objects()->objects) {
+  for (const files::ObjectRecord& object : sequence.objects()->objects) {
     const std::vector<ObjectView> views = MakeTrueViews(frames, object, /*with_depth=*/true);
     ASSERT_EQ(views.size(), frames.size());
     for (size_t i = 0; i < views.size(); ++i) {
@@ -59,9 +59,9 @@ TEST(TrueViewsTest, AViewShowsItsObjectAndWhatIsAroundIt) {
 
 TEST(TrueViewsTest, AnObjectThatIsHardlySeenGivesNoView) {
   const testing::TinySequence data;
-  const Sequence sequence = data.Open();
+  const files::Sequence sequence = data.Open();
   Frame frame = *LoadTrueFrames(sequence, 24, 0)->front();
-  const ObjectRecord& object = sequence.objects()->objects.front();
+  const files::ObjectRecord& object = sequence.objects()->objects.front();
   ASSERT_TRUE(MakeTrueView(frame, object, false).has_value());
   frame.labels = cv::Mat::zeros(frame.labels.size(), frame.labels.type());
   EXPECT_FALSE(MakeTrueView(frame, object, false).has_value());
@@ -80,4 +80,4 @@ TEST(TrueViewsTest, CuboidsMustBeThere) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::bench

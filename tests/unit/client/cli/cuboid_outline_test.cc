@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 const CameraModel kCamera{
@@ -30,4 +30,4 @@ TEST(CuboidOutlineTest, NoneBehindTheCameraOrAcrossTheBorder) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::cli

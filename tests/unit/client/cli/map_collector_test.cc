@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 ObjectUpdate Update(uint64_t id, uint64_t revision, ObjectState state = ObjectState::kConfirmed) {
@@ -101,4 +101,4 @@ TEST(MapCollectorTest, AcknowledgementsMakeTheTrajectory) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::cli

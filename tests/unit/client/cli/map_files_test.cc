@@ -5,7 +5,7 @@
 
 #include "common/mesh_codec.h"
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 using ::testing::IsEmpty;
@@ -50,11 +50,11 @@ TEST(MapFilesTest, TheTrajectoryOfAMapLeavesOutFramesWithoutPose) {
   tracked.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3));
   snapshot.trajectory = {untracked, tracked};
   snapshot.timestamps_ns = {10, 20};
-  const std::vector<StampedPose> trajectory = TrajectoryOf(snapshot);
+  const std::vector<files::StampedPose> trajectory = TrajectoryOf(snapshot);
   ASSERT_THAT(trajectory, SizeIs(1));
   EXPECT_EQ(trajectory[0].timestamp_ns, 20);
   EXPECT_EQ(trajectory[0].T_world_camera.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::cli

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace romap {
+namespace romap::cli {
 namespace {
 
 using ::testing::ElementsAre;
@@ -74,4 +74,4 @@ TEST(MaskScheduleTest, MasksComeLaterByTheFramesTimestamps) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::cli

@@ -8,7 +8,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using eval_world::TempFolder;
@@ -22,13 +22,13 @@ class BoxesEval : public testing::Test {
  protected:
   BoxesEval() { Write("gt.yaml", {First(), Second()}); }
 
-  static ObjectRecord First() { return UprightCuboid(1, {0, 0, 0}, 0.3, {0.1, 0.2, 0.05}); }
-  static ObjectRecord Second() { return UprightCuboid(2, {1, 0, 0.1}, -0.5, {0.15, 0.1, 0.2}); }
+  static files::ObjectRecord First() { return eval_world::UprightCuboid(1, {0, 0, 0}, 0.3, {0.1, 0.2, 0.05}); }
+  static files::ObjectRecord Second() { return eval_world::UprightCuboid(2, {1, 0, 0.1}, -0.5, {0.15, 0.1, 0.2}); }
 
-  void Write(const std::string& name, const std::vector<ObjectRecord>& objects) {
-    EXPECT_TRUE(WriteObjects(folder_ / name, {.objects = objects}).ok());
+  void Write(const std::string& name, const std::vector<files::ObjectRecord>& objects) {
+    EXPECT_TRUE(files::WriteObjects(folder_ / name, {.objects = objects}).ok());
   }
-  absl::StatusOr<BoxesReport> Evaluate(const std::vector<ObjectRecord>& predicted) {
+  absl::StatusOr<BoxesReport> Evaluate(const std::vector<files::ObjectRecord>& predicted) {
     Write("cuboids.json", predicted);
     BoxesEvalOptions options;
     options.predicted = folder_ / "cuboids.json";
@@ -36,7 +36,7 @@ class BoxesEval : public testing::Test {
     return EvaluateBoxes(options);
   }
 
-  TempFolder folder_;
+  eval_world::TempFolder folder_;
 };
 
 TEST_F(BoxesEval, BoxesAgainstThemselvesAreExactInAnyOrder) {
@@ -49,15 +49,16 @@ TEST_F(BoxesEval, BoxesAgainstThemselvesAreExactInAnyOrder) {
 }
 
 TEST_F(BoxesEval, HalfALengthAlongXGivesAThird) {
-  ObjectRecord moved = UprightCuboid(1, 0.1 * Eigen::Vector3d(std::cos(0.3), std::sin(0.3), 0), 0.3, {0.1, 0.2, 0.05});
+  files::ObjectRecord moved =
+      eval_world::UprightCuboid(1, 0.1 * Eigen::Vector3d(std::cos(0.3), std::sin(0.3), 0), 0.3, {0.1, 0.2, 0.05});
   const auto report = Evaluate({moved, Second()});
   EXPECT_NEAR(report->rows[0].match->iou, 1.0 / 3, 1e-7);
   EXPECT_NEAR(report->rows[0].match->center_cm, 10, 1e-6);
 }
 
 TEST_F(BoxesEval, AQuarterTurnWithSwappedSidesIsTheSameBox) {
-  const auto report = Evaluate({UprightCuboid(1, {0, 0, 0}, 0.3 + std::numbers::pi / 2, {0.2, 0.1, 0.05}),
-                                UprightCuboid(2, {1, 0, 0.1}, -0.5 + 10 * kRadPerDeg, {0.15, 0.1, 0.2})});
+  const auto report = Evaluate({eval_world::UprightCuboid(1, {0, 0, 0}, 0.3 + std::numbers::pi / 2, {0.2, 0.1, 0.05}),
+                                eval_world::UprightCuboid(2, {1, 0, 0.1}, -0.5 + 10 * kRadPerDeg, {0.15, 0.1, 0.2})});
   const BoxFigures& turned = *report->rows[0].match;
   EXPECT_NEAR(turned.iou, 1, 1e-7);
   EXPECT_NEAR(turned.yaw_deg, 0, 1e-6);
@@ -66,11 +67,12 @@ TEST_F(BoxesEval, AQuarterTurnWithSwappedSidesIsTheSameBox) {
 }
 
 TEST_F(BoxesEval, TenPercentTooLargeInAllDirections) {
-  EXPECT_NEAR(Evaluate({UprightCuboid(1, {0, 0, 0}, 0.3, {0.11, 0.22, 0.055})})->iou_matched, 1 / 1.331, 1e-7);
+  EXPECT_NEAR(Evaluate({eval_world::UprightCuboid(1, {0, 0, 0}, 0.3, {0.11, 0.22, 0.055})})->iou_matched, 1 / 1.331,
+              1e-7);
 }
 
 TEST_F(BoxesEval, CountsMissingAndExtraBoxes) {
-  const auto report = Evaluate({First(), UprightCuboid(9, {50, 0, 0}, 0, {1, 1, 1})});
+  const auto report = Evaluate({First(), eval_world::UprightCuboid(9, {50, 0, 0}, 0, {1, 1, 1})});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_FALSE(report->rows[1].match.has_value());
   EXPECT_NEAR(report->iou_matched, 1, 1e-7);
@@ -79,16 +81,16 @@ TEST_F(BoxesEval, CountsMissingAndExtraBoxes) {
 }
 
 TEST_F(BoxesEval, MovesBoxesThroughTheTrajectories) {
-  const Similarity other = eval_world::OtherWorld();
-  std::vector<ObjectRecord> moved{First(), Second()};
-  for (ObjectRecord& object : moved) {
+  const FittedSimilarity other = eval_world::OtherWorld();
+  std::vector<files::ObjectRecord> moved{First(), Second()};
+  for (files::ObjectRecord& object : moved) {
     object.T_world_object = {Eigen::Matrix3d(other.rotation * object.T_world_object.RotationMatrix()),
                              other * object.T_world_object.translation()};
     object.half_extents *= other.scale;
   }
   EXPECT_THAT(std::string(Evaluate(moved).status().message()), HasSubstr("another world frame?"));
-  ASSERT_TRUE(WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
-  ASSERT_TRUE(WriteTum(folder_ / "est.txt", eval_world::Moved(eval_world::Orbit(), other)).ok());
+  ASSERT_TRUE(files::WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
+  ASSERT_TRUE(files::WriteTum(folder_ / "est.txt", eval_world::Moved(eval_world::Orbit(), other)).ok());
   BoxesEvalOptions options;
   options.predicted = folder_ / "cuboids.json";
   options.ground_truth = folder_ / "gt.yaml";
@@ -106,9 +108,9 @@ TEST_F(BoxesEval, RefusesEmptyFiles) {
 }
 
 TEST(IntersectionOverUnion, AgreesWithCountingRandomPoints) {
-  const UprightBox a{{0, 0, 0}, -0.5, {0.15, 0.1, 0.2}, 0};
-  const UprightBox b{{0.04, -0.03, 0.05}, 0.2, {0.12, 0.13, 0.15}, 0};
-  const auto inside = [](const UprightBox& box, const Eigen::Vector3d& p) {
+  const YawBox a{{0, 0, 0}, -0.5, {0.15, 0.1, 0.2}, 0};
+  const YawBox b{{0.04, -0.03, 0.05}, 0.2, {0.12, 0.13, 0.15}, 0};
+  const auto inside = [](const YawBox& box, const Eigen::Vector3d& p) {
     const Eigen::AngleAxisd turn(-box.yaw_rad, Eigen::Vector3d::UnitZ());
     return ((turn * (p - box.center)).cwiseAbs().array() < box.half_extents.array()).all();
   };
@@ -130,10 +132,10 @@ TEST(MakeUpright, TakesTheAxisClosestToUpAndReportsTheTilt) {
   const Eigen::Matrix3d rotation = (Eigen::AngleAxisd(5 * kRadPerDeg, Eigen::Vector3d::UnitX()) *
                                     Eigen::AngleAxisd(-90 * kRadPerDeg, Eigen::Vector3d::UnitY()))
                                        .toRotationMatrix();
-  const UprightBox box = MakeUpright(rotation, {0, 0, 0}, {3, 1, 2});
+  const YawBox box = MakeUpright(rotation, {0, 0, 0}, {3, 1, 2});
   EXPECT_EQ(box.half_extents.z(), 3);
   EXPECT_NEAR(box.tilt_deg, 5, 1e-9);
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

@@ -75,20 +75,20 @@ inline Mesh Box(const Eigen::Vector3d& half_extents, const Eigen::Vector3d& cent
   return mesh;
 }
 
-inline Mesh Moved(Mesh mesh, const Similarity& similarity) {
+inline Mesh Moved(Mesh mesh, const eval::FittedSimilarity& similarity) {
   for (Eigen::Vector3f& vertex : mesh.vertices) vertex = (similarity * vertex.cast<double>()).cast<float>();
   return mesh;
 }
 
 // A similarity that is far from identity: another world than the ground truth's.
-inline Similarity OtherWorld() {
+inline eval::FittedSimilarity OtherWorld() {
   return {0.37, Eigen::AngleAxisd(1.4, Eigen::Vector3d(0.4, -1.1, 0.8).normalized()).toRotationMatrix(),
           Eigen::Vector3d(3, -2, 5)};
 }
 
 // Cameras on a wavy circle of radius 1 that look at the origin, 25 Hz.
-inline std::vector<StampedPose> Orbit(int count = 200) {
-  std::vector<StampedPose> poses;
+inline std::vector<files::StampedPose> Orbit(int count = 200) {
+  std::vector<files::StampedPose> poses;
   for (int k = 0; k < count; ++k) {
     const double a = 2 * std::numbers::pi * k / count;
     const Eigen::Vector3d position(std::cos(a), std::sin(a), 0.3 + 0.2 * std::sin(3 * a));
@@ -101,16 +101,17 @@ inline std::vector<StampedPose> Orbit(int count = 200) {
   return poses;
 }
 
-inline std::vector<StampedPose> Moved(std::vector<StampedPose> poses, const Similarity& similarity) {
-  for (StampedPose& pose : poses) {
+inline std::vector<files::StampedPose> Moved(std::vector<files::StampedPose> poses,
+                                             const eval::FittedSimilarity& similarity) {
+  for (files::StampedPose& pose : poses) {
     const Eigen::Matrix3d rotation = similarity.rotation * pose.T_world_camera.RotationMatrix();
     pose.T_world_camera = {rotation, similarity * pose.T_world_camera.translation()};
   }
   return poses;
 }
 
-inline ObjectRecord UprightCuboid(int64_t id, const Eigen::Vector3d& center, double yaw_rad,
-                                  const Eigen::Vector3d& half_extents) {
+inline files::ObjectRecord UprightCuboid(int64_t id, const Eigen::Vector3d& center, double yaw_rad,
+                                         const Eigen::Vector3d& half_extents) {
   return {id,           fmt::format("b{}", id),
           "box",        {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), center},
           half_extents, {}};

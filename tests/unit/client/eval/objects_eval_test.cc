@@ -12,7 +12,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using eval_world::Box;
@@ -39,7 +39,7 @@ class ObjectsEval : public testing::Test {
   }
 
   void Put(const std::string& name, const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars = {}) {
-    const absl::Status status = WritePly(folder_ / (name + ".ply"), mesh, scalars);
+    const absl::Status status = files::WritePly(folder_ / (name + ".ply"), mesh, scalars);
     EXPECT_TRUE(status.ok()) << status;
   }
   // The match of the only true object.
@@ -50,28 +50,29 @@ class ObjectsEval : public testing::Test {
   }
   std::string Error() { return std::string(EvaluateObjects(options_).status().message()); }
 
-  TempFolder folder_;
+  eval_world::TempFolder folder_;
   ObjectsEvalOptions options_;
 };
 
 TEST_F(ObjectsEval, AMeshAgainstItselfGivesTheSamplingFloor) {
-  Put("gt/sphere", Sphere(0.1, {0, 0, 0}));
-  Put("gt/box", Box(kBoxHalf, kBoxCenter));
-  Put("pred/object_7", Box(kBoxHalf, kBoxCenter));
-  Put("pred/object_8", Sphere(0.1, {0, 0, 0}, 90));
+  Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
+  Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("pred/object_7", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("pred/object_8", eval_world::Sphere(0.1, {0, 0, 0}, 90));
   const auto report = EvaluateObjects(options_);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->rows[0].match->predicted, "object_7");
   EXPECT_EQ(report->rows[1].match->predicted, "object_8");
-  EXPECT_NEAR(report->rows[0].match->figures.accuracy_cm, SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.01);
-  EXPECT_NEAR(report->rows[1].match->figures.completion_cm, SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.01);
+  EXPECT_NEAR(report->rows[0].match->figures.accuracy_cm, eval_world::SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.01);
+  EXPECT_NEAR(report->rows[1].match->figures.completion_cm, eval_world::SamplingFloor_cm(kSphereArea_cm2, kSamples),
+              0.01);
   EXPECT_NEAR(*report->mean.accuracy_cm,
               (report->rows[0].match->figures.accuracy_cm + report->rows[1].match->figures.accuracy_cm) / 2, 1e-12);
 }
 
 TEST_F(ObjectsEval, ASphereFiveMillimetresTooLarge) {
-  Put("gt/sphere", Sphere(0.1, {0, 0, 0}));
-  Put("pred/a", Sphere(0.105, {0, 0, 0}));
+  Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
+  Put("pred/a", eval_world::Sphere(0.105, {0, 0, 0}));
   const ObjectMatch match = EvaluateOne();
   EXPECT_NEAR(match.figures.accuracy_cm, 0.5, 0.02);
   EXPECT_NEAR(match.figures.completion_cm, 0.5, 0.02);
@@ -80,7 +81,7 @@ TEST_F(ObjectsEval, ASphereFiveMillimetresTooLarge) {
   options_.alignment = Alignment::kSim3;
   const ObjectMatch aligned = EvaluateOne();
   EXPECT_NEAR(aligned.icp->scale, 1 / 1.05, 2e-3);
-  EXPECT_NEAR(aligned.figures.accuracy_cm, SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
+  EXPECT_NEAR(aligned.figures.accuracy_cm, eval_world::SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
   options_.alignment = Alignment::kSe3;
   EXPECT_EQ(EvaluateOne().icp->scale, 1);
 }
@@ -89,23 +90,23 @@ TEST_F(ObjectsEval, IcpUndoesScaleTurnAndShift) {
   const double angle_rad = 0.054;
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(angle_rad, Eigen::Vector3d(0.02, -0.03, 0.04).normalized()).toRotationMatrix();
-  const Similarity about_center{1.06, turn,
-                                kBoxCenter - 1.06 * (turn * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005)};
-  Put("gt/box", Box(kBoxHalf, kBoxCenter));
-  Put("pred/a", eval_world::Moved(Box(kBoxHalf, kBoxCenter), about_center));
+  const FittedSimilarity about_center{1.06, turn,
+                                      kBoxCenter - 1.06 * (turn * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005)};
+  Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("pred/a", eval_world::Moved(eval_world::Box(kBoxHalf, kBoxCenter), about_center));
   options_.alignment = Alignment::kSim3;
   for (const IcpKind kind : {IcpKind::kOneSided, IcpKind::kSymmetric}) {
     options_.icp = kind;
     const ObjectMatch match = EvaluateOne();
     EXPECT_NEAR(match.icp->scale, 1 / 1.06, 3e-3);
     EXPECT_NEAR(match.icp->rotation_deg, angle_rad * 180 / std::numbers::pi, 0.2);
-    EXPECT_NEAR(match.figures.accuracy_cm, SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.03);
+    EXPECT_NEAR(match.figures.accuracy_cm, eval_world::SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.03);
   }
 }
 
 TEST_F(ObjectsEval, HalfASphereIsHalfComplete) {
-  Put("gt/sphere", Sphere(0.1, {0, 0, 0}));
-  Put("pred/a", Sphere(0.1, {0, 0, 0}, 240, /*min_z=*/0));
+  Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
+  Put("pred/a", eval_world::Sphere(0.1, {0, 0, 0}, 240, /*min_z=*/0));
   const ObjectMatch match = EvaluateOne();
   // From angle a below the equator the rim is 2 r sin(a / 2) away; mean over the lower half, halved for the whole.
   double integral_cm = 0;
@@ -116,11 +117,11 @@ TEST_F(ObjectsEval, HalfASphereIsHalfComplete) {
   }
   EXPECT_NEAR(match.figures.completion_cm, integral_cm, 0.1);
   EXPECT_NEAR(match.figures.ratios[1].all_percent, 100 * (0.5 + 0.5 * std::sin(2 * std::asin(0.05))), 1.5);
-  EXPECT_NEAR(match.figures.accuracy_cm, SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
+  EXPECT_NEAR(match.figures.accuracy_cm, eval_world::SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
 }
 
 TEST_F(ObjectsEval, SeenColumnsLeaveOutWhatNoCameraSawAndNoCapTheUnderside) {
-  Mesh cloud = Sphere(0.1, {0, 0, 0}, 300);
+  Mesh cloud = eval_world::Sphere(0.1, {0, 0, 0}, 300);
   cloud.triangles.clear();
   std::vector<double> seen, source;
   for (const Eigen::Vector3f& vertex : cloud.vertices) {
@@ -128,7 +129,7 @@ TEST_F(ObjectsEval, SeenColumnsLeaveOutWhatNoCameraSawAndNoCapTheUnderside) {
     source.push_back(vertex.z() < -0.05 ? 2 : 0);
   }
   Put("gt/sphere", cloud, {{"seen", seen}, {"source", source}});
-  Mesh predicted = Sphere(0.1, {0, 0, 0}, 240);
+  Mesh predicted = eval_world::Sphere(0.1, {0, 0, 0}, 240);
   for (Eigen::Vector3f& vertex : predicted.vertices) vertex *= vertex.z() < -1e-6f ? 1.2f : 1.f;
   Put("pred/a", predicted);
   const ObjectMatch match = EvaluateOne();
@@ -140,23 +141,23 @@ TEST_F(ObjectsEval, SeenColumnsLeaveOutWhatNoCameraSawAndNoCapTheUnderside) {
 }
 
 TEST_F(ObjectsEval, MovesMeshesThroughTheTrajectories) {
-  const Similarity other = eval_world::OtherWorld();
-  Put("gt/box", Box(kBoxHalf, kBoxCenter));
-  Put("pred/a", eval_world::Moved(Box(kBoxHalf, kBoxCenter), other));
+  const FittedSimilarity other = eval_world::OtherWorld();
+  Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("pred/a", eval_world::Moved(eval_world::Box(kBoxHalf, kBoxCenter), other));
   EXPECT_THAT(Error(), HasSubstr("another world frame?"));
   options_.estimated_trajectory = folder_ / "est.txt";
   EXPECT_THAT(Error(), HasSubstr("go together"));
   options_.true_trajectory = folder_ / "gt.txt";
-  ASSERT_TRUE(WriteTum(options_.true_trajectory, eval_world::Orbit()).ok());
-  ASSERT_TRUE(WriteTum(options_.estimated_trajectory, eval_world::Moved(eval_world::Orbit(), other)).ok());
-  EXPECT_NEAR(EvaluateOne().figures.accuracy_cm, SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.01);
+  ASSERT_TRUE(files::WriteTum(options_.true_trajectory, eval_world::Orbit()).ok());
+  ASSERT_TRUE(files::WriteTum(options_.estimated_trajectory, eval_world::Moved(eval_world::Orbit(), other)).ok());
+  EXPECT_NEAR(EvaluateOne().figures.accuracy_cm, eval_world::SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.01);
 }
 
 TEST_F(ObjectsEval, CountsMissingAndExtraMeshes) {
-  Put("gt/box", Box(kBoxHalf, kBoxCenter));
-  Put("gt/far", Sphere(0.1, {10, 0, 0}));
-  Put("pred/a", Box(kBoxHalf, kBoxCenter));
-  Put("pred/ghost", Sphere(0.05, {-7, 0, 0}));
+  Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("gt/far", eval_world::Sphere(0.1, {10, 0, 0}));
+  Put("pred/a", eval_world::Box(kBoxHalf, kBoxCenter));
+  Put("pred/ghost", eval_world::Sphere(0.05, {-7, 0, 0}));
   const auto report = EvaluateObjects(options_);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->matched, 1u);
@@ -169,7 +170,7 @@ TEST_F(ObjectsEval, NamesWhatIsWrong) {
   options_.predicted_dir = folder_ / "nowhere_at_all/x";
   options_.ground_truth_dir = folder_ / "gt/";
   EXPECT_THAT(Error(), HasSubstr("holds no .ply or .obj"));
-  Put("gt/box", Box(kBoxHalf, kBoxCenter));
+  Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   EXPECT_THAT(Error(), HasSubstr("nowhere_at_all/x: no folder of meshes"));
   std::ofstream(folder_ / "pred/broken.ply") << "ply\nformat ascii 1.0\n";
   options_.predicted_dir = folder_ / "pred";
@@ -186,31 +187,32 @@ class ObjectsEvalWithMasks : public ObjectsEval {
  protected:
   ObjectsEvalWithMasks() {
     const std::string root = folder_ / "set";
-    const CameraYaml camera{{64, 48, 100, 100, 31.5, 23.5, {}}, 10, 0.001};
-    EXPECT_TRUE(WriteCameraYaml(folder_ / "set/camera.yaml", camera).ok());
+    const files::CameraYaml camera{{64, 48, 100, 100, 31.5, 23.5, {}}, 10, 0.001};
+    EXPECT_TRUE(files::WriteCameraYaml(folder_ / "set/camera.yaml", camera).ok());
     for (const char* list : {"rgb", "mask", "depth"}) {
       EXPECT_TRUE(
-          WriteFile(folder_ / ("set/" + std::string(list) + ".txt"), "0.0 " + std::string(list) + ".png\n").ok());
+          files::WriteFile(folder_ / ("set/" + std::string(list) + ".txt"), "0.0 " + std::string(list) + ".png\n")
+              .ok());
     }
     cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
     labels.colRange(32, 64) = 3;
     cv::imwrite(folder_ / "set/rgb.png", cv::Mat::zeros(48, 64, CV_8UC3));
     cv::imwrite(folder_ / "set/mask.png", labels);
     cv::imwrite(folder_ / "set/depth.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(1000)));
-    ObjectRecord plate = eval_world::UprightCuboid(3, {0, 0, 0}, 0, {0.1, 0.1, 0.02});
+    files::ObjectRecord plate = eval_world::UprightCuboid(3, {0, 0, 0}, 0, {0.1, 0.1, 0.02});
     plate.name = "plate";
-    EXPECT_TRUE(WriteObjects(folder_ / "set/objects.yaml", {.objects = {plate}}).ok());
+    EXPECT_TRUE(files::WriteObjects(folder_ / "set/objects.yaml", {.objects = {plate}}).ok());
     const Eigen::Quaterniond down(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX()));
-    EXPECT_TRUE(
-        WriteTum(folder_ / "set/groundtruth.txt", std::vector<StampedPose>{{0, {down, Eigen::Vector3d(0, 0, 1)}}})
-            .ok());
+    EXPECT_TRUE(files::WriteTum(folder_ / "set/groundtruth.txt",
+                                std::vector<files::StampedPose>{{0, {down, Eigen::Vector3d(0, 0, 1)}}})
+                    .ok());
     options_.dataset_dir = root;
     options_.dataset_every = 1;
   }
 };
 
 TEST_F(ObjectsEvalWithMasks, PointsInTheMaskAndNearTheDepthCountAsSeen) {
-  Mesh cloud = Box({0.1, 0.1, 0.05}, {0, 0, 0});
+  Mesh cloud = eval_world::Box({0.1, 0.1, 0.05}, {0, 0, 0});
   cloud.triangles.clear();
   Put("gt/plate", cloud, {{"seen", std::vector<double>(8, 0)}});
   Mesh points;
@@ -225,10 +227,10 @@ TEST_F(ObjectsEvalWithMasks, PointsInTheMaskAndNearTheDepthCountAsSeen) {
 }
 
 TEST_F(ObjectsEvalWithMasks, NamesATrueSurfaceThatIsNoObject) {
-  Put("gt/bowl", Box(kBoxHalf, {0, 0, 0}));
-  Put("pred/a", Box(kBoxHalf, {0, 0, 0}));
+  Put("gt/bowl", eval_world::Box(kBoxHalf, {0, 0, 0}));
+  Put("pred/a", eval_world::Box(kBoxHalf, {0, 0, 0}));
   EXPECT_THAT(Error(), HasSubstr("objects.yaml has no object named bowl"));
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

@@ -5,11 +5,11 @@
 
 #include <random>
 
-#include "common/assignment.h"
 #include "client/eval/pcg64.h"
+#include "common/assignment.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using ::testing::ElementsAre;
@@ -114,4 +114,4 @@ TEST(AssignRows, AgreesWithTryingAllPairings) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

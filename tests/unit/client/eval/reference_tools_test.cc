@@ -13,7 +13,7 @@
 #include "client/files/mesh_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using eval_world::Moved;
@@ -69,18 +69,19 @@ class ReferenceTools : public testing::Test {
     ExpectAgrees(ToJson(*report), expected, "objects");
   }
 
-  TempFolder folder_;
+  eval_world::TempFolder folder_;
   std::string tools_dir_;
 };
 
 TEST_F(ReferenceTools, AgreeOnMeshes) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  const Similarity error{1.03, turn, Eigen::Vector3d(0.004, -0.003, 0.005)};
-  ASSERT_TRUE(WritePly(folder_ / "gt/ball.ply", eval_world::Sphere(0.1, {0, 0, 0})).ok());
-  ASSERT_TRUE(WritePly(folder_ / "gt/brick.ply", eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0})).ok());
-  ASSERT_TRUE(WritePly(folder_ / "pred/1.ply", Moved(eval_world::Sphere(0.1, {0, 0, 0}, 60), error)).ok());
-  ASSERT_TRUE(WritePly(folder_ / "pred/2.ply", Moved(eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0}), error)).ok());
-  ASSERT_TRUE(WritePly(folder_ / "pred/3.ply", eval_world::Sphere(0.1, {5, 5, 5})).ok());
+  const FittedSimilarity error{1.03, turn, Eigen::Vector3d(0.004, -0.003, 0.005)};
+  ASSERT_TRUE(files::WritePly(folder_ / "gt/ball.ply", eval_world::Sphere(0.1, {0, 0, 0})).ok());
+  ASSERT_TRUE(files::WritePly(folder_ / "gt/brick.ply", eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0})).ok());
+  ASSERT_TRUE(files::WritePly(folder_ / "pred/1.ply", Moved(eval_world::Sphere(0.1, {0, 0, 0}, 60), error)).ok());
+  ASSERT_TRUE(
+      files::WritePly(folder_ / "pred/2.ply", Moved(eval_world::Box({0.1, 0.07, 0.05}, {0, 0.4, 0}), error)).ok());
+  ASSERT_TRUE(files::WritePly(folder_ / "pred/3.ply", eval_world::Sphere(0.1, {5, 5, 5})).ok());
   ObjectsEvalOptions options;
   options.predicted_dir = folder_ / "pred";
   options.ground_truth_dir = folder_ / "gt";
@@ -97,16 +98,16 @@ TEST_F(ReferenceTools, AgreeOnMeshes) {
 TEST_F(ReferenceTools, AgreeOnTrajectories) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0, 0.01);
-  std::vector<StampedPose> estimated = Moved(eval_world::Orbit(), eval_world::OtherWorld());
-  for (StampedPose& pose : estimated) {
+  std::vector<files::StampedPose> estimated = Moved(eval_world::Orbit(), eval_world::OtherWorld());
+  for (files::StampedPose& pose : estimated) {
     pose.timestamp_ns += 3'000'000;
     pose.T_world_camera = {pose.T_world_camera.rotation(),
                            Eigen::Vector3d(pose.T_world_camera.translation() +
                                            Eigen::Vector3d(noise(random), noise(random), noise(random)))};
   }
   estimated.resize(150);
-  ASSERT_TRUE(WriteTum(folder_ / "est.txt", estimated).ok());
-  ASSERT_TRUE(WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
+  ASSERT_TRUE(files::WriteTum(folder_ / "est.txt", estimated).ok());
+  ASSERT_TRUE(files::WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
   for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
     const auto report = EvaluateTrajectory({.estimated = folder_ / "est.txt",
                                             .ground_truth = folder_ / "gt.txt",
@@ -124,7 +125,7 @@ TEST_F(ReferenceTools, AgreeOnTrajectories) {
 TEST_F(ReferenceTools, AgreeOnBoxes) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  ObjectsYaml truth, predicted;
+  files::ObjectsYaml truth, predicted;
   truth.up_world = Eigen::Vector3d(0.02, -0.05, 1).normalized();
   for (int k = 1; k <= 6; ++k) {
     const Eigen::Vector3d center(k, uniform(random), uniform(random));
@@ -137,9 +138,9 @@ TEST_F(ReferenceTools, AgreeOnBoxes) {
                                                           (1 + 0.2 * uniform(random)) * half));
   }
   predicted.objects.push_back(eval_world::UprightCuboid(99, {-20, 0, 0}, 0, {1, 1, 1}));
-  ASSERT_TRUE(WriteObjects(folder_ / "gt.yaml", truth).ok());
+  ASSERT_TRUE(files::WriteObjects(folder_ / "gt.yaml", truth).ok());
   for (const std::string name : {"cuboids.json", "cuboids.yaml"}) {
-    ASSERT_TRUE(WriteObjects(folder_ / name, predicted).ok());
+    ASSERT_TRUE(files::WriteObjects(folder_ / name, predicted).ok());
     BoxesEvalOptions options;
     options.predicted = folder_ / name;
     options.ground_truth = folder_ / "gt.yaml";
@@ -155,7 +156,7 @@ TEST_F(ReferenceTools, AgreeOnASequenceWithMasksAndDepth) {
   const char* data_dir = std::getenv("ROMAP_DATA_DIR");
   if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
   const std::string room = std::string(data_dir) + "/cube_diorama_room";
-  const auto truth = ReadMeshFolder(room + "/gt");
+  const auto truth = files::ReadMeshFolder(room + "/gt");
   ASSERT_TRUE(truth.ok()) << truth.status();
   std::mt19937 random(1);
   std::normal_distribution<float> noise(0, 0.003f);
@@ -169,7 +170,7 @@ TEST_F(ReferenceTools, AgreeOnASequenceWithMasksAndDepth) {
                            {p, p + Eigen::Vector3f(0.003f, 0, 0), p + Eigen::Vector3f(0, 0.002f, 0.002f)});
       mesh.triangles.push_back({first, first + 1, first + 2});
     }
-    ASSERT_TRUE(WritePly(folder_ / ("pred/" + name + ".ply"), mesh).ok());
+    ASSERT_TRUE(files::WritePly(folder_ / ("pred/" + name + ".ply"), mesh).ok());
   }
   ObjectsEvalOptions options;
   options.predicted_dir = folder_ / "pred";
@@ -182,4 +183,4 @@ TEST_F(ReferenceTools, AgreeOnASequenceWithMasksAndDepth) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

@@ -7,7 +7,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using eval_world::Box;
@@ -21,20 +21,23 @@ using ::testing::SizeIs;
 class RunEval : public testing::Test {
  protected:
   // A sequence with one box, and a run that found it in the world that `run_from_true` leads to.
-  void Write(const Similarity& run_from_true) {
+  void Write(const FittedSimilarity& run_from_true) {
     const Eigen::Vector3d half_extents(0.1, 0.07, 0.05);
-    const ObjectRecord truth = UprightCuboid(1, {0, 0, 0}, 0, half_extents);
-    ObjectRecord found = UprightCuboid(5, run_from_true.translation, 0, run_from_true.scale * half_extents);
+    const files::ObjectRecord truth = eval_world::UprightCuboid(1, {0, 0, 0}, 0, half_extents);
+    files::ObjectRecord found =
+        eval_world::UprightCuboid(5, run_from_true.translation, 0, run_from_true.scale * half_extents);
     found.T_world_object = {run_from_true.rotation, run_from_true.translation};
-    EXPECT_TRUE(WritePly(folder_ / "set/gt/b1.ply", Box(half_extents, {0, 0, 0})).ok());
-    EXPECT_TRUE(WriteObjects(folder_ / "set/objects.yaml", {.objects = {truth}}).ok());
-    EXPECT_TRUE(WriteTum(folder_ / "set/groundtruth.txt", eval_world::Orbit()).ok());
-    EXPECT_TRUE(WritePly(folder_ / "run/objects/5_box.ply", Moved(Box(half_extents, {0, 0, 0}), run_from_true)).ok());
-    EXPECT_TRUE(WriteObjects(folder_ / "run/cuboids.json", {.objects = {found}}).ok());
-    EXPECT_TRUE(WriteTum(folder_ / "run/trajectory.txt", Moved(eval_world::Orbit(), run_from_true)).ok());
+    EXPECT_TRUE(files::WritePly(folder_ / "set/gt/b1.ply", eval_world::Box(half_extents, {0, 0, 0})).ok());
+    EXPECT_TRUE(files::WriteObjects(folder_ / "set/objects.yaml", {.objects = {truth}}).ok());
+    EXPECT_TRUE(files::WriteTum(folder_ / "set/groundtruth.txt", eval_world::Orbit()).ok());
+    EXPECT_TRUE(files::WritePly(folder_ / "run/objects/5_box.ply",
+                                Moved(eval_world::Box(half_extents, {0, 0, 0}), run_from_true))
+                    .ok());
+    EXPECT_TRUE(files::WriteObjects(folder_ / "run/cuboids.json", {.objects = {found}}).ok());
+    EXPECT_TRUE(files::WriteTum(folder_ / "run/trajectory.txt", Moved(eval_world::Orbit(), run_from_true)).ok());
   }
 
-  TempFolder folder_;
+  eval_world::TempFolder folder_;
 };
 
 TEST_F(RunEval, WithGivenPosesNothingIsAligned) {
@@ -64,7 +67,7 @@ TEST_F(RunEval, WhatCannotBeMeasuredIsNoted) {
   EXPECT_THAT(nothing.notes, SizeIs(3));
   EXPECT_THAT(nothing.notes[0], AllOf(HasSubstr("meshes not measured"), HasSubstr("run/x/objects")));
   Write({});
-  ASSERT_TRUE(WriteFile(folder_ / "run/cuboids.json", "{\"objects\": 5}").ok());
+  ASSERT_TRUE(files::WriteFile(folder_ / "run/cuboids.json", "{\"objects\": 5}").ok());
   const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
   ASSERT_THAT(report.notes, SizeIs(1));
   EXPECT_THAT(report.notes[0], AllOf(HasSubstr("cuboids not measured"), HasSubstr("should hold a list 'objects:'")));
@@ -85,4 +88,4 @@ TEST_F(RunEval, TablesAndJsonShowTheFigures) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

@@ -7,7 +7,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap {
+namespace romap::eval {
 namespace {
 
 using eval_world::Moved;
@@ -19,19 +19,19 @@ using ::testing::HasSubstr;
 class TrajectoryEval : public testing::Test {
  protected:
   // Evaluates `estimated` against the orbit.
-  absl::StatusOr<TrajectoryReport> Evaluate(const std::vector<StampedPose>& estimated, Alignment alignment) {
-    EXPECT_TRUE(WriteTum(folder_ / "gt.txt", Orbit()).ok());
-    EXPECT_TRUE(WriteTum(folder_ / "est.txt", estimated).ok());
+  absl::StatusOr<TrajectoryReport> Evaluate(const std::vector<files::StampedPose>& estimated, Alignment alignment) {
+    EXPECT_TRUE(files::WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
+    EXPECT_TRUE(files::WriteTum(folder_ / "est.txt", estimated).ok());
     return EvaluateTrajectory(
         {.estimated = folder_ / "est.txt", .ground_truth = folder_ / "gt.txt", .alignment = alignment});
   }
 
-  TempFolder folder_;
+  eval_world::TempFolder folder_;
 };
 
 TEST_F(TrajectoryEval, ATrajectoryAgainstItselfIsExact) {
   for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
-    const auto report = Evaluate(Orbit(), alignment);
+    const auto report = Evaluate(eval_world::Orbit(), alignment);
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_LT(report->ate_rmse_m, 1e-8);
     EXPECT_EQ(report->matched, 200u);
@@ -39,7 +39,7 @@ TEST_F(TrajectoryEval, ATrajectoryAgainstItselfIsExact) {
 }
 
 TEST_F(TrajectoryEval, UndoesAKnownSimilarity) {
-  const auto report = Evaluate(Moved(Orbit(), OtherWorld()), Alignment::kSim3);
+  const auto report = Evaluate(Moved(eval_world::Orbit(), eval_world::OtherWorld()), Alignment::kSim3);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_LT(report->ate_rmse_m, 1e-7);
   EXPECT_NEAR(report->scale, 1 / 0.37, 1e-6);
@@ -47,12 +47,12 @@ TEST_F(TrajectoryEval, UndoesAKnownSimilarity) {
 }
 
 TEST_F(TrajectoryEval, RigidAlignmentLeavesTheErrorOfScale) {
-  const auto report = Evaluate(Moved(Orbit(), OtherWorld()), Alignment::kSe3);
+  const auto report = Evaluate(Moved(eval_world::Orbit(), eval_world::OtherWorld()), Alignment::kSe3);
   ASSERT_TRUE(report.ok()) << report.status();
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const StampedPose& pose : Orbit()) mean += pose.T_world_camera.translation() / 200;
+  for (const files::StampedPose& pose : eval_world::Orbit()) mean += pose.T_world_camera.translation() / 200;
   double squared_radius = 0;
-  for (const StampedPose& pose : Orbit()) {
+  for (const files::StampedPose& pose : eval_world::Orbit()) {
     squared_radius += (pose.T_world_camera.translation() - mean).squaredNorm() / 200;
   }
   EXPECT_NEAR(report->ate_rmse_m, (1 - 0.37) * std::sqrt(squared_radius), 1e-7);
@@ -60,9 +60,9 @@ TEST_F(TrajectoryEval, RigidAlignmentLeavesTheErrorOfScale) {
 }
 
 TEST_F(TrajectoryEval, MeasuresAShiftAndARollAsTheyAre) {
-  std::vector<StampedPose> poses = Orbit();
+  std::vector<files::StampedPose> poses = eval_world::Orbit();
   const Eigen::Quaterniond roll(Eigen::AngleAxisd(2 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
-  for (StampedPose& pose : poses) {
+  for (files::StampedPose& pose : poses) {
     pose.T_world_camera = {pose.T_world_camera.rotation() * roll,
                            Eigen::Vector3d(pose.T_world_camera.translation() + Eigen::Vector3d(0.03, 0.04, 0))};
   }
@@ -76,16 +76,16 @@ TEST_F(TrajectoryEval, MeasuresAShiftAndARollAsTheyAre) {
 }
 
 TEST_F(TrajectoryEval, SaysWhyThereIsNothingToCompare) {
-  std::vector<StampedPose> late = Orbit();
-  for (StampedPose& pose : late) pose.timestamp_ns += 1'000'000'000'000;
+  std::vector<files::StampedPose> late = eval_world::Orbit();
+  for (files::StampedPose& pose : late) pose.timestamp_ns += 1'000'000'000'000;
   EXPECT_THAT(std::string(Evaluate(late, Alignment::kSim3).status().message()),
               HasSubstr("only 0 of 200 estimated poses"));
-  std::vector<StampedPose> still = Orbit();
-  for (StampedPose& pose : still) pose.T_world_camera = {};
+  std::vector<files::StampedPose> still = eval_world::Orbit();
+  for (files::StampedPose& pose : still) pose.T_world_camera = {};
   EXPECT_THAT(std::string(Evaluate(still, Alignment::kSim3).status().message()), HasSubstr("positions coincide"));
   EXPECT_EQ(EvaluateTrajectory({.estimated = folder_ / "no", .ground_truth = folder_ / "gt.txt"}).status().code(),
             absl::StatusCode::kNotFound);
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::eval

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 uint32_t WordAt(const std::string& bytes, size_t offset) {
@@ -107,4 +107,4 @@ TEST(Glb, RefusesBrokenMeshes) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::files

@@ -12,7 +12,7 @@
 #include "client/files/ply.h"
 #include "client/files/text_file.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 using ::testing::ElementsAre;
@@ -203,4 +203,4 @@ TEST(SharedMeshes, ReadsGroundTruthClouds) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::files

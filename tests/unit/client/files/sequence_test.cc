@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 using ::testing::AllOf;
@@ -214,4 +214,4 @@ TEST(SharedSequence, ReadsTheKitchenWithDetectorMasksOnEverySecondFrame) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::files

@@ -8,7 +8,7 @@
 #include "client/files/text_file.h"
 #include "client/files/tum.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 using ::testing::ElementsAre;
@@ -103,4 +103,4 @@ TEST(PoseAt, TurnsHalfWayBetweenTwoPoses) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::files

@@ -7,7 +7,7 @@
 #include "client/files/camera_yaml.h"
 #include "client/files/objects_yaml.h"
 
-namespace romap {
+namespace romap::files {
 namespace {
 
 using ::testing::AllOf;
@@ -138,4 +138,4 @@ TEST(ObjectsYaml, SaysWhichObjectIsWrong) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::files

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace romap {
+namespace romap::pictures {
 namespace {
 
 CameraModel SmallCamera() {
@@ -187,4 +187,4 @@ TEST(DrawOverview, TakesAnEmptyMap) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::pictures

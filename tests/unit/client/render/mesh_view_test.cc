@@ -7,7 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-namespace romap {
+namespace romap::render {
 namespace {
 
 CameraModel SmallCamera() {
@@ -76,4 +76,4 @@ TEST(RenderMeshes, TakesEmptyMeshesAndLeavesOutBrokenTriangles) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::render

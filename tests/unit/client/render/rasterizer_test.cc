@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace romap {
+namespace romap::render {
 namespace {
 
 CameraModel SmallCamera() {
@@ -135,4 +135,4 @@ TEST(Barycentrics, ArePerspectiveCorrect) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::render

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::client {
 namespace {
 
 ObjectUpdate Update(uint64_t id, uint64_t revision) {
@@ -58,4 +58,4 @@ TEST(MapCopyTest, OtherEventsSayNothingOfObjects) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::client

@@ -16,7 +16,7 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap {
+namespace romap::client {
 namespace {
 
 using absl::StatusCode;
@@ -28,10 +28,11 @@ using testing::Only;
 using testing::ReadToEnd;
 using ::testing::SizeIs;
 
-std::unique_ptr<GrpcServer> StartServer(MappingService* service, const std::string& address = "127.0.0.1:0") {
-  TransportConfig config;
+std::unique_ptr<transport::GrpcServer> StartServer(MappingService* service,
+                                                   const std::string& address = "127.0.0.1:0") {
+  transport::TransportConfig config;
   config.listen_address = address;
-  return GrpcServer::Start(service, config).value();
+  return transport::GrpcServer::Start(service, config).value();
 }
 
 class RemoteMappingServiceTest : public ::testing::Test {
@@ -39,7 +40,7 @@ class RemoteMappingServiceTest : public ::testing::Test {
   std::string NewSession() { return client_->CreateSession({.name = "", .camera = testing::SmallCamera()})->id; }
 
   testing::FakeMappingService fake_;
-  std::unique_ptr<GrpcServer> server_ = StartServer(&fake_);
+  std::unique_ptr<transport::GrpcServer> server_ = StartServer(&fake_);
   std::unique_ptr<RemoteMappingService> client_ = RemoteMappingService::Connect(server_->address()).value();
 };
 
@@ -67,9 +68,9 @@ TEST_F(RemoteMappingServiceTest, AnotherKindOfServerIsToldApart) {
 TEST_F(RemoteMappingServiceTest, AServerThatGoesAwayEndsTheStream) {
   const auto stream = client_->OpenMap(NewSession()).value();
   server_.reset();
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   EXPECT_CODE(stream->status(), StatusCode::kUnavailable);
-  EXPECT_CODE(stream->Send(MakeFrame(1)), StatusCode::kUnavailable);
+  EXPECT_CODE(stream->Send(testing::MakeFrame(1)), StatusCode::kUnavailable);
   EXPECT_FALSE(client_->ListSessions().ok());
 }
 
@@ -77,28 +78,28 @@ TEST_F(RemoteMappingServiceTest, AServerThatComesBackIsFoundAgain) {
   const std::string session = NewSession();
   const std::string address = server_->address();
   server_.reset();
-  TransportConfig config;
+  transport::TransportConfig config;
   config.listen_address = address;
-  auto again = GrpcServer::Start(&fake_, config);
+  auto again = transport::GrpcServer::Start(&fake_, config);
   if (!again.ok()) GTEST_SKIP() << "the port was taken by somebody else meanwhile";
   std::unique_ptr<MapStream> stream;
-  EXPECT_TRUE(Eventually([&] {
+  EXPECT_TRUE(testing::Eventually([&] {
     auto opened = client_->OpenMap(session);
     if (opened.ok()) stream = *std::move(opened);
     return stream != nullptr;
   }));
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
 TEST_F(RemoteMappingServiceTest, AFrameTooLargeIsRefusedAndTheStreamLivesOn) {
   const auto stream = client_->OpenMap(NewSession()).value();
-  FrameInput frame = MakeFrame(1);
+  FrameInput frame = testing::MakeFrame(1);
   frame.image.assign(33 << 20, 'x');
   EXPECT_OK(stream->Send(std::move(frame)));
-  EXPECT_OK(stream->Send(MakeFrame(2)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(2)));
   EXPECT_OK(stream->CloseSend());
-  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(2));
   EXPECT_EQ(acks[0].frame_id, 1u);
   EXPECT_FALSE(acks[0].accepted);
@@ -108,10 +109,10 @@ TEST_F(RemoteMappingServiceTest, AFrameTooLargeIsRefusedAndTheStreamLivesOn) {
 
 TEST_F(RemoteMappingServiceTest, AFrameJustBelowTheLimitArrives) {
   const auto stream = client_->OpenMap(NewSession()).value();
-  FrameInput frame = MakeFrame(1);
+  FrameInput frame = testing::MakeFrame(1);
   frame.image.assign((32 << 20) - 1000, 'x');
   EXPECT_OK(stream->Send(std::move(frame)));
-  const auto ack = NextOf<FrameAck>(*stream);
+  const auto ack = testing::NextOf<FrameAck>(*stream);
   ASSERT_TRUE(ack.has_value());
   EXPECT_TRUE(ack->accepted);
 }
@@ -119,9 +120,9 @@ TEST_F(RemoteMappingServiceTest, AFrameJustBelowTheLimitArrives) {
 TEST_F(RemoteMappingServiceTest, EventsWaitForALateReader) {
   constexpr uint64_t kFrames = 500;  // three events each, more than the client keeps
   const auto stream = client_->OpenMap(NewSession()).value();
-  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id, "mug")).ok());
+  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());
   EXPECT_OK(stream->CloseSend());
-  const auto acks = Only<FrameAck>(ReadToEnd(*stream));
+  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(kFrames));
   for (uint64_t i = 0; i < kFrames; ++i) ASSERT_EQ(acks[i].frame_id, i + 1);
 }
@@ -130,16 +131,16 @@ TEST_F(RemoteMappingServiceTest, AStreamMayBeDroppedWithEventsUnread) {
   const auto session = NewSession();
   const auto watch = client_->Watch(session).value();
   auto stream = client_->OpenMap(session).value();
-  for (uint64_t id = 1; id <= 200; ++id) ASSERT_TRUE(stream->Send(MakeFrame(id, "mug")).ok());
+  for (uint64_t id = 1; id <= 200; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());
   stream.reset();
-  EXPECT_TRUE(Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
+  EXPECT_TRUE(testing::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
 }
 
 TEST_F(RemoteMappingServiceTest, AStreamOutlivesItsService) {
   const auto stream = client_->OpenMap(NewSession()).value();
   client_.reset();
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
 // A server of another release.
@@ -187,7 +188,7 @@ TEST(RemoteMappingServiceOtherRelease, EventsThatAreNotKnownAreSkipped) {
   OtherServer server;
   const auto client = RemoteMappingService::Connect(server.address()).value();
   const auto watch = client->Watch("any").value();
-  const auto events = ReadToEnd(*watch);
+  const auto events = testing::ReadToEnd(*watch);
   ASSERT_THAT(events, SizeIs(1));
   EXPECT_EQ(std::get<ObjectRemoved>(events[0]).id, ObjectId{7});
   EXPECT_OK(watch->status());
@@ -202,4 +203,4 @@ TEST(RemoteMappingServiceOtherRelease, AStreamThatIsNeverOpenedTimesOut) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::client

@@ -47,7 +47,7 @@ Files AllFiles(const std::string& dir) {
   Files files;
   for (const auto& entry : fs::recursive_directory_iterator(dir)) {
     if (!entry.is_regular_file()) continue;
-    files[fs::relative(entry.path(), dir)] = ReadFile(entry.path()).value();
+    files[fs::relative(entry.path(), dir)] = files::ReadFile(entry.path()).value();
   }
   return files;
 }
@@ -60,7 +60,7 @@ TEST_F(MakeSequenceTest, ReadsBackAsASequence) {
                 last_done = done;
               }).ok());
   EXPECT_EQ(last_done, 4);
-  const auto sequence = Sequence::Open(Dir(), {.use_depth = true});
+  const auto sequence = files::Sequence::Open(Dir(), {.use_depth = true});
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   ASSERT_EQ(sequence->size(), 4U);
   EXPECT_EQ(sequence->camera().width_px, 160);
@@ -78,11 +78,11 @@ TEST_F(MakeSequenceTest, ReadsBackAsASequence) {
 // Where each point of the true surfaces falls into the frames.
 TEST_F(MakeSequenceTest, TruthAgreesWithMasksAndDepth) {
   ASSERT_TRUE(MakeSequence(Small(), Dir()).ok());
-  const auto sequence = Sequence::Open(Dir(), {.use_depth = true});
+  const auto sequence = files::Sequence::Open(Dir(), {.use_depth = true});
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   const CameraModel& camera = sequence->camera();
-  for (const ObjectRecord& object : sequence->objects()->objects) {
-    const auto cloud = ReadPly(Dir() + "/gt/" + object.name + ".ply");
+  for (const files::ObjectRecord& object : sequence->objects()->objects) {
+    const auto cloud = files::ReadPly(Dir() + "/gt/" + object.name + ".ply");
     ASSERT_TRUE(cloud.ok()) << cloud.status();
     const std::vector<double>& seen = cloud->scalars.at("seen");
     const std::vector<double>& source = cloud->scalars.at("source");
@@ -130,11 +130,11 @@ TEST_F(MakeSequenceTest, TruthAgreesWithMasksAndDepth) {
 
 TEST_F(MakeSequenceTest, CloudsLieOnTheMeshesAndFillTheCuboids) {
   ASSERT_TRUE(MakeSequence(Small(), Dir()).ok());
-  const auto objects = ReadObjects(Dir() + "/objects.yaml");
+  const auto objects = files::ReadObjects(Dir() + "/objects.yaml");
   ASSERT_TRUE(objects.ok()) << objects.status();
-  for (const ObjectRecord& object : objects->objects) {
-    const auto mesh = ReadPly(Dir() + "/gt_mesh/" + object.name + ".ply");
-    const auto cloud = ReadPly(Dir() + "/gt/" + object.name + ".ply");
+  for (const files::ObjectRecord& object : objects->objects) {
+    const auto mesh = files::ReadPly(Dir() + "/gt_mesh/" + object.name + ".ply");
+    const auto cloud = files::ReadPly(Dir() + "/gt/" + object.name + ".ply");
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     ASSERT_TRUE(cloud.ok()) << cloud.status();
     EXPECT_FALSE(mesh->mesh.triangles.empty());
@@ -181,7 +181,7 @@ TEST_F(MakeSequenceTest, FaultsShowInMasksAndTables) {
   options.format = ImageFormat::kJpeg;
   ASSERT_TRUE(MakeSequence(options, Dir()).ok());
   EXPECT_TRUE(fs::exists(Dir() + "/rgb/000008.jpg"));
-  const auto sequence = Sequence::Open(Dir());
+  const auto sequence = files::Sequence::Open(Dir());
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   std::map<uint32_t, std::set<std::string>> classes_of_label;
   size_t instances = 0;
@@ -212,7 +212,7 @@ TEST_F(MakeSequenceTest, CutFramesAreGoneAndRepeatedOnesListTheSamePicture) {
   options.black = {{8, 8}};
   options.duplicate_share = 1;
   ASSERT_TRUE(MakeSequence(options, Dir()).ok());
-  const auto sequence = Sequence::Open(Dir(), {.use_depth = true});
+  const auto sequence = files::Sequence::Open(Dir(), {.use_depth = true});
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   ASSERT_EQ(sequence->size(), 6U);
   EXPECT_EQ(sequence->timestamp_ns(1), 40000000);

@@ -67,7 +67,7 @@ class RecordingTest : public ::testing::Test {
     return Message(recording.status());
   }
 
-  TemporaryFolder folder_;
+  testing_support::TemporaryFolder folder_;
 };
 
 TEST_F(RecordingTest, GivesBackWhatWasWritten) {

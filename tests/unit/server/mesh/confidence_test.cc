@@ -8,12 +8,12 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 constexpr double kFar = 4.0;
 
-Mesh Extract(FieldSnapshot snapshot, const std::vector<FieldView>& views, const MeshConfig& config = {}) {
+Mesh Extract(FieldSnapshot snapshot, const std::vector<TrainingCamera>& views, const MeshConfig& config = {}) {
   snapshot.cameras = views;
   absl::StatusOr<Mesh> mesh = ExtractMesh(snapshot, config);
   EXPECT_TRUE(mesh.ok()) << mesh.status();
@@ -51,13 +51,13 @@ TEST(Confidence, OfOneSharpViewFallsWithTheAngle) {
 TEST(Confidence, GrowsWithViewsAndWithSharpness) {
   const FieldSnapshot ball = SnapshotOf(Sphere(0.6f));
   const Eigen::Vector3f front(0.6f, 0, 0);
-  const FieldView view = ViewFrom({kFar, 0, 0});
-  const auto with = [&](const std::vector<FieldView>& views) {
+  const TrainingCamera view = ViewFrom({kFar, 0, 0});
+  const auto with = [&](const std::vector<TrainingCamera>& views) {
     return ConfidenceAt(Extract(ball, views, AsTheFieldSays()), front);
   };
   EXPECT_NEAR(with({view}), 0.39f, 0.01f);
   EXPECT_NEAR(with({view, view, view, view, view}), 0.92f, 0.01f);
-  EXPECT_NEAR(with(std::vector<FieldView>(40, view)), 1.0f, 1e-3f);  // more than are asked
+  EXPECT_NEAR(with(std::vector<TrainingCamera>(40, view)), 1.0f, 1e-3f);  // more than are asked
   // At 24.4 a side of 2 is 32 px long.
   EXPECT_NEAR(with({ViewFrom({25.6f, 0, 0})}), 1 - std::exp(-0.25f), 0.01f);
 }
@@ -75,7 +75,7 @@ TEST(Confidence, WhatStandsBehindIsNotSeen) {
 
 TEST(Confidence, OnlyPixelsOfTheObjectCount) {
   const FieldSnapshot ball = SnapshotOf(Sphere(0.6f));
-  FieldView view = ViewFrom({kFar, 0, 0});
+  TrainingCamera view = ViewFrom({kFar, 0, 0});
   // This view has y pointing down.
   const Eigen::Vector3f above(0.5f, -0.3f, 0), below(0.5f, 0.3f, 0);
   ASSERT_LT(view.camera.Project(view.T_camera_object * above.cast<double>()).y(), 180);
@@ -92,12 +92,12 @@ TEST(Confidence, OnlyPixelsOfTheObjectCount) {
 }
 
 TEST(Confidence, ViewsThatCannotBeObserveNothing) {
-  FieldView nowhere = ViewFrom({std::numeric_limits<float>::quiet_NaN(), 0, 0});
-  FieldView no_picture = ViewFrom({kFar, 0, 0});
+  TrainingCamera nowhere = ViewFrom({std::numeric_limits<float>::quiet_NaN(), 0, 0});
+  TrainingCamera no_picture = ViewFrom({kFar, 0, 0});
   no_picture.ray_kind = cv::Mat();
-  FieldView no_focal = ViewFrom({kFar, 0, 0});
+  TrainingCamera no_focal = ViewFrom({kFar, 0, 0});
   no_focal.camera.fx_px = std::numeric_limits<double>::quiet_NaN();
-  const FieldView within = ViewFrom({0.1f, 0, 0});
+  const TrainingCamera within = ViewFrom({0.1f, 0, 0});
   const Mesh mesh = Extract(SnapshotOf(Sphere(0.6f)), {nowhere, no_picture, no_focal, within}, AsTheFieldSays());
   for (const float confidence : mesh.confidence) EXPECT_EQ(confidence, 0);
 }
@@ -137,4 +137,4 @@ TEST(TrimUnseen, NothingSeenIsSaidSo) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

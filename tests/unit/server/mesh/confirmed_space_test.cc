@@ -9,13 +9,13 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 constexpr double kLeastShare = 0.25;
 
 // Marks the pixels of a view whose rays from the camera meet `shape` (> 0 inside) within the box of half extents 1.
-void Paint(FieldView& view, const InsideDistance& shape, RayKind kind) {
+void Paint(TrainingCamera& view, const InsideDistance& shape, RayKind kind) {
   const SE3<Object, Camera> T_object_camera = view.T_camera_object.Inverse();
   for (int v = 0; v < view.ray_kind.rows; ++v) {
     for (int u = 0; u < view.ray_kind.cols; ++u) {
@@ -30,8 +30,8 @@ void Paint(FieldView& view, const InsideDistance& shape, RayKind kind) {
 }
 
 // Views all around that show `object`, before `behind` showing only what is in the way of it.
-std::vector<FieldView> ViewsOf(const InsideDistance& object, const InsideDistance& behind, int count = 12) {
-  std::vector<FieldView> views;
+std::vector<TrainingCamera> ViewsOf(const InsideDistance& object, const InsideDistance& behind, int count = 12) {
+  std::vector<TrainingCamera> views;
   for (int i = 0; i < count; ++i) {
     const double angle = 2 * std::numbers::pi * i / count;
     views.push_back(ViewFrom({4 * std::cos(angle), 4 * std::sin(angle), 0.8}));
@@ -47,7 +47,7 @@ const InsideDistance kWall = [](const Eigen::Vector3f& p) {  // as large as the 
   return std::min({p.x() - 0.7f, 0.5f - std::abs(p.y()), 0.6f - std::abs(p.z())});
 };
 
-FieldSnapshot SeenSnapshot(const InsideDistance& field, std::vector<FieldView> views) {
+FieldSnapshot SeenSnapshot(const InsideDistance& field, std::vector<TrainingCamera> views) {
   FieldSnapshot snapshot = SnapshotOf(field);
   snapshot.cameras = std::move(views);
   return snapshot;
@@ -95,7 +95,7 @@ TEST(ConfirmedSpace, ThinTruePartsAmongNeighboursStay) {
 }
 
 TEST(ConfirmedSpace, HalfOfTheViewsAreEnough) {
-  std::vector<FieldView> views = ViewsOf(kBody, kWall);
+  std::vector<TrainingCamera> views = ViewsOf(kBody, kWall);
   for (size_t i = 0; i < views.size(); ++i) {
     if (i % 2 != 0) views[i].ray_kind.setTo(static_cast<int>(RayKind::kOccluder));  // something stands before all
   }
@@ -108,7 +108,7 @@ TEST(ConfirmedSpace, OutsideTheCropIsNoConfirmationButOutsideTheImageSaysNothing
   FieldSnapshot snapshot = SnapshotOf(Union({kBody, kWall}));
   const SurfaceProbe probe(snapshot);
   const FieldGrid before = SampleField(snapshot, probe, {48, 48, 48}).grid;
-  const auto matter_at_wall = [&](const std::vector<FieldView>& views) {
+  const auto matter_at_wall = [&](const std::vector<TrainingCamera>& views) {
     FieldGrid grid = before;
     EmptyUnconfirmed(views, kLeastShare, grid);
     size_t nodes = 0;
@@ -118,7 +118,7 @@ TEST(ConfirmedSpace, OutsideTheCropIsNoConfirmationButOutsideTheImageSaysNothing
     return nodes;
   };
   // From y = -4 with x to the right: the wall is right of pixel 240.
-  FieldView view = ViewFrom({0, -4, 0});
+  TrainingCamera view = ViewFrom({0, -4, 0});
   ASSERT_GT(view.camera.Project(view.T_camera_object * Eigen::Vector3d(0.75, 0.5, 0)).x(), 240);
   EXPECT_GT(matter_at_wall({view}), 1000u);
   view.roi_px.width = 240;
@@ -131,17 +131,17 @@ TEST(ConfirmedSpace, OutsideTheCropIsNoConfirmationButOutsideTheImageSaysNothing
 
 // Grids of all sizes are looked at up to their last nodes, and views that cannot be are not counted.
 TEST(ConfirmedSpace, LooksAtEveryNode) {
-  FieldView view = ViewFrom({0, -4, 0});
+  TrainingCamera view = ViewFrom({0, -4, 0});
   view.ray_kind.setTo(static_cast<int>(RayKind::kOccluder));
-  const FieldView nowhere = ViewFrom({std::numeric_limits<double>::quiet_NaN(), 0, 0});
+  const TrainingCamera nowhere = ViewFrom({std::numeric_limits<double>::quiet_NaN(), 0, 0});
   for (int nodes = 2; nodes < 16; ++nodes) {
     FieldGrid grid = MakeEmptyGrid({nodes, nodes + 1, nodes + 2}, Eigen::Vector3f::Constant(0.5f));
     for (float& value : grid.value) value = value == kBeyondBox ? kBeyondBox : 1;
-    const std::vector<FieldView> views = {view, nowhere, nowhere};
+    const std::vector<TrainingCamera> views = {view, nowhere, nowhere};
     EmptyUnconfirmed(views, kLeastShare, grid);
     EXPECT_EQ(std::count_if(grid.value.begin(), grid.value.end(), [](float value) { return value > 0; }), 0) << nodes;
   }
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

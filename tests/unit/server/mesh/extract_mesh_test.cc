@@ -10,7 +10,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 using ::testing::HasSubstr;
@@ -279,4 +279,4 @@ TEST(MeshConfig, FieldsAreListedWithTheirDefaults) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

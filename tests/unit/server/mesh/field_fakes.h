@@ -11,7 +11,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::mesh {
 
 // Signed distance to a surface in map units at a point of the Object frame, positive inside.
 using InsideDistance = std::function<float(const Eigen::Vector3f&)>;
@@ -45,8 +45,8 @@ class DistanceField : public FieldSampler {
 inline constexpr float kTestLevel = 3.0f;
 
 // A view from `center` (Object frame) towards the origin that sees nothing but the object, 400 x 400 px large.
-inline FieldView ViewFrom(const Eigen::Vector3d& center) {
-  FieldView view;
+inline TrainingCamera ViewFrom(const Eigen::Vector3d& center) {
+  TrainingCamera view;
   const Eigen::Quaterniond turn = ShortestRotation(-center, Eigen::Vector3d::UnitZ());
   view.T_camera_object = {turn, -(turn * center)};
   view.camera = {.width_px = 400, .height_px = 400, .fx_px = 400, .fy_px = 400, .cx_px = 199.5, .cy_px = 199.5};
@@ -94,4 +94,4 @@ inline InsideDistance Union(std::vector<InsideDistance> parts) {
   };
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

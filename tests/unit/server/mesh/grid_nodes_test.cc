@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 TEST(ChooseNodes, CellsAreCubesAboveTheFloor) {
@@ -49,4 +49,4 @@ TEST(ChooseNodes, ViewsThatCannotBeAreNotAsked) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

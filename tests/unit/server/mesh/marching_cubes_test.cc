@@ -8,7 +8,7 @@
 #include "server/mesh/marching_cubes_table.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 template <class Value>
@@ -135,4 +135,4 @@ TEST(MarchingCubes, EmptyGridGivesEmptyMesh) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

@@ -10,7 +10,7 @@
 
 #include "common/mesh.h"
 
-namespace romap {
+namespace romap::mesh {
 
 struct Topology {
   size_t bad_edges = 0;     // directed edges that occur more than once, or whose opposite is missing
@@ -102,4 +102,4 @@ double LargestDistance(const Mesh& mesh, Distance distance) {
   return largest;
 }
 
-}  // namespace romap
+}  // namespace romap::mesh

@@ -8,7 +8,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 class Dice {
@@ -124,4 +124,4 @@ TEST(RandomFields, GiveTheSameMeshEachTime) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

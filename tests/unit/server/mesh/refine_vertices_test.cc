@@ -6,7 +6,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 double LargestVertexDistance(const Mesh& mesh, const InsideDistance& distance) {
@@ -69,4 +69,4 @@ TEST(RefineVertices, KeepsVerticesOnTheirEdges) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 constexpr int kNodes = 64;
@@ -99,4 +99,4 @@ TEST(SampleField, OutsideTheHullIsEmptyAndNotAsked) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

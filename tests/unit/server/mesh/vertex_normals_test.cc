@@ -9,7 +9,7 @@
 #include "server/mesh/sample_field.h"
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap {
+namespace romap::mesh {
 namespace {
 
 constexpr float kRadius = 0.6f;
@@ -80,4 +80,4 @@ TEST(VertexNormals, OfTrianglesWithoutAreaAreUnitLength) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::mesh

@@ -10,7 +10,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -24,7 +24,7 @@ NerfConfig ShortConfig() {
   return config;
 }
 
-ObjectField MakeField(const BallScene& scene, const Cuboid& box, uint64_t seed = 1) {
+ObjectField MakeField(const testing::BallScene& scene, const Cuboid& box, uint64_t seed = 1) {
   ObjectField field(ShortConfig(), scene.object, seed);
   EXPECT_TRUE(field.SetBox(box).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
@@ -50,20 +50,20 @@ struct Change {
 class ChangedBoxTest : public ::testing::TestWithParam<Change> {};
 
 TEST_P(ChangedBoxTest, FieldIsKeptAndSoonAsGoodAsOneOfTheRightBox) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());
   const double new_loss = right.Train(1, 1).color_loss;
   right.Train(whole - 1, 1);
-  const double right_error = BallSurfaceError(scene, right.Snapshot());
+  const double right_error = testing::BallSurfaceError(scene, right.Snapshot());
 
   ObjectField field = MakeField(scene, GetParam().Apply(scene.Box()));
   field.Train(99, 1);
   const double loss_before = field.Train(1, 1).color_loss;
-  const double error_before = BallSurfaceError(scene, field.Snapshot());
+  const double error_before = testing::BallSurfaceError(scene, field.Snapshot());
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   EXPECT_EQ(field.steps(), 100u);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), error_before + 0.02);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), error_before + 0.02);
   const double loss_after = field.Train(1, 1).color_loss;
   EXPECT_LT(loss_after, 0.4 * new_loss);
   EXPECT_LT(loss_after, 2.5 * loss_before + 0.01);
@@ -71,11 +71,11 @@ TEST_P(ChangedBoxTest, FieldIsKeptAndSoonAsGoodAsOneOfTheRightBox) {
   const auto rest = static_cast<int>(field.AllowedSteps(true) - field.steps());
   EXPECT_LE(rest, whole);
   field.Train(rest, 1);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.2 * right_error + 0.01);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 1.2 * right_error + 0.01);
 }
 
 TEST_P(ChangedBoxTest, SnapshotIsOfTheNewBoxAtOnce) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, GetParam().Apply(scene.Box()));
   field.Train(10, 1);
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
@@ -109,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(Boxes, ChangedBoxTest,
                          [](const auto& info) { return info.param.name; });
 
 TEST(ChangedBoxSpaceTest, WhatIsLearnedStaysWhereItIs) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, scene.Box());
   field.Train(60, 1);
   const FieldSnapshot before = field.Snapshot();
@@ -135,7 +135,7 @@ TEST(ChangedBoxSpaceTest, WhatIsLearnedStaysWhereItIs) {
 }
 
 TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const Eigen::AngleAxisd turn(0.35, Eigen::Vector3d(0.1, -0.1, 1).normalized());
   const Sim3<World, World> S(1.3, Eigen::Quaterniond(turn), {2.0, -1.0, 0.5});
   const Cuboid small = Change{"", {0.75, 1, 1}}.Apply(scene.Box());
@@ -151,13 +151,13 @@ TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
   EXPECT_EQ(a.steps, 20u);
   EXPECT_TRUE(a.T_world_object.Matrix().isApprox(S.Moved(b.T_world_object).Matrix(), 1e-9));
   EXPECT_TRUE(a.box_half_extents.isApprox(1.3f * b.box_half_extents, 1e-5f));
-  const std::vector<float> raw_a = RawOnGrid(a, 0.98F), raw_b = RawOnGrid(b, 0.98F);
+  const std::vector<float> raw_a = testing::RawOnGrid(a, 0.98F), raw_b = testing::RawOnGrid(b, 0.98F);
   for (size_t i = 0; i < raw_a.size(); ++i) EXPECT_NEAR(raw_a[i], raw_b[i], 0.05) << i;
 }
 
 // A thing that is seen from more and more sides gets many boxes; its field must outlive them all.
 TEST(ChangedBoxSpaceTest, ManyBoxesOneAfterAnotherDoNotWearTheFieldOut) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());
   right.Train(whole, 1);
@@ -169,11 +169,12 @@ TEST(ChangedBoxSpaceTest, ManyBoxesOneAfterAnotherDoNotWearTheFieldOut) {
   }
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   field.Train(static_cast<int>(field.AllowedSteps(true) - field.steps()), 1);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.5 * BallSurfaceError(scene, right.Snapshot()) + 0.02);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()),
+            1.5 * testing::BallSurfaceError(scene, right.Snapshot()) + 0.02);
 }
 
 TEST(ChangedBoxSpaceTest, IsDeterministic) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const auto train = [&](int threads) {
     ObjectField field = MakeField(scene, Change{"", {0.7, 1, 1}}.Apply(scene.Box()));
     field.Train(12, threads);
@@ -181,7 +182,7 @@ TEST(ChangedBoxSpaceTest, IsDeterministic) {
     field.Train(12, threads);
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     field.Train(12, threads);
-    return RawOnGrid(field.Snapshot());
+    return testing::RawOnGrid(field.Snapshot());
   };
   EXPECT_EQ(train(1), train(1));
   EXPECT_EQ(train(2), train(2));
@@ -212,4 +213,4 @@ TEST(OccupancyTest, ScoresGoAlongToAnotherBox) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

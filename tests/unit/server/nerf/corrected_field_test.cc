@@ -8,7 +8,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -22,7 +22,7 @@ NerfConfig FastConfig() {
   return config;
 }
 
-ObjectField MakeField(const BallScene& scene, const std::vector<ObjectView>& views,
+ObjectField MakeField(const testing::BallScene& scene, const std::vector<ObjectView>& views,
                       const NerfConfig& config = FastConfig()) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
@@ -37,7 +37,7 @@ Sim3<World, World> LoopClosure() {
 }
 
 TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, scene.Views());
   field.Train(40, 1);
   const FieldSnapshot before = field.Snapshot();
@@ -58,12 +58,12 @@ TEST(CorrectedFieldTest, AMovedFieldIsTheSameFieldElsewhere) {
     const SE3<Camera, Object> T_scaled(T_before.rotation(), 1.3 * T_before.translation());
     EXPECT_TRUE(after.cameras[i].T_camera_object.Matrix().isApprox(T_scaled.Matrix(), 1e-5));
   }
-  const std::vector<float> raw_before = RawOnGrid(before, 0.98F), raw_after = RawOnGrid(after, 0.98F);
+  const std::vector<float> raw_before = testing::RawOnGrid(before, 0.98F), raw_after = testing::RawOnGrid(after, 0.98F);
   for (size_t i = 0; i < raw_before.size(); ++i) EXPECT_NEAR(raw_before[i], raw_after[i], 0.02) << i;
 }
 
 TEST(CorrectedFieldTest, TrainingGoesOnInTheCorrectedWorld) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   const std::vector<ObjectView> views = scene.Views();
   const std::vector<ObjectView> first_half(views.begin(), views.begin() + 6);
@@ -77,26 +77,26 @@ TEST(CorrectedFieldTest, TrainingGoesOnInTheCorrectedWorld) {
   field.Train(120, 1);
   EXPECT_EQ(field.steps(), 180u);
 
-  BallScene moved = scene;
+  testing::BallScene moved = scene;
   moved.radius_mu = S.scale() * scene.radius_mu;
-  EXPECT_LT(BallSurfaceError(moved, field.Snapshot()), 0.06);
+  EXPECT_LT(testing::BallSurfaceError(moved, field.Snapshot()), 0.06);
 }
 
 TEST(CorrectedFieldTest, AFieldThatMovedLearnsWhatOneThatDidNotLearns) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField moved = MakeField(scene, scene.Views()), still = MakeField(scene, scene.Views());
   moved.Train(10, 1);
   still.Train(10, 1);
   moved.Move(LoopClosure());
   moved.Train(10, 1);
   still.Train(10, 1);
-  const std::vector<float> raw_moved = RawOnGrid(moved.Snapshot(), 0.98F),
-                           raw_still = RawOnGrid(still.Snapshot(), 0.98F);
+  const std::vector<float> raw_moved = testing::RawOnGrid(moved.Snapshot(), 0.98F),
+                           raw_still = testing::RawOnGrid(still.Snapshot(), 0.98F);
   for (size_t i = 0; i < raw_moved.size(); ++i) EXPECT_NEAR(raw_moved[i], raw_still[i], 0.02) << i;
 }
 
 TEST(CorrectedFieldTest, ABoxThatLeansALittleIsNoReasonToStartAnew) {
-  BallScene scene;
+  testing::BallScene scene;
   Cuboid box = scene.Box();
   box.half_extents.x() *= 4;  // of a leaning bar the ends go far up and down
   ObjectField field(FastConfig(), scene.object, 1);
@@ -122,7 +122,7 @@ TEST(CorrectedFieldTest, ABoxThatLeansALittleIsNoReasonToStartAnew) {
 }
 
 // Every third camera believes the object lower than it is, the others higher.
-std::vector<ObjectView> WithWrongPoses(const BallScene& scene, double error_rad) {
+std::vector<ObjectView> WithWrongPoses(const testing::BallScene& scene, double error_rad) {
   std::vector<ObjectView> views = scene.Views();
   for (size_t i = 0; i < views.size(); ++i) {
     const double turn_rad = i % 3 == 0 ? error_rad : -error_rad;
@@ -134,7 +134,7 @@ std::vector<ObjectView> WithWrongPoses(const BallScene& scene, double error_rad)
 }
 
 TEST(CorrectedFieldTest, CorrectedPosesImproveAFieldThatWasTrainedWithWrongOnes) {
-  const BallScene scene;
+  const testing::BallScene scene;
   NerfConfig config;
   config.pose_prior_px = 0;  // else training finds the errors itself
   ObjectField field = MakeField(scene, WithWrongPoses(scene, 0.008), config);
@@ -151,12 +151,12 @@ TEST(CorrectedFieldTest, CorrectedPosesImproveAFieldThatWasTrainedWithWrongOnes)
   EXPECT_LE(more, static_cast<uint64_t>(config.full_budget_steps));
   field.Train(static_cast<int>(more), 1);
   const FieldSnapshot after = field.Snapshot();
-  EXPECT_LT(BallSurfaceError(scene, after), 0.7 * BallSurfaceError(scene, before));
+  EXPECT_LT(testing::BallSurfaceError(scene, after), 0.7 * testing::BallSurfaceError(scene, before));
   EXPECT_LT(after.loss, 0.5 * before.loss);
 }
 
 TEST(CorrectedFieldTest, SmallCorrectionsCostFewSteps) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, WithWrongPoses(scene, 0.0005));
   const uint64_t planned = field.AllowedSteps(true);
   field.Train(static_cast<int>(planned), 1);
@@ -165,7 +165,7 @@ TEST(CorrectedFieldTest, SmallCorrectionsCostFewSteps) {
 }
 
 TEST(CorrectedFieldTest, PosesThatCannotBeOrAreOfNoViewChangeNothing) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, scene.Views());
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(NAN);
   EXPECT_FALSE(field.CorrectView({KeyframeId{1}, {Eigen::Quaterniond::Identity(), nan}}).ok());
@@ -176,4 +176,4 @@ TEST(CorrectedFieldTest, PosesThatCannotBeOrAreOfNoViewChangeNothing) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

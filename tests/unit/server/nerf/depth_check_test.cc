@@ -7,13 +7,13 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
 
 std::vector<ObjectView> ViewsWithDepth(double scale) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.depth_mu = view.depth_mu * scale;
@@ -50,13 +50,13 @@ TEST(DepthCheckTest, DepthOfAnythingDoesNotFit) {
 }
 
 TEST(DepthCheckTest, NoDepthIsNoMisfit) {
-  EXPECT_TRUE(DepthsFit(BallScene().Views()));
+  EXPECT_TRUE(DepthsFit(testing::BallScene().Views()));
   EXPECT_TRUE(DepthsFit({}));
-  EXPECT_EQ(MisplacedShare(BallScene().Views(), 1), 0);
-  std::vector<ObjectView> views = BallScene().Views();
+  EXPECT_EQ(MisplacedShare(testing::BallScene().Views(), 1), 0);
+  std::vector<ObjectView> views = testing::BallScene().Views();
   for (ObjectView& view : views) view.depth_mu = cv::Mat(view.roi_px.size(), CV_32FC1, cv::Scalar(NAN));
   EXPECT_TRUE(DepthsFit(views));
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -8,7 +8,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -22,7 +22,7 @@ NerfConfig DistanceConfig() {
   return config;
 }
 
-ObjectField MakeField(const BallScene& scene, const NerfConfig& config) {
+ObjectField MakeField(const testing::BallScene& scene, const NerfConfig& config) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
@@ -30,19 +30,19 @@ ObjectField MakeField(const BallScene& scene, const NerfConfig& config) {
 }
 
 TEST(DistanceFieldTest, StartsWithTheHullAndLearnsTheBall) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, DistanceConfig());
   field.Train(1, 1);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.15) << "the hull is there from the first step on";
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.15) << "the hull is there from the first step on";
   const TrainStats stats = field.Train(199, 1);
   EXPECT_LT(stats.color_loss, 0.05);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.04);
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.04);
   EXPECT_EQ(snapshot.surface_level, 0);
 }
 
 TEST(DistanceFieldTest, RawValuesAreDistances) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, DistanceConfig());
   field.Train(200, 1);
   const FieldSnapshot snapshot = field.Snapshot();
@@ -65,16 +65,16 @@ TEST(DistanceFieldTest, RawValuesAreDistances) {
 }
 
 TEST(DistanceFieldTest, DependsOnNothingButItsInputs) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField first = MakeField(scene, DistanceConfig()), second = MakeField(scene, DistanceConfig());
   first.Train(30, 2);
   second.Train(10, 2);
   second.Train(20, 2);
-  EXPECT_EQ(RawOnGrid(first.Snapshot()), RawOnGrid(second.Snapshot()));
+  EXPECT_EQ(testing::RawOnGrid(first.Snapshot()), testing::RawOnGrid(second.Snapshot()));
 }
 
 TEST(DistanceFieldTest, GoesOnInAnotherBoxAndWithMoreViews) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field(DistanceConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   ASSERT_TRUE(field.SetBox(box).ok());
@@ -86,11 +86,11 @@ TEST(DistanceFieldTest, GoesOnInAnotherBoxAndWithMoreViews) {
   for (size_t i = 6; i < views.size(); ++i) ASSERT_TRUE(field.AddView(views[i]).ok());
   field.Train(static_cast<int>(field.AllowedSteps(true) - field.steps()), 1);
   EXPECT_GT(field.steps(), 100u) << "it was not started anew";
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.05);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.05);
 }
 
 TEST(DistanceFieldTest, SurfaceGetsSharperAsThePlanIsFulfilled) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const NerfConfig config = DistanceConfig();
   ObjectField field = MakeField(scene, config);
   field.Train(20, 1);
@@ -123,4 +123,4 @@ TEST(FieldSurfaceTest, DensityIsMeasuredPerMapUnitAndDistancesByTheirSharpness) 
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -12,7 +12,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -42,7 +42,7 @@ void TrainToTheEnd(ObjectField& field) {
   }
 }
 
-ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& views,
+ObjectField TrainedOn(const testing::BallScene& scene, const std::vector<ObjectView>& views,
                       const NerfConfig& config = ShapeConfig()) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
@@ -57,7 +57,7 @@ void Turn(ObjectView& view, double angle_deg) {
 }
 
 TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 16;
   std::vector<ObjectView> views = scene.Views();
   const ObjectField right = TrainedOn(scene, views);
@@ -67,8 +67,8 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   const FieldSnapshot snapshot = field.Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
   EXPECT_EQ(snapshot.cameras.size(), 15u);
-  const double right_error = BallSurfaceError(scene, right.Snapshot());
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
+  const double right_error = testing::BallSurfaceError(scene, right.Snapshot());
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
 
   // Its pose is corrected: it counts again.
   ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
@@ -79,7 +79,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
 }
 
 TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 16;
   std::vector<ObjectView> views = scene.Views();
   ObjectView& wrong = views[4];
@@ -87,12 +87,12 @@ TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
   wrong.ray_kind(cv::Rect(0, 0, 20, 24)).setTo(static_cast<int>(RayKind::kObject));
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/5 contradicts"));
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
 }
 
 TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
   // The lower half of the ball is not of the object, as the revised masks say.
-  const BallScene scene;
+  const testing::BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   ObjectField field = TrainedOn(scene, views);
   const Eigen::Vector3d eye_below = scene.Box().T_world_object.Inverse() * scene.View(1).T_world_camera.translation();
@@ -133,16 +133,16 @@ TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
 }
 
 TEST(FieldLifeTest, BlackImagesStillGiveAShapeAndAreNamed) {
-  const BallScene scene;
+  const testing::BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("black in 12 of its 12 views"));
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.12);
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.12);
 }
 
 TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field(ShapeConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   box.T_world_object = {box.T_world_object.rotation(),
@@ -152,15 +152,15 @@ TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
   TrainToTheEnd(field);
   const FieldSnapshot snapshot = field.Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("its box misses"));
-  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  for (float raw : testing::RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   TrainToTheEnd(field);
   EXPECT_THAT(field.Concern(), Not(HasSubstr("its box misses")));
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.06);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.06);
 }
 
 TEST(FieldLifeTest, WhatIsRefusedIsSaid) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ObjectField field(SmallConfig(), scene.object, 1);
   Cuboid box = scene.Box();
@@ -188,7 +188,7 @@ TEST(FieldLifeTest, WhatIsRefusedIsSaid) {
 }
 
 TEST(FieldLifeTest, NoNumbersInDepthLeaveNoTrace) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   std::vector<ObjectView> views = scene.Views();
   const float inf = std::numeric_limits<float>::infinity();
@@ -201,23 +201,23 @@ TEST(FieldLifeTest, NoNumbersInDepthLeaveNoTrace) {
   }
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
   EXPECT_TRUE(std::isfinite(snapshot.loss));
-  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.08);
+  for (float raw : testing::RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.08);
 }
 
 TEST(FieldLifeTest, DepthOfAWrongScaleIsNotUsed) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.depth_mu = view.depth_mu * 1.1;
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
   EXPECT_THAT(snapshot.concern, HasSubstr("depth images do not agree"));
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
 }
 
 TEST(FieldLifeTest, DepthCarvesWhatMasksCannot) {
   // A dent that no outline shows: what one view measured lies behind the ball's surface.
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
   const Eigen::Vector3d eye = box.T_world_object.Inverse() * scene.View(0).T_world_camera.translation();
@@ -242,10 +242,10 @@ TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
   std::vector<std::vector<float>> raws;
   std::vector<std::vector<uint8_t>> hulls;
   for (const double scale : {1.0, 0.01, 100.0}) {
-    BallScene scene;
+    testing::BallScene scene;
     scene.radius_mu = 0.5 * scale;
     const FieldSnapshot snapshot = TrainedOn(scene, scene.Views(), SmallConfig()).Snapshot();
-    raws.push_back(RawOnGrid(snapshot, 0.98f));
+    raws.push_back(testing::RawOnGrid(snapshot, 0.98f));
     hulls.push_back(snapshot.hull.bits);
     EXPECT_NEAR(snapshot.box_half_extents.x(), 0.55 * scale, 1e-5 * scale);
   }
@@ -256,7 +256,7 @@ TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
 }
 
 TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
-  const BallScene scene;
+  const testing::BallScene scene;
   NerfConfig config = SmallConfig();
   config.full_budget_steps = 40;  // far too few
   config.least_loss_fall = 0.05;
@@ -274,7 +274,7 @@ TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
 }
 
 TEST(FieldLifeTest, LooksDoNotDependOnHowTrainingIsSliced) {
-  const BallScene scene;
+  const testing::BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   Turn(views[5], 5);
   const auto train = [&](int slice) {
@@ -282,10 +282,10 @@ TEST(FieldLifeTest, LooksDoNotDependOnHowTrainingIsSliced) {
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
     for (int done = 0; done < 120; done += slice) field.Train(slice, 1);
-    return RawOnGrid(field.Snapshot());
+    return testing::RawOnGrid(field.Snapshot());
   };
   EXPECT_EQ(train(120), train(8));
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

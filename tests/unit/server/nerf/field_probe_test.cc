@@ -5,7 +5,7 @@
 #include "server/nerf/cpu/occupancy.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -29,7 +29,7 @@ TEST(FieldProbeTest, NeedFollowsTheResidualButLeavesSomeToAll) {
 }
 
 TEST(FieldProbeTest, SeesWhichRaysMeetTheBoxAndHowAnEmptySpaceDiffersFromTheViews) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 3;
   const std::vector<ObjectView> views = scene.Views();
   const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
@@ -54,4 +54,4 @@ TEST(FieldProbeTest, SeesWhichRaysMeetTheBoxAndHowAnEmptySpaceDiffersFromTheView
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 TEST(GainMeterTest, MeasuresHowFastALossFalls) {
@@ -49,4 +49,4 @@ TEST(GainMeterTest, KnowsNothingFromFewLooksNorAfterARestart) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

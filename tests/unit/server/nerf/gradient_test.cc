@@ -49,7 +49,7 @@ TEST(GradientTest, EncodingScattersWhatItGathered) {
     return sum;
   };
   kernels.encode_backward(layout, kPoints, x.data(), y.data(), z.data(), weights.data(), gradient.data());
-  ExpectGradient(loss, table.data(), gradient.data(), table.size(), table.size(), 0.25f, 1e-4);
+  testing::ExpectGradient(loss, table.data(), gradient.data(), table.size(), table.size(), 0.25f, 1e-4);
 }
 
 TEST(GradientTest, MlpPassesGradientsToWeightsAndInputs) {
@@ -71,8 +71,8 @@ TEST(GradientTest, MlpPassesGradientsToWeightsAndInputs) {
   loss();
   AlignedBuffer<float> d_inputs = inputs.Clone(), d_hidden = hidden.Clone();
   PlainKernels().mlp_backward(mlp, kPoints, d_inputs.data(), d_hidden.data(), d_raw.data(), gradient.data());
-  ExpectGradient(loss, mlp.parameters.data(), gradient.data(), gradient.size(), 60, 5e-4f, 1e-2);
-  ExpectGradient(loss, inputs.data(), d_inputs.data(), inputs.size(), inputs.size(), 5e-4f, 1e-2);
+  testing::ExpectGradient(loss, mlp.parameters.data(), gradient.data(), gradient.size(), 60, 5e-4f, 1e-2);
+  testing::ExpectGradient(loss, inputs.data(), d_inputs.data(), inputs.size(), inputs.size(), 5e-4f, 1e-2);
 }
 
 struct LossCase {
@@ -111,7 +111,8 @@ TEST_P(CompositeGradientTest, MatchesDifferencesOfTheWholeLoss) {
   };
   const RayResult result = forward();
   plain::CompositeBackward(samples, target, weights, result, weight, behind, d_raw);
-  ExpectGradient([&] { return forward().loss; }, raw, d_raw, kSamples * kOutputs, kSamples * kOutputs, 1e-2f, 5e-3);
+  testing::ExpectGradient([&] { return forward().loss; }, raw, d_raw, kSamples * kOutputs, kSamples * kOutputs, 1e-2f,
+                          5e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Losses, CompositeGradientTest,
@@ -153,7 +154,8 @@ TEST(CompositeTest, ContrastHasTheGradientOfBothRaysLosses) {
     }
     EXPECT_NEAR(whole, squares + 3 * contrast + 0.5 * (2 - results[0].opacity - results[1].opacity), 1e-5);
     std::vector<float> d_raw(chunk.d_raw.data(), chunk.d_raw.data() + chunk.size * kOutputs);
-    ExpectGradient(loss, chunk.raw.data(), d_raw.data(), chunk.size * kOutputs, chunk.size * kOutputs, 1e-2f, 5e-3);
+    testing::ExpectGradient(loss, chunk.raw.data(), d_raw.data(), chunk.size * kOutputs, chunk.size * kOutputs, 1e-2f,
+                            5e-3);
   }
 }
 

@@ -7,7 +7,7 @@
 
 #include "server/nerf/math/types.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr int kSide = nerf::kOccupancyResolution;
@@ -53,4 +53,4 @@ TEST(HullDistanceTest, WithoutABorderAllIsFarAway) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -11,7 +11,7 @@
 #include "common/status.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using testing::RawOnGrid;
 using testing::SmallFieldConfig;
 
-ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t seed = 1) {
+ObjectField MakeField(const testing::BallScene& scene, const NerfConfig& config, uint64_t seed = 1) {
   ObjectField field(config, scene.object, seed);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
@@ -28,7 +28,7 @@ ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t
 }
 
 TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {
-  const BallScene scene;
+  const testing::BallScene scene;
   ObjectField field = MakeField(scene, NerfConfig{});
   field.Train(150, 1);
   const TrainStats stats = field.Train(50, 1);
@@ -37,7 +37,7 @@ TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {
   const FieldSnapshot snapshot = field.Snapshot();
   EXPECT_EQ(snapshot.steps, 200u);
   EXPECT_EQ(snapshot.views, scene.views);
-  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.04);
+  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.04);
   // Every view's central pixel shows the surface point towards it.
   for (int i = 0; i < scene.views; ++i) {
     const ObjectView view = scene.View(i);
@@ -54,7 +54,7 @@ TEST(ObjectFieldTest, LearnsTheShapeAndColourOfABall) {
 }
 
 TEST(ObjectFieldTest, LearnsWithThePapersSamplingAndLosses) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.with_depth = true;
   NerfConfig config;
   config.sampling = "uniform";
@@ -62,17 +62,17 @@ TEST(ObjectFieldTest, LearnsWithThePapersSamplingAndLosses) {
   config.random_background = true;
   ObjectField field = MakeField(scene, config);
   field.Train(150, 1);
-  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.08);
+  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.08);
 }
 
 TEST(ObjectFieldTest, DoesNotDependOnTheScaleOfTheMap) {
   std::vector<std::vector<float>> raws;
   for (const double radius : {0.5, 0.5 * 128, 0.5 / 128}) {  // powers of two scale without rounding
-    BallScene scene;
+    testing::BallScene scene;
     scene.radius_mu = radius;
-    ObjectField field = MakeField(scene, SmallFieldConfig());
+    ObjectField field = MakeField(scene, testing::SmallFieldConfig());
     field.Train(15, 1);
-    raws.push_back(RawOnGrid(field.Snapshot()));
+    raws.push_back(testing::RawOnGrid(field.Snapshot()));
   }
   for (size_t i = 0; i < raws[0].size(); ++i) {
     EXPECT_NEAR(raws[0][i], raws[1][i], 0.02) << i;
@@ -81,48 +81,49 @@ TEST(ObjectFieldTest, DoesNotDependOnTheScaleOfTheMap) {
 }
 
 TEST(ObjectFieldTest, IsDeterministicForSeedAndThreadCount) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 5;
   for (const int threads : {1, 2}) {
-    ObjectField a = MakeField(scene, SmallFieldConfig()), b = MakeField(scene, SmallFieldConfig());
+    ObjectField a = MakeField(scene, testing::SmallFieldConfig()), b = MakeField(scene, testing::SmallFieldConfig());
     a.Train(12, threads);
     b.Train(5, threads);
     b.Train(7, threads);
-    EXPECT_EQ(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot())) << threads << " threads";
+    EXPECT_EQ(testing::RawOnGrid(a.Snapshot()), testing::RawOnGrid(b.Snapshot())) << threads << " threads";
   }
-  ObjectField a = MakeField(scene, SmallFieldConfig(), 1), b = MakeField(scene, SmallFieldConfig(), 2);
+  ObjectField a = MakeField(scene, testing::SmallFieldConfig(), 1),
+              b = MakeField(scene, testing::SmallFieldConfig(), 2);
   a.Train(3, 1);
   b.Train(3, 1);
-  EXPECT_NE(RawOnGrid(a.Snapshot()), RawOnGrid(b.Snapshot()));
+  EXPECT_NE(testing::RawOnGrid(a.Snapshot()), testing::RawOnGrid(b.Snapshot()));
 }
 
 TEST(ObjectFieldTest, EveryInstructionSetLearnsTheSame) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 5;
   std::vector<double> losses;
   for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
     hwy::SetSupportedTargetsForTest(left & -left);
-    losses.push_back(MakeField(scene, SmallFieldConfig()).Train(25, 1).color_loss);
+    losses.push_back(MakeField(scene, testing::SmallFieldConfig()).Train(25, 1).color_loss);
     hwy::SetSupportedTargetsForTest(0);
   }
   for (const double loss : losses) EXPECT_NEAR(loss, losses[0], 0.02 * losses[0]);
 }
 
 TEST(ObjectFieldTest, SnapshotDoesNotChangeWhenTrainingGoesOn) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.views = 4;
-  ObjectField field = MakeField(scene, SmallFieldConfig());
+  ObjectField field = MakeField(scene, testing::SmallFieldConfig());
   field.Train(5, 1);
   const FieldSnapshot snapshot = field.Snapshot();
-  const std::vector<float> before = RawOnGrid(snapshot);
+  const std::vector<float> before = testing::RawOnGrid(snapshot);
   field.Train(5, 1);
-  EXPECT_EQ(RawOnGrid(snapshot), before);
-  EXPECT_NE(RawOnGrid(field.Snapshot()), before);
+  EXPECT_EQ(testing::RawOnGrid(snapshot), before);
+  EXPECT_NE(testing::RawOnGrid(field.Snapshot()), before);
 }
 
 TEST(ObjectFieldTest, OutsideTheBoxThereIsNothing) {
-  const BallScene scene;
-  const ObjectField field = MakeField(scene, SmallFieldConfig());
+  const testing::BallScene scene;
+  const ObjectField field = MakeField(scene, testing::SmallFieldConfig());
   const std::vector<Eigen::Vector3f> points = {{2, 0, 0}, {0, 0, 0}, {0, NAN, 0}};
   std::vector<float> raw(3);
   std::vector<Rgb8> rgb(3);
@@ -133,9 +134,9 @@ TEST(ObjectFieldTest, OutsideTheBoxThereIsNothing) {
 }
 
 TEST(ObjectFieldTest, RejectsViewsThatCannotBe) {
-  const BallScene scene;
+  const testing::BallScene scene;
   const auto fault = [&](auto&& spoil) {
-    ObjectField field(SmallFieldConfig(), scene.object, 1);
+    ObjectField field(testing::SmallFieldConfig(), scene.object, 1);
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     ObjectView view = scene.View(0);
     spoil(view);
@@ -169,8 +170,8 @@ TEST(ObjectFieldTest, RejectsViewsThatCannotBe) {
 }
 
 TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
-  const BallScene scene;
-  ObjectField field(SmallFieldConfig(), scene.object, 1);
+  const testing::BallScene scene;
+  ObjectField field(testing::SmallFieldConfig(), scene.object, 1);
   EXPECT_EQ(field.AddView(scene.View(0)).code(), absl::StatusCode::kFailedPrecondition);
   Cuboid flat = scene.Box();
   flat.half_extents.z() = 0;
@@ -179,8 +180,8 @@ TEST(ObjectFieldTest, NeedsABoxThatCanBe) {
 }
 
 TEST(ObjectFieldTest, OnlyABoxWithLittleInCommonStartsAnew) {
-  const BallScene scene;
-  ObjectField field = MakeField(scene, SmallFieldConfig());
+  const testing::BallScene scene;
+  ObjectField field = MakeField(scene, testing::SmallFieldConfig());
   field.Train(10, 1);
   Cuboid box = scene.Box();
   box.half_extents *= 0.95;
@@ -204,8 +205,8 @@ TEST(ObjectFieldTest, OnlyABoxWithLittleInCommonStartsAnew) {
 }
 
 TEST(ObjectFieldTest, CorrectedPoseReplacesTheView) {
-  const BallScene scene;
-  NerfConfig config = SmallFieldConfig();
+  const testing::BallScene scene;
+  NerfConfig config = testing::SmallFieldConfig();
   ObjectField field(config, scene.object, 1), clean(config, scene.object, 1);
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   ASSERT_TRUE(clean.SetBox(scene.Box()).ok());
@@ -220,19 +221,19 @@ TEST(ObjectFieldTest, CorrectedPoseReplacesTheView) {
   field.Train(1, 1);
   clean.Train(1, 1);
   EXPECT_EQ(field.Snapshot().hull.bits, clean.Snapshot().hull.bits);
-  EXPECT_EQ(RawOnGrid(field.Snapshot()), RawOnGrid(clean.Snapshot()));
+  EXPECT_EQ(testing::RawOnGrid(field.Snapshot()), testing::RawOnGrid(clean.Snapshot()));
 }
 
 TEST(ObjectFieldTest, ViewBeyondTheLimitReplacesTheNearestOne) {
-  BallScene scene;
-  NerfConfig config = SmallFieldConfig();
+  testing::BallScene scene;
+  NerfConfig config = testing::SmallFieldConfig();
   config.max_views = 6;
   const ObjectField field = MakeField(scene, config);
   EXPECT_EQ(field.views(), 6);
 }
 
 TEST(VisualHullTest, HoldsTheBallAndLittleMore) {
-  const BallScene scene;
+  const testing::BallScene scene;
   VisualHull hull(NerfConfig{});
   hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
   for (const ObjectView& view : scene.Views()) hull.Add(view);
@@ -267,7 +268,7 @@ TEST(OccupancyTest, TrimmedHullEndsWhereRaysEnd) {
 }
 
 TEST(VisualHullTest, OneBadMaskIsOutvoted) {
-  const BallScene scene;
+  const testing::BallScene scene;
   NerfConfig config;
   config.hull_min_votes = 2;
   VisualHull hull(config);
@@ -291,7 +292,7 @@ TEST(VisualHullTest, OneBadMaskIsOutvoted) {
 }
 
 TEST(VisualHullTest, OccludersAndPixelsOutsideTheCropCarveNothing) {
-  const BallScene scene;
+  const testing::BallScene scene;
   VisualHull hull(NerfConfig{});
   hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
   for (const ObjectView& view : scene.Views()) hull.Add(view);
@@ -312,7 +313,7 @@ TEST(VisualHullTest, OccludersAndPixelsOutsideTheCropCarveNothing) {
 
 TEST(VisualHullTest, WhatOnlyHidesBehindOtherThingsIsNotTheObject) {
   // In every view something stands before all that is not the ball.
-  const BallScene scene;
+  const testing::BallScene scene;
   NerfConfig config;
   const auto carved = [&](double show_share) {
     config.hull_show_share = show_share;
@@ -345,7 +346,7 @@ TEST(VisualHullTest, WhatOnlyHidesBehindOtherThingsIsNotTheObject) {
 }
 
 TEST(VisualHullTest, WithoutViewsAllIsPossible) {
-  const BallScene scene;
+  const testing::BallScene scene;
   VisualHull hull(NerfConfig{});
   hull.Reset(TrainingBox::Around(scene.Box(), 0.1));
   const auto all = [&] {
@@ -360,4 +361,4 @@ TEST(VisualHullTest, WithoutViewsAllIsPossible) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

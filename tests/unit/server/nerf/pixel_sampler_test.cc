@@ -11,7 +11,7 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -46,7 +46,7 @@ class PixelSamplerTest : public ::testing::Test {
   }
   std::vector<float> Ones(size_t per_view) const { return std::vector<float>(views_.size() * per_view, 1.0f); }
 
-  BallScene scene_;
+  testing::BallScene scene_;
   NerfConfig config_;
   std::vector<ObjectView> views_;
 };
@@ -197,4 +197,4 @@ TEST_F(PixelSamplerTest, ObjectPixelsComeInPairsOfOneViewSomePixelsApart) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -9,7 +9,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -21,7 +21,7 @@ NerfConfig FastConfig() {
   return config;
 }
 
-BallScene Scene() { return {.views = 14, .size_px = 120}; }
+testing::BallScene Scene() { return {.views = 14, .size_px = 120}; }
 
 // The view with its camera turned so that the object appears shifted.
 ObjectView Off(ObjectView view, double right_px, double down_px) {
@@ -31,7 +31,7 @@ ObjectView Off(ObjectView view, double right_px, double down_px) {
   return view;
 }
 
-ObjectField Trained(const BallScene& scene, const std::vector<ObjectView>& views, const NerfConfig& config,
+ObjectField Trained(const testing::BallScene& scene, const std::vector<ObjectView>& views, const NerfConfig& config,
                     int steps = 200) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
@@ -41,9 +41,9 @@ ObjectField Trained(const BallScene& scene, const std::vector<ObjectView>& views
 }
 
 // How far from the truth each view of the field puts the object's middle.
-std::vector<double> Errors_px(const BallScene& scene, const ObjectField& field) {
+std::vector<double> Errors_px(const testing::BallScene& scene, const ObjectField& field) {
   std::vector<double> errors_px;
-  const std::vector<FieldView> cameras = field.Snapshot().cameras;
+  const std::vector<TrainingCamera> cameras = field.Snapshot().cameras;
   for (size_t i = 0; i < cameras.size(); ++i) {
     const ObjectView truth = scene.View(static_cast<int>(i));
     const Eigen::Vector3d center = truth.T_world_camera.Inverse() * scene.Center();
@@ -60,7 +60,7 @@ double Rms(const std::vector<double>& values) {
 }
 
 // Errors of two pixels that have nothing in common.
-std::vector<ObjectView> ShakenViews(const BallScene& scene) {
+std::vector<ObjectView> ShakenViews(const testing::BallScene& scene) {
   std::vector<ObjectView> views;
   for (int i = 0; i < scene.views; ++i) {
     views.push_back(Off(scene.View(i), i % 2 == 0 ? 1.5 : -1.5, i % 4 < 2 ? 1.3 : -1.3));
@@ -69,7 +69,7 @@ std::vector<ObjectView> ShakenViews(const BallScene& scene) {
 }
 
 TEST(PoseRefinerTest, PutsRightViewsThatAreAllALittleOff) {
-  const BallScene scene = Scene();
+  const testing::BallScene scene = Scene();
   NerfConfig config = FastConfig();
   const std::vector<double> refined_px = Errors_px(scene, Trained(scene, ShakenViews(scene), config));
   config.pose_prior_px = 0;
@@ -80,7 +80,7 @@ TEST(PoseRefinerTest, PutsRightViewsThatAreAllALittleOff) {
 }
 
 TEST(PoseRefinerTest, PutsRightOneViewAndLeavesTheOthers) {
-  const BallScene scene = Scene();
+  const testing::BallScene scene = Scene();
   std::vector<ObjectView> views = scene.Views();
   views[5] = Off(views[5], 2.5, -1);
   const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, FastConfig()));
@@ -89,7 +89,7 @@ TEST(PoseRefinerTest, PutsRightOneViewAndLeavesTheOthers) {
 }
 
 TEST(PoseRefinerTest, NeverMovesAllViewsAlike) {
-  const BallScene scene = Scene();
+  const testing::BallScene scene = Scene();
   const std::vector<ObjectView> views = ShakenViews(scene);
   const FieldSnapshot snapshot = Trained(scene, views, FastConfig(), 50).Snapshot();
   Eigen::Vector3d shift = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
@@ -110,7 +110,7 @@ TEST(PoseRefinerTest, NeverMovesAllViewsAlike) {
 }
 
 TEST(PoseRefinerTest, ACorrectionKeepsWhatWasFoundIfItIsSmall) {
-  const BallScene scene = Scene();
+  const testing::BallScene scene = Scene();
   const std::vector<ObjectView> views = ShakenViews(scene);
   ObjectField field = Trained(scene, views, FastConfig());
   const std::vector<double> before_px = Errors_px(scene, field);
@@ -123,7 +123,7 @@ TEST(PoseRefinerTest, ACorrectionKeepsWhatWasFoundIfItIsSmall) {
 }
 
 TEST(PoseRefinerTest, FewViewsAreTakenAsTheyAre) {
-  BallScene scene = Scene();
+  testing::BallScene scene = Scene();
   scene.views = 5;
   std::vector<ObjectView> views = scene.Views();
   views[1] = Off(views[1], 2, 0);
@@ -133,4 +133,4 @@ TEST(PoseRefinerTest, FewViewsAreTakenAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 ConfigFields FieldsOf(NerfConfig& config) {
@@ -81,4 +81,4 @@ TEST(PresetsTest, AssignmentsHoldInTheirOrder) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

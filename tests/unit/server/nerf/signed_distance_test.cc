@@ -93,7 +93,7 @@ TEST(SignedDistanceTest, GradientMatchesDifferencesOfTheWholeLoss) {
     PlainKernels().distance_backward(rays.spans.data(), 2, kSharpness, c);
     const std::vector<float> d_raw(c.d_raw.data(), c.d_raw.data() + c.size * kOutputs);
     const auto count = static_cast<size_t>(c.size * kOutputs);
-    ExpectGradient(loss, c.raw.data(), d_raw.data(), count, count, 1e-3f, 1e-2);
+    testing::ExpectGradient(loss, c.raw.data(), d_raw.data(), count, count, 1e-3f, 1e-2);
   }
 }
 
@@ -162,8 +162,8 @@ TEST(ShapeLossTest, GradientMatchesDifferences) {
     std::array<float, kStencilPoints> distance, d;
     for (size_t i = 0; i < distance.size(); ++i) distance[i] = 0.02f * Noise(7, i);
     plain::ShapeLoss(weights, kSpacing, distance.data(), d.data());
-    ExpectGradient([&] { return Loss(weights, distance); }, distance.data(), d.data(), kStencilPoints, kStencilPoints,
-                   1e-4f, 1e-2);
+    testing::ExpectGradient([&] { return Loss(weights, distance); }, distance.data(), d.data(), kStencilPoints,
+                            kStencilPoints, 1e-4f, 1e-2);
   }
 }
 

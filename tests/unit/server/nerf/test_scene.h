@@ -24,7 +24,7 @@ struct BallScene {
 };
 
 // Small enough to learn the ball quickly.
-NerfConfig SmallFieldConfig();
+nerf::NerfConfig SmallFieldConfig();
 
 // Mean distance, in radii, of the learned surface (where raw first exceeds the surface level on the way from outside to
 // the centre, within the hull) from the ball, over evenly spread directions. A direction without surface counts as 1.

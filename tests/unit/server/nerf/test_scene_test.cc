@@ -90,8 +90,8 @@ std::vector<ObjectView> BallScene::Views() const {
   return all;
 }
 
-NerfConfig SmallFieldConfig() {
-  NerfConfig config;
+nerf::NerfConfig SmallFieldConfig() {
+  nerf::NerfConfig config;
   config.levels = 6;
   config.log2_table_entries = 12;
   config.finest_resolution = 128;

@@ -7,7 +7,7 @@
 #include "server/nerf/cpu/field_model.h"
 #include "server/nerf/math/hash_grid.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 SE3<World, Object> Pose(double yaw_rad, const Eigen::Vector3d& center) {
@@ -75,4 +75,4 @@ TEST(HashGridTest, CornersOfADenseLevelAreDistinctInAnyWindowAroundTheFirstBox) 
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
@@ -49,4 +49,4 @@ TEST(TrainingPlanTest, StepsBeyondThePlanAreEarnedByTheLoss) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

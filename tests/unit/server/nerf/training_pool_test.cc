@@ -12,7 +12,7 @@
 #include "common/map_motion.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
@@ -35,7 +35,7 @@ NerfConfig TinyConfig() {
 }
 
 ObjectViews Offer(uint64_t object, int views) {
-  BallScene scene;
+  testing::BallScene scene;
   scene.object = ObjectId{object};
   scene.views = views;
   scene.size_px = 32;
@@ -356,4 +356,4 @@ TEST(TrainingPoolTest, WithoutWorkersItTrainsByHandAndAlwaysAlike) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 constexpr double kFocal_px = 500, kDistance_mu = 2;
@@ -144,4 +144,4 @@ TEST(ViewAlignmentTest, WhatNothingHoldsGoesBackToThePoseThatWasGiven) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

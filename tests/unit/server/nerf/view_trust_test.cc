@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::nerf {
 namespace {
 
 ProbeReport Report(size_t views, ViewResidual ordinary = {0.02f, 0.05f, 0.01f}) {
@@ -83,4 +83,4 @@ TEST(ViewTrustTest, AFieldThatForgotForgives) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::nerf

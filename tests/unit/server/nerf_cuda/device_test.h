@@ -45,8 +45,10 @@ inline void ExpectNoRaces() {
 
 inline auto AllOrders() {
   using cuda_on_host::ThreadOrder;
-  return testing::Values(RunOptions{ThreadOrder::kForward}, RunOptions{ThreadOrder::kReverse},
-                         RunOptions{ThreadOrder::kShuffled, 3}, RunOptions{ThreadOrder::kShuffled, 4, 2, true});
+  return testing::Values(RunOptions{cuda_on_host::ThreadOrder::kForward},
+                         RunOptions{cuda_on_host::ThreadOrder::kReverse},
+                         RunOptions{cuda_on_host::ThreadOrder::kShuffled, 3},
+                         RunOptions{cuda_on_host::ThreadOrder::kShuffled, 4, 2, true});
 }
 
 #endif

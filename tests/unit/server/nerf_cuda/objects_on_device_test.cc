@@ -36,8 +36,8 @@ NerfConfig TinyConfig() {
   return config;
 }
 
-BallScene TinyScene(uint64_t object) {
-  BallScene scene;
+testing::BallScene TinyScene(uint64_t object) {
+  testing::BallScene scene;
   scene.object = ObjectId{object};
   scene.views = 4;
   scene.size_px = 32;
@@ -45,13 +45,13 @@ BallScene TinyScene(uint64_t object) {
 }
 
 std::vector<float> Train(const NerfConfig& config, int steps) {
-  const BallScene scene = TinyScene(1);
+  const testing::BallScene scene = TinyScene(1);
   ObjectField field(config, scene.object, 5);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   EXPECT_EQ(field.Train(steps, 1).steps, steps);
   EXPECT_EQ(field.steps(), static_cast<uint64_t>(steps));
-  return RawOnGrid(field.Snapshot(), 0.7f);
+  return testing::RawOnGrid(field.Snapshot(), 0.7f);
 }
 
 TEST_F(ObjectsOnDeviceTest, AnObjectLearnsOnTheDeviceWhatItLearnsOnTheCpu) {
@@ -74,7 +74,7 @@ TEST_F(ObjectsOnDeviceTest, TimeOnADeviceIsLimitedToo) {
   config.most_time_per_view_s = 0;
   TrainingPool pool(config, 1);
   const uint64_t client = pool.Register([](FieldSnapshot) {});
-  const BallScene scene = TinyScene(1);
+  const testing::BallScene scene = TinyScene(1);
   pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   pool.Finish(client);
   while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -92,7 +92,7 @@ TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
   });
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 14});  // of 48
   for (uint64_t object = 1; object <= 2; ++object) {
-    const BallScene scene = TinyScene(object);
+    const testing::BallScene scene = TinyScene(object);
     pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   }
   pool.Finish(client);
@@ -103,7 +103,7 @@ TEST_F(ObjectsOnDeviceTest, APoolWhoseDeviceFailsTrainsEveryObjectToTheEnd) {
   for (const auto& [object, snapshot] : last) {
     EXPECT_TRUE(snapshot.converged);
     EXPECT_EQ(snapshot.steps, 8u);
-    for (const float raw : RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
+    for (const float raw : testing::RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
   }
   EXPECT_EQ(cuda_on_host::AllocatedBytes(), 0u);
 }

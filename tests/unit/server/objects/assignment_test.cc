@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::ElementsAre;
@@ -60,4 +60,4 @@ TEST(AssignMaximal, EqualsExhaustiveSearch) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -7,7 +7,7 @@
 
 #include "server/objects/projection.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::NotNull;
@@ -208,4 +208,4 @@ TEST_F(AssociationTest, WithoutMasksAllAreMissed) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/objects/seen_object.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 const Eigen::Vector3d kHalf(0.10, 0.07, 0.05);
@@ -130,4 +130,4 @@ TEST_F(BoxSearchTest, PointsBoundWhatNoMaskDoes) {
 
 }  // namespace
 
-}  // namespace romap
+}  // namespace romap::objects

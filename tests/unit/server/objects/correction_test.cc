@@ -14,7 +14,7 @@
 #include "server/objects/projection.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::IsEmpty;
@@ -262,4 +262,4 @@ TEST(MeanMotion, IsTheMeanAtTheCentre) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -10,7 +10,7 @@
 #include "server/objects/projection.h"
 #include "tests/unit/server/objects/seen_object.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 const Eigen::Vector3d kHalf(0.10, 0.07, 0.05);
@@ -126,4 +126,4 @@ TEST(FindSupportHeightTest, IsWhatTheNeighboursStandOnWhereNothingIsSeen) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

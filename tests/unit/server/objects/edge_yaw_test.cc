@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kYaw_rad = 0.3;
@@ -66,4 +66,4 @@ TEST(EdgeYawTest, IsNotToldWithoutEdges) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -12,7 +12,7 @@
 #include "server/objects/object_mapper.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::ElementsAre;
@@ -111,4 +111,4 @@ TEST(FitScheduleTest, IsDeterministic) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

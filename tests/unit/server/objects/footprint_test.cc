@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kCell = 0.01;
@@ -74,4 +74,4 @@ TEST(FootprintTest, DistrustsEdgesThatWasteSpace) {
 TEST(FootprintTest, NeedsCells) { EXPECT_FALSE(Fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, 0.3).has_value()); }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr int64_t kFramePeriod_ns = 40'000'000;
@@ -124,4 +124,4 @@ TEST(FrameHistory, WaitingFramesFollowCorrections) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

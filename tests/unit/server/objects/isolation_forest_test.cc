@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
@@ -160,4 +160,4 @@ TEST(IsolationForestTest, FewOrEqualPointsAreNoAnomalies) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

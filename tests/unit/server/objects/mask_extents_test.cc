@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kBorder_px = 0.5;  // between a mask's last pixel's centre and its border
@@ -50,4 +50,4 @@ TEST(MaskExtentsTest, LookAtOneLabelOnly) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -12,7 +12,7 @@
 
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::IsEmpty;
@@ -394,4 +394,4 @@ TEST(ObjectMapper, ViewsSurroundTheObjectAndSayWhatEachRayMeets) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

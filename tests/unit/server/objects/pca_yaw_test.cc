@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Points spread evenly over an upright cuboid.
@@ -58,4 +58,4 @@ TEST(PcaYawTest, BearsPointsOnALine) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

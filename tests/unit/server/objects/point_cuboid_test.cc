@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 // Points on the faces of a box of half extents (3, 1, 0.5), turned by `yaw_rad`, around (10, 20, 30).
@@ -59,4 +59,4 @@ TEST(CuboidOfPoints, NeedsAVolume) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

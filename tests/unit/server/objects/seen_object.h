@@ -11,7 +11,7 @@
 #include "server/objects/silhouette_hull.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::objects {
 
 // A synthetic object as the cuboid fit gets to know it.
 struct SeenObject {
@@ -70,4 +70,4 @@ inline double LargestFaceError(const Cuboid& cuboid, const Cuboid& truth) {
   return ((shift + growth).cwiseAbs().cwiseMax((shift - growth).cwiseAbs())).maxCoeff();
 }
 
-}  // namespace romap
+}  // namespace romap::objects

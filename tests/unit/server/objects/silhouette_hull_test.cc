@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr int kCells = 20;
@@ -135,4 +135,4 @@ TEST(SilhouetteHullTest, BoundsSurroundTheCells) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

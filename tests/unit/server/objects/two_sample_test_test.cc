@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
@@ -190,4 +190,4 @@ TEST(SamePlaceTest, TooFewOrBrokenPointsSayNothing) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -6,7 +6,7 @@
 #include "tests/support/checked_copy.h"
 #include "tests/support/random_map.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 using testing::CheckedCopy;
@@ -21,12 +21,12 @@ class Reader {
  public:
   Reader(MapState& map, Outbox::Acks acks, int share) : outbox_(map.Subscribe(acks, 50, true)), share_(share) {}
 
-  void MaybeRead(RandomMap& random) {
+  void MaybeRead(testing::RandomMap& random) {
     if (random.Pick(0, 9) >= share_) return;
     for (int n = random.Pick(1, 12); n > 0; --n) Take();
   }
   // What still waits; how many events of objects that was.
-  int ReadToEnd() {
+  int testing::ReadToEnd() {
     int of_objects = 0;
     while (const auto event = Take()) {
       const bool is_other = std::holds_alternative<FrameAck>(*event) || std::holds_alternative<MasksAck>(*event) ||
@@ -35,7 +35,7 @@ class Reader {
     }
     return of_objects;
   }
-  const CheckedCopy& copy() const { return copy_; }
+  const testing::CheckedCopy& copy() const { return copy_; }
 
  private:
   std::optional<MapEvent> Take() {
@@ -44,7 +44,7 @@ class Reader {
     return event;
   }
 
-  CheckedCopy copy_;
+  testing::CheckedCopy copy_;
   std::shared_ptr<Outbox> outbox_;
   int share_;
 };
@@ -59,7 +59,7 @@ TEST(CopiedMapTest, IsTheMapHoweverSlowlyItIsRead) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    RandomMap random(seed, &map);
+    testing::RandomMap random(seed, &map);
     std::vector<Reader> readers;
     for (const int share : {10, 5, 1}) readers.emplace_back(map, Outbox::Acks::kAll, share);
     for (int step = 0; step < kSteps; ++step) {
@@ -79,13 +79,13 @@ TEST(CopiedMapTest, WhatIsExportedIsTheMapWithoutProvisionalObjects) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    RandomMap random(seed, &map);
+    testing::RandomMap random(seed, &map);
     for (int step = 0; step < kSteps; ++step) random.Step();
     const std::vector<ObjectSnapshot> objects = map.Snapshot().objects;
     const auto truth = TruthOf(map);
     for (const ObjectSnapshot& object : objects) {
       EXPECT_NE(object.object.state, ObjectState::kProvisional);
-      EXPECT_EQ(CheckedCopy::ToBytes(object), truth.at(object.object.id));
+      EXPECT_EQ(testing::CheckedCopy::ToBytes(object), truth.at(object.object.id));
     }
     EXPECT_EQ(objects.size(), map.ConfirmedObjects());
     exported += objects.size();
@@ -99,7 +99,7 @@ TEST(CopiedMapTest, WhatWaitsForOneWhoNeverReadsIsBoundedByTheMap) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    RandomMap random(seed, &map);
+    testing::RandomMap random(seed, &map);
     Reader sleeper(map, Outbox::Acks::kAll, 0);
     for (int step = 0; step < kSteps; ++step) random.Step();
     const auto truth = TruthOf(map);
@@ -109,4 +109,4 @@ TEST(CopiedMapTest, WhatWaitsForOneWhoNeverReadsIsBoundedByTheMap) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::session

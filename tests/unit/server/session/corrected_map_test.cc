@@ -14,7 +14,7 @@
 #include "server/session/mesher.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 using ::testing::SizeIs;
@@ -32,8 +32,8 @@ SyntheticWorldOptions SmallWorld() {
   return options;
 }
 
-NerfConfig FastNerf() {
-  NerfConfig config;
+nerf::NerfConfig FastNerf() {
+  nerf::NerfConfig config;
   config.levels = 5;
   config.log2_table_entries = 12;
   config.finest_resolution = 128;
@@ -58,7 +58,7 @@ class Stages {
     mesher_.Unregister(mesher_client_);
   }
 
-  void Publish(ObjectMapper::Output output) {
+  void Publish(objects::ObjectMapper::Output output) {
     for (const ObjectViews& views : output.views) {
       if (views.S_new_old) map.MoveObject(views.object, *views.S_new_old);
     }
@@ -93,14 +93,14 @@ class Stages {
     }
   }
 
-  ObjectMapper mapper{ObjectsConfig{}};
+  objects::ObjectMapper mapper{objects::ObjectsConfig{}};
   MapState map;
   std::shared_ptr<Outbox> outbox;
   std::map<KeyframeId, SE3<World, Camera>> keyframes;
 
  private:
-  Mesher mesher_{MeshConfig{}};
-  TrainingPool pool_{FastNerf(), 1};
+  Mesher mesher_{mesh::MeshConfig{}};
+  nerf::TrainingPool pool_{FastNerf(), 1};
   uint64_t mesher_client_ = 0, pool_client_ = 0;
 };
 
@@ -193,4 +193,4 @@ TEST(CorrectedMapTest, MeshesMadeWhileTheMapIsCorrectedEndUpInTheirCuboids) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::session

@@ -8,7 +8,7 @@
 
 #include "common/status.h"
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 using ::testing::HasSubstr;
@@ -349,4 +349,4 @@ TEST(IngestTest, TimestampsAtBothEndsOfTimeAreFarApart) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::session

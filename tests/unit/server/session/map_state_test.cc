@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 constexpr std::chrono::milliseconds kNoWait{0};
@@ -237,4 +237,4 @@ TEST(MapStateTest, CloseEndsPresentAndLaterSubscriptions) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::session

@@ -4,7 +4,7 @@
 
 #include <thread>
 
-namespace romap {
+namespace romap::session {
 namespace {
 
 constexpr std::chrono::milliseconds kNoWait{0};
@@ -158,4 +158,4 @@ TEST(OutboxTest, CloseWakesAWaitingReader) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::session

@@ -6,7 +6,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Two cameras side by side, 10 degrees of parallax at the points' depth, and exact features of random points.
@@ -109,4 +109,4 @@ TEST_F(EpipolarMatcherTest, NoBaselineNoMatches) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

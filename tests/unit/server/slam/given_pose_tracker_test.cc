@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 using ::testing::AllOf;
@@ -121,4 +121,4 @@ TEST(GivenPoseTracker, ADueKeyframeWaitsForMasksWhenOnlySomeFramesHaveThem) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

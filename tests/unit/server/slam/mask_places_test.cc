@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr uint16_t kLabel = 3;
@@ -59,4 +59,4 @@ TEST(MaskVotes, CountsPlacesThatAreKnown) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

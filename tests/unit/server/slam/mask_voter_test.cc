@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr uint16_t kLabel = 5;
@@ -173,4 +173,4 @@ TEST_F(MaskVoterTest, VotesOutliveTheMergingOfPoints) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include "server/slam/descriptor_matching.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 Descriptor RandomDescriptor(std::mt19937_64& random) {
@@ -106,4 +106,4 @@ TEST_F(ProjectionSearchTest, LooksAloneFindThePointsToo) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -4,7 +4,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Straight down from 3 mu above the floor, moved along x.
@@ -51,4 +51,4 @@ TEST(MakeDepthView, ABlurredFrameIsLessSharp) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

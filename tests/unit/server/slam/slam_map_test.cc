@@ -8,7 +8,7 @@
 #include "server/slam/correction_log.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Keyframes on a line along x that see the same points ahead of them.
@@ -174,4 +174,4 @@ TEST_F(SlamMapTest, ALensCorrectsAllKeyframesAndThoseThatCome) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // A keyframe whose pose the client gave.
@@ -227,4 +227,4 @@ TEST(SparseMapper, AnAbsurdPoseDoesNoHarm) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

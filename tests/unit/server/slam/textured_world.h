@@ -9,7 +9,7 @@
 
 #include "common/messages.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A world with exact geometry for the tests of this folder: a textured floor (z = 0) and above it a smaller textured
 // plate (z = kPlateHeight_mu) that carries label kPlateLabel, seen by a pinhole camera.
@@ -141,4 +141,4 @@ class TexturedWorld {
   cv::Mat plate_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

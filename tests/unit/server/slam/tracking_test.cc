@@ -15,7 +15,7 @@
 #include "server/slam/tracker.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 using ::testing::HasSubstr;
@@ -339,4 +339,4 @@ TEST_F(TrackingTest, PriorsAreCorrectedByTheImages) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

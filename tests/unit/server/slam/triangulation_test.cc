@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 Sight SightFrom(const Eigen::Vector3d& center_world, const Eigen::Vector3d& p_world, double sigma_rad = 1e-3) {
@@ -94,4 +94,4 @@ TEST(RefinePoint, ARangeFixesWhatASingleRayLeavesOpen) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // A frame whose gravity is that of a world where up is `up_world`.
@@ -53,4 +53,4 @@ TEST(UpEstimator, AveragesNoiseAndIgnoresJolts) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -11,7 +11,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -104,4 +104,4 @@ TEST_F(WorldUpTest, SmallTurnsAreMadeAtTheEndOnly) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -14,7 +14,7 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap {
+namespace romap::transport {
 namespace {
 
 using absl::StatusCode;
@@ -36,13 +36,13 @@ class GrpcServerTest : public ::testing::Test {
  protected:
   void Start(MappingService* service, const TransportConfig& config = AnyPort()) {
     server_ = GrpcServer::Start(service, config).value();
-    client_ = RemoteMappingService::Connect(server_->address()).value();
+    client_ = client::RemoteMappingService::Connect(server_->address()).value();
   }
   std::string NewSession() { return client_->CreateSession({.name = "", .camera = testing::SmallCamera()})->id; }
 
-  FakeMappingService fake_;
+  testing::FakeMappingService fake_;
   std::unique_ptr<GrpcServer> server_;
-  std::unique_ptr<RemoteMappingService> client_;
+  std::unique_ptr<client::RemoteMappingService> client_;
 };
 
 TEST_F(GrpcServerTest, PortZeroTakesAFreePort) {
@@ -117,13 +117,13 @@ TEST_F(GrpcServerTest, ABusyServiceSlowsTheClientDown) {
   Start(&fake_);
   const auto stream = client_->OpenMap(NewSession()).value();
   for (uint64_t id = 1; id <= kFrames; ++id) {
-    FrameInput frame = MakeFrame(id);
+    FrameInput frame = testing::MakeFrame(id);
     frame.image.assign(kFrameBytes, '\0');
     ++sent;
     ASSERT_TRUE(stream->Send(std::move(frame)).ok());
   }
   EXPECT_OK(stream->CloseSend());
-  ReadToEnd(*stream);
+  testing::ReadToEnd(*stream);
   EXPECT_EQ(taken, kFrames);
   // What HTTP/2 windows and socket buffers hold, far less than everything.
   EXPECT_LT(most_on_the_way, kFrames / 2);
@@ -134,15 +134,15 @@ TEST_F(GrpcServerTest, ShutdownEndsStreamsAndKeepsWhatWasAccepted) {
   const std::string session = NewSession();
   const auto stream = client_->OpenMap(session).value();
   const auto watch = client_->Watch(session).value();
-  EXPECT_OK(stream->Send(MakeFrame(1)));
-  EXPECT_TRUE(NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
   server_->Shutdown();
-  ReadToEnd(*stream);
-  ReadToEnd(*watch);
+  testing::ReadToEnd(*stream);
+  testing::ReadToEnd(*watch);
   EXPECT_CODE(stream->status(), StatusCode::kUnavailable);
   EXPECT_CODE(watch->status(), StatusCode::kUnavailable);
   EXPECT_THAT(Message(watch->status()), HasSubstr("shutting down"));
-  EXPECT_CODE(stream->Send(MakeFrame(2)), StatusCode::kUnavailable);
+  EXPECT_CODE(stream->Send(testing::MakeFrame(2)), StatusCode::kUnavailable);
   EXPECT_FALSE(fake_.GetSession(session)->stream_open);
   EXPECT_THAT(fake_.ExportMap(session)->trajectory, SizeIs(1));
 }
@@ -156,7 +156,7 @@ TEST_F(GrpcServerTest, ShutdownWaitsForAFrameThatIsBeingTaken) {
   Start(&fake_);
   const std::string session = NewSession();
   const auto stream = client_->OpenMap(session).value();
-  EXPECT_OK(stream->Send(MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   taking.get_future().wait();
   std::thread shutdown([&] { server_->Shutdown(); });
   release.set_value();
@@ -173,12 +173,12 @@ TEST_F(GrpcServerTest, ShutdownTwiceIsHarmless) {
 TEST_F(GrpcServerTest, AClientThatVanishesFreesTheSession) {
   Start(&fake_);
   const std::string session = NewSession();
-  auto other = RemoteMappingService::Connect(server_->address()).value();
+  auto other = client::RemoteMappingService::Connect(server_->address()).value();
   auto stream = other->OpenMap(session).value();
   EXPECT_TRUE(fake_.GetSession(session)->stream_open);
   stream.reset();
   other.reset();
-  EXPECT_TRUE(Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
+  EXPECT_TRUE(testing::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
   EXPECT_EQ(fake_.GetSession(session)->state, SessionState::kOpen);
 }
 
@@ -193,10 +193,10 @@ TEST_F(GrpcServerTest, TooManyCallsAreRefusedUntilOneEnds) {
   EXPECT_CODE(client_->ListSessions().status(), StatusCode::kResourceExhausted);
   EXPECT_CODE(client_->Watch(session).status(), StatusCode::kResourceExhausted);
   second->Cancel();
-  EXPECT_TRUE(Eventually([&] { return client_->ListSessions().ok(); }));
+  EXPECT_TRUE(testing::Eventually([&] { return client_->ListSessions().ok(); }));
 }
 
-class ThrowingService : public FakeMappingService {
+class ThrowingService : public testing::FakeMappingService {
  public:
   absl::StatusOr<SessionInfo> GetSession(const std::string&) override {
     throw std::runtime_error("a broken invariant");
@@ -216,4 +216,4 @@ TEST_F(GrpcServerTest, AnExceptionEndsItsCallAndNotTheServer) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::transport

@@ -15,7 +15,7 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap {
+namespace romap::transport {
 namespace {
 
 using ::testing::HasSubstr;
@@ -66,7 +66,7 @@ TEST_F(MapReactorTest, SaysThatItIsOpenFirst) {
 }
 
 TEST_F(MapReactorTest, AFrameWithoutStartIsRefused) {
-  WriteFrame(wire::ToProto(MakeFrame(1)));
+  WriteFrame(wire::ToProto(testing::MakeFrame(1)));
   const grpc::Status status = Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_THAT(status.error_message(), HasSubstr("the first request must be `start`"));
@@ -88,7 +88,7 @@ TEST_F(MapReactorTest, ASecondStartEndsTheStreamAndFreesTheSession) {
 
 TEST_F(MapReactorTest, LateMasksThatAreMalformedAreRefusedByName) {
   WriteStart();
-  WriteFrame(wire::ToProto(MakeFrame(1)));
+  WriteFrame(wire::ToProto(testing::MakeFrame(1)));
   v1::MapRequest request;
   request.mutable_late_masks()->set_frame_id(1);
   request.mutable_late_masks()->mutable_masks()->set_label_png("");
@@ -110,7 +110,7 @@ TEST_F(MapReactorTest, LateMasksThatAreMalformedAreRefusedByName) {
 
 TEST_F(MapReactorTest, AFrameOfANewerClientIsRefusedByName) {
   WriteStart();
-  v1::Frame frame = wire::ToProto(MakeFrame(1));
+  v1::Frame frame = wire::ToProto(testing::MakeFrame(1));
   frame.mutable_image()->set_encoding(static_cast<v1::ImageEncoding>(77));
   WriteFrame(frame);
   v1::MapResponse response;
@@ -120,7 +120,7 @@ TEST_F(MapReactorTest, AFrameOfANewerClientIsRefusedByName) {
   EXPECT_FALSE(response.event().frame_ack().accepted());
   EXPECT_THAT(response.event().frame_ack().error(), HasSubstr("frame.image.encoding: value 77"));
 
-  WriteFrame(wire::ToProto(MakeFrame(2)));
+  WriteFrame(wire::ToProto(testing::MakeFrame(2)));
   ASSERT_TRUE(call_->Read(&response));
   EXPECT_EQ(response.event().frame_ack().frame_id(), 2u);
   EXPECT_TRUE(response.event().frame_ack().accepted());
@@ -129,4 +129,4 @@ TEST_F(MapReactorTest, AFrameOfANewerClientIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::transport

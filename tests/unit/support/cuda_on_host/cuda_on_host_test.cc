@@ -40,19 +40,20 @@ class DeviceArray {
   T* data_ = nullptr;
 };
 
-class CudaOnHost : public testing::TestWithParam<RunOptions> {
+class CudaOnHost : public testing::TestWithParam<cuda_on_host::RunOptions> {
  protected:
   void SetUp() override {
-    SetRunOptions(GetParam());
-    SetDeviceTraits({});
+    cuda_on_host::SetRunOptions(GetParam());
+    cuda_on_host::SetDeviceTraits({});
   }
   void TearDown() override { EXPECT_EQ(cudaGetLastError(), cudaSuccess); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Orders, CudaOnHost,
-                         testing::Values(RunOptions{ThreadOrder::kForward}, RunOptions{ThreadOrder::kReverse},
-                                         RunOptions{ThreadOrder::kShuffled, 3},
-                                         RunOptions{ThreadOrder::kShuffled, 4, 2, true}),
+                         testing::Values(cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kForward},
+                                         cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kReverse},
+                                         cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kShuffled, 3},
+                                         cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kShuffled, 4, 2, true}),
                          [](const auto& info) { return "Order" + std::to_string(info.index); });
 
 TEST_P(CudaOnHost, ScatteredFloatsAreAllAdded) {

@@ -15,10 +15,10 @@ using cuda_on_host::SetRunOptions;
 class CudaLimits : public testing::Test {
  protected:
   void SetUp() override {
-    SetRunOptions({});
-    SetDeviceTraits({});
+    cuda_on_host::SetRunOptions({});
+    cuda_on_host::SetDeviceTraits({});
   }
-  void TearDown() override { SetDeviceTraits({}); }
+  void TearDown() override { cuda_on_host::SetDeviceTraits({}); }
 };
 using CudaLimitsDeathTest = CudaLimits;
 
@@ -53,16 +53,16 @@ TEST_F(CudaLimits, MoreSharedMemoryMustBeAskedFor) {
 }
 
 TEST_F(CudaLimits, MemoryRunsOutAndIsAccountedFor) {
-  SetDeviceTraits({.memory_bytes = 1000});
-  const size_t before = AllocatedBytes();
+  cuda_on_host::SetDeviceTraits({.memory_bytes = 1000});
+  const size_t before = cuda_on_host::AllocatedBytes();
   char* first = nullptr;
   char* second = nullptr;
   EXPECT_EQ(cudaMalloc(&first, 600), cudaSuccess);
   EXPECT_EQ(cudaMalloc(&second, 600), cudaErrorMemoryAllocation);
   EXPECT_EQ(second, nullptr);
-  EXPECT_EQ(AllocatedBytes(), before + 600);
+  EXPECT_EQ(cuda_on_host::AllocatedBytes(), before + 600);
   EXPECT_EQ(cudaFree(first), cudaSuccess);
-  EXPECT_EQ(AllocatedBytes(), before);
+  EXPECT_EQ(cuda_on_host::AllocatedBytes(), before);
   EXPECT_EQ(cudaFree(&second), cudaErrorInvalidValue);
 }
 
@@ -78,7 +78,7 @@ TEST_F(CudaLimits, CopiesBeyondAnAllocationAreRefused) {
 }
 
 TEST_F(CudaLimits, WithoutADeviceEveryCallSaysSo) {
-  SetDeviceTraits({.devices = 0});
+  cuda_on_host::SetDeviceTraits({.devices = 0});
   int count = -1;
   EXPECT_EQ(cudaGetDeviceCount(&count), cudaErrorNoDevice);
   EXPECT_EQ(count, 0);
@@ -136,7 +136,7 @@ TEST_F(CudaLimitsDeathTest, KernelsThatBreakTheRulesEndTheProcess) {
 TEST_F(CudaLimitsDeathTest, StrictBarriersMustBeReachedByAll) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr);  // devices let it pass
-  SetRunOptions({.strict_barriers = true});
+  cuda_on_host::SetRunOptions({.strict_barriers = true});
   EXPECT_DEATH(ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr), "__syncthreads");
 }
 

@@ -88,7 +88,7 @@ TEST_P(CudaResourceTest, KernelsStayWithinTheirLimits) {
 }
 
 size_t StepBytes(int levels, int hidden, int most_samples) {
-  FieldView field{};
+  DeviceField field{};
   NerfConfig config;
   config.levels = levels;
   field.grid = MakeGridLayout(config);

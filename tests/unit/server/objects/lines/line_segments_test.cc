@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 using ::testing::IsEmpty;
@@ -149,4 +149,4 @@ TEST(LineSegmentsTest, AnswersAlikeWhateverWasSeenBefore) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

@@ -10,7 +10,7 @@
 
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::objects {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -265,4 +265,4 @@ TEST(YawFromLinesTest, IsExactWithoutNoise) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::objects

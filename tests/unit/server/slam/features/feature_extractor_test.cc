@@ -12,7 +12,7 @@
 #include "common/lens.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 size_t CountLabelled(const std::vector<Feature>& features) {
@@ -225,4 +225,4 @@ TEST(FeatureExtractor, TurnsItsAnglesAndPositionsWithTheImage) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

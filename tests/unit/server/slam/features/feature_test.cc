@@ -5,7 +5,7 @@
 #include <bitset>
 #include <random>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 TEST(HammingDistance, CountsTheBitsThatDiffer) {
@@ -31,4 +31,4 @@ TEST(HammingDistance, ReachesFromNothingToAllBits) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 #include <set>
 #include <tuple>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kCenter_px = 60;
@@ -96,4 +96,4 @@ TEST(SteeredBrief, HardlyChangesWhenTheImageTurnsAndMuchWhenItIsAnother) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

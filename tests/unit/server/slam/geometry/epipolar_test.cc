@@ -7,7 +7,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 Motion TestMotion() { return {Turn(3, -5, 8).toRotationMatrix(), Eigen::Vector3d(0.8, -0.1, 0.3).normalized()}; }
@@ -89,4 +89,4 @@ TEST(Epipolar, SigmasTellTheErrorsThatNoiseCauses) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

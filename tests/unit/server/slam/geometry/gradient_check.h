@@ -6,7 +6,7 @@
 
 #include "server/slam/geometry/levenberg_marquardt.h"
 
-namespace romap {
+namespace romap::slam {
 
 // Checks the gradient of normal equations (half the cost's derivative) against central differences of the cost along
 // the parameters of `move`. `linearise` and `move` are as for Minimise.
@@ -22,4 +22,4 @@ void ExpectGradientOfCost(const Linearise& linearise, const Move& move, const St
   }
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 struct Scene {
@@ -102,4 +102,4 @@ TEST(Pnp, TheSameSeedGivesTheSamePose) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 struct Scene {
@@ -145,4 +145,4 @@ TEST(PoseRefiner, PointsNearTheCameraPlaneDoNotBlock) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -5,7 +5,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 class ReprojectionGradient : public testing::TestWithParam<PoseObservation> {};
@@ -44,4 +44,4 @@ TEST(Reprojection, ADepthWithoutDeviationIsNoDepth) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

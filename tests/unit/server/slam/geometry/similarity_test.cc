@@ -8,7 +8,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 const Sim3<Camera, Camera> kTruth(1.6, Turn(12, -20, 5), {0.4, -0.1, 0.3});
@@ -162,4 +162,4 @@ TEST(Similarity, GradientAgreesWithDifferencesOfTheCost) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -12,7 +12,7 @@
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
-namespace romap {
+namespace romap::slam {
 
 inline constexpr double kDegree = std::numbers::pi / 180;
 
@@ -70,4 +70,4 @@ inline double AngleBetween_deg(const Eigen::Quaterniond& a, const Eigen::Quatern
   return a.angularDistance(b) / kDegree;
 }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -15,7 +15,7 @@
 #include "server/slam/geometry/two_view.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 struct TimedPose {
@@ -103,4 +103,4 @@ TEST(TwoViewReal, NoWrongMotionBetweenHandHeldFrames) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

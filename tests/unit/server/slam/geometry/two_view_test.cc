@@ -8,7 +8,7 @@
 
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Where a ray (z = 1) of the first camera meets the scene: its z depth.
@@ -217,4 +217,4 @@ TEST(TwoView, NeverReturnsAWrongMotion) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

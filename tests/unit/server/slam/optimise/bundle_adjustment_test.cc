@@ -10,7 +10,7 @@
 
 #include "tests/unit/server/slam/optimise/bundle_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 BundleWorldOptions NoisyStart() {
@@ -372,4 +372,4 @@ TEST(BundleAdjustment, PointsThatStartBehindTheCameraSpoilNothing) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -10,7 +10,7 @@
 
 #include "server/slam/optimise/bundle_adjustment.h"
 
-namespace romap {
+namespace romap::slam {
 
 struct BundleWorldOptions {
   int cameras = 10;
@@ -142,4 +142,4 @@ class BundleWorldMaker {
 
 inline BundleWorld MakeBundleWorld(const BundleWorldOptions& options) { return BundleWorldMaker(options).Make(); }
 
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 #include <functional>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 
 // Compares all Jacobians of `cost` at `parameters` with central differences, to 1e-6 of the largest entry of each.
 // `refresh` is called whenever the parameters have changed. They are restored.
@@ -55,4 +55,4 @@ inline void ExpectJacobiansMatch(const ceres::CostFunction& cost, const std::vec
   }
 }
 
-}  // namespace romap
+}  // namespace romap::slam

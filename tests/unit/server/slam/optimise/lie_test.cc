@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // Increments from tiny to large: rotation up to 3 rad, scale from 1/20 to 20.
@@ -105,4 +105,4 @@ TEST(Lie, AdjointMovesAnIncrementToTheOtherSide) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -9,7 +9,7 @@
 #include "server/slam/optimise/pose_graph_cost.h"
 #include "tests/unit/server/slam/optimise/jacobians.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 using std::numbers::pi;
@@ -173,4 +173,4 @@ TEST(PoseGraph, BadNumbersAreLeftOutOrRefused) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

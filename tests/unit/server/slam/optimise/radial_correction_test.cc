@@ -5,7 +5,7 @@
 #include "server/slam/optimise/bundle_adjustment.h"
 #include "tests/unit/server/slam/optimise/bundle_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr BundleOptions kThorough{.max_iterations = 30, .function_tolerance = 1e-6};
@@ -71,4 +71,4 @@ TEST(RadialCorrection, ThePriorHolds) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -8,7 +8,7 @@
 #include "tests/unit/server/slam/optimise/bundle_world.h"
 #include "tests/unit/server/slam/optimise/jacobians.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 // A camera some way off its start, so that the Jacobians of the increment matter, and a point in its view.
@@ -150,4 +150,4 @@ TEST(CameraState, PoseAgreesWithWhatTheCostsRead) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr int kAllLeaves = std::numeric_limits<int>::max();
@@ -87,4 +87,4 @@ TEST_F(DescriptorTreeTest, RemovesOwners) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 using ::testing::Field;
@@ -197,4 +197,4 @@ TEST_F(PlaceIndexTest, TheSameSeedAnswersTheSame) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
@@ -81,4 +81,4 @@ TEST(FitPlane, SigmaTellsTheScatterOfTheNormal) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

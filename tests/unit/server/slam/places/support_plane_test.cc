@@ -9,7 +9,7 @@
 
 #include "tests/unit/server/slam/places/support_world.h"
 
-namespace romap {
+namespace romap::slam {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -148,4 +148,4 @@ TEST(SupportPlane, IsTheSameForTheSameSeedAndAboutTheSameForAnother) {
 }
 
 }  // namespace
-}  // namespace romap
+}  // namespace romap::slam

@@ -8,7 +8,7 @@
 
 #include "server/slam/places/support_plane.h"
 
-namespace romap {
+namespace romap::slam {
 
 // A sparse monocular map of boxes on a table, seen from above on part of a circle, with dials for what goes wrong.
 // Built with the table at z = 0 and metres, then turned, shifted and scaled at random, as a monocular map is.
@@ -125,4 +125,4 @@ class SupportWorld {
   std::vector<Eigen::Vector3d> centers_m_;
 };
 
-}  // namespace romap
+}  // namespace romap::slam

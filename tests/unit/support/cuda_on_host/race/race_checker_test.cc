@@ -23,7 +23,7 @@ struct Pattern {
 
 class RaceChecker : public testing::TestWithParam<Pattern> {
  protected:
-  void SetUp() override { ResetRaces(); }
+  void SetUp() override { cuda_on_host::ResetRaces(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Patterns, RaceChecker,
@@ -35,23 +35,27 @@ INSTANTIATE_TEST_SUITE_P(Patterns, RaceChecker,
                          [](const auto& info) { return info.param.name; });
 
 TEST_P(RaceChecker, RightKernelsHaveNoRace) {
-  for (const ThreadOrder order : {ThreadOrder::kForward, ThreadOrder::kReverse, ThreadOrder::kShuffled}) {
+  for (const cuda_on_host::ThreadOrder order :
+       {cuda_on_host::ThreadOrder::kForward, cuda_on_host::ThreadOrder::kReverse,
+        cuda_on_host::ThreadOrder::kShuffled}) {
     for (const int workers : {1, 2}) {
-      SetRunOptions({.order = order, .workers = workers});
+      cuda_on_host::SetRunOptions({.order = order, .workers = workers});
       GetParam().run(true);
-      EXPECT_EQ(RaceCount(), 0) << FirstRace();
+      EXPECT_EQ(cuda_on_host::RaceCount(), 0) << cuda_on_host::FirstRace();
     }
   }
 }
 
 // In every order, also in those where the result happens to be right.
 TEST_P(RaceChecker, PlantedMistakesAreFound) {
-  for (const ThreadOrder order : {ThreadOrder::kForward, ThreadOrder::kReverse, ThreadOrder::kShuffled}) {
-    SetRunOptions({.order = order});
-    ResetRaces();
+  for (const cuda_on_host::ThreadOrder order :
+       {cuda_on_host::ThreadOrder::kForward, cuda_on_host::ThreadOrder::kReverse,
+        cuda_on_host::ThreadOrder::kShuffled}) {
+    cuda_on_host::SetRunOptions({.order = order});
+    cuda_on_host::ResetRaces();
     GetParam().run(false);
-    EXPECT_GT(RaceCount(), 0);
-    EXPECT_NE(FirstRace().find(GetParam().memory), std::string::npos) << FirstRace();
+    EXPECT_GT(cuda_on_host::RaceCount(), 0);
+    EXPECT_NE(cuda_on_host::FirstRace().find(GetParam().memory), std::string::npos) << cuda_on_host::FirstRace();
   }
 }
 
