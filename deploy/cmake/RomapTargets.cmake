@@ -1,4 +1,4 @@
-#Compiler settings, the libraries of the distribution, and the helpers that make one target per folder.
+# Compiler settings, the libraries of the distribution, and the helpers that make one target per folder.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -10,8 +10,8 @@ endif()
 
 find_program(ROMAP_CCACHE ccache)
 if(ROMAP_CCACHE)
-#The sloppiness lets ccache trust precompiled headers.The base directory makes paths relative, so that two clones of
-#one commit share their results.
+  # The sloppiness lets ccache trust precompiled headers. The base directory makes paths relative, so that two clones of
+  # one commit share their results.
   set(CMAKE_CXX_COMPILER_LAUNCHER
       env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
       CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${ROMAP_CCACHE})
@@ -24,8 +24,8 @@ endif()
 if(ROMAP_SANITIZER)
   add_compile_options(-fsanitize=${ROMAP_SANITIZER} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ROMAP_SANITIZER})
-#Eigen has an allocator of its own under AddressSanitizer.The installed libraries(Ceres) do not, and their matrices
-#are freed by our code.
+  # Eigen has an allocator of its own under AddressSanitizer. The installed libraries (Ceres) do not, and their matrices
+  # are freed by our code.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
@@ -46,14 +46,14 @@ find_package(draco CONFIG REQUIRED)
 find_package(nanoflann CONFIG REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 
-#OpenCV's headers warn under C++20, so they come in as system headers.
+# OpenCV's headers warn under C++20, so they come in as system headers.
 add_library(romap_opencv INTERFACE)
 target_include_directories(romap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(romap_opencv INTERFACE opencv_core opencv_imgproc opencv_imgcodecs opencv_features2d
                                              opencv_calib3d)
 
-#Eigen, OpenCV's matrices and Abseil take five seconds of every compilation; they are parsed once instead. All targets
-#share the one precompiled header, so the definitions that its libraries bring must be the same everywhere.
+# Eigen, OpenCV's matrices and Abseil take five seconds of every compilation; they are parsed once instead. All targets
+# share the one precompiled header, so the definitions that its libraries bring must be the same everywhere.
 file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cc "")
 add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
 target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
@@ -68,14 +68,13 @@ function(romap_precompile target)
   target_compile_options(${target} PRIVATE -fpch-preprocess)
 endfunction()
 
-#romap_library(name[PUBLIC targets...][PRIVATE targets...][SOURCES files...])
-#A static library `romap_ < name>` of all *.cc in the folder(or of SOURCES).Links are the layering : a folder may
-#include only what it links.
+# romap_library(name [PUBLIC targets...] [PRIVATE targets...] [SOURCES files...])
+# A static library `romap_<name>` of all *.cc in the folder (or of SOURCES). Links are the layering: a folder may
+# include only what it links.
 function(romap_library name)
   cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;SOURCES" ${ARGN})
   if(NOT ARG_SOURCES)
-    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${
-  CMAKE_CURRENT_SOURCE_DIR}/*.cc)
+    file(GLOB ARG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cc)
   endif()
   if(ARG_SOURCES)
     add_library(romap_${name} STATIC ${ARG_SOURCES})
