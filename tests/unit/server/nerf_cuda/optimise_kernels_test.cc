@@ -62,8 +62,7 @@ class OptimiseOnDevice {
     threshold_ = static_cast<float>(config.occupancy_threshold);
   }
 
-  StepLaunch cuda_on_host::Launch(DeviceArray<float>* table, DeviceArray<float>* mlp, DeviceArray<float>& partial,
-                                  int blocks) {
+  StepLaunch Launch(DeviceArray<float>* table, DeviceArray<float>* mlp, DeviceArray<float>& partial, int blocks) {
     StepLaunch launch{.step = step_->Params(), .optimise = {}, .occupancy = {}};
     launch.step.slice = slice_.data();
     launch.step.rays = rays_.data();

@@ -29,7 +29,7 @@ class CudaStreams : public testing::Test {
     EXPECT_EQ(cudaStreamDestroy(stream_), cudaSuccess);
   }
 
-  void cuda_on_host::Launch() { ROMAP_LAUNCH(AddOne, dim3(1), dim3(1), 0, stream_, device_, device_ + 1); }
+  void Launch() { ROMAP_LAUNCH(AddOne, dim3(1), dim3(1), 0, stream_, device_, device_ + 1); }
   int Value() const {
     int value = -1;
     EXPECT_EQ(cudaMemcpy(&value, device_, sizeof(value), cudaMemcpyDeviceToHost), cudaSuccess);
@@ -41,7 +41,7 @@ class CudaStreams : public testing::Test {
 };
 
 TEST_F(CudaStreams, WorkIsDoneWhenSomebodyWaits) {
-  cuda_on_host::Launch();
+  Launch();
   int copied = 77;
   EXPECT_EQ(cudaMemcpyAsync(&copied, device_, sizeof(copied), cudaMemcpyDeviceToHost, stream_), cudaSuccess);
   EXPECT_EQ(Value(), 0);
@@ -62,7 +62,7 @@ TEST_F(CudaStreams, SourcesOfCopiesAreReadLate) {
 TEST_F(CudaStreams, EventsWaitForWhatCameBefore) {
   cudaEvent_t event = nullptr;
   ASSERT_EQ(cudaEventCreate(&event), cudaSuccess);
-  cuda_on_host::Launch();
+  Launch();
   EXPECT_EQ(cudaEventRecord(event, stream_), cudaSuccess);
   EXPECT_EQ(cudaEventSynchronize(event), cudaSuccess);
   EXPECT_EQ(Value(), 1);
@@ -71,8 +71,8 @@ TEST_F(CudaStreams, EventsWaitForWhatCameBefore) {
 
 TEST_F(CudaStreams, GraphsReplayWhatWasCaptured) {
   ASSERT_EQ(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), cudaSuccess);
-  cuda_on_host::Launch();
-  cuda_on_host::Launch();
+  Launch();
+  Launch();
   EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorStreamCaptureUnsupported);
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t executable = nullptr;
@@ -89,8 +89,8 @@ TEST_F(CudaStreams, GraphsReplayWhatWasCaptured) {
 
 TEST_F(CudaStreams, AFaultStaysUntilTheMachineIsAnother) {
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 1});
-  cuda_on_host::Launch();
-  cuda_on_host::Launch();
+  Launch();
+  Launch();
   EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorLaunchFailure);
   EXPECT_EQ(cudaStreamSynchronize(stream_), cudaErrorLaunchFailure);
   void* more = nullptr;
