@@ -108,7 +108,7 @@ absl::Status Run(const Options& options) {
   const bench::TrueFrames frames = WithNoise(true_frames, options.noise);
   std::printf("%-10s %5s %5s %8s %8s %8s %7s %6s %7s |", "object", "views", "steps", "setup s", "cpu s", "wall s",
               "Msam/s", "active", "loss");
-  for (const char* name : kTrainPhaseNames) std::printf(" %11s", name);
+  for (const char* name : nerf::kTrainPhaseNames) std::printf(" %11s", name);
   std::printf("  [ns/sample]\n");
   for (const files::ObjectRecord& object : sequence.objects()->objects) {
     ROMAP_RETURN_IF_ERROR(BenchObject(frames, object, options));

@@ -149,7 +149,7 @@ int main(int argc, char** argv) {
   romap::measure::Options options;
   CLI::App app("Trains fields on input that is not as it should be");
   std::vector<std::string> names;
-  for (const auto& [name, spoiler] : romap::kSpoilers) names.push_back(name);
+  for (const auto& [name, spoiler] : romap::measure::kSpoilers) names.push_back(name);
   options.scenarios = names;
   app.add_option("sequence", options.sequence)->required();
   app.add_option("out", options.out)->required();

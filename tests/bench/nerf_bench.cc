@@ -151,7 +151,7 @@ void PrintPhases(const nerf::TrainStats& one, const nerf::TrainStats& many, cons
                 many_s / static_cast<double>(many.samples) * 1e9, limit_s * 1e9, 100 * limit_s * 1e9 / one_ns);
   };
   for (size_t p = 0; p < kPhases; ++p) {
-    row(kTrainPhaseNames[p], one.phase_cpu_s[p], many.phase_cpu_s[p], limits[p]);
+    row(nerf::kTrainPhaseNames[p], one.phase_cpu_s[p], many.phase_cpu_s[p], limits[p]);
     limit_sum += limits[p];
   }
   row("all", one.CpuSeconds(), many.CpuSeconds(), limit_sum);

@@ -10,7 +10,7 @@
 namespace romap::measure {
 namespace {
 
-ObjectErrors Compare(const eval::UprightBox& box, const eval::UprightBox& truth) {
+ObjectErrors Compare(const eval::YawBox& box, const eval::YawBox& truth) {
   const Eigen::Vector3d shift_cm = 100 * (box.center - truth.center);
   ObjectErrors errors;
   errors.iou = eval::IntersectionOverUnion(box, truth);
@@ -21,7 +21,7 @@ ObjectErrors Compare(const eval::UprightBox& box, const eval::UprightBox& truth)
 }
 
 // Which true object each box is matched with, -1 = none.
-std::vector<int> Match(const std::vector<eval::UprightBox>& boxes, const std::vector<eval::UprightBox>& truth) {
+std::vector<int> Match(const std::vector<eval::YawBox>& boxes, const std::vector<eval::YawBox>& truth) {
   constexpr double kNever = 1e6;  // more than all admissible pairs together
   Eigen::MatrixXd cost(boxes.size(), truth.size());
   for (size_t i = 0; i < boxes.size(); ++i) {
@@ -39,7 +39,7 @@ std::vector<int> Match(const std::vector<eval::UprightBox>& boxes, const std::ve
 }
 
 // Name of the found object that the box shares the most volume with; empty when it touches none.
-std::string MostOverlapped(const eval::UprightBox& box, const std::vector<eval::UprightBox>& truth,
+std::string MostOverlapped(const eval::YawBox& box, const std::vector<eval::YawBox>& truth,
                            const std::vector<TrueObject>& objects) {
   double most = 0;
   std::string name;
@@ -64,7 +64,7 @@ size_t MapScore::Extra() const { return mapped.size() - Found(); }
 MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
                   const eval::FittedSimilarity& true_from_map) {
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
-  std::vector<eval::UprightBox> true_boxes, boxes;
+  std::vector<eval::YawBox> true_boxes, boxes;
   MapScore score;
   for (const files::ObjectRecord& record : truth.objects) {
     true_boxes.push_back(eval::MakeUpright((z_from_up * record.T_world_object.rotation()).toRotationMatrix(),

@@ -40,7 +40,7 @@ class OneMapService : public testing::FakeMappingService {
   session::MapState map;
 };
 
-void testing::ReadToEnd(EventStream& stream, testing::CheckedCopy& copy, std::chrono::microseconds pause) {
+void ReadToEnd(EventStream& stream, testing::CheckedCopy& copy, std::chrono::microseconds pause) {
   while (!stream.Done()) {
     if (const auto event = stream.Next(std::chrono::milliseconds(100))) copy.Apply(*event);
     std::this_thread::sleep_for(pause);
@@ -55,18 +55,18 @@ TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
   const auto remote = client::RemoteMappingService::Connect(server->address()).value();
   testing::CheckedCopy fast, slow, latecomer, truth;
   const auto fast_stream = remote->Watch("any").value(), slow_stream = remote->Watch("any").value();
-  std::thread fast_reader([&] { testing::ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
-  std::thread slow_reader([&] { testing::ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
+  std::thread fast_reader([&] { ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
+  std::thread slow_reader([&] { ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
   testing::RandomMap random(7, &service.map);
   for (int step = 0; step < 6000; ++step) random.Step();
   const auto late_stream = remote->Watch("any").value();
-  std::thread late_reader([&] { testing::ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
+  std::thread late_reader([&] { ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
   for (int step = 0; step < 2000; ++step) random.Step();
   const auto all = service.map.Subscribe(session::Outbox::Acks::kAll, 16, /*with_snapshot=*/true);
   service.map.Close(absl::OkStatus());
   for (std::thread* reader : {&fast_reader, &slow_reader, &late_reader}) reader->join();
   OutboxStream truth_stream(all);
-  testing::ReadToEnd(truth_stream, truth, std::chrono::microseconds(0));
+  ReadToEnd(truth_stream, truth, std::chrono::microseconds(0));
   EXPECT_FALSE(truth.Bytes().empty());
   EXPECT_EQ(fast.Bytes(), truth.Bytes());
   EXPECT_EQ(slow.Bytes(), truth.Bytes());

@@ -26,7 +26,7 @@ class Reader {
     for (int n = random.Pick(1, 12); n > 0; --n) Take();
   }
   // What still waits; how many events of objects that was.
-  int testing::ReadToEnd() {
+  int ReadToEnd() {
     int of_objects = 0;
     while (const auto event = Take()) {
       const bool is_other = std::holds_alternative<FrameAck>(*event) || std::holds_alternative<MasksAck>(*event) ||
