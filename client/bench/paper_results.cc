@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/median.h"
+#include "common/statistics.h"
 
 namespace romap::bench {
 namespace {

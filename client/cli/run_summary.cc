@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/trackable.h"
+#include "common/statistics.h"
 
 namespace romap::cli {
 namespace {
@@ -15,12 +16,6 @@ uint64_t PeakBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 std::string SecondsText(double seconds) { return seconds < 0 ? "-" : fmt::format("{:.2f} s", seconds); }
@@ -43,7 +38,7 @@ RunSummary Summarise(const files::Sequence& sequence, const StreamResult& stream
   summary.mapping_s = stream.mapping_s;
   summary.training_s = stream.training_s;
   summary.frames_per_s = stream.mapping_s > 0 ? static_cast<double>(collector.acknowledged()) / stream.mapping_s : 0;
-  summary.median_latency_ms = 1000 * Median(collector.latencies_s());
+  summary.median_latency_ms = collector.latencies_s().empty() ? 0 : 1000 * Median(collector.latencies_s());
   summary.interrupted = stream.interrupted;
   summary.training_complete = stream.training_complete;
   summary.client_peak_bytes = PeakBytes();

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "client/files/associate.h"
+#include "common/statistics.h"
 
 namespace romap::eval {
 namespace {

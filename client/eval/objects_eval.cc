@@ -11,6 +11,7 @@
 #include "client/files/mesh_file.h"
 #include "client/files/tum.h"
 #include "common/assignment.h"
+#include "common/statistics.h"
 
 namespace romap::eval {
 namespace {

@@ -66,15 +66,6 @@ Points Take(const Points& points, const std::vector<uint32_t>& indices) {
   return taken;
 }
 
-double Quantile(std::vector<double> values, double share) {
-  const double position = share * static_cast<double>(values.size() - 1);
-  const auto low = values.begin() + static_cast<ptrdiff_t>(position);
-  std::nth_element(values.begin(), low, values.end());
-  if (low + 1 == values.end()) return *low;
-  const double next = *std::min_element(low + 1, values.end());
-  return *low + (position - std::floor(position)) * (next - *low);
-}
-
 struct NearestIndex::Tree {
   explicit Tree(const Points& points)
       : points(points), index(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(/*leaf_max_size=*/12)) {}

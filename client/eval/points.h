@@ -20,9 +20,6 @@ absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t se
 // Points at the given positions of `points`.
 Points Take(const Points& points, const std::vector<uint32_t>& indices);
 
-// Value below which `share` (0..1) of the values lie, linear between order statistics. `values` must not be empty.
-double Quantile(std::vector<double> values, double share);
-
 // For each query point its nearest neighbour among the points of an index.
 struct Neighbours {
   std::vector<uint32_t> index;

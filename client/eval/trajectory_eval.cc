@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "client/files/tum.h"
+#include "common/statistics.h"
 
 namespace romap::eval {
 namespace {

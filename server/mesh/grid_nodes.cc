@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
+
+#include "common/statistics.h"
 
 namespace romap::mesh {
 namespace {
@@ -19,9 +22,7 @@ double LongestSide_px(const FieldSnapshot& snapshot) {
     if (std::isfinite(side_px) && side_px > 0) sides_px.push_back(side_px);
   }
   if (sides_px.empty()) return 0;
-  const auto good = sides_px.begin() + static_cast<std::ptrdiff_t>(kGoodViewShare * (sides_px.size() - 1));
-  std::nth_element(sides_px.begin(), good, sides_px.end());
-  return *good;
+  return LowerQuantile(std::move(sides_px), kGoodViewShare);
 }
 
 }  // namespace

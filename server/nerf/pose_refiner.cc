@@ -3,6 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "common/statistics.h"
 
 namespace romap::nerf {
 namespace {
@@ -119,9 +122,7 @@ double PoseRefiner::TypicalError_px(std::span<const ObjectView> views, std::span
                                  views[i].T_world_camera.Inverse() * box.T_world_object));
   }
   if (errors_px.empty()) return 0;
-  const auto middle = errors_px.begin() + static_cast<std::ptrdiff_t>(errors_px.size() / 2);
-  std::nth_element(errors_px.begin(), middle, errors_px.end());
-  return *middle / kMedianOfRayleigh;
+  return Median(std::move(errors_px)) / kMedianOfRayleigh;
 }
 
 // A similarity of the object's space takes a camera at c to one that is turned alike, and shifted by shift + growth c:

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "common/statistics.h"
 #include "server/nerf/math/random.h"
 
 namespace romap::nerf {
@@ -126,10 +127,8 @@ struct ViewAlignment::Equations {
 
   // As large as the errors themselves: then those of a field that is not sharp yet say little.
   Scales OwnScales() {
-    const auto middle = color_errors.begin() + static_cast<std::ptrdiff_t>(color_errors.size() / 2);
-    std::nth_element(color_errors.begin(), middle, color_errors.end());
     const double outline = std::sqrt(outline_square / static_cast<double>(outline_count));
-    return {std::max(kLeastColorScale, 1.48 * *middle), std::max(kLeastOutlineScale, outline)};
+    return {std::max(kLeastColorScale, 1.48 * Median(color_errors)), std::max(kLeastOutlineScale, outline)};
   }
 };
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/statistics.h"
+
 namespace romap::nerf {
 namespace {
 
@@ -17,12 +19,6 @@ struct Limit {
 constexpr Limit kOutlineLimit = {0.15, 3.0};
 constexpr Limit kColorLimit = {0.1, 4.0};
 constexpr double kForgiven = 0.75;  // of the limit: a view that was odd must come below this
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // How odd each view is: 1 is at the limit.
 std::vector<double> Oddness(const ProbeReport& report) {

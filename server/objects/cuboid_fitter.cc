@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/statistics.h"
 #include "server/objects/box_search.h"
 #include "server/objects/footprint.h"
 
@@ -12,12 +13,6 @@ namespace romap::objects {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double Quantile(std::vector<double> values, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<size_t>(rank)];
-}
 
 struct Interval {
   double low = kInfinity;
@@ -46,7 +41,7 @@ Interval Bounds(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3
 // Bounds of the points without the outermost 2 % on either side.
 Interval TrimmedBounds(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& axis) {
   const std::vector<double> values = Along(points, axis);
-  return {Quantile(values, 0.02), Quantile(values, 0.98)};
+  return {NearestQuantile(values, 0.02), NearestQuantile(values, 0.98)};
 }
 
 // The horizontal direction in which the hull is unbounded because all cameras look along it; nullopt when they stand
@@ -133,11 +128,11 @@ std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const st
       highs.push_back(heights->high);
     }
     if (lows.size() < 8) continue;
-    tops.push_back(Quantile(lows, 0.98));
-    bottoms.push_back(Quantile(highs, 0.02));
+    tops.push_back(NearestQuantile(lows, 0.98));
+    bottoms.push_back(NearestQuantile(highs, 0.02));
   }
   if (tops.empty()) return std::nullopt;
-  return Interval{Quantile(bottoms, 0.1), Quantile(tops, 0.9)};
+  return Interval{NearestQuantile(bottoms, 0.1), NearestQuantile(tops, 0.9)};
 }
 
 // The heights between which a hull is broad. Above and below it tapers like the cones that every hull wears.
@@ -220,8 +215,8 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
   const Interval hull = Bounds(evidence.hull_cells, up);
   const bool enough_points = evidence.points.size() >= static_cast<size_t>(evidence.min_points);
   // A surface above the lowest fifth of the object's own points cannot carry it.
-  const double ceiling =
-      enough_points ? Quantile(Along(evidence.points, up), 0.2) : evidence.center.z() + 0.1 * evidence.object_size_mu;
+  const double ceiling = enough_points ? NearestQuantile(Along(evidence.points, up), 0.2)
+                                       : evidence.center.z() + 0.1 * evidence.object_size_mu;
   const double floor = std::min(hull.low, ceiling) - 0.3 * evidence.object_size_mu;
   const double layer_mu = 0.05 * evidence.object_size_mu;
   // What lies under the object hides the table there, and its own points are no background.
@@ -251,7 +246,7 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
     if (bottom >= floor && bottom <= ceiling + layer_mu) bottoms.push_back(bottom);
   }
   if (bottoms.empty()) return std::nullopt;
-  return Quantile(bottoms, 0.5);
+  return NearestQuantile(bottoms, 0.5);
 }
 
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,

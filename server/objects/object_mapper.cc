@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "common/statistics.h"
 
 namespace romap::objects {
 namespace {
@@ -255,8 +258,7 @@ void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
   }
   if (depths.empty()) return;
   last_keyframe_ = view.id;
-  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
-  scene_depth_mu_ = depths[depths.size() / 2];
+  scene_depth_mu_ = Median(std::move(depths));
 }
 
 }  // namespace romap::objects

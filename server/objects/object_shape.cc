@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/statistics.h"
 #include "server/objects/angles.h"
 #include "server/objects/cuboid_fitter.h"
 #include "server/objects/edge_yaw.h"
@@ -20,8 +21,7 @@ Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Eigen::Vector3d& p : points) values.push_back(p[axis]);
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    median[axis] = values[values.size() / 2];
+    median[axis] = Median(std::move(values));
   }
   return median;
 }

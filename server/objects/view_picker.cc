@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/map_motion.h"
+#include "common/statistics.h"
 #include "server/objects/angles.h"
 #include "server/objects/projection.h"
 
@@ -167,9 +168,7 @@ bool ViewPicker::IsSharp(const ViewCandidate& candidate) {
   const double sharpness = MeasureSharpness(candidate.frame->image_bgr, candidate.box_px);
   sharpness_history_.push_back(sharpness);
   if (sharpness_history_.size() > kHistory) sharpness_history_.erase(sharpness_history_.begin());
-  std::vector<double> sorted = sharpness_history_;
-  std::sort(sorted.begin(), sorted.end());
-  return sharpness >= config_.view_min_sharpness_share * sorted[sorted.size() / 2];
+  return sharpness >= config_.view_min_sharpness_share * Median(sharpness_history_);
 }
 
 std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {

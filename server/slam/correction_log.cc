@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/median.h"
+#include "common/statistics.h"
 
 namespace romap::slam {
 namespace {

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/statistics.h"
+
 namespace romap::slam {
 namespace {
 
@@ -99,9 +101,8 @@ bool KeyframeSelector::IsGood(const Frame& frame, double sharpness) {
 
   recent_sharpness_.push_back(sharpness);
   if (recent_sharpness_.size() > kSharpnessWindowFrames) recent_sharpness_.pop_front();
-  std::vector<double> sorted(recent_sharpness_.begin(), recent_sharpness_.end());
-  std::sort(sorted.begin(), sorted.end());
-  return has_what_comes && sharpness >= config_.keyframe_sharpness_ratio * sorted[sorted.size() / 2];
+  const double typical = Median(std::vector<double>(recent_sharpness_.begin(), recent_sharpness_.end()));
+  return has_what_comes && sharpness >= config_.keyframe_sharpness_ratio * typical;
 }
 
 }  // namespace romap::slam

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "common/median.h"
+#include "common/statistics.h"
 
 namespace romap::slam {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/projection_search.h"

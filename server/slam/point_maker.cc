@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/epipolar_matcher.h"
 #include "server/slam/projection_search.h"
 #include "server/slam/triangulation.h"

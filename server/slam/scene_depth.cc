@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "common/median.h"
+#include "common/statistics.h"
 
 namespace romap::slam {
 namespace {

@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "common/thread_priority.h"
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"

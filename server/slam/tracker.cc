@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/geometry/pnp.h"
 #include "server/slam/projection_search.h"
 

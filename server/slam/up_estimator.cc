@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "common/median.h"
+#include "common/statistics.h"
 
 namespace romap::slam {
 namespace {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "common/statistics.h"
+
 namespace romap::measure {
 namespace {
 
@@ -53,11 +55,9 @@ class Summary {
   // IoU and its least, centre, in-plane and yaw errors, as cells without the bars at either end.
   std::string ErrorCells() const {
     if (yaws_deg_.empty()) return "- | - | - | - | - | -";
-    std::vector<double> yaws_deg = yaws_deg_;
-    const auto middle = yaws_deg.begin() + static_cast<ptrdiff_t>(yaws_deg.size() / 2);
-    std::nth_element(yaws_deg.begin(), middle, yaws_deg.end());
     return fmt::format("{:.3f} | {:.3f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} %", Iou(), least_iou_,
-                       center_sum_cm_ / Count(), in_plane_sum_cm_ / Count(), *middle, 100 * right_class_ / Count());
+                       center_sum_cm_ / Count(), in_plane_sum_cm_ / Count(), Median(yaws_deg_),
+                       100 * right_class_ / Count());
   }
 
  private:

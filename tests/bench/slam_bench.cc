@@ -16,6 +16,7 @@
 
 #include "client/files/sequence.h"
 #include "common/config.h"
+#include "common/statistics.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 #include "tests/bench/user_seconds.h"
@@ -81,11 +82,9 @@ void Record(const KeyframeView& view, const cv::Mat& true_depth_mu, Run& run) {
   for (const MapPointId id : view.removed_points) run.points.erase(id);
 }
 
-double Quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return std::nan("");
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+// Lower quantile; NaN without values.
+double QuantileOrNan(const std::vector<double>& values, double share) {
+  return values.empty() ? std::nan("") : LowerQuantile(values, share);
 }
 
 uint16_t MostSeenLabel(const PointRecord& record) {
@@ -112,12 +111,12 @@ void Report(const Run& run, const slam::SparseMapper& mapper) {
     errors_of_label[seen.label].push_back(error);
     all_errors.push_back(error);
   }
-  std::printf("relative depth error of observations: median %.4f, 90 %% %.4f (%zu)\n", Quantile(all_errors, 0.5),
-              Quantile(all_errors, 0.9), all_errors.size());
+  std::printf("relative depth error of observations: median %.4f, 90 %% %.4f (%zu)\n", QuantileOrNan(all_errors, 0.5),
+              QuantileOrNan(all_errors, 0.9), all_errors.size());
   for (const auto& [label, count] : points_of_label) {
-    std::vector<double>& errors = errors_of_label[label];
+    const std::vector<double>& errors = errors_of_label[label];
     std::printf("label %2d: %5zu points, %6zu observations, depth error median %.4f, 90 %% %.4f\n", label, count,
-                errors.size(), Quantile(errors, 0.5), Quantile(errors, 0.9));
+                errors.size(), QuantileOrNan(errors, 0.5), QuantileOrNan(errors, 0.9));
   }
 }
 

@@ -31,6 +31,7 @@
 #include "client/files/tum.h"
 #include "common/bounded_queue.h"
 #include "common/config.h"
+#include "common/statistics.h"
 #include "common/status.h"
 #include "server/session/ingest.h"
 #include "server/slam/sparse_mapper.h"
@@ -43,10 +44,9 @@ using Clock = std::chrono::steady_clock;
 
 double Seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+// Lower quantile; 0 without values.
+double QuantileOrZero(const std::vector<double>& values, double share) {
+  return values.empty() ? 0 : LowerQuantile(values, share);
 }
 
 struct Options {
@@ -251,13 +251,13 @@ class Run {
         "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
         mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, begun_anew_,
         figures.up_confidence);
-    const double orb_ms = 1e3 * Quantile(orb_s_, 0.5);
+    const double orb_ms = 1e3 * QuantileOrZero(orb_s_, 0.5);
     fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
-               1e3 * Quantile(track_s_, 0.5), 1e3 * eval::Quantile(track_s_, 0.99),
-               1e3 * Quantile(track_s_, 0.5) / orb_ms, orb_ms);
+               1e3 * QuantileOrZero(track_s_, 0.5), 1e3 * QuantileOrZero(track_s_, 0.99),
+               1e3 * QuantileOrZero(track_s_, 0.5) / orb_ms, orb_ms);
     fmt::print("keyframe mapping: median {:.0f} ms, p99 {:.0f} ms; local adjustment: median {:.0f} ms, p99 {:.0f} ms\n",
-               1e3 * Quantile(map_s_, 0.5), 1e3 * eval::Quantile(map_s_, 0.99), 1e3 * Quantile(figures.window_s, 0.5),
-               1e3 * eval::Quantile(figures.window_s, 0.99));
+               1e3 * QuantileOrZero(map_s_, 0.5), 1e3 * QuantileOrZero(map_s_, 0.99),
+               1e3 * QuantileOrZero(figures.window_s, 0.5), 1e3 * QuantileOrZero(figures.window_s, 0.99));
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     fmt::print("peak memory {} MB\n", usage.ru_maxrss / 1024);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/geometry/homography.h"
 
 namespace romap::slam {

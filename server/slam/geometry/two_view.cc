@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/homography.h"
 #include "server/slam/geometry/motion_ranking.h"

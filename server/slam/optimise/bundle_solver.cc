@@ -9,7 +9,7 @@
 #include <deque>
 #include <memory>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/optimise/bundle_state.h"
 #include "server/slam/optimise/reprojection_cost.h"
 

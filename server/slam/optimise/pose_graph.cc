@@ -7,7 +7,7 @@
 #include <deque>
 #include <numeric>
 
-#include "common/median.h"
+#include "common/statistics.h"
 #include "server/slam/optimise/pose_graph_cost.h"
 
 namespace romap::slam {

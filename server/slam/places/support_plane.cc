@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "common/statistics.h"
 #include "server/slam/places/plane_fit.h"
 
 namespace romap::slam {
@@ -41,12 +42,6 @@ double Ramp(double value, double zero_at, double one_at) {
 }
 
 double Angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
-
-double Quantile(std::vector<double> values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
 
 // The query made clean: finite values only, typical lengths, and a weight for every point.
 struct Scene {
@@ -81,12 +76,12 @@ bool MeasureScene(const SupportPlaneQuery& query, Scene& scene) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const auto& p : scene.object_points) values.push_back(p[axis]);
-    middle[axis] = Quantile(std::move(values), 0.5);
+    middle[axis] = LowerQuantile(std::move(values), 0.5);
   }
   const auto distance = [&](const std::vector<Eigen::Vector3d>& points, double share) {
     std::vector<double> distances;
     for (const auto& p : points) distances.push_back((p - middle).norm());
-    return Quantile(std::move(distances), share);
+    return LowerQuantile(std::move(distances), share);
   };
   scene.distance_mu = distance(scene.cameras, 0.5);
   scene.object_spread_mu = distance(scene.object_points, 0.8);  // masks take in some of the background
@@ -125,8 +120,8 @@ double ObjectsStandOn(const Scene& scene, const Plane& plane) {
 
   std::vector<double> heights;
   for (const auto& p : scene.object_points) heights.push_back(plane.Height(p));
-  const double low = Quantile(heights, 0.1);
-  const double extent = Quantile(heights, 0.9) - low;
+  const double low = LowerQuantile(heights, 0.1);
+  const double extent = LowerQuantile(heights, 0.9) - low;
   // Masks are not exact and take in some of what lies behind and below.
   const double tolerance = 0.1 * extent + 3 * kLeastSigma * scene.distance_mu;
   const auto below = static_cast<double>(std::ranges::count_if(heights, [&](double h) { return h < -tolerance; }));
@@ -163,7 +158,7 @@ std::optional<PlaneFit> Refine(const Scene& scene, const Plane& start) {
       if (relative < 1) weights[i] = scene.weights[i] * std::pow(1 - relative * relative, 2);
     }
     if (std::ssize(near) < kMinInliers) return std::nullopt;
-    scale = std::clamp(1.4826 * Quantile(near, 0.5), 0.2, 1.0);
+    scale = std::clamp(1.4826 * LowerQuantile(near, 0.5), 0.2, 1.0);
     const auto refit = FitPlane(scene.points, weights, scene.up);
     if (!refit) return std::nullopt;
     fit = *refit;

@@ -56,14 +56,6 @@ TEST(SampleSurface, SpreadsPointsEvenlyOverTheArea) {
   EXPECT_EQ(SampleSurface(mesh, 10, 1, "cloud")->size(), 8u) << "a cloud is taken whole";
 }
 
-TEST(Quantile, IsLinearBetweenOrderStatistics) {
-  EXPECT_DOUBLE_EQ(Quantile({4, 1, 3, 2}, 0.5), 2.5);
-  EXPECT_DOUBLE_EQ(Quantile({4, 1, 3, 2}, 0), 1);
-  EXPECT_DOUBLE_EQ(Quantile({4, 1, 3, 2}, 1), 4);
-  EXPECT_DOUBLE_EQ(Quantile({10, 20}, 0.01), 10.1);
-  EXPECT_DOUBLE_EQ(Quantile({7}, 0.3), 7);
-}
-
 TEST(NearestIndex, FindsWhatASearchThroughAllFinds) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);

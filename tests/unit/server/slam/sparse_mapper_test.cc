@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "common/statistics.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap::slam {
@@ -59,8 +60,7 @@ struct KnownPoints {
     for (const auto& [id, point] : points) {
       errors_mu.push_back(TexturedWorld::DistanceToSurface_mu(point.position_world));
     }
-    std::sort(errors_mu.begin(), errors_mu.end());
-    return errors_mu.at(static_cast<size_t>(share * static_cast<double>(errors_mu.size() - 1)));
+    return LowerQuantile(std::move(errors_mu), share);
   }
 };
 

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <functional>
 #include <vector>
 
+#include "common/statistics.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
 namespace romap::slam {
@@ -133,9 +133,8 @@ TEST(TwoView, PointsAreWhereTheyShouldBe) {
     EXPECT_LT((scene.camera.Project(*result.points_first[i]) - scene.matches[i].first_px).norm(), 2);
   }
   EXPECT_EQ(points, result.points);
-  std::sort(errors.begin(), errors.end());
-  EXPECT_LT(errors[errors.size() / 2], 0.03);
-  EXPECT_LT(errors[errors.size() * 9 / 10], 0.1);
+  EXPECT_LT(Median(errors), 0.03);
+  EXPECT_LT(NearestQuantile(errors, 0.9), 0.1);
 }
 
 TEST(TwoView, RefusesAMereTurn) {
@@ -212,8 +211,7 @@ TEST(TwoView, NeverReturnsAWrongMotion) {
     }
   }
   EXPECT_GT(found, tried / 3);
-  std::sort(rotation_errors_deg.begin(), rotation_errors_deg.end());
-  EXPECT_LT(rotation_errors_deg[rotation_errors_deg.size() / 2], 0.5);
+  EXPECT_LT(Median(rotation_errors_deg), 0.5);
 }
 
 }  // namespace
