@@ -1,7 +1,8 @@
 #pragma once
 
+#include "common/cuboid.h"
 #include "common/geometry.h"
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap {
 

@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "common/camera_model.h"
-#include "common/messages.h"
+#include "common/client_input.h"
+#include "common/map_events.h"
 
 namespace romap {
 

@@ -2,7 +2,9 @@
 
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 
 namespace romap::bench {

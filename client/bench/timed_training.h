@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "client/bench/stopwatch.h"
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 #include "common/status.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"

@@ -6,7 +6,7 @@
 
 #include "client/files/objects_yaml.h"
 #include "client/files/sequence.h"
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "common/status.h"
 
 namespace romap::bench {

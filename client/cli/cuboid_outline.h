@@ -3,7 +3,8 @@
 #include <opencv2/core/types.hpp>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/camera_model.h"
+#include "common/cuboid.h"
 
 namespace romap::cli {
 

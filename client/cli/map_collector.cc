@@ -37,9 +37,9 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
     return;
   }
   if (ack.is_keyframe) ++keyframes_;
-  tracking_.initialising += ack.state == TrackingState::kInitialising ? 1 : 0;
+  tracking_.initialising += ack.state == TrackingState::kInitializing ? 1 : 0;
   tracking_.lost += ack.state == TrackingState::kLost ? 1 : 0;
-  tracking_.relocalised += ack.state == TrackingState::kRelocalised ? 1 : 0;
+  tracking_.relocalised += ack.state == TrackingState::kRelocalized ? 1 : 0;
   tracking_.tracked += ack.T_world_camera ? 1 : 0;
   if (!ack.T_world_camera) tracking_.last_reason = ack.state_reason;
   const auto sent = sent_.find(ack.frame_id);

@@ -9,7 +9,7 @@
 
 #include "client/files/tum.h"
 #include "client/sdk/map_copy.h"
-#include "common/messages.h"
+#include "common/map_events.h"
 
 namespace romap::cli {
 

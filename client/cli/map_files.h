@@ -4,8 +4,9 @@
 #include <vector>
 
 #include "client/files/tum.h"
+#include "common/map_events.h"
 #include "common/mapping_service.h"
-#include "common/messages.h"
+#include "common/mesh.h"
 #include "common/status.h"
 
 namespace romap::cli {

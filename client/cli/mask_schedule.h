@@ -4,7 +4,7 @@
 #include <deque>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/client_input.h"
 
 namespace romap::cli {
 

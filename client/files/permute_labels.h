@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/client_input.h"
 #include "common/status.h"
 
 namespace romap::files {

@@ -10,7 +10,7 @@
 #include "client/files/camera_yaml.h"
 #include "client/files/objects_yaml.h"
 #include "client/files/tum.h"
-#include "common/messages.h"
+#include "common/client_input.h"
 #include "common/status.h"
 
 namespace romap::files {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/camera_model.h"
-#include "common/messages.h"
+#include "common/cuboid.h"
 
 namespace romap::pictures {
 

@@ -4,9 +4,10 @@
 #include <span>
 
 #include "common/camera_model.h"
+#include "common/cuboid.h"
 #include "common/geometry.h"
+#include "common/map_events.h"
 #include "common/mesh.h"
-#include "common/messages.h"
 
 namespace romap::pictures {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "common/messages.h"
+#include "common/map_events.h"
 #include "common/status.h"
 #include "common/wire/events.h"
 #include "common/wire/status.h"

@@ -2,8 +2,8 @@
 
 #include <map>
 
+#include "common/map_events.h"
 #include "common/mapping_service.h"
-#include "common/messages.h"
 
 namespace romap::client {
 

@@ -6,8 +6,9 @@
 #include <array>
 #include <string>
 
+#include "common/client_input.h"
+#include "common/map_events.h"
 #include "common/mapping_service.h"
-#include "common/messages.h"
 #include "common/status.h"
 #include "romap/v1/mapping.pb.h"
 
@@ -63,10 +64,10 @@ inline constexpr std::array<EnumPair<SessionState, v1::SessionState>, 4> kSessio
 }};
 
 inline constexpr std::array<EnumPair<TrackingState, v1::TrackingState>, 4> kTrackingStates{{
-    {TrackingState::kInitialising, v1::TRACKING_STATE_INITIALISING},
+    {TrackingState::kInitializing, v1::TRACKING_STATE_INITIALIZING},
     {TrackingState::kTracking, v1::TRACKING_STATE_TRACKING},
     {TrackingState::kLost, v1::TRACKING_STATE_LOST},
-    {TrackingState::kRelocalised, v1::TRACKING_STATE_RELOCALISED},
+    {TrackingState::kRelocalized, v1::TRACKING_STATE_RELOCALIZED},
 }};
 
 inline constexpr std::array<EnumPair<ObjectState, v1::ObjectState>, 3> kObjectStates{{

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "common/messages.h"
+#include "common/map_events.h"
 #include "romap/v1/mapping.pb.h"
 
 namespace romap::wire {

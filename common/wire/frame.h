@@ -2,7 +2,7 @@
 
 #include <absl/status/statusor.h>
 
-#include "common/messages.h"
+#include "common/client_input.h"
 #include "romap/v1/mapping.pb.h"
 
 namespace romap::wire {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/client_input.h"
 #include "common/mapping_service.h"
-#include "common/messages.h"
 
 namespace romap::wire {
 

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "common/field_snapshot.h"
 #include "common/mesh.h"
-#include "common/messages.h"
 
 namespace romap::mesh {
 

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
 #include "server/mesh/field_grid.h"
 
 namespace romap::mesh {

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 
+#include "common/field_snapshot.h"
 #include "common/mesh.h"
-#include "common/messages.h"
 #include "server/mesh/mesh_config.h"
 
 namespace romap::mesh {

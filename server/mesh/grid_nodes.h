@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
 #include "server/mesh/mesh_config.h"
 
 namespace romap::mesh {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
 #include "server/mesh/field_grid.h"
 #include "server/mesh/surface_probe.h"
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
 
 namespace romap::mesh {
 

@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 
 namespace romap::mesh {
 

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::nerf {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
 #include "server/nerf/cpu/field_model.h"
 #include "server/nerf/training_box.h"
 

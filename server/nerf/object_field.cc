@@ -296,7 +296,7 @@ FieldSnapshot ObjectField::Snapshot() const {
   snapshot.train_seconds = train_seconds_;
   snapshot.loss = loss_;
   snapshot.views = views();
-  snapshot.concern = Concern();
+  snapshot.warning = Concern();
   const TrainingBox box = box_.Moved(S_new_first_);
   snapshot.S_new_first = S_new_first_;
   snapshot.T_world_object = box.T_world_object;

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 #include "server/nerf/cpu/occupancy.h"
 #include "server/nerf/field_probe.h"
 #include "server/nerf/gain_meter.h"

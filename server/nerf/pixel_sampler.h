@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 
 namespace romap::nerf {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/nerf/cpu/ray_renderer.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/ray_set.h"

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/pixel_sampler.h"

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
 #include "server/nerf/math/types.h"
 
 namespace romap::nerf {

@@ -13,7 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/object_field.h"
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::nerf {
 

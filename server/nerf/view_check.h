@@ -2,7 +2,7 @@
 
 #include <absl/status/status.h>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/nerf/training_box.h"
 
 namespace romap::nerf {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/training_box.h"
 

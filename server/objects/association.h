@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/objects/detections.h"
 #include "server/objects/landmark.h"
 #include "server/objects/objects_config.h"

@@ -5,7 +5,8 @@
 #include <span>
 #include <unordered_map>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/stage_messages.h"
 
 namespace romap::objects {
 

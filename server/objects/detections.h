@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/objects/objects_config.h"
 
 namespace romap::objects {

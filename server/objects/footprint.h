@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
 
 namespace romap::objects {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/objects/correction.h"
 #include "server/objects/point_registry.h"
 

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/map_events.h"
 #include "server/objects/object_shape.h"
 #include "server/objects/point_registry.h"
 #include "server/objects/view_picker.h"

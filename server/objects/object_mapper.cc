@@ -12,7 +12,7 @@ namespace romap::objects {
 namespace {
 
 bool HasUsablePose(TrackingState state, const SE3<World, Camera>& T_world_camera) {
-  const bool tracked = state == TrackingState::kTracking || state == TrackingState::kRelocalised;
+  const bool tracked = state == TrackingState::kTracking || state == TrackingState::kRelocalized;
   return tracked && T_world_camera.IsFinite();
 }
 

@@ -7,7 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/map_events.h"
+#include "common/stage_messages.h"
 #include "server/objects/association.h"
 #include "server/objects/correction.h"
 #include "server/objects/detections.h"

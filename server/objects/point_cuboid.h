@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
 #include "server/objects/silhouette_hull.h"
 
 namespace romap::objects {

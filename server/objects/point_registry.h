@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::objects {
 

@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/camera_model.h"
+#include "common/cuboid.h"
 
 namespace romap::objects {
 

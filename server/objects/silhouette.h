@@ -7,7 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/stage_messages.h"
 #include "server/objects/detections.h"
 #include "server/objects/lines/line_segments.h"
 #include "server/objects/mask_extents.h"

@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/stage_messages.h"
 #include "server/objects/correction.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/camera_model.h"
-#include "common/messages.h"
+#include "common/client_input.h"
 
 namespace romap::session {
 

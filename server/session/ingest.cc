@@ -143,7 +143,7 @@ absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindMaskless(uint64_t frame_id) {
 }
 
 void Ingest::Undistort(Frame& frame) const {
-  cv::cvtColor(frame.image_bgr, frame.source_grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(frame.image_bgr, frame.source_gray, cv::COLOR_BGR2GRAY);
   frame.source_camera = camera_;
   cv::Mat undistorted;
   cv::remap(frame.image_bgr, undistorted, maps_.xy, maps_.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);

@@ -6,8 +6,9 @@
 #include <deque>
 #include <memory>
 
+#include "common/client_input.h"
 #include "common/lens.h"
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::session {
 

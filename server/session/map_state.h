@@ -9,8 +9,9 @@
 #include <set>
 #include <vector>
 
+#include "common/map_events.h"
 #include "common/mapping_service.h"
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/session/mesh_place.h"
 #include "server/session/outbox.h"
 

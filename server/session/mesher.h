@@ -7,7 +7,8 @@
 #include <thread>
 #include <utility>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
+#include "common/map_events.h"
 #include "server/mesh/mesh_config.h"
 #include "server/session/mesh_place.h"
 

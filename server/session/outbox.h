@@ -11,7 +11,7 @@
 #include <mutex>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/map_events.h"
 
 namespace romap::session {
 

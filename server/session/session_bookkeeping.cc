@@ -26,7 +26,7 @@ double Seconds(std::chrono::steady_clock::duration duration) { return std::chron
 
 void Session::Acknowledge(const Arrival& arrival, const TrackedFrame& tracked) {
   const FrameInput& input = std::get<FrameInput>(arrival.input);
-  const bool has_pose = tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalised;
+  const bool has_pose = tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalized;
   FrameAck ack;
   ack.frame_id = input.frame_id;
   ack.state = tracked.state;

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/slam_map.h"
 
 namespace romap::slam {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/features/feature.h"
 #include "server/slam/mask_places.h"
 #include "server/slam/optimise/radial_correction.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/keyframe_selector.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/up_estimator.h"

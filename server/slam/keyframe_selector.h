@@ -3,7 +3,7 @@
 #include <deque>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/scene_depth.h"
 #include "server/slam/slam_config.h"
 

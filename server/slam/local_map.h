@@ -10,7 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/geometry.h"
+#include "common/ids.h"
 #include "server/slam/features/feature.h"
 #include "server/slam/optimise/radial_correction.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 

@@ -3,7 +3,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::slam {
 

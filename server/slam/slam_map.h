@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/optimise/bundle_adjustment.h"
 #include "server/slam/slam_config.h"

@@ -62,7 +62,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
   bool moved = TakeWholeAdjustment(/*wait=*/false);
   const bool lost = image.tracked.state == TrackingState::kLost;
-  const bool tracked = !lost && image.tracked.state != TrackingState::kInitialising;
+  const bool tracked = !lost && image.tracked.state != TrackingState::kInitializing;
   const bool fits = image.pose_given || image.generation == generation_;
   if (image.start) {
     mapped.begun_anew = !map_->keyframes().empty();

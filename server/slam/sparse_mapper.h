@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/correction_log.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/local_map.h"

@@ -106,7 +106,7 @@ TrackedImage Tracker::Initialise(std::shared_ptr<const Frame> frame, std::shared
   TrackedImage image;
   image.generation = map_ ? map_->generation : 0;
   image.tracked.frame = frame;
-  image.tracked.state = TrackingState::kInitialising;
+  image.tracked.state = TrackingState::kInitializing;
   image.sight = sight;
   if (waiting_for_map_) {
     image.tracked.reason = "the map is being made";
@@ -147,11 +147,11 @@ void Tracker::TakeNewestMap() {
         state_ = TrackingState::kTracking;
         frames_since_found_ = 0;
       } else {
-        state_ = TrackingState::kInitialising;
+        state_ = TrackingState::kInitializing;
       }
       motion_.reset();
     } else if (newest->points.empty() && !world_is_given_) {
-      state_ = TrackingState::kInitialising;
+      state_ = TrackingState::kInitializing;
       monocular_start_.Reset();
       last_pose_.reset();
       motion_.reset();
@@ -365,7 +365,7 @@ void Tracker::Accept(const Frame& frame, const FrameFeatures& sight, const Attem
   const bool was_lost = state_ == TrackingState::kLost;
   frames_since_found_ = was_lost ? 0 : frames_since_found_ + 1;
   state_ = TrackingState::kTracking;
-  image.tracked.state = was_lost ? TrackingState::kRelocalised : TrackingState::kTracking;
+  image.tracked.state = was_lost ? TrackingState::kRelocalized : TrackingState::kTracking;
   image.tracked.T_world_camera = attempt.T_world_camera;
   HangOnReference(image.tracked);
 

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/client_input.h"
+#include "common/map_events.h"
+#include "common/stage_messages.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/geometry/pose_refiner.h"
@@ -83,7 +85,7 @@ class Tracker {
   KeyframeSelector selector_;
   std::shared_ptr<const LocalMap> map_;
 
-  TrackingState state_ = TrackingState::kInitialising;
+  TrackingState state_ = TrackingState::kInitializing;
   bool world_is_given_ = false;   // the map's world is that of the client's poses
   bool waiting_for_map_ = false;  // a start was handed on
   int waiting_generation_ = 0;    // of the map when it was

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <deque>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::slam {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/up_estimator.h"
 

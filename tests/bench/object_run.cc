@@ -93,7 +93,7 @@ class Runner {
   }
 
   void Remember(const TrackedFrame& tracked) {
-    if (tracked.state != TrackingState::kTracking && tracked.state != TrackingState::kRelocalised) return;
+    if (tracked.state != TrackingState::kTracking && tracked.state != TrackingState::kRelocalized) return;
     tracked_.push_back(
         {tracked.frame->timestamp_ns, tracked.T_world_camera, tracked.reference, tracked.T_reference_camera});
   }

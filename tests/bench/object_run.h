@@ -11,7 +11,8 @@
 
 #include "client/files/sequence.h"
 #include "client/files/tum.h"
-#include "common/messages.h"
+#include "common/client_input.h"
+#include "common/map_events.h"
 #include "common/status.h"
 #include "server/objects/objects_config.h"
 #include "server/slam/slam_config.h"

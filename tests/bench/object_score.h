@@ -7,7 +7,7 @@
 
 #include "client/eval/alignment.h"
 #include "client/files/objects_yaml.h"
-#include "common/messages.h"
+#include "common/map_events.h"
 
 namespace romap::measure {
 

@@ -185,7 +185,7 @@ class Run {
     slam::TrackedImage image = tracker_.Track(frame);
     const TrackingState state = image.tracked.state;
     ++frames_;
-    if (state == TrackingState::kInitialising) {
+    if (state == TrackingState::kInitializing) {
       ++initialising_;
       if (!tracking_began_) reason_ = image.tracked.reason;
       if (options_.verbose) fmt::print("frame {}: {}\n", frame->frame_id, image.tracked.reason);
@@ -198,8 +198,8 @@ class Run {
       ++lost_;
       lost_frames_ += fmt::format(" {}", frame->frame_id);
     }
-    const bool has_pose = state == TrackingState::kTracking || state == TrackingState::kRelocalised;
-    if (state == TrackingState::kRelocalised) relocalised_ += fmt::format(" {}", frame->frame_id);
+    const bool has_pose = state == TrackingState::kTracking || state == TrackingState::kRelocalized;
+    if (state == TrackingState::kRelocalized) relocalised_ += fmt::format(" {}", frame->frame_id);
     if (has_pose) {
       live_.push_back({1e-9 * static_cast<double>(frame->timestamp_ns), image.tracked});
       live_.back().tracked.frame = nullptr;
@@ -217,7 +217,7 @@ class Run {
     if (mapped.begun_anew) ++begun_anew_;
     if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
     const TrackedFrame& tracked = mapped.tracked;
-    if (tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalised) {
+    if (tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalized) {
       final_.push_back({1e-9 * static_cast<double>(tracked.frame->timestamp_ns), tracked});
       final_.back().tracked.frame = nullptr;
     }

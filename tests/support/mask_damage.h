@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap {
 

@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/map_events.h"
 #include "server/session/map_state.h"
 
 namespace romap::testing {

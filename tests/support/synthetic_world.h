@@ -12,7 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/cuboid.h"
+#include "common/stage_messages.h"
 
 namespace romap {
 

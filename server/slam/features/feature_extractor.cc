@@ -60,7 +60,7 @@ size_t Share(size_t left, int octave) {
 }  // namespace
 
 void FeatureExtractor::LookAt(const Frame& frame) {
-  const cv::Mat& picture = frame.source_grey.empty() ? frame.image_bgr : frame.source_grey;
+  const cv::Mat& picture = frame.source_gray.empty() ? frame.image_bgr : frame.source_gray;
   if (picture_.data == picture.data && picture_.size() == picture.size() && picture_frame_id_ == frame.frame_id) return;
   picture_ = picture;
   picture_frame_id_ = frame.frame_id;
@@ -73,7 +73,7 @@ std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame,
   std::vector<Eigen::Vector2f> pixels_px;
   pixels_px.reserve(corners.size());
   for (const cv::KeyPoint& corner : corners) pixels_px.push_back(pyramid_.ToFullSize(octave, corner.pt));
-  return frame.source_grey.empty() ? pixels_px : UndistortPixels(frame.source_camera, pixels_px);
+  return frame.source_gray.empty() ? pixels_px : UndistortPixels(frame.source_camera, pixels_px);
 }
 
 Corners FeatureExtractor::KeepSeen(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const {
@@ -104,7 +104,7 @@ std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
     const cv::Mat& image = pyramid_.sharp(octave);
     Corners corners = DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
                                               config_.scene_fast_min_threshold);
-    if (!frame.source_grey.empty()) corners = KeepSeen(frame, octave, corners, {});
+    if (!frame.source_gray.empty()) corners = KeepSeen(frame, octave, corners, {});
     return SpreadEvenly(std::move(corners), image.size(), count);
   };
   return Describe(frame, FindInOctaves(frame, config_.scene_features, find));
@@ -117,7 +117,7 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
   if (box_px.empty()) return {};
   LookAt(frame);
   // A lens may show the objects anywhere else than the pinhole image does.
-  if (!frame.source_grey.empty()) box_px = cv::Rect(cv::Point(), frame.source_grey.size());
+  if (!frame.source_gray.empty()) box_px = cv::Rect(cv::Point(), frame.source_gray.size());
   cv::Mat free;
   const auto find = [&](int octave, size_t count) {
     inside.copyTo(free);

@@ -7,7 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 #include "server/slam/features/corner_detector.h"
 #include "server/slam/features/feature.h"
 #include "server/slam/features/image_pyramid.h"
@@ -19,7 +19,7 @@ namespace romap::slam {
 // same features in the same order; an image that is too small or has no texture gives none. For one thread: keeps its
 // buffers, and the pyramid of the last frame, from call to call (its picture must not be written to meanwhile).
 //
-// Where the frame has the picture as the lens gave it (Frame::source_grey), corners are found and described there and
+// Where the frame has the picture as the lens gave it (Frame::source_gray), corners are found and described there and
 // only their positions are undistorted: a resampled picture is less sharp.
 class FeatureExtractor {
  public:

@@ -65,10 +65,10 @@ TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
     if (has_pose) ack.T_world_camera.emplace();
     collector.Apply(ack);
   };
-  apply(TrackingState::kInitialising, false, "too little parallax");
+  apply(TrackingState::kInitializing, false, "too little parallax");
   apply(TrackingState::kTracking, true, "");
   apply(TrackingState::kLost, false, "dark");
-  apply(TrackingState::kRelocalised, true, "");
+  apply(TrackingState::kRelocalized, true, "");
   EXPECT_EQ(collector.tracking().initialising, 1U);
   EXPECT_EQ(collector.tracking().tracked, 2U);
   EXPECT_EQ(collector.tracking().lost, 1U);

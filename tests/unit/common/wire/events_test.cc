@@ -40,7 +40,7 @@ TEST(WireEvents, FrameAckComesBack) {
   ack.frame_id = 3;
   ack.accepted = false;
   ack.error = "too dark";
-  ack.state = TrackingState::kRelocalised;
+  ack.state = TrackingState::kRelocalized;
   ack.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3));
   ack.is_keyframe = true;
   ack.latency_s = 0.125;

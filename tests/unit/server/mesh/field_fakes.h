@@ -9,7 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/field_snapshot.h"
+#include "common/stage_messages.h"
 
 namespace romap::mesh {
 

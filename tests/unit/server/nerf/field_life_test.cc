@@ -65,7 +65,7 @@ TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
   Turn(views[6], 5);
   ObjectField field = TrainedOn(scene, views);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/7 contradicts"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("keyframe/7 contradicts"));
   EXPECT_EQ(snapshot.cameras.size(), 15u);
   const double right_error = testing::BallSurfaceError(scene, right.Snapshot());
   EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
@@ -86,7 +86,7 @@ TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
   wrong.ray_kind = cv::Mat(wrong.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kBackground)));
   wrong.ray_kind(cv::Rect(0, 0, 20, 24)).setTo(static_cast<int>(RayKind::kObject));
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.concern, HasSubstr("keyframe/5 contradicts"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("keyframe/5 contradicts"));
   EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
 }
 
@@ -137,7 +137,7 @@ TEST(FieldLifeTest, BlackImagesStillGiveAShapeAndAreNamed) {
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.concern, HasSubstr("black in 12 of its 12 views"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("black in 12 of its 12 views"));
   EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.12);
 }
 
@@ -151,7 +151,7 @@ TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
   for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
   TrainToTheEnd(field);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_THAT(snapshot.concern, HasSubstr("its box misses"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("its box misses"));
   for (float raw : testing::RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   TrainToTheEnd(field);
@@ -211,7 +211,7 @@ TEST(FieldLifeTest, DepthOfAWrongScaleIsNotUsed) {
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.depth_mu = view.depth_mu * 1.1;
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.concern, HasSubstr("depth images do not agree"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("depth images do not agree"));
   EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
 }
 

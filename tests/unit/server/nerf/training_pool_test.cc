@@ -241,8 +241,8 @@ TEST(TrainingPoolTest, TellsWhatIsWrongWithAnObject) {
   concern = pool.GetProgress(client).concerns.front().second;
   EXPECT_EQ(concern.find("half extents"), std::string::npos) << concern;
   EXPECT_NE(concern.find("4 views were refused"), std::string::npos) << concern;
-  EXPECT_EQ(inbox.Of(2).back().concern, concern);
-  EXPECT_EQ(inbox.Of(1).back().concern, "");
+  EXPECT_EQ(inbox.Of(2).back().warning, concern);
+  EXPECT_EQ(inbox.Of(1).back().warning, "");
   EXPECT_EQ(inbox.Of(1).back().steps, 40u) << "others go on";
 }
 

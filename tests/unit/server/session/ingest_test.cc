@@ -245,10 +245,10 @@ TEST(IngestTest, ThePictureIsKeptAsADistortingLensGaveIt) {
   distorted.distortion = {-0.2, 0.05, 0.001, -0.001, 0};
   const auto frame = AcceptDot(distorted, {50, 10});
   EXPECT_EQ(frame->source_camera, distorted);
-  ASSERT_EQ(frame->source_grey.type(), CV_8UC1);
-  ASSERT_EQ(frame->source_grey.size(), cv::Size(64, 48));
-  EXPECT_EQ(frame->source_grey.at<uint8_t>(10, 50), 255);
-  EXPECT_TRUE(AcceptDot(kCamera, {50, 10})->source_grey.empty());
+  ASSERT_EQ(frame->source_gray.type(), CV_8UC1);
+  ASSERT_EQ(frame->source_gray.size(), cv::Size(64, 48));
+  EXPECT_EQ(frame->source_gray.at<uint8_t>(10, 50), 255);
+  EXPECT_TRUE(AcceptDot(kCamera, {50, 10})->source_gray.empty());
 }
 
 // ------------------------------------------------------------------------------------------------ late masks

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "common/messages.h"
+#include "common/stage_messages.h"
 
 namespace romap::slam {
 

@@ -45,7 +45,7 @@ class TrackingTest : public ::testing::Test {
     mapped_ = mapper_->Process(image);
     const TrackingState state = image.tracked.state;
     if (mapped_.begun_anew) ++begun_anew_;
-    if (state == TrackingState::kTracking || state == TrackingState::kRelocalised) {
+    if (state == TrackingState::kTracking || state == TrackingState::kRelocalized) {
       frames_.push_back({mapped_.tracked, *frame->T_world_camera});
       frames_.back().tracked.frame = nullptr;
     }
@@ -57,7 +57,7 @@ class TrackingTest : public ::testing::Test {
     int initialising = 0;
     for (int i = 0; i < end; ++i) {
       const TrackingState state = Feed(Render(i));
-      if (state == TrackingState::kInitialising && initialising == i) {
+      if (state == TrackingState::kInitializing && initialising == i) {
         ++initialising;
       } else {
         EXPECT_EQ(state, TrackingState::kTracking) << i << ": " << reason_;
@@ -143,7 +143,7 @@ TEST_F(TrackingTest, AStandingCameraWaitsAndSaysWhy) {
     auto frame = Render(0);
     frame->frame_id = static_cast<uint64_t>(i + 1);
     frame->timestamp_ns = i * 33'000'000;
-    EXPECT_EQ(Feed(frame), TrackingState::kInitialising);
+    EXPECT_EQ(Feed(frame), TrackingState::kInitializing);
   }
   EXPECT_THAT(reason_, HasSubstr("too little parallax"));
   EXPECT_EQ(mapper_->keyframes(), 0U);
@@ -152,7 +152,7 @@ TEST_F(TrackingTest, AStandingCameraWaitsAndSaysWhy) {
 TEST_F(TrackingTest, ATurningCameraWaitsAndSaysWhy) {
   for (int i = 0; i < 12; ++i) {
     const SE3<World, Camera> pose = TexturedWorld::LookAt({1.2, 0, 1.2}, {0.02 * i, 0.04 * i, 0});
-    EXPECT_EQ(Feed(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitialising) << i;
+    EXPECT_EQ(Feed(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitializing) << i;
   }
   EXPECT_THAT(reason_, HasSubstr("parallax"));
 }
@@ -167,7 +167,7 @@ TEST_F(TrackingTest, ACoveredLensIsSurvived) {
     EXPECT_THAT(reason_, HasSubstr("texture"));
   }
   EXPECT_EQ(mapper_->keyframes(), keyframes);
-  EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalised) << reason_;
+  EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalized) << reason_;
   EXPECT_EQ(Feed(Render(67)), TrackingState::kTracking) << reason_;
   EXPECT_EQ(begun_anew_, 0);
   EXPECT_LT(Error().first, 0.02);
@@ -188,7 +188,7 @@ TEST_F(TrackingTest, ACameraThatWasCarriedOffIsFoundAgainInTheSameMap) {
   for (int i = 0; i < 10 && found_after < 0; ++i) {
     const int place = 20 + i;
     auto frame = world_.Render(static_cast<uint64_t>(120 + i), Pose(place));
-    if (Feed(frame) == TrackingState::kRelocalised) found_after = i;
+    if (Feed(frame) == TrackingState::kRelocalized) found_after = i;
   }
   EXPECT_GE(found_after, 0) << "not found again: " << reason_;
   EXPECT_LE(found_after, 3);
@@ -216,7 +216,7 @@ TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrameOn) {
     auto frame = Render(i);
     frame->depth_mu = world_.RenderDepth(*frame);
     const TrackingState state = Feed(frame);
-    EXPECT_EQ(state, i == 0 ? TrackingState::kInitialising : TrackingState::kTracking) << i << ": " << reason_;
+    EXPECT_EQ(state, i == 0 ? TrackingState::kInitializing : TrackingState::kTracking) << i << ": " << reason_;
   }
   const auto [worst, scale] = Error();
   EXPECT_NEAR(scale, 1, 0.01);

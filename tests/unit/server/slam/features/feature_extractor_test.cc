@@ -112,7 +112,7 @@ Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
                     const_cast<Eigen::Vector2f*>(pinhole_px.data()));
   cv::Mat grey;
   cv::cvtColor(pinhole.image_bgr, grey, cv::COLOR_BGR2GRAY);
-  cv::remap(grey, frame.source_grey, map, cv::noArray(), cv::INTER_CUBIC);
+  cv::remap(grey, frame.source_gray, map, cv::noArray(), cv::INTER_CUBIC);
   return frame;
 }
 
@@ -171,7 +171,7 @@ INSTANTIATE_TEST_SUITE_P(Lenses, FeatureExtractorLens,
 TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
   const TexturedWorld world;
   Frame frame = *world.Render(1, TexturedWorld::OrbitPose(0));
-  cv::cvtColor(frame.image_bgr, frame.source_grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(frame.image_bgr, frame.source_gray, cv::COLOR_BGR2GRAY);
   frame.source_camera = frame.camera;
   frame.source_camera.lens = LensModel::kFisheye;
   frame.source_camera.fx_px = frame.source_camera.fy_px = 100;  // sees twice as far to all sides

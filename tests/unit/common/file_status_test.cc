@@ -1,0 +1,44 @@
+#include "common/file_status.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/status.h"
+
+namespace romap {
+namespace {
+
+TEST(FileErrorTest, NamesPathActionAndReason) {
+  const absl::Status status = FileError("/data/map.ply", "open for reading", ENOENT);
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(Message(status), "/data/map.ply: cannot open for reading: No such file or directory");
+}
+
+TEST(FileErrorTest, ChoosesTheCodeByErrno) {
+  EXPECT_EQ(FileError("f", "write", EACCES).code(), absl::StatusCode::kPermissionDenied);
+  EXPECT_EQ(FileError("f", "write", EISDIR).code(), absl::StatusCode::kPermissionDenied);
+  EXPECT_EQ(FileError("f", "write", ENOSPC).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(FileError("f", "write", EIO).code(), absl::StatusCode::kResourceExhausted);
+}
+
+TEST(FileErrorTest, TakesErrnoOfAFailedStream) {
+  std::ifstream file("/nonexistent/file");
+  EXPECT_EQ(FileError("/nonexistent/file", "open for reading").code(), absl::StatusCode::kNotFound);
+}
+
+TEST(FileErrorTest, TakesErrorCodeOfFilesystemFunctions) {
+  std::error_code error;
+  std::filesystem::file_size("/nonexistent/file", error);
+  const absl::Status status = FileError("/nonexistent/file", "read the size", error);
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(Message(status), "/nonexistent/file: cannot read the size: No such file or directory");
+}
+
+TEST(FileErrorTest, ReportsAnUnknownReason) {
+  EXPECT_EQ(Message(FileError("f", "write", 0)), "f: cannot write: unknown reason");
+}
+
+}  // namespace
+}  // namespace romap
