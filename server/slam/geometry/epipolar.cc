@@ -152,7 +152,7 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
 }
 
 Motion Moved(const Motion& motion, const MotionEquations::Vector& step) {
-  return {ExpRotation(step.head<3>()) * motion.rotation,
+  return {ExpRotationMatrix(step.head<3>()) * motion.rotation,
           (motion.direction + AxesAcross(motion.direction) * step.tail<2>()).normalized()};
 }
 

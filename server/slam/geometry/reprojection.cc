@@ -41,7 +41,7 @@ void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, cons
 }
 
 CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& step) {
-  const Eigen::Matrix3d turn = ExpRotation(step.tail<3>());
+  const Eigen::Matrix3d turn = ExpRotationMatrix(step.tail<3>());
   return {turn * pose.rotation, turn * pose.translation + step.head<3>()};
 }
 

@@ -13,7 +13,7 @@ inline Eigen::Matrix3d Skew(const Eigen::Vector3d& a) {
 }
 
 // Turn about the axis of a vector by its length in radians (the exponential map of SO(3)).
-inline Eigen::Matrix3d ExpRotation(const Eigen::Vector3d& turn_rad) {
+inline Eigen::Matrix3d ExpRotationMatrix(const Eigen::Vector3d& turn_rad) {
   const double angle_rad = turn_rad.norm();
   if (angle_rad == 0) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad).toRotationMatrix();

@@ -72,7 +72,7 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
 
 Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step) {
   const double growth = std::exp(step[6]);
-  const Eigen::Matrix3d turn = ExpRotation(step.segment<3>(3));
+  const Eigen::Matrix3d turn = ExpRotationMatrix(step.segment<3>(3));
   return {growth * similarity.scale, turn * similarity.rotation,
           growth * (turn * similarity.translation) + step.head<3>()};
 }
