@@ -17,86 +17,103 @@
 
 namespace romap {
 
-enum class SessionState { kOpen, kFinishing, kFinished, kFailed };
+enum class SessionState {
+  kOpen,       // accepts frames
+  kFinishing,  // accepts no more frames; processing and training continue
+  kFinished,   // all processing and training is complete
+  kFailed,     // ended by an internal error; the map up to then can be exported
+};
+
 enum class FrameMode {
-  kReplay /* lossless: a full queue pushes back */,
-  kLive /* the oldest waiting frame is dropped */
+  kReplay,  // lossless: a full input queue blocks the sender
+  kLive,    // a full input queue drops its oldest frame
 };
 
 struct SessionOptions {
-  std::string name;  // for people; may be empty
+  std::string name;  // display name; may be empty
   CameraModel camera;
   FrameMode mode = FrameMode::kReplay;
   PoseUse pose_use = PoseUse::kGiven;
 };
 
 struct SessionInfo {
-  std::string id;
-  std::string name;
+  std::string id;    // assigned by the service
+  std::string name;  // as given in SessionOptions
   CameraModel camera;
   FrameMode mode = FrameMode::kReplay;
   SessionState state = SessionState::kOpen;
-  int64_t created_unix_ns = 0;
-  bool stream_open = false;  // a Map stream is attached
+  int64_t created_unix_ns = 0;  // nanoseconds since the Unix epoch
+  bool stream_open = false;     // a client has an open Map stream
   Statistics statistics;
 };
 
-// One object with everything a newcomer needs: what ExportMap returns and Watch begins with.
+// The current state of one object.
 struct ObjectSnapshot {
-  ObjectUpdate object;
-  std::optional<MeshUpdate> mesh;
+  ObjectUpdate object;             // cuboid in the World frame, map units
+  std::optional<MeshUpdate> mesh;  // absent until the first mesh is extracted
 };
 
+// The map of a session at one instant.
 struct MapSnapshot {
   std::string session_id;
   SessionState state = SessionState::kOpen;
-  std::vector<ObjectSnapshot> objects;  // confirmed and lost ones, by id
-  std::vector<FrameAck> trajectory;     // one entry per accepted frame with a pose, by frame id
-  std::vector<int64_t> timestamps_ns;   // of `trajectory`
+  std::vector<ObjectSnapshot> objects;  // confirmed and lost objects, in ascending order of id
+  std::vector<FrameAck> trajectory;     // one entry per accepted frame with a pose, in ascending order of frame_id
+  std::vector<int64_t> timestamps_ns;   // capture times of `trajectory`, same length
   Statistics statistics;
 };
 
-// Server-to-client events of one subscription. Thread-safe between Next() and Cancel().
+// The events of one subscription. Cancel() may be called while another thread waits in Next().
 class EventStream {
  public:
   virtual ~EventStream() = default;
-  // Waits up to `timeout` for the next event. nullopt: none came in time, or the stream has ended (see Done()).
+  // Waits up to `timeout` for the next event. Returns nullopt on timeout or when the stream has ended (see Done()).
   virtual std::optional<MapEvent> Next(std::chrono::milliseconds timeout) = 0;
+  // True once the stream has ended and all of its events have been returned.
   virtual bool Done() const = 0;
-  // OK while open or after a clean end; otherwise why the stream broke.
+  // OK while the stream is open and after a regular end; otherwise the reason why the stream ended.
   virtual absl::Status status() const = 0;
+  // Ends the stream. Pending events are discarded.
   virtual void Cancel() = 0;
 };
 
-// The bidirectional stream of the client that owns the session: frames and late masks in, events out.
+// The bidirectional stream of the client that feeds a session: frames and masks in, events out.
 class MapStream : public EventStream {
  public:
-  // Blocks while the server pushes back. A frame that is bad in itself is answered with a FrameAck{accepted=false} and
-  // the stream lives on; a non-OK status here means the stream is over.
+  // Sends a frame. Blocks while the service applies back pressure. A frame with invalid content is reported by a
+  // FrameAck with accepted = false, and the stream stays usable. A non-OK status means that the stream has ended.
   virtual absl::Status Send(FrameInput frame) = 0;
-  // The masks of a frame that was sent before, without any. Blocks and fails as Send(); answered with a MasksAck.
+  // Sends the masks of an earlier frame that was sent without masks. Blocks and fails like Send(); reported by a
+  // MasksAck.
   virtual absl::Status SendMasks(MasksInput masks) = 0;
-  // No more frames and masks on this stream. Events keep coming until those that were accepted are processed, then the
-  // stream ends.
+  // Ends sending. Events continue until all accepted frames and masks are processed; then the stream ends with OK.
+  // FAILED_PRECONDITION if sending has already ended.
   virtual absl::Status CloseSend() = 0;
 };
 
-// All that romap can do for a client. Implemented in process (server/session) and over gRPC (client/sdk).
+// The mapping API. Implemented in process (server/session/local_mapping_service.h) and over gRPC
+// (client/sdk/remote_mapping_service.h). Thread-safe.
+//
+// Methods that take a session_id return NOT_FOUND if no such session exists.
 class MappingService {
  public:
   virtual ~MappingService() = default;
-  // INVALID_ARGUMENT: bad camera. RESOURCE_EXHAUSTED: too many sessions.
+  // Creates an empty session. INVALID_ARGUMENT: invalid camera. RESOURCE_EXHAUSTED: session limit reached.
   virtual absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) = 0;
+  // Returns all sessions.
   virtual absl::StatusOr<std::vector<SessionInfo>> ListSessions() = 0;
-  virtual absl::StatusOr<SessionInfo> GetSession(const std::string& session_id) = 0;  // NOT_FOUND
-  // No more frames will come: processes what was accepted and trains every object to its end. Returns at once; the
-  // state goes kFinishing -> kFinished and open event streams end when it is reached.
+  virtual absl::StatusOr<SessionInfo> GetSession(const std::string& session_id) = 0;
+  // Ends the input of a session: accepted frames are still processed, and every object is trained to completion.
+  // Returns immediately. The state changes to kFinishing and later to kFinished, which ends all open event streams.
   virtual absl::StatusOr<SessionInfo> FinishSession(const std::string& session_id) = 0;
+  // Deletes a session and its map.
   virtual absl::Status DeleteSession(const std::string& session_id) = 0;
-  // NOT_FOUND; FAILED_PRECONDITION when the session has a Map stream already or is finished.
+  // Opens the stream that feeds a session. FAILED_PRECONDITION: the session already has an open Map stream or accepts
+  // no more frames.
   virtual absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) = 0;
-  // First the objects there are, then every change.
+  // Subscribes to the events of a session: first the current state of all objects, then every change.
   virtual absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) = 0;
+  // Returns the map of a session, in any state.
   virtual absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) = 0;
 };
 

@@ -19,6 +19,7 @@
 
 #include "common/config.h"
 #include "common/status.h"
+#include "common/version.h"
 #include "server/session/local_mapping_service.h"
 #include "server/session/server_config.h"
 #include "server/transport/grpc_server.h"
@@ -67,7 +68,7 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "critical", "off"}))
       ->capture_default_str();
   app.add_option("--threads", threads, "Training threads (default: one per core)");
-  app.set_version_flag("--version", "romap-server " ROMAP_VERSION);
+  app.set_version_flag("--version", fmt::format("romap-server {}", Version()));
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

@@ -9,6 +9,7 @@
 #include "client/cli/command.h"
 #include "client/cli/interrupt.h"
 #include "common/status.h"
+#include "common/version.h"
 
 namespace romap::cli {
 namespace {
@@ -34,7 +35,7 @@ int RunCli(int argc, const char* const* argv) {
   CLI::App app{"romap: turns a video with instance masks into a map of objects", "romap"};
   app.require_subcommand(1);
   app.fallthrough();  // --log-level may stand after the command too
-  app.set_version_flag("--version", "romap 0.1.0");
+  app.set_version_flag("--version", fmt::format("romap {}", Version()));
   std::string log_level = "warning";
   app.add_option("--log-level", log_level, "What to log to stderr")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))

@@ -8,7 +8,7 @@
 
 #include <utility>
 
-#include "client/sdk/remote_streams.h"
+#include "client/sdk/internal/remote_streams.h"
 #include "common/status.h"
 #include "common/wire/sessions.h"
 #include "common/wire/status.h"
@@ -24,19 +24,19 @@ grpc::ChannelArguments MakeChannelArguments(const RemoteOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(options.max_message_bytes);
   arguments.SetMaxSendMessageSize(options.max_message_bytes);
-  // A server that vanished without a word (power, network) is noticed by pings.
+  // Detects a server that disappears without closing the connection (power or network failure).
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepalive_ms);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // A server that is just starting is found soon after it listens.
+  // Connects quickly to a server that is still starting.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
-  // Not shared with other channels of the process, whose failed attempts would delay ours.
+  // The global pool would share reconnect backoff with other channels to the same address.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return arguments;
 }
 
-// A context whose call must be over in `timeout`.
+// The context of a call with a deadline.
 struct TimedContext : grpc::ClientContext {
   explicit TimedContext(std::chrono::milliseconds timeout) { set_deadline(system_clock::now() + timeout); }
 };
@@ -54,14 +54,14 @@ absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::Conn
       grpc::CreateCustomChannel(host_port, grpc::InsecureChannelCredentials(), MakeChannelArguments(options));
   if (!channel->WaitForConnected(system_clock::now() + options.connect_timeout)) {
     return absl::UnavailableError(
-        fmt::format("no romap-server at {0} (start it with: romap-server --listen {0})", host_port));
+        fmt::format("cannot connect to romap-server at {0} (start it with: romap-server --listen {0})", host_port));
   }
   std::unique_ptr<Connection> connection(new Connection{options, v1::Mapping::NewStub(channel)});
   std::unique_ptr<RemoteMappingService> service(new RemoteMappingService(std::move(connection)));
-  // Something listens there; only an answer proves that it is a romap-server.
-  if (const absl::Status answer = service->ListSessions().status(); !answer.ok()) {
+  // A TCP connection does not prove that the peer is a romap-server.
+  if (const absl::Status listed = service->ListSessions().status(); !listed.ok()) {
     return absl::UnavailableError(
-        fmt::format("what listens at {} does not answer as a romap-server: {}", host_port, Message(answer)));
+        fmt::format("{} accepts connections but is not a working romap-server: {}", host_port, Message(listed)));
   }
   return service;
 }
@@ -116,12 +116,12 @@ absl::Status RemoteMappingService::DeleteSession(const std::string& session_id) 
 }
 
 absl::StatusOr<std::unique_ptr<MapStream>> RemoteMappingService::OpenMap(const std::string& session_id) {
-  return client::RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
-                                       connection_->options.max_message_bytes);
+  return RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
+                               connection_->options.max_message_bytes);
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> RemoteMappingService::Watch(const std::string& session_id) {
-  return client::RemoteWatchStream::Open(connection_->stub, session_id, connection_->options.call_timeout);
+  return RemoteWatchStream::Open(connection_->stub, session_id, connection_->options.call_timeout);
 }
 
 absl::StatusOr<MapSnapshot> RemoteMappingService::ExportMap(const std::string& session_id) {

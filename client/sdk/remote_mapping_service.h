@@ -13,19 +13,24 @@ namespace romap::client {
 
 struct RemoteOptions {
   std::chrono::milliseconds connect_timeout{3000};
-  std::chrono::milliseconds call_timeout{30'000};     // of one answer, and of opening a stream
-  std::chrono::milliseconds export_timeout{300'000};  // of a whole export
-  int max_message_bytes = 32 << 20;                   // as the server's transport.max_message_bytes
+  std::chrono::milliseconds call_timeout{30'000};     // per unary call, and for opening a stream
+  std::chrono::milliseconds export_timeout{300'000};  // for a whole ExportMap()
+  int max_message_bytes = 32 << 20;                   // must match transport.max_message_bytes of the server
 };
 
-// The mapping service of a romap-server. Thread-safe. Streams keep the connection and may outlive this object.
+// A MappingService that calls a romap-server over gRPC (plaintext HTTP/2).
 //
-// The connection is mended by gRPC when it breaks; a stream that was open then ends with UNAVAILABLE, and the session
-// lives on at the server, where OpenMap() can take it up again.
-// Beyond MappingService's own errors every call may answer UNAVAILABLE (the server is gone) and DEADLINE_EXCEEDED.
+// Thread-safe. Streams share ownership of the connection and may outlive this object.
+//
+// gRPC reconnects automatically. When the connection breaks, open streams end with UNAVAILABLE. The session stays on
+// the server; call OpenMap() again to continue it.
+//
+// Errors: in addition to those of MappingService, every call may return UNAVAILABLE (no connection to the server),
+// DEADLINE_EXCEEDED (a timeout of RemoteOptions), and INVALID_ARGUMENT for a malformed response.
 class RemoteMappingService : public MappingService {
  public:
-  // `host_port`: "127.0.0.1:50051". UNAVAILABLE when no romap-server answers there within the timeout.
+  // Connects to a server and verifies that it is a romap-server. `host_port`: e.g. "127.0.0.1:50051".
+  // Errors: UNAVAILABLE if no romap-server responds within the timeouts of `options`.
   static absl::StatusOr<std::unique_ptr<RemoteMappingService>> Connect(const std::string& host_port,
                                                                        const RemoteOptions& options = {});
 
@@ -36,8 +41,8 @@ class RemoteMappingService : public MappingService {
   absl::StatusOr<SessionInfo> GetSession(const std::string& session_id) override;
   absl::StatusOr<SessionInfo> FinishSession(const std::string& session_id) override;
   absl::Status DeleteSession(const std::string& session_id) override;
-  // Send() blocks while HTTP/2 flow control pushes back. A frame whose message is larger than max_message_bytes is
-  // answered with a FrameAck{accepted=false} from here.
+  // Send() and SendMasks() of the stream block while HTTP/2 flow control applies. A request larger than
+  // max_message_bytes is not sent; the stream delivers a FrameAck or MasksAck with accepted = false instead.
   absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;

@@ -95,6 +95,16 @@ TEST(HouseTest, FoldersIncludeOnlyWhatTheyMay) {
   }
 }
 
+// The headers of client/sdk are installed; users of the library need neither gRPC nor protobuf.
+TEST(HouseTest, PublicHeadersOfTheSdkIncludeNoGrpc) {
+  const std::regex include(R"(^\s*#include\s+[<"](grpc|google/|romap/v1/|common/wire/|client/sdk/internal/))");
+  for (const SourceFile& file : SourceFiles()) {
+    const std::filesystem::path path = file.path;
+    if (path.parent_path() != "client/sdk" || path.extension() != ".h") continue;
+    for (const std::string& line : file.lines) EXPECT_FALSE(std::regex_search(line, include)) << path << ": " << line;
+  }
+}
+
 TEST(HouseTest, FilesStayReadable) {
   for (const SourceFile& file : SourceFiles()) EXPECT_LE(file.lines.size(), 500u) << file.path;
 }

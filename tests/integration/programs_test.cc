@@ -196,7 +196,7 @@ TEST(BadInputTest, NoServerAndPortInUse) {
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);
   ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 1,
-                "no romap-server at " + address);
+                "cannot connect to romap-server at " + address);
 }
 
 }  // namespace

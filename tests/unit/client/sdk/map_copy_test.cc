@@ -20,10 +20,10 @@ MeshUpdate MeshOf(uint64_t id, uint64_t revision) {
   return mesh;
 }
 
-TEST(MapCopyTest, KeepsTheNewestCuboidAndTheNewestMesh) {
+TEST(MapCopyTest, KeepsTheNewestCuboidAndMesh) {
   MapCopy copy;
   copy.Apply(Update(1, 3));
-  copy.Apply(MeshOf(1, 2));  // made before the cuboid
+  copy.Apply(MeshOf(1, 2));  // older than the cuboid, but the first mesh
   copy.Apply(Update(1, 2));
   const ObjectSnapshot& object = copy.objects().at(ObjectId{1});
   EXPECT_EQ(object.object.observations, 3u);
@@ -34,22 +34,22 @@ TEST(MapCopyTest, KeepsTheNewestCuboidAndTheNewestMesh) {
   EXPECT_EQ(object.object.revision, 3u);
 }
 
-TEST(MapCopyTest, AMeshOfNoObjectIsPassedOver) {
+TEST(MapCopyTest, IgnoresAMeshOfAnUnknownObject) {
   MapCopy copy;
   copy.Apply(MeshOf(7, 1));
   EXPECT_TRUE(copy.objects().empty());
 }
 
-TEST(MapCopyTest, RemovedAndMergedObjectsGo) {
+TEST(MapCopyTest, DropsRemovedAndMergedObjects) {
   MapCopy copy;
   for (uint64_t id : {1, 2, 3}) copy.Apply(Update(id, 1));
-  copy.Apply(ObjectRemoved{ObjectId{1}, 2, "ghost"});
+  copy.Apply(ObjectRemoved{ObjectId{1}, 2, "false detection"});
   copy.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 6});
   ASSERT_EQ(copy.objects().size(), 1u);
   EXPECT_EQ(copy.objects().at(ObjectId{3}).object.revision, 6u);
 }
 
-TEST(MapCopyTest, OtherEventsSayNothingOfObjects) {
+TEST(MapCopyTest, IgnoresEventsThatDoNotConcernObjects) {
   MapCopy copy;
   copy.Apply(FrameAck{});
   copy.Apply(MasksAck{});

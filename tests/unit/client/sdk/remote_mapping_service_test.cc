@@ -44,28 +44,28 @@ class RemoteMappingServiceTest : public ::testing::Test {
   std::unique_ptr<RemoteMappingService> client_ = RemoteMappingService::Connect(server_->address()).value();
 };
 
-TEST_F(RemoteMappingServiceTest, NobodyThereSaysHowToStartOne) {
+TEST_F(RemoteMappingServiceTest, ConnectFailsWithInstructionsWithoutServer) {
   const std::string address = server_->address();
   server_->Shutdown();
   const auto client = RemoteMappingService::Connect(address, {.connect_timeout = std::chrono::milliseconds(200)});
   EXPECT_CODE(client.status(), StatusCode::kUnavailable);
   EXPECT_EQ(Message(client.status()),
-            "no romap-server at " + address + " (start it with: romap-server --listen " + address + ")");
+            "cannot connect to romap-server at " + address + " (start it with: romap-server --listen " + address + ")");
 }
 
-TEST_F(RemoteMappingServiceTest, AnotherKindOfServerIsToldApart) {
-  grpc::CallbackGenericService knows_no_method;
+TEST_F(RemoteMappingServiceTest, ConnectRejectsAServerThatIsNotRomap) {
+  grpc::CallbackGenericService service_without_methods;
   grpc::ServerBuilder builder;
   int port = 0;
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
-  builder.RegisterCallbackGenericService(&knows_no_method);
+  builder.RegisterCallbackGenericService(&service_without_methods);
   const auto server = builder.BuildAndStart();
   const auto client = RemoteMappingService::Connect("127.0.0.1:" + std::to_string(port));
   EXPECT_CODE(client.status(), StatusCode::kUnavailable);
-  EXPECT_THAT(Message(client.status()), HasSubstr("does not answer as a romap-server"));
+  EXPECT_THAT(Message(client.status()), HasSubstr("is not a working romap-server"));
 }
 
-TEST_F(RemoteMappingServiceTest, AServerThatGoesAwayEndsTheStream) {
+TEST_F(RemoteMappingServiceTest, ServerShutdownEndsTheStream) {
   const auto stream = client_->OpenMap(NewSession()).value();
   server_.reset();
   testing::ReadToEnd(*stream);
@@ -74,16 +74,16 @@ TEST_F(RemoteMappingServiceTest, AServerThatGoesAwayEndsTheStream) {
   EXPECT_FALSE(client_->ListSessions().ok());
 }
 
-TEST_F(RemoteMappingServiceTest, AServerThatComesBackIsFoundAgain) {
+TEST_F(RemoteMappingServiceTest, ReconnectsAfterServerRestart) {
   const std::string session = NewSession();
   const std::string address = server_->address();
   server_.reset();
   transport::TransportConfig config;
   config.listen_address = address;
-  auto again = transport::GrpcServer::Start(&fake_, config);
-  if (!again.ok()) GTEST_SKIP() << "the port was taken by somebody else meanwhile";
+  auto restarted = transport::GrpcServer::Start(&fake_, config);
+  if (!restarted.ok()) GTEST_SKIP() << "another process took the port in the meantime";
   std::unique_ptr<MapStream> stream;
-  EXPECT_TRUE(testing::Eventually([&] {
+  ASSERT_TRUE(testing::Eventually([&] {
     auto opened = client_->OpenMap(session);
     if (opened.ok()) stream = *std::move(opened);
     return stream != nullptr;
@@ -92,7 +92,7 @@ TEST_F(RemoteMappingServiceTest, AServerThatComesBackIsFoundAgain) {
   EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
-TEST_F(RemoteMappingServiceTest, AFrameTooLargeIsRefusedAndTheStreamLivesOn) {
+TEST_F(RemoteMappingServiceTest, RejectsAnOversizedFrameAndKeepsTheStreamOpen) {
   const auto stream = client_->OpenMap(NewSession()).value();
   FrameInput frame = testing::MakeFrame(1);
   frame.image.assign(33 << 20, 'x');
@@ -103,11 +103,11 @@ TEST_F(RemoteMappingServiceTest, AFrameTooLargeIsRefusedAndTheStreamLivesOn) {
   ASSERT_THAT(acks, SizeIs(2));
   EXPECT_EQ(acks[0].frame_id, 1u);
   EXPECT_FALSE(acks[0].accepted);
-  EXPECT_THAT(acks[0].error, HasSubstr("at most 33554432"));
+  EXPECT_THAT(acks[0].error, HasSubstr("the limit is 33554432"));
   EXPECT_TRUE(acks[1].accepted);
 }
 
-TEST_F(RemoteMappingServiceTest, AFrameJustBelowTheLimitArrives) {
+TEST_F(RemoteMappingServiceTest, SendsAFrameJustBelowTheSizeLimit) {
   const auto stream = client_->OpenMap(NewSession()).value();
   FrameInput frame = testing::MakeFrame(1);
   frame.image.assign((32 << 20) - 1000, 'x');
@@ -117,8 +117,8 @@ TEST_F(RemoteMappingServiceTest, AFrameJustBelowTheLimitArrives) {
   EXPECT_TRUE(ack->accepted);
 }
 
-TEST_F(RemoteMappingServiceTest, EventsWaitForALateReader) {
-  constexpr uint64_t kFrames = 500;  // three events each, more than the client keeps
+TEST_F(RemoteMappingServiceTest, BuffersEventsForALateReader) {
+  constexpr uint64_t kFrames = 500;  // three events each, more than the client buffers
   const auto stream = client_->OpenMap(NewSession()).value();
   for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());
   EXPECT_OK(stream->CloseSend());
@@ -127,7 +127,7 @@ TEST_F(RemoteMappingServiceTest, EventsWaitForALateReader) {
   for (uint64_t i = 0; i < kFrames; ++i) ASSERT_EQ(acks[i].frame_id, i + 1);
 }
 
-TEST_F(RemoteMappingServiceTest, AStreamMayBeDroppedWithEventsUnread) {
+TEST_F(RemoteMappingServiceTest, StreamCanBeDestroyedWithUnreadEvents) {
   const auto session = NewSession();
   const auto watch = client_->Watch(session).value();
   auto stream = client_->OpenMap(session).value();
@@ -136,14 +136,14 @@ TEST_F(RemoteMappingServiceTest, AStreamMayBeDroppedWithEventsUnread) {
   EXPECT_TRUE(testing::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
 }
 
-TEST_F(RemoteMappingServiceTest, AStreamOutlivesItsService) {
+TEST_F(RemoteMappingServiceTest, StreamOutlivesItsService) {
   const auto stream = client_->OpenMap(NewSession()).value();
   client_.reset();
   EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
-// A server of another release.
+// A server of another romap release.
 class OtherServer : public v1::Mapping::Service {
  public:
   OtherServer() {
@@ -164,7 +164,7 @@ class OtherServer : public v1::Mapping::Service {
     v1::WatchResponse response;
     response.mutable_opened();
     writer->Write(response);
-    response.mutable_event();  // of a kind that we do not know
+    response.mutable_event();  // of an event type unknown to this client
     writer->Write(response);
     *response.mutable_event() = wire::ToProto(MapEvent(FrameAck{}));
     response.mutable_event()->mutable_frame_ack()->set_state(static_cast<v1::TrackingState>(88));
@@ -184,7 +184,7 @@ class OtherServer : public v1::Mapping::Service {
   std::unique_ptr<grpc::Server> server_;
 };
 
-TEST(RemoteMappingServiceOtherRelease, EventsThatAreNotKnownAreSkipped) {
+TEST(RemoteMappingServiceOtherReleaseTest, IgnoresUnknownEvents) {
   OtherServer server;
   const auto client = RemoteMappingService::Connect(server.address()).value();
   const auto watch = client->Watch("any").value();
@@ -194,7 +194,7 @@ TEST(RemoteMappingServiceOtherRelease, EventsThatAreNotKnownAreSkipped) {
   EXPECT_OK(watch->status());
 }
 
-TEST(RemoteMappingServiceOtherRelease, AStreamThatIsNeverOpenedTimesOut) {
+TEST(RemoteMappingServiceOtherReleaseTest, OpenMapTimesOut) {
   OtherServer server;
   RemoteOptions options;
   options.call_timeout = std::chrono::milliseconds(300);

@@ -1,4 +1,4 @@
-#include "client/sdk/remote_streams.h"
+#include "client/sdk/internal/remote_streams.h"
 
 #include <utility>
 
@@ -35,31 +35,31 @@ void RemoteMapStream::Reactor::QueueStart(const std::string& session_id) {
 }
 
 absl::Status RemoteMapStream::Reactor::Send(FrameInput frame) {
-  FrameAck refusal;
-  refusal.frame_id = frame.frame_id;
+  FrameAck rejection;
+  rejection.frame_id = frame.frame_id;
   v1::MapRequest request;
   *request.mutable_frame() = wire::ToProto(std::move(frame));
-  return SendRequest(std::move(request), std::move(refusal));
+  return SendRequest(std::move(request), std::move(rejection));
 }
 
 absl::Status RemoteMapStream::Reactor::SendMasks(MasksInput masks) {
-  MasksAck refusal;
-  refusal.frame_id = masks.frame_id;
+  MasksAck rejection;
+  rejection.frame_id = masks.frame_id;
   v1::MapRequest request;
   *request.mutable_late_masks() = wire::ToProto(std::move(masks));
-  return SendRequest(std::move(request), std::move(refusal));
+  return SendRequest(std::move(request), std::move(rejection));
 }
 
 template <class Ack>
-absl::Status RemoteMapStream::Reactor::SendRequest(v1::MapRequest request, Ack refusal) {
+absl::Status RemoteMapStream::Reactor::SendRequest(v1::MapRequest request, Ack rejection) {
   std::lock_guard sending(send_mutex_);
-  if (send_closed_) return FailedPrecondition("this stream was closed for sending");
+  if (send_closed_) return FailedPrecondition("CloseSend() was already called on this stream");
   ROMAP_RETURN_IF_ERROR(WaitForWrite());
   const size_t bytes = request.ByteSizeLong();
   if (bytes > static_cast<size_t>(max_message_bytes_)) {
-    refusal.accepted = false;
-    refusal.error = fmt::format("message of {} bytes, at most {} are allowed", bytes, max_message_bytes_);
-    Deliver(std::move(refusal));
+    rejection.accepted = false;
+    rejection.error = fmt::format("message has {} bytes; the limit is {}", bytes, max_message_bytes_);
+    Deliver(std::move(rejection));
     return absl::OkStatus();
   }
   request_ = std::move(request);
@@ -78,7 +78,7 @@ absl::Status RemoteMapStream::Reactor::SendRequest(v1::MapRequest request, Ack r
 
 absl::Status RemoteMapStream::Reactor::CloseSend() {
   std::lock_guard sending(send_mutex_);
-  if (send_closed_) return FailedPrecondition("this stream was closed for sending");
+  if (send_closed_) return FailedPrecondition("CloseSend() was already called on this stream");
   ROMAP_RETURN_IF_ERROR(WaitForWrite());
   if (!HoldUnlessEnded()) return EndStatus();
   send_closed_ = true;
@@ -101,7 +101,7 @@ absl::Status RemoteMapStream::Reactor::WaitForWrite() {
     if (!write_failed_) return absl::OkStatus();
   }
   const absl::Status status = EndStatus();
-  return status.ok() ? FailedPrecondition("the server has ended the stream and takes no more frames") : status;
+  return status.ok() ? FailedPrecondition("the server closed the stream and accepts no more frames") : status;
 }
 
 }  // namespace romap::client

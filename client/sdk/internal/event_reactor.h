@@ -20,35 +20,37 @@
 
 namespace romap::client {
 
-// The receiving half of a stream: keeps a few events for Next() and stops reading while nobody takes them, so that
-// HTTP/2 pushes back to the server, which coalesces what waits.
+// The receiving half of a stream. Buffers up to kMaxEvents events for Next() and stops reading while the buffer is
+// full, so that HTTP/2 flow control reaches the server, which then coalesces pending events.
 //
 // Reactor: grpc::ClientReadReactor<Response>, or a ClientBidiReactor that reads Response.
-// Usage: construct, let the stub bind context() and this, Begin(), then anything; destroy whenever.
+// Usage: construct; pass context() and this to the stub's async call; call Begin() once; then call any method. The
+// destructor cancels the call. All public methods are thread-safe after Begin().
 template <class Reactor, class Response>
 class EventReactor : public Reactor {
  public:
-  // The derived destructor must call Shut(), while its own members are still alive.
+  // The derived destructor must call Shutdown() while its own members still exist.
   ~EventReactor() override = default;
 
   grpc::ClientContext* context() { return &context_; }
 
-  // Starts the call and waits for the server to say that the stream is open. Otherwise the status it ended with.
+  // Starts the call and waits for the `opened` message of the server. Errors: DEADLINE_EXCEEDED after `timeout`;
+  // INTERNAL if the server ended the stream with OK before it opened; otherwise the status of the call.
   absl::Status Begin(std::chrono::milliseconds timeout) {
-    // gRPC's "hold" keeps the call alive while neither a read nor a write is under way. It is given back when the
-    // server's last message has been read.
+    // A gRPC hold keeps the call alive while no read or write is pending. OnReadDone(false) releases it.
     this->AddHold();
     this->StartRead(&response_);
     this->StartCall();
     std::unique_lock lock(mutex_);
-    const bool answered = changed_.wait_for(lock, timeout, [&] { return opened_ || done_; });
+    const bool finished = changed_.wait_for(lock, timeout, [&] { return opened_ || done_; });
     if (opened_) return absl::OkStatus();
-    if (answered) return status_.ok() ? Internal("the server ended the stream before it was open") : status_;
+    if (finished) return status_.ok() ? Internal("the server closed the stream before opening it") : status_;
     lock.unlock();
     Cancel();
-    return absl::DeadlineExceededError(fmt::format("the server did not open the stream in {} ms", timeout.count()));
+    return absl::DeadlineExceededError(fmt::format("the server did not open the stream within {} ms", timeout.count()));
   }
 
+  // As EventStream::Next().
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, timeout, [&] { return done_ || !events_.empty(); });
@@ -86,7 +88,7 @@ class EventReactor : public Reactor {
     bool read_on = true;
     {
       std::lock_guard lock(mutex_);
-      Take(response_);
+      Store(response_);
       read_on = draining_ || events_.size() < kMaxEvents;
       paused_ = !read_on;
       changed_.notify_all();
@@ -102,7 +104,8 @@ class EventReactor : public Reactor {
   }
 
  protected:
-  // Takes a hold for an operation that is about to start. False when the stream is over and none may start.
+  // Adds a gRPC hold for an operation about to start. Returns false, without a hold, if the stream has ended and no
+  // operation may start.
   bool HoldUnlessEnded() {
     std::lock_guard lock(mutex_);
     if (!ended_) this->AddHold();
@@ -115,7 +118,7 @@ class EventReactor : public Reactor {
     changed_.notify_all();
   }
 
-  // For a stream that has broken: waits for the status that it ended with.
+  // Waits for the end of a stream whose last operation failed and returns its final status.
   absl::Status EndStatus() {
     Drain(/*keep_events=*/true);
     std::unique_lock lock(mutex_);
@@ -123,8 +126,8 @@ class EventReactor : public Reactor {
     return status_;
   }
 
-  // Cancels the call and waits until gRPC has let go of this object.
-  void Shut() {
+  // Cancels the call and waits for OnDone(), after which gRPC no longer uses this object.
+  void Shutdown() {
     Cancel();
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return done_; });
@@ -133,20 +136,21 @@ class EventReactor : public Reactor {
  private:
   static constexpr size_t kMaxEvents = 256;
 
-  // Under mutex_.
-  void Take(Response& response) {
+  // Buffers the event of a response. Requires mutex_.
+  void Store(Response& response) {
     if (response.has_opened()) opened_ = true;
     if (discarding_ || !response.has_event()) return;
-    if (response.event().event_case() == v1::MapEvent::EVENT_NOT_SET) return;  // of a newer server
+    if (response.event().event_case() == v1::MapEvent::EVENT_NOT_SET) return;  // event type of a newer server
     auto event = wire::FromProto(std::move(*response.mutable_event()), "event");
     if (event.ok()) {
       events_.push_back(*std::move(event));
     } else {
-      spdlog::warn("an event was skipped: {}", Message(event.status()));
+      spdlog::warn("ignored a malformed event from the server: {}", Message(event.status()));
     }
   }
 
-  // Reads to the end without regard to how much waits; gRPC ends a call only when everything was read.
+  // Reads until the end of the stream regardless of the buffer size: gRPC completes a call only after all messages are
+  // read. Discards the buffered and later events unless `keep_events`.
   void Drain(bool keep_events) {
     std::unique_lock lock(mutex_);
     draining_ = true;
@@ -154,27 +158,27 @@ class EventReactor : public Reactor {
     ResumeReading(lock);
   }
 
-  // Unlocks `lock` before it calls gRPC.
+  // Starts the next read if reading is paused and may resume. Unlocks `lock` before calling gRPC.
   void ResumeReading(std::unique_lock<std::mutex>& lock) {
     if (!paused_ || !(draining_ || events_.size() < kMaxEvents)) return;
     paused_ = false;
     lock.unlock();
-    // The hold of Begin() is still there: it is only given back by a read that fails.
+    // Safe: Begin()'s hold is released only by a failed read.
     this->StartRead(&response_);
   }
 
   grpc::ClientContext context_;
-  Response response_;  // of the read under way
+  Response response_;  // target of the pending read
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<MapEvent> events_;
   bool opened_ = false;
-  bool paused_ = false;      // no read is under way because enough events wait
-  bool draining_ = false;    // never pause again
-  bool discarding_ = false;  // nobody wants further events
-  bool ended_ = false;       // the last read failed: no operation may start any more
-  bool done_ = false;        // gRPC has let go of this object; status_ is final
+  bool paused_ = false;      // no read is pending because the buffer is full
+  bool draining_ = false;    // read to the end without pausing
+  bool discarding_ = false;  // drop all further events
+  bool ended_ = false;       // a read failed: no further operation may start
+  bool done_ = false;        // OnDone() was called; status_ is final
   absl::Status status_;
 };
 

@@ -10,16 +10,18 @@
 #include <string>
 #include <utility>
 
-#include "client/sdk/event_reactor.h"
+#include "client/sdk/internal/event_reactor.h"
 #include "common/mapping_service.h"
 #include "romap/v1/mapping.grpc.pb.h"
 
 namespace romap::client {
 
-// Streams keep the stub, because it keeps the channel that their call runs on.
+// The streams of RemoteMappingService. Each stream holds the stub, which keeps the channel of its call open.
 
+// A Watch stream.
 class RemoteWatchStream : public EventStream {
  public:
+  // Waits up to `timeout` until the server has opened the stream. Errors as EventReactor::Begin().
   static absl::StatusOr<std::unique_ptr<EventStream>> Open(std::shared_ptr<v1::Mapping::Stub> stub,
                                                            const std::string& session_id,
                                                            std::chrono::milliseconds timeout);
@@ -32,7 +34,7 @@ class RemoteWatchStream : public EventStream {
  private:
   class Reactor : public EventReactor<grpc::ClientReadReactor<v1::WatchResponse>, v1::WatchResponse> {
    public:
-    ~Reactor() override { Shut(); }
+    ~Reactor() override { Shutdown(); }
   };
 
   explicit RemoteWatchStream(std::shared_ptr<v1::Mapping::Stub> stub) : stub_(std::move(stub)) {}
@@ -42,8 +44,10 @@ class RemoteWatchStream : public EventStream {
   Reactor reactor_;
 };
 
+// A Map stream.
 class RemoteMapStream : public MapStream {
  public:
+  // As RemoteWatchStream::Open(). Requests of more than max_message_bytes are rejected locally.
   static absl::StatusOr<std::unique_ptr<MapStream>> Open(std::shared_ptr<v1::Mapping::Stub> stub,
                                                          const std::string& session_id,
                                                          std::chrono::milliseconds timeout, int max_message_bytes);
@@ -57,13 +61,13 @@ class RemoteMapStream : public MapStream {
   absl::Status CloseSend() override { return reactor_.CloseSend(); }
 
  private:
-  // The sending half; one write is under way at a time.
+  // The sending half. At most one write is pending at a time, as gRPC requires.
   class Reactor : public EventReactor<grpc::ClientBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
    public:
     explicit Reactor(int max_message_bytes) : max_message_bytes_(max_message_bytes) {}
-    ~Reactor() override { Shut(); }
+    ~Reactor() override { Shutdown(); }
 
-    // The first request goes out with the start of the call.
+    // Queues the first request. Call before Begin(), which sends it.
     void QueueStart(const std::string& session_id);
     absl::Status Send(FrameInput frame);
     absl::Status SendMasks(MasksInput masks);
@@ -71,13 +75,13 @@ class RemoteMapStream : public MapStream {
     void OnWriteDone(bool ok) override;
 
    private:
-    // Writes one request. When that is too large for a message, `refusal` is delivered instead, with the reason in it.
+    // Writes one request. If it exceeds max_message_bytes_, delivers `rejection` with the reason instead.
     template <class Ack>
-    absl::Status SendRequest(v1::MapRequest request, Ack refusal);
+    absl::Status SendRequest(v1::MapRequest request, Ack rejection);
     absl::Status WaitForWrite();
 
     const int max_message_bytes_;
-    std::mutex send_mutex_;  // held by a sender from start to end
+    std::mutex send_mutex_;  // serializes Send(), SendMasks() and CloseSend()
     v1::MapRequest request_;
     bool send_closed_ = false;
 

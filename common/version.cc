@@ -1,0 +1,7 @@
+#include "common/version.h"
+
+namespace romap {
+
+const char* Version() { return ROMAP_VERSION; }
+
+}  // namespace romap
