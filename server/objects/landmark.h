@@ -22,7 +22,6 @@ struct Landmark {
   LandmarkKey key;
   ObjectId id;  // given when it is confirmed
   ObjectState state = ObjectState::kProvisional;
-  uint64_t revision = 0;
 
   // Sightings.
   uint64_t last_frame = 0;  // counted by the mapper, not the client's frame ids

@@ -22,11 +22,6 @@ std::vector<LandmarkKey> SortedUnique(std::vector<LandmarkKey> keys) {
   return keys;
 }
 
-void Append(ObjectMapper::Output&& from, ObjectMapper::Output* into) {
-  for (MapEvent& event : from.events) into->events.push_back(std::move(event));
-  for (ObjectViews& views : from.views) into->views.push_back(std::move(views));
-}
-
 }  // namespace
 
 Landmark* ObjectMapper::FindLandmark(LandmarkKey key) {
@@ -35,8 +30,8 @@ Landmark* ObjectMapper::FindLandmark(LandmarkKey key) {
   return found == landmarks_.end() ? nullptr : found->get();
 }
 
-ObjectMapper::Output ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
-  Output output;
+ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
+  ObjectOutput output;
   current_ = {};
   if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
   history_.Add(tracked);
@@ -44,25 +39,25 @@ ObjectMapper::Output ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   if (!tracked.frame->has_masks) return output;
   output = ObserveMaskedFrame(tracked);
   if (tracked.is_keyframe) return output;
-  if (const auto stand_in = history_.StandIn(tracked, registry_)) Append(ObserveMaskedKeyframe(*stand_in), &output);
+  if (const auto stand_in = history_.StandIn(tracked, registry_)) output.Append(ObserveMaskedKeyframe(*stand_in));
   return output;
 }
 
-ObjectMapper::Output ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
+ObjectOutput ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
   current_ = {};
   auto masked = history_.TakeLateMasks(masks);
   if (!masked) {
     spdlog::debug("objects: late masks of frame {} are passed over", masks.frame_id);
     return {};
   }
-  Output output = ObserveMaskedFrame(masked->tracked);
+  ObjectOutput output = ObserveMaskedFrame(masked->tracked);
   if (!masked->view) masked->view = history_.StandIn(masked->tracked, registry_);
-  if (masked->view) Append(ObserveMaskedKeyframe(*masked->view), &output);
+  if (masked->view) output.Append(ObserveMaskedKeyframe(*masked->view));
   return output;
 }
 
-ObjectMapper::Output ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
-  Output output;
+ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
+  ObjectOutput output;
   current_.usable = true;
   current_.frame_id = tracked.frame->frame_id;
   ++frame_index_;
@@ -125,7 +120,7 @@ void ObjectMapper::RecordCompany(const Association& association, size_t landmark
   }
 }
 
-void ObjectMapper::UpdateLost(const Association& association, Output* output) {
+void ObjectMapper::UpdateLost(const Association& association, ObjectOutput* output) {
   constexpr double kPlainlyVisible = 0.6;
   std::vector<bool> matched(landmarks_.size(), false);
   for (const Match& match : association.matches) {
@@ -144,19 +139,18 @@ void ObjectMapper::UpdateLost(const Association& association, Output* output) {
   }
 }
 
-void ObjectMapper::BuryGhosts(Output* output) {
+void ObjectMapper::BuryGhosts(ObjectOutput* output) {
   Bury([&](const Landmark& landmark) { return WhyGhost(landmark); }, output);
 }
 
-void ObjectMapper::Bury(const std::function<const char*(const Landmark&)>& why, Output* output) {
+void ObjectMapper::Bury(const std::function<const char*(const Landmark&)>& why, ObjectOutput* output) {
   std::erase_if(landmarks_, [&](const auto& landmark) {
     const char* reason = why(*landmark);
     if (reason == nullptr) return false;
     spdlog::debug("objects: landmark {} goes: {} ({} sightings, {} expected)", landmark->key, reason,
                   landmark->sightings, landmark->expected);
     if (landmark->published) {
-      output->events.emplace_back(
-          ObjectRemoved{.id = landmark->id, .revision = ++landmark->revision, .reason = reason});
+      output->events.emplace_back(ObjectRemoved{.id = landmark->id, .reason = reason});
     }
     return true;
   });
@@ -181,8 +175,8 @@ const char* ObjectMapper::WhyGhost(const Landmark& landmark) const {
   return unseen > (landmark.cuboid ? 10 * patience : patience) ? "it was not seen again" : nullptr;
 }
 
-ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
-  Output output;
+ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
+  ObjectOutput output;
   registry_.UpdatePositions(view);
   if (!view.frame || !view.T_world_camera.IsFinite()) return output;
   history_.AddKeyframe(view);
@@ -192,8 +186,8 @@ ObjectMapper::Output ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
   return ObserveMaskedKeyframe(view);
 }
 
-ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& view) {
-  Output output;
+ObjectOutput ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& view) {
+  ObjectOutput output;
   CountPointVotes(view);
   UpdateSceneDepth(view);
   CollectSilhouettes(view);
@@ -208,8 +202,8 @@ ObjectMapper::Output ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& vie
   return output;
 }
 
-ObjectMapper::Output ObjectMapper::Finish() {
-  Output output;
+ObjectOutput ObjectMapper::Finish() {
+  ObjectOutput output;
   std::vector<LandmarkKey> keys;
   for (const auto& landmark : landmarks_) keys.push_back(landmark->key);
   FitAll();
@@ -220,13 +214,13 @@ ObjectMapper::Output ObjectMapper::Finish() {
         return landmark.state == ObjectState::kProvisional ? "it never got sure" : nullptr;
       },
       &output);
-  Output last;
+  ObjectOutput last;
   PublishAll(keys, &last);
   for (const auto& landmark : landmarks_) {
     // Small corrections that waited for more.
     if (landmark->published && landmark->S_now_told) Publish(*landmark, /*force=*/true, &last);
   }
-  Append(std::move(last), &output);
+  output.Append(std::move(last));
   return output;
 }
 

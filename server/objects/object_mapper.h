@@ -15,6 +15,7 @@
 #include "server/objects/detections.h"
 #include "server/objects/frame_history.h"
 #include "server/objects/landmark.h"
+#include "server/objects/object_output.h"
 #include "server/objects/objects_config.h"
 #include "server/objects/point_registry.h"
 
@@ -28,28 +29,23 @@ namespace romap::objects {
 // or not finite) and masks that do not fit the image are passed over.
 class ObjectMapper {
  public:
-  struct Output {
-    std::vector<MapEvent> events;    // ObjectUpdate, ObjectRemoved, ObjectMerged, in this order of happening
-    std::vector<ObjectViews> views;  // of confirmed objects; the cuboid is what they may fill, at least that told
-  };
-
   explicit ObjectMapper(ObjectsConfig config) : config_(config), history_(config.mask_patience_s) {}
 
   // Every frame, in order.
-  Output ObserveFrame(const TrackedFrame& tracked);
+  ObjectOutput ObserveFrame(const TrackedFrame& tracked);
   // Right after ObserveFrame of the same frame, when it is a keyframe.
-  Output ObserveKeyframe(const KeyframeView& view);
+  ObjectOutput ObserveKeyframe(const KeyframeView& view);
   // Masks of an earlier frame that had none, in the order of their frames; passed over when they are older than
   // ObjectsConfig::mask_patience_s or the camera's pose was not known. Not between ObserveFrame and ObserveKeyframe.
-  Output ObserveLateMasks(const FrameMasks& masks);
+  ObjectOutput ObserveLateMasks(const FrameMasks& masks);
   // The map was corrected, as the stage before this one says of what it handed on so far. Each object goes along with
   // the keyframes that saw it (MeanMotion). What changed noticeably is told: the cuboid in an ObjectUpdate, and to the
   // field, in ObjectViews, the motion of the object's space and the views that moved against the object.
-  Output Correct(const MapCorrection& correction);
+  ObjectOutput Correct(const MapCorrection& correction);
   // The map was begun anew and all poses so far are void: every object goes. Ids are not used again.
-  Output Reset();
+  ObjectOutput Reset();
   // No more frames: the last fits and all views that still wait.
-  Output Finish();
+  ObjectOutput Finish();
 
  private:
   struct CurrentFrame {
@@ -63,17 +59,17 @@ class ObjectMapper {
   using PointGroups = std::map<LandmarkKey, std::vector<PointRegistry::Member>>;
 
   // Per frame.
-  Output ObserveMaskedFrame(const TrackedFrame& tracked);
+  ObjectOutput ObserveMaskedFrame(const TrackedFrame& tracked);
   void RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked);
   void RecordCompany(const Association& association, size_t landmarks_before);
-  void UpdateLost(const Association& association, Output* output);
-  void BuryGhosts(Output* output);
+  void UpdateLost(const Association& association, ObjectOutput* output);
+  void BuryGhosts(ObjectOutput* output);
   // Takes out the landmarks for which `why` gives a reason.
-  void Bury(const std::function<const char*(const Landmark&)>& why, Output* output);
+  void Bury(const std::function<const char*(const Landmark&)>& why, ObjectOutput* output);
   const char* WhyGhost(const Landmark& landmark) const;
 
   // Per keyframe.
-  Output ObserveMaskedKeyframe(const KeyframeView& view);
+  ObjectOutput ObserveMaskedKeyframe(const KeyframeView& view);
   void CountPointVotes(const KeyframeView& view);
   void UpdateSceneDepth(const KeyframeView& view);
   struct KeptSilhouette {
@@ -96,8 +92,8 @@ class ObjectMapper {
   bool IsSteady(const Landmark& landmark) const;
   bool IsProven(const Landmark& landmark) const;
   void ConfirmProven(const std::vector<LandmarkKey>& keys);
-  void MergeDuplicates(Output* output);
-  void Merge(Landmark& from, Landmark& into, Output* output);
+  void MergeDuplicates(ObjectOutput* output);
+  void Merge(Landmark& from, Landmark& into, ObjectOutput* output);
   struct Company {
     uint64_t together = 0;  // frames in which both had a mask
     uint64_t covered = 0;   // frames in which one had none and the other one's mask lay over it
@@ -107,9 +103,9 @@ class ObjectMapper {
   std::optional<bool> PointsAgree(const Landmark& a, const Landmark& b) const;
   std::vector<Eigen::Vector3d> PointsOf(const Landmark& landmark) const;
   bool IsAnnounceable(const Landmark& landmark) const;
-  void Publish(Landmark& landmark, bool force, Output* output);
+  void Publish(Landmark& landmark, bool force, ObjectOutput* output);
   std::vector<ObjectView> TakeViews(Landmark& landmark, const Cuboid& cuboid);
-  void PublishAll(const std::vector<LandmarkKey>& keys, Output* output);
+  void PublishAll(const std::vector<LandmarkKey>& keys, ObjectOutput* output);
 
   // Per correction.
   void CorrectLandmark(Landmark& landmark, const KeyframeCorrections& keyframes);

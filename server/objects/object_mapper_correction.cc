@@ -23,8 +23,8 @@ bool IsUsable(const KeyframeCorrection& keyframe) {
 
 }  // namespace
 
-ObjectMapper::Output ObjectMapper::Correct(const MapCorrection& correction) {
-  Output output;
+ObjectOutput ObjectMapper::Correct(const MapCorrection& correction) {
+  ObjectOutput output;
   registry_.MovePoints(correction.points);
   if (correction.up_world.allFinite() && correction.up_world.norm() > 0.5) up_world_ = correction.up_world.normalized();
   KeyframeCorrections keyframes;

@@ -168,7 +168,7 @@ std::vector<Eigen::Vector3d> ObjectMapper::PointsOf(const Landmark& landmark) co
   return landmark.cuboid ? points_world : landmark.body_world;
 }
 
-void ObjectMapper::MergeDuplicates(Output* output) {
+void ObjectMapper::MergeDuplicates(ObjectOutput* output) {
   for (size_t i = 0; i < landmarks_.size(); ++i) {
     for (size_t j = i + 1; j < landmarks_.size();) {
       if (!AreTheSame(*landmarks_[i], *landmarks_[j])) {
@@ -187,7 +187,7 @@ void ObjectMapper::MergeDuplicates(Output* output) {
   }
 }
 
-void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
+void ObjectMapper::Merge(Landmark& from, Landmark& into, ObjectOutput* output) {
   spdlog::debug("objects: landmark {} merges into landmark {}", from.key, into.key);
   registry_.Merge(from.key, into.key);
   // Pieces of a thing do not show its outline.
@@ -223,14 +223,14 @@ void ObjectMapper::Merge(Landmark& from, Landmark& into, Output* output) {
   if (!is_piece) adopted = into.views.Adopt(std::move(from.views), into.id, into.cuboid->T_world_object.translation());
   if (!from.published) return;
   if (!into.published) Publish(into, /*force=*/true, output);  // clients must know whom they are told of
-  output->events.emplace_back(ObjectMerged{.from = from.id, .into = into.id, .revision = ++into.revision});
+  output->events.emplace_back(ObjectMerged{.from = from.id, .into = into.id});
   Publish(into, /*force=*/true, output);
   if (!adopted.empty()) {
     output->views.push_back({.object = into.id, .cuboid = *into.reach, .new_views = adopted});
   }
 }
 
-void ObjectMapper::PublishAll(const std::vector<LandmarkKey>& keys, Output* output) {
+void ObjectMapper::PublishAll(const std::vector<LandmarkKey>& keys, ObjectOutput* output) {
   for (LandmarkKey key : keys) {
     Landmark* landmark = FindLandmark(key);  // may have been merged away
     if (landmark == nullptr) continue;
@@ -245,7 +245,7 @@ Cuboid ObjectMapper::ToldCuboid(const Landmark& landmark) const {
   return Upright(Moved(S_now_told, landmark.published->cuboid), up_world_);
 }
 
-void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
+void ObjectMapper::Publish(Landmark& landmark, bool force, ObjectOutput* output) {
   if (!landmark.cuboid) return;
   const auto [class_name, class_score] = landmark.BestClass();
   const bool first = !landmark.published;
@@ -270,7 +270,6 @@ void ObjectMapper::Publish(Landmark& landmark, bool force, Output* output) {
   if (!landmark.has_field) views.S_new_old.reset();  // it begins in the corrected world
   if (tell || views.S_new_old) {
     landmark.published = ObjectUpdate{.id = landmark.id,
-                                      .revision = ++landmark.revision,
                                       .state = landmark.state,
                                       .class_name = class_name,
                                       .class_score = class_score,
@@ -300,12 +299,11 @@ std::vector<ObjectView> ObjectMapper::TakeViews(Landmark& landmark, const Cuboid
                               .neighbours = neighbours});
 }
 
-ObjectMapper::Output ObjectMapper::Reset() {
-  Output output;
+ObjectOutput ObjectMapper::Reset() {
+  ObjectOutput output;
   for (const auto& landmark : landmarks_) {
     if (!landmark->published) continue;
-    output.events.emplace_back(
-        ObjectRemoved{.id = landmark->id, .revision = ++landmark->revision, .reason = "the map was begun anew"});
+    output.events.emplace_back(ObjectRemoved{.id = landmark->id, .reason = "map was reset"});
   }
   landmarks_.clear();
   registry_ = {};

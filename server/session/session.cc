@@ -207,7 +207,7 @@ void Session::Correct(const MapCorrection& correction) {
   Publish(object_mapper_.Correct(correction));
 }
 
-void Session::Publish(objects::ObjectMapper::Output output) {
+void Session::Publish(objects::ObjectOutput output) {
   // Before the updates that tell clients of it, and before the fields make meshes in the corrected world.
   for (const ObjectViews& views : output.views) {
     if (views.S_new_old) map_.MoveObject(views.object, *views.S_new_old);

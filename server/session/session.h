@@ -90,7 +90,7 @@ class Session {
   void MapFrame(const slam::TrackedImage& image);
   void MapMasks(const FrameMasks& masks);
   void Correct(const MapCorrection& correction);
-  void Publish(objects::ObjectMapper::Output output);
+  void Publish(objects::ObjectOutput output);
   void TrainToTheEnd();
   void PublishStatistics();
   void Settle();

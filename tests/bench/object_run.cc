@@ -106,13 +106,14 @@ class Runner {
     return reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
   }
 
-  void Record(const objects::ObjectMapper::Output& output) {
+  void Record(const objects::ObjectOutput& output) {
     const auto frame = static_cast<size_t>(run_.frames);
     for (const MapEvent& event : output.events) {
       if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
         const auto [entry, is_new] = run_.objects.try_emplace(update->id);
         if (is_new) entry->second.first_frame = frame;
         entry->second.last = *update;
+        ++entry->second.updates;
       } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
         Forget(merged->from, fmt::format("merged into {}", merged->into.ToString()));
       } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {

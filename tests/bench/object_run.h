@@ -30,6 +30,7 @@ struct ObjectRunOptions {
 // What was told of one object.
 struct ToldObject {
   ObjectUpdate last;
+  size_t updates = 0;         // ObjectUpdates published
   size_t first_frame = 0;     // index in the sequence of the frame it was first told with
   size_t views = 0;           // training views
   size_t cuboid_changes = 0;  // cuboids handed to its field

@@ -68,10 +68,10 @@ void Print(const files::Sequence& sequence, const ObjectRun& run) {
     const Cuboid& cuboid = told.last.cuboid;
     const Eigen::Vector3d half_cm = 100 * cuboid.half_extents;
     std::printf(
-        "%-10s %-13s score %.2f state %d first %3zu seen %3lu revisions %2lu boxes %2zu views %2zu half %.1f %.1f %.1f "
+        "%-10s %-13s score %.2f state %d first %3zu seen %3lu updates %2zu boxes %2zu views %2zu half %.1f %.1f %.1f "
         "cm",
         id.ToString().c_str(), told.last.class_name.c_str(), told.last.class_score, static_cast<int>(told.last.state),
-        told.first_frame, told.last.observations, told.last.revision, told.cuboid_changes, told.views, half_cm.x(),
+        told.first_frame, told.last.observations, told.updates, told.cuboid_changes, told.views, half_cm.x(),
         half_cm.y(), half_cm.z());
     if (const files::ObjectRecord* truth = NearestTrue(sequence, cuboid)) {
       const Cuboid true_cuboid{.T_world_object = truth->T_world_object, .half_extents = truth->half_extents};

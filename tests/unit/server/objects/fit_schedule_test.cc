@@ -72,7 +72,7 @@ Boxes Map(const SyntheticWorld& world, int fits_per_keyframe) {
   config.fits_per_keyframe = fits_per_keyframe;
   ObjectMapper mapper(config);
   Boxes boxes;
-  const auto take = [&](const ObjectMapper::Output& output) {
+  const auto take = [&](const ObjectOutput& output) {
     for (const MapEvent& event : output.events) {
       const auto* update = std::get_if<ObjectUpdate>(&event);
       if (update == nullptr) continue;

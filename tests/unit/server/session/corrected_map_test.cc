@@ -58,7 +58,7 @@ class Stages {
     mesher_.Unregister(mesher_client_);
   }
 
-  void Publish(objects::ObjectMapper::Output output) {
+  void Publish(objects::ObjectOutput output) {
     for (const ObjectViews& views : output.views) {
       if (views.S_new_old) map.MoveObject(views.object, *views.S_new_old);
     }

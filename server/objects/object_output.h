@@ -1,0 +1,24 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "common/messages.h"
+
+namespace romap::objects {
+
+// What one call of the object mapper publishes.
+struct ObjectOutput {
+  // ObjectUpdate, ObjectRemoved and ObjectMerged, in the order in which they happened. Their revisions are 0: the
+  // session's map counts revisions, because meshes get theirs from the same counter.
+  std::vector<MapEvent> events;
+  // For the fields of confirmed objects. The cuboid is the box a field learns in: at least the published one.
+  std::vector<ObjectViews> views;
+
+  void Append(ObjectOutput&& later) {
+    for (MapEvent& event : later.events) events.push_back(std::move(event));
+    for (ObjectViews& object : later.views) views.push_back(std::move(object));
+  }
+};
+
+}  // namespace romap::objects
