@@ -13,15 +13,14 @@ namespace {
 // A plain MLP on a frequency encoding, and rays through the whole box: what iMAP (Sucar et al., ICCV 2021) and vMAP
 // (Kong et al., CVPR 2023) train per scene or object, with Adam's rate of theirs.
 std::vector<std::string> FrequencyMlp(int hidden_width) {
-  return {"nerf.encoding=frequency",  "nerf.levels=10",
-          "nerf.hidden_layers=4",     fmt::format("nerf.hidden_width={}", hidden_width),
-          "nerf.learning_rate=0.001", "nerf.final_learning_rate=0.0002",
-          "nerf.adam_beta1=0.9",      "nerf.adam_beta2=0.999",
-          "nerf.carve_hull=false",    "nerf.hull_trim_share=0",
-          "nerf.sampling=uniform",    "nerf.max_samples_per_ray=32",
-          "nerf.density_weight=0",    "nerf.contrast_weight=0",
-          "nerf.border_weight=1",     "nerf.full_budget_steps=10000",
-          "nerf.max_extra_steps=0"};
+  return {"nerf.encoding=frequency",      "nerf.levels=10",
+          "nerf.hidden_layers=4",         fmt::format("nerf.hidden_width={}", hidden_width),
+          "nerf.learning_rate=0.001",     "nerf.final_learning_rate=0.0002",
+          "nerf.adam_beta1=0.9",          "nerf.adam_beta2=0.999",
+          "nerf.carve_hull=false",        "nerf.hull_trim_share=0",
+          "nerf.sampling=uniform",        "nerf.max_samples_per_ray=32",
+          "nerf.density_weight=0",        "nerf.contrast_weight=0",
+          "nerf.full_budget_steps=10000", "nerf.max_extra_steps=0"};
 }
 
 // The paper's fields and its surface, which has 64^3 nodes whatever the object's size; then `more`.

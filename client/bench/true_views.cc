@@ -41,7 +41,7 @@ absl::Status CheckLabels(const files::Sequence& sequence, const FrameInput& inpu
 
 absl::StatusOr<TrueFrames> LoadTrueFrames(const files::Sequence& sequence, int every, int offset) {
   if (!sequence.objects()) return NotFound("{}: objects.yaml with the true cuboids is missing", sequence.dir());
-  session::Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
+  session::Ingest ingest(sequence.camera(), /*max_mask_delay_s=*/0);
   TrueFrames frames;
   for (size_t i = static_cast<size_t>(offset); i < sequence.size(); i += static_cast<size_t>(every)) {
     if (!sequence.has_mask(i)) continue;

@@ -131,7 +131,7 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command
       ->add_option("--mask-delay", options->stream.mask_delay_s,
                    "Send each frame without masks at once, and its masks so much later by the frames' timestamps [s]; "
-                   "the server takes them up to objects.mask_patience_s")
+                   "the server takes them up to objects.max_mask_delay_s")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--depth", options->sequence.use_depth, "Send the depth images too");

@@ -23,6 +23,8 @@
 namespace romap::mesh {
 namespace {
 
+constexpr float kUnseenOpticalDepth = 0.2f;  // towards a view, beyond which the view sees nothing
+
 absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   const std::string object = snapshot.object.ToString();
   if (!snapshot.field) return InvalidArgument("{}: the snapshot has no field", object);
@@ -67,7 +69,7 @@ class PhaseClock {
 SightLimits SightOf(const FieldSnapshot& snapshot, const MeshConfig& config) {
   SightLimits limits{.view_centers = {},
                      .surface_density_per_mu = snapshot.optics.surface_density_per_mu,
-                     .max_optical_depth = static_cast<float>(config.unseen_optical_depth)};
+                     .max_optical_depth = kUnseenOpticalDepth};
   for (const TrainingCamera& view : snapshot.cameras) {
     limits.view_centers.push_back(view.T_camera_object.Inverse().translation().cast<float>());
   }

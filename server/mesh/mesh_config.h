@@ -12,7 +12,6 @@ struct MeshConfig {
   int min_side_nodes = 48;
   double min_confirmed_share = 0.25;
   bool fill_unseen = true;
-  double unseen_optical_depth = 0.2;
   bool cut_below_support = true;
   double min_component_share = 0.35;
   bool trim_unseen = false;
@@ -32,8 +31,6 @@ struct MeshConfig {
                {.min = 0, .max = 1, .help = "Where a smaller share of the views shows the object there is nothing"});
     fields.Add("fill_unseen", &fill_unseen,
                {.help = "Empty space that no training view can see becomes solid (undersides, insides)"});
-    fields.Add("unseen_optical_depth", &unseen_optical_depth,
-               {.min = 0.01, .max = 100, .help = "Optical depth towards a view beyond which it sees nothing"});
     fields.Add("cut_below_support", &cut_below_support,
                {.help = "The object ends at the lowest height where a training view sees its surface"});
     fields.Add("min_component_share", &min_component_share,

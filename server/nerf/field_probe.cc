@@ -22,38 +22,22 @@ double ProbeReport::Loss(std::span<const float> view_weights) const {
   return weight > 0 ? sum / weight : 0;
 }
 
-std::vector<float> ProbeReport::NeedOfTiles(double share) const {
-  constexpr double kMostNeed = 4;
-  double sum = 0;
-  int count = 0;
-  for (float residual : tiles) {
-    sum += residual;
-    count += residual > 0 ? 1 : 0;
-  }
-  const double mean = sum / std::max(1, count);
-  std::vector<float> need(tiles.size(), 1.0f);
-  for (size_t i = 0; i < tiles.size() && mean > 0; ++i) {
-    need[i] = static_cast<float>(1 - share + share * std::min(kMostNeed, tiles[i] / mean));
-  }
-  return need;
-}
-
 void FieldProbe::Build(const RaySet& rays, size_t views) {
   views_ = views;
   rays_.clear();
   places_.clear();
-  const auto add = [&](const std::vector<const TrainingPixel*>& pixels, size_t view, int tile) {
+  const auto add = [&](const std::vector<const TrainingPixel*>& pixels, size_t view, bool is_object) {
     for (const TrainingPixel* pixel : pixels) {
-      rays_.push_back(rays.Through(*pixel, tile >= 0, 0.5f));
-      places_.push_back({static_cast<uint32_t>(view), tile});
+      rays_.push_back(rays.Through(*pixel, is_object, 0.5f));
+      places_.push_back({static_cast<uint32_t>(view), is_object});
     }
   };
   for (size_t view = 0; view < views; ++view) {
     for (int tile = 0; tile < PixelSampler::kTiles; ++tile) {
       const size_t most = tile == PixelSampler::kBorderTile ? kBorderProbes : kProbesPerTile;
-      add(rays.sampler().OfTile(view, tile, most), view, tile);
+      add(rays.sampler().OfTile(view, tile, most), view, /*is_object=*/true);
     }
-    add(rays.sampler().OfBackground(view, kBackgroundProbes), view, -1);
+    add(rays.sampler().OfBackground(view, kBackgroundProbes), view, /*is_object=*/false);
   }
 }
 
@@ -71,29 +55,25 @@ double FieldProbe::ShareMeeting(const std::array<float, 3>& extent) const {
 ProbeReport FieldProbe::Look(const nerf::FieldModel& model, const NerfConfig& config,
                              const nerf::RenderSpace& space) const {
   const std::vector<nerf::RayResult> results = nerf::RenderRays(model, config, space, rays_);
-  ProbeReport report{std::vector<ViewResidual>(views_), std::vector<float>(views_ * PixelSampler::kTiles)};
-  std::vector<int> object(views_), background(views_), in_tile(report.tiles.size());
+  ProbeReport report{std::vector<ViewResidual>(views_)};
+  std::vector<int> object(views_), background(views_);
   for (size_t i = 0; i < results.size(); ++i) {
     const Place& place = places_[i];
     ViewResidual& view = report.views[place.view];
-    if (place.tile < 0) {
+    if (!place.is_object) {
       view.spilled += results[i].opacity;
       ++background[place.view];
       continue;
     }
-    const size_t tile = place.view * PixelSampler::kTiles + static_cast<size_t>(place.tile);
     view.color += results[i].color_loss;
     view.missing += 1 - results[i].opacity;
-    report.tiles[tile] += results[i].color_loss + 1 - results[i].opacity;
     ++object[place.view];
-    ++in_tile[tile];
   }
   for (size_t v = 0; v < views_; ++v) {
     report.views[v].color /= static_cast<float>(std::max(1, object[v]));
     report.views[v].missing /= static_cast<float>(std::max(1, object[v]));
     report.views[v].spilled /= static_cast<float>(std::max(1, background[v]));
   }
-  for (size_t t = 0; t < report.tiles.size(); ++t) report.tiles[t] /= static_cast<float>(std::max(1, in_tile[t]));
   return report;
 }
 

@@ -23,12 +23,7 @@ struct ProbeReport {
   // Mean over the views of all residuals, weighted.
   double Loss(std::span<const float> view_weights) const;
 
-  // Weights for tiles, [views][PixelSampler::kTiles], with a mean near 1: `share` of them in proportion to the
-  // residual, at most four times as large as its mean, the rest evenly.
-  std::vector<float> NeedOfTiles(double share) const;
-
   std::vector<ViewResidual> views;
-  std::vector<float> tiles;  // [views][PixelSampler::kTiles]: squared colour error plus missing opacity; 0 = no pixel
 };
 
 // Looks at a field through the same few pixels of every view again and again. What it sees changes only because the
@@ -44,7 +39,7 @@ class FieldProbe {
  private:
   struct Place {
     uint32_t view;
-    int tile;  // < 0: background
+    bool is_object;
   };
 
   size_t views_ = 0;

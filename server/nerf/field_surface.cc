@@ -5,6 +5,7 @@
 namespace romap::nerf {
 namespace {
 
+constexpr double kConnectMargin = 2;       // raw density: parts joined above surface_level - this are one piece
 constexpr double kConnectDistance = 0.01;  // box sides: parts of a signed-distance field as near as twice this are one
 
 }  // namespace
@@ -23,7 +24,7 @@ void DescribeSurface(const NerfConfig& config, const nerf::FieldModel& model, co
   snapshot.surface_level = static_cast<float>(config.surface_level);
   // Training measures density per unit of the box's Unit space.
   snapshot.optics.surface_density_per_mu = static_cast<float>(std::exp(config.surface_level) / box.unit_mu);
-  snapshot.connect_level = static_cast<float>(config.surface_level - config.connect_margin);
+  snapshot.connect_level = static_cast<float>(config.surface_level - kConnectMargin);
 }
 
 }  // namespace romap::nerf

@@ -29,8 +29,6 @@ void FieldFields(NerfConfig& c, ConfigFields& fields) {
              {.min = -10, .max = 10, .help = "Added to the raw density: how full space is before it is learned"});
   fields.Add("surface_level", &c.surface_level,
              {.min = -10, .max = 10, .help = "Raw density (with bias) at the surface; density = e^raw per box side"});
-  fields.Add("connect_margin", &c.connect_margin,
-             {.min = 0, .max = 20, .help = "Parts joined through raw >= surface_level - this are one piece"});
 }
 
 void SpaceFields(NerfConfig& c, ConfigFields& fields) {
@@ -62,24 +60,15 @@ void RayFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("rays_per_step", &c.rays_per_step,
              {.unit = "rays", .min = 64, .max = 65536, .help = "Rays of one optimisation step (paper 4096)"});
   fields.Add("background_share", &c.background_share, {.min = 0, .max = 0.9, .help = "Share of background rays"});
-  fields.Add("background_band_px", &c.background_band_px,
-             {.unit = "px", .min = 1, .max = 100, .help = "Background rays lie within this distance of the mask"});
   fields.Add("sparse_depth_share", &c.sparse_depth_share,
              {.min = 0, .max = 0.5, .help = "Most rays of a step spent on pixels with a map point"});
-  fields.Add(
-      "border_weight", &c.border_weight,
-      {.min = 0, .max = 10, .help = "How often object pixels at the mask's border are chosen; 1 = as the others"});
-  fields.Add("residual_share", &c.residual_share,
-             {.min = 0, .max = 1, .help = "Share of the object rays that go where the residual is high"});
-  fields.Add("new_view_weight", &c.new_view_weight,
-             {.min = 0.1, .max = 10, .help = "How often a new view's pixels are chosen; 1 = as the others"});
   fields.Add("sampling", &c.sampling,
              {.choices = {"occupied", "uniform"},
               .help = "Samples in occupied cells, or evenly between entry and exit of the box as in the paper"});
   fields.Add("max_samples_per_ray", &c.max_samples_per_ray,
              {.min = 1, .max = 64, .help = "Samples per ray (paper 32)"});
   fields.Add("min_samples_per_ray", &c.min_samples_per_ray, {.min = 1, .max = 64, .help = "Fewest samples per ray"});
-  fields.Add("finest_sample_step", &c.finest_sample_step,
+  fields.Add("min_sample_spacing", &c.min_sample_spacing,
              {.unit = "box sides", .min = 1e-4, .max = 1, .help = "Samples are not set closer, down to the fewest"});
   fields.Add("max_views", &c.max_views,
              {.unit = "views", .min = 3, .max = 1000, .help = "Views kept per object; then the most redundant goes"});
@@ -95,22 +84,14 @@ void LossFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add(
       "contrast_weight", &c.contrast_weight,
       {.min = 0, .max = 100, .help = "Weight of errors in the difference of two near pixels' colours; 0 = no pairs"});
-  fields.Add(
-      "contrast_distance", &c.contrast_distance,
-      {.unit = "mask sizes",
-       .min = 0.001,
-       .max = 0.5,
-       .help = "How far the pixels of a pair are apart, give or take half; a mask's size is the root of its area"});
   fields.Add("depth_weight", &c.depth_weight,
              {.min = 0, .max = 100, .help = "Weight of the depth error, box sides, on rays with depth (paper .5)"});
-  fields.Add("depth_limit", &c.depth_limit,
-             {.unit = "box sides", .min = 0, .max = 10, .help = "Depth errors beyond this are taken for outliers"});
   fields.Add("random_background", &c.random_background,
              {.help = "Blend every ray over a random colour (the paper's L_rr)"});
   fields.Add(
-      "first_sharpness", &c.first_sharpness,
+      "initial_sharpness", &c.initial_sharpness,
       {.unit = "per box side", .min = 1, .max = 1000, .help = "Of surfaces at the first step, signed distances"});
-  fields.Add("last_sharpness", &c.last_sharpness,
+  fields.Add("final_sharpness", &c.final_sharpness,
              {.unit = "per box side", .min = 10, .max = 100000, .help = "Of surfaces at the last step"});
   fields.Add("eikonal_weight", &c.eikonal_weight,
              {.min = 0, .max = 10, .help = "Weight of (|gradient| - 1)^2 of signed distances"});
@@ -124,7 +105,7 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.min = 1e-7, .max = 1, .help = "Adam's rate when the planned steps are done"});
   fields.Add("adam_beta1", &c.adam_beta1, {.min = 0, .max = 0.9999, .help = "Adam's decay of the mean"});
   fields.Add("adam_beta2", &c.adam_beta2, {.min = 0, .max = 0.9999, .help = "Adam's decay of the square"});
-  fields.Add("gradient_cut", &c.gradient_cut,
+  fields.Add("min_sample_gradient", &c.min_sample_gradient,
              {.min = 0, .max = 1, .help = "Samples with a smaller gradient are left out of the backward pass"});
   fields.Add(
       "backend", &c.backend,
@@ -151,17 +132,17 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("probe_interval_steps", &c.probe_interval_steps,
              {.unit = "steps", .min = 10, .max = 10000, .help = "Steps between looks at how well each view is met"});
   fields.Add(
-      "least_loss_fall", &c.least_loss_fall,
+      "min_loss_decrease", &c.min_loss_decrease,
       {.min = 0, .max = 1, .help = "Beyond the plan training goes on while 100 steps lower the loss by this share"});
   fields.Add(
       "max_extra_steps", &c.max_extra_steps,
       {.unit = "steps", .min = 0, .max = 100000, .help = "Most such steps since the last view or box; 0 = none"});
   fields.Add(
-      "most_time_s", &c.most_time_s,
+      "max_training_time_s", &c.max_training_time_s,
       {.unit = "s", .min = 0, .max = 86400, .help = "Longest training of an object, CPU time of all its workers"});
-  fields.Add("most_time_per_view_s", &c.most_time_per_view_s,
+  fields.Add("max_training_time_per_view_s", &c.max_training_time_per_view_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "and so much more for each of its views"});
-  fields.Add("settle_time_s", &c.settle_time_s,
+  fields.Add("completion_delay_s", &c.completion_delay_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Without a new view for this long, training is completed"});
   fields.Add("pose_prior_px", &c.pose_prior_px,
              {.unit = "px",

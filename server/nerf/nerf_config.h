@@ -38,15 +38,11 @@ struct NerfConfig {
   // Rays and samples.
   int rays_per_step = 1024;
   double background_share = 0.3;
-  int background_band_px = 6;
   double sparse_depth_share = 0.1;
-  double border_weight = 1.0;
-  double residual_share = 0.0;
-  double new_view_weight = 1.0;
   std::string sampling = "occupied";
   int max_samples_per_ray = 16;
   int min_samples_per_ray = 4;
-  double finest_sample_step = 0.01;
+  double min_sample_spacing = 0.01;
   int max_views = 80;
 
   // Loss.
@@ -54,12 +50,10 @@ struct NerfConfig {
   double opacity_weight_background = 0.5;
   double density_weight = 0.01;
   double contrast_weight = 1.0;
-  double contrast_distance = 0.1;
   double depth_weight = 0.5;
-  double depth_limit = 0.2;
   bool random_background = false;
-  double first_sharpness = 20;
-  double last_sharpness = 1000;
+  double initial_sharpness = 20;
+  double final_sharpness = 1000;
   double eikonal_weight = 0.01;
   double curvature_weight = 0.001;
 
@@ -68,7 +62,7 @@ struct NerfConfig {
   double final_learning_rate = 0.002;
   double adam_beta1 = 0.8;
   double adam_beta2 = 0.95;
-  double gradient_cut = 1e-5;
+  double min_sample_gradient = 1e-5;
 
   // Where training runs.
   std::string backend = "auto";
@@ -83,16 +77,15 @@ struct NerfConfig {
   int slice_steps = 20;
   int snapshot_interval_steps = 40;
   double snapshot_interval_s = 1.0;
-  double settle_time_s = 1.0;
+  double completion_delay_s = 1.0;
   int probe_interval_steps = 25;
-  double least_loss_fall = 0.1;
+  double min_loss_decrease = 0.1;
   int max_extra_steps = 100;
-  double most_time_s = 8.0;
-  double most_time_per_view_s = 0.3;
+  double max_training_time_s = 8.0;
+  double max_training_time_per_view_s = 0.3;
   double pose_prior_px = 8.0;
 
   double surface_level = 3.0;
-  double connect_margin = 2.0;
 
   void Fields(ConfigFields& fields);
 };

@@ -211,7 +211,7 @@ void ObjectField::PrepareViews() {
   JudgeDepths();
   rays_.Build(views_, box_, depths_fit_);
   probe_.Build(rays_, views_.size());
-  WeighRays(nullptr);
+  rays_.Weigh(trust_.Weights());
   black_views_ = static_cast<int>(std::ranges::count_if(views_, IsBlack));
   share_in_box_ = probe_.ShareMeeting(Space().extent);
   occupancy_.SetHull(hull_.Carve());

@@ -89,7 +89,6 @@ class ObjectField {
   void JudgeDepths();
   void Look();
   void RefinePoses();
-  void WeighRays(const ProbeReport* report);
   void RebuildHull();
   void VoteOnHull(size_t view);
   void WithdrawVote(size_t view);
@@ -117,7 +116,6 @@ class ObjectField {
   PoseRefiner refiner_;
   std::vector<SE3<World, Camera>> voted_;  // where the views were when they voted on the hull
   GainMeter gain_;
-  std::vector<float> need_;             // [views][PixelSampler::kTiles]
   std::string box_fault_, view_fault_;  // of the last box or view that was refused
   int refused_views_ = 0;
   bool motion_refused_ = false;

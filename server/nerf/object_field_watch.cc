@@ -51,21 +51,6 @@ void ObjectField::JudgeDepths() {
   RebuildHull();
 }
 
-// Rays go where they are needed: to views that are new, to borders, and to tiles that are met worse than the others,
-// but some to all that can be trusted.
-void ObjectField::WeighRays(const ProbeReport* report) {
-  std::vector<float> views = trust_.Weights();
-  for (size_t i = 0; i < views.size(); ++i) {
-    if (trust_.IsYoung(i, steps())) views[i] *= static_cast<float>(config_.new_view_weight);
-  }
-  std::vector<float> tiles(views.size() * PixelSampler::kTiles, 1.0f);
-  if (report != nullptr && config_.residual_share > 0) tiles = report->NeedOfTiles(config_.residual_share);
-  for (size_t i = PixelSampler::kBorderTile; i < tiles.size(); i += PixelSampler::kTiles) {
-    tiles[i] *= static_cast<float>(config_.border_weight);
-  }
-  rays_.Weigh(views, tiles);
-}
-
 void ObjectField::RefinePoses() {
   if (!refiner_.IsDue(views_.size(), steps())) return;
   refiner_.Refine(views_, trust_.Weights(), box_, rays_, trainer_->model(), Space(), steps());
@@ -90,7 +75,7 @@ void ObjectField::Look() {
     gain_.Restart();
   }
   gain_.Record(steps(), report.Loss(trust_.Weights()));
-  WeighRays(&report);
+  rays_.Weigh(trust_.Weights());
   plan_.OnFulfilled(steps(), gain_.FallPer100Steps());
 }
 

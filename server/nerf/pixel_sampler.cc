@@ -11,7 +11,10 @@ namespace {
 
 // A full training reads about 100 000 object pixels besides partners; more than this are thinned out evenly.
 constexpr double kMostObjectPixels = 1 << 17;
-constexpr int kBorder_px = 2;  // object pixels so near to another kind lie at the border
+constexpr double kPairDistance =
+    0.1;  // between the pixels of a pair, give or take half; of the root of the mask's area
+constexpr int kBackgroundBand_px = 6;  // around the mask: background rays come from it
+constexpr int kBorder_px = 2;          // object pixels so near to another kind lie at the border
 
 cv::Mat KindMask(const ObjectView& view, RayKind kind) { return view.ray_kind == static_cast<int>(kind); }
 
@@ -57,17 +60,17 @@ void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
   sparse_.SetRays(sparse / rays_per_slot_ * rays_per_slot_, seed_);
   const int left = rays - background_.rays() - sparse_.rays();
   object_.SetRays((left + rays_per_slot_ - 1) / rays_per_slot_, seed_);
-  Weigh(std::vector<float>(views.size(), 1.0f), std::vector<float>(views.size() * kTiles, 1.0f));
+  Weigh(std::vector<float>(views.size(), 1.0f));
 }
 
 void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth) {
   const cv::Mat is_object = KindMask(view, RayKind::kObject);
   const cv::Rect bounds = cv::boundingRect(is_object);
   cv::Mat near_object, inside;
-  cv::dilate(is_object, near_object, Square(config_.background_band_px));
+  cv::dilate(is_object, near_object, Square(kBackgroundBand_px));
   cv::erode(is_object, inside, Square(kBorder_px), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   std::array<std::vector<TrainingPixel>, kTiles> tiles;
-  const double apart_px = std::clamp(config_.contrast_distance * std::sqrt(cv::countNonZero(is_object)), 1.5, 80.0);
+  const double apart_px = std::clamp(kPairDistance * std::sqrt(cv::countNonZero(is_object)), 1.5, 80.0);
   for (int y = 0; y < view.roi_px.height; ++y) {
     for (int x = 0; x < view.roi_px.width; ++x) {
       const bool object = is_object.at<uint8_t>(y, x) != 0;
@@ -126,10 +129,10 @@ void PixelSampler::CollectMapPoints(const ObjectView& view, uint16_t view_index)
   sparse_.CloseGroup();
 }
 
-void PixelSampler::Weigh(std::span<const float> views, std::span<const float> tiles) {
-  std::vector<float> both(tiles.begin(), tiles.end());
-  for (size_t i = 0; i < both.size(); ++i) both[i] *= views[i / kTiles];
-  object_.Divide(both);
+void PixelSampler::Weigh(std::span<const float> views) {
+  std::vector<float> tiles(views.size() * kTiles);
+  for (size_t i = 0; i < tiles.size(); ++i) tiles[i] = views[i / kTiles];
+  object_.Divide(tiles);
   background_.Divide(views);
   sparse_.Divide(views);
 }

@@ -58,9 +58,9 @@ class PixelSampler {
   // Replaces all pixels; everything weighs 1. `use_depth`: object pixels get the dense depth. Keeps no reference to the
   // views.
   void Build(std::span<const ObjectView> views, bool use_depth = true);
-  // Weights >= 0, how often pixels are chosen, relative to the others: `views`, one per view, of all its pixels, and
-  // `tiles`, [views][kTiles], of its object pixels besides. Where all weights are 0 they are taken for 1.
-  void Weigh(std::span<const float> views, std::span<const float> tiles);
+  // Sets how often the pixels of each view are chosen relative to those of the others: one weight >= 0 per view. If all
+  // weights are 0, all views weigh 1.
+  void Weigh(std::span<const float> views);
   // There is no object pixel.
   bool empty() const { return object_.pixels.empty(); }
 

@@ -26,7 +26,6 @@ NerfConfig PaperPreset() {
   c.depth_weight = 0.5;
   c.contrast_weight = 0;
   c.random_background = true;
-  c.border_weight = 1;
 
   c.learning_rate = 0.01;
   c.final_learning_rate = 0.001;

@@ -25,7 +25,7 @@ class RaySet {
   bool empty() const { return sampler_.empty(); }
 
   // See PixelSampler.
-  void Weigh(std::span<const float> views, std::span<const float> tiles) { sampler_.Weigh(views, tiles); }
+  void Weigh(std::span<const float> views) { sampler_.Weigh(views); }
   const PixelSampler& sampler() const { return sampler_; }
 
   // Ray `index` (0 .. rays_per_step - 1) of `step`, in Unit space. Thread-safe.

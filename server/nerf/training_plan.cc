@@ -17,7 +17,7 @@ void TrainingPlan::Restart() {
 
 void TrainingPlan::OnFulfilled(uint64_t steps_done, std::optional<double> loss_fall) {
   constexpr uint64_t kPortion_steps = 50;
-  if (steps_done < planned_steps_ || loss_fall.value_or(0) < config_.least_loss_fall) return;
+  if (steps_done < planned_steps_ || loss_fall.value_or(0) < config_.min_loss_decrease) return;
   const uint64_t most = static_cast<uint64_t>(config_.max_extra_steps);
   const uint64_t portion = std::min(kPortion_steps, most - std::min(most, extra_steps_));
   planned_steps_ += portion;

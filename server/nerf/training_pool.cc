@@ -169,7 +169,7 @@ bool TrainingPool::Complete(const Client& client, const Job& job, Clock::time_po
   if (client.finished) return true;
   if (threads_ == 0) return false;  // time does not count
   const std::chrono::duration<double> quiet = now - job.last_view_time;
-  return quiet.count() >= config_.settle_time_s && job.views >= config_.min_views;
+  return quiet.count() >= config_.completion_delay_s && job.views >= config_.min_views;
 }
 
 bool TrainingPool::Runnable(const Client& client, const Job& job, Clock::time_point now) const {
@@ -179,7 +179,8 @@ bool TrainingPool::Runnable(const Client& client, const Job& job, Clock::time_po
 // When the next object will count as complete just because time passed.
 std::optional<TrainingPool::Clock::time_point> TrainingPool::NextSettleTime() const {
   std::optional<Clock::time_point> next;
-  const auto settle = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(config_.settle_time_s));
+  const auto settle =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(config_.completion_delay_s));
   for (const auto& [id, client] : clients_) {
     for (const auto& [object, job] : client->jobs) {
       if (job->leased || client->closing || job->views < config_.min_views || job->StepsLeft(true) == 0) continue;
@@ -313,7 +314,7 @@ void TrainingPool::RunSlice(Lease& lease) {
 bool TrainingPool::HasTimeLeft(const Job& job) const {
   if (threads_ == 0) return true;
   const int views = job.field ? job.field->views() : 0;
-  return job.busy_s < config_.most_time_s + config_.most_time_per_view_s * views;
+  return job.busy_s < config_.max_training_time_s + config_.max_training_time_per_view_s * views;
 }
 
 void TrainingPool::TakeNews(Job& job, const ObjectField& field) const {

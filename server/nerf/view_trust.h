@@ -21,8 +21,6 @@ class ViewTrust {
   // The field forgot all; so do the verdicts.
   void Restart();
 
-  // Was trained on for too short a time to be judged.
-  bool IsYoung(size_t index, uint64_t step) const;
   bool trusted(size_t index) const { return views_[index].trusted; }
   size_t distrusted() const;
   // One per view: 1 trusted, 0 not.
@@ -33,6 +31,8 @@ class ViewTrust {
     uint64_t since_step = 0;
     bool trusted = true;
   };
+  // Was trained on for too short a time to be judged.
+  bool IsYoung(size_t index, uint64_t step) const;
   std::vector<State> views_;
 };
 

@@ -12,6 +12,7 @@ namespace romap::objects {
 namespace {
 
 constexpr uint64_t kRecentFrames = 15;
+constexpr double kMinMatchScore = 0.3;  // between a detection and a landmark
 constexpr size_t kFewestBodyPoints = 4;
 
 double BoxIou(const cv::Rect& a, const cv::Rect& b) {
@@ -345,7 +346,7 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
     association.visible_share.push_back(sight.share_in_image * (1 - sight.share_hidden));
   }
   const bool greedy = config.association == "greedy_iou";
-  association.matches = greedy ? MatchGreedily(scene) : MatchGlobally(scene, config.match_min_score);
+  association.matches = greedy ? MatchGreedily(scene) : MatchGlobally(scene, kMinMatchScore);
   std::vector<bool> matched(landmarks.size(), false);
   for (const Match& match : association.matches) {
     if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;

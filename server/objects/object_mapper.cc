@@ -170,8 +170,9 @@ const char* ObjectMapper::WhyGhost(const Landmark& landmark) const {
   }
   // What was seen often and then left the view may come back; what was seen twice will not.
   const uint64_t unseen = frame_index_ - landmark.last_frame;
-  const auto patience = static_cast<uint64_t>(config_.provisional_patience_frames);
-  if (landmark.missed_in_view >= config_.provisional_patience_frames) return "it is not where it was seen";
+  constexpr int kPatienceFrames = 40;
+  constexpr uint64_t patience = kPatienceFrames;
+  if (landmark.missed_in_view >= kPatienceFrames) return "it is not where it was seen";
   return unseen > (landmark.cuboid ? 10 * patience : patience) ? "it was not seen again" : nullptr;
 }
 

@@ -29,14 +29,14 @@ namespace romap::objects {
 // or not finite) and masks that do not fit the image are passed over.
 class ObjectMapper {
  public:
-  explicit ObjectMapper(ObjectsConfig config) : config_(config), history_(config.mask_patience_s) {}
+  explicit ObjectMapper(ObjectsConfig config) : config_(config), history_(config.max_mask_delay_s) {}
 
   // Every frame, in order.
   ObjectOutput ObserveFrame(const TrackedFrame& tracked);
   // Right after ObserveFrame of the same frame, when it is a keyframe.
   ObjectOutput ObserveKeyframe(const KeyframeView& view);
   // Masks of an earlier frame that had none, in the order of their frames; passed over when they are older than
-  // ObjectsConfig::mask_patience_s or the camera's pose was not known. Not between ObserveFrame and ObserveKeyframe.
+  // ObjectsConfig::max_mask_delay_s or the camera's pose was not known. Not between ObserveFrame and ObserveKeyframe.
   ObjectOutput ObserveLateMasks(const FrameMasks& masks);
   // The map was corrected, as the stage before this one says of what it handed on so far. Each object goes along with
   // the keyframes that saw it (MeanMotion). What changed noticeably is told: the cuboid in an ObjectUpdate, and to the

@@ -27,12 +27,14 @@ double ShareInside(const Cuboid& cuboid, const std::vector<Eigen::Vector3d>& poi
 }
 
 // Largest move of a face in terms of the size, and whether the yaw turned notably.
-bool DiffersNotably(const Cuboid& a, const Cuboid& b, const ObjectsConfig& config) {
+bool DiffersNotably(const Cuboid& a, const Cuboid& b) {
   const double size = 2 * a.half_extents.maxCoeff();
   const double shift = (a.T_world_object.translation() - b.T_world_object.translation()).norm();
   const double growth = 2 * (a.half_extents - b.half_extents).cwiseAbs().maxCoeff();
   const double turn_rad = a.T_world_object.rotation().angularDistance(b.T_world_object.rotation());
-  return std::max(shift, growth) > config.update_change_share * size || turn_rad > config.update_yaw_deg * kRadPerDeg;
+  constexpr double kChangeShare = 0.02;
+  constexpr double kTurnRad = 2 * kRadPerDeg;
+  return std::max(shift, growth) > kChangeShare * size || turn_rad > kTurnRad;
 }
 
 // Whether what was told of a cuboid is noticeably wrong since the map was corrected. `S_now_told` also turns meshes in
@@ -63,9 +65,9 @@ bool ObjectMapper::IsSteady(const Landmark& landmark) const {
   const auto sightings = static_cast<double>(landmark.sightings);
   if (sightings < config_.confirm_seen_share * static_cast<double>(landmark.expected)) return false;
   constexpr uint64_t kEnoughToJudge = 3;
-  const bool agrees =
-      landmark.agreement_count < kEnoughToJudge ||
-      landmark.agreement_sum >= config_.confirm_agreement * static_cast<double>(landmark.agreement_count);
+  constexpr double kMinAgreement = 0.5;  // mean agreement of the masks with the shape
+  const bool agrees = landmark.agreement_count < kEnoughToJudge ||
+                      landmark.agreement_sum >= kMinAgreement * static_cast<double>(landmark.agreement_count);
   // A piece of another thing is mostly a part of that one's mask.
   const bool stands_alone = std::all_of(landmark.covered_by.begin(), landmark.covered_by.end(),
                                         [&](const auto& cover) { return cover.second <= landmark.sightings; });
@@ -251,7 +253,7 @@ void ObjectMapper::Publish(Landmark& landmark, bool force, ObjectOutput* output)
   const bool first = !landmark.published;
   if (first) landmark.S_now_told.reset();
   const Cuboid told = first ? *landmark.cuboid : ToldCuboid(landmark);
-  const bool cuboid_changed = first || DiffersNotably(told, *landmark.cuboid, config_);
+  const bool cuboid_changed = first || DiffersNotably(told, *landmark.cuboid);
   const Cuboid& cuboid = cuboid_changed ? *landmark.cuboid : told;
   const bool text_changed =
       first || landmark.published->class_name != class_name || landmark.published->state != landmark.state;

@@ -41,7 +41,7 @@ void ObjectMapper::FindSegments(const KeyframeView& view, std::vector<KeptSilhou
     return std::pair(entry->landmark->shape.SegmentViews(), entry->landmark->key);
   };
   std::sort(wanting.begin(), wanting.end(), [&](const auto* a, const auto* b) { return rank(a) < rank(b); });
-  const auto most = static_cast<size_t>(config_.edge_searches_per_keyframe);
+  constexpr size_t most = 1;
   if (wanting.size() > most) wanting.resize(most);
   for (KeptSilhouette* entry : wanting) {
     entry->silhouette.segments =
@@ -87,7 +87,7 @@ std::vector<LandmarkKey> ObjectMapper::FitNeediest() {
                              .waiting_frames = frame_index_ - landmark->last_fit_frame};
     if (IsWorthAFit(request)) requests.push_back(request);
   }
-  return FitShapes(OrderByNeed(requests), static_cast<size_t>(config_.fits_per_keyframe));
+  return FitShapes(OrderByNeed(requests), static_cast<size_t>(config_.cuboid_fits_per_keyframe));
 }
 
 void ObjectMapper::FitAll() {

@@ -149,7 +149,8 @@ std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surrounding
 
 // Carving anew is also when the silhouettes learn where the other things in their pictures stand by now.
 void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundings) {
-  hull_.Reset(region, config_.hull_cells);
+  constexpr int kHullCells = 20;  // along each side of the grid
+  hull_.Reset(region, kHullCells);
   forest_.reset();
   silhouettes_when_carved_ = silhouettes_.size();
   for (Silhouette& silhouette : silhouettes_) UpdateNeighbours(*surroundings.neighbours, &silhouette);

@@ -14,6 +14,9 @@
 namespace romap::objects {
 namespace {
 
+constexpr double kMinSharpnessShare = 0.6;   // of the object's median sharpness; a view below it waits for a better one
+constexpr size_t kMaxWaitingKeyframes = 24;  // kept until the object has a cuboid
+
 // Why the candidate's mask does not fit what is known of the object, or nullptr. A body point must lie in the mask
 // unless something hides it, and the mask must not reach far beyond the cuboid.
 const char* FindDoubt(const ViewCandidate& candidate, const ViewContext& context) {
@@ -143,7 +146,7 @@ double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px) {
 }
 
 void ViewPicker::Offer(ViewCandidate candidate) {
-  if (waiting_.size() >= static_cast<size_t>(config_.max_waiting_keyframes)) {
+  if (waiting_.size() >= kMaxWaitingKeyframes) {
     std::vector<ViewCandidate> kept;
     for (size_t i = 0; i < waiting_.size(); i += 2) kept.push_back(std::move(waiting_[i]));
     waiting_ = std::move(kept);
@@ -168,7 +171,7 @@ bool ViewPicker::IsSharp(const ViewCandidate& candidate) {
   const double sharpness = MeasureSharpness(candidate.frame->image_bgr, candidate.box_px);
   sharpness_history_.push_back(sharpness);
   if (sharpness_history_.size() > kHistory) sharpness_history_.erase(sharpness_history_.begin());
-  return sharpness >= config_.view_min_sharpness_share * Median(sharpness_history_);
+  return sharpness >= kMinSharpnessShare * Median(sharpness_history_);
 }
 
 std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {

@@ -67,7 +67,8 @@ void ListAllLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
 
 }  // namespace
 
-Ingest::Ingest(const CameraModel& camera, double mask_patience_s) : camera_(camera), mask_patience_s_(mask_patience_s) {
+Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s)
+    : camera_(camera), max_mask_delay_s_(max_mask_delay_s) {
   if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
 }
 
@@ -110,7 +111,7 @@ void Ingest::Remember(const Frame& frame) {
   const auto is_too_old = [&](const AcceptedFrame& old) {
     // The clock's epoch is the client's: only the unsigned difference of two far times cannot overflow.
     const uint64_t behind_ns = static_cast<uint64_t>(frame.timestamp_ns) - static_cast<uint64_t>(old.timestamp_ns);
-    return static_cast<double>(behind_ns) > 1e9 * mask_patience_s_;
+    return static_cast<double>(behind_ns) > 1e9 * max_mask_delay_s_;
   };
   while (is_too_old(accepted_.front())) {
     accepted_.pop_front();
@@ -134,8 +135,8 @@ absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindMaskless(uint64_t frame_id) {
   const auto found = std::lower_bound(accepted_.begin(), accepted_.end(), frame_id,
                                       [](const AcceptedFrame& frame, uint64_t id) { return frame.frame_id < id; });
   if (found == accepted_.begin() && any_forgotten_ && found->frame_id != frame_id) {
-    return InvalidArgument("too late: the frame lies more than {} s (objects.mask_patience_s) behind the newest",
-                           mask_patience_s_);
+    return InvalidArgument("too late: the frame lies more than {} s (objects.max_mask_delay_s) behind the newest",
+                           max_mask_delay_s_);
   }
   if (found == accepted_.end() || found->frame_id != frame_id) return InvalidArgument("no such frame was accepted");
   if (found->has_masks) return InvalidArgument("the frame has masks already");

@@ -18,7 +18,7 @@ namespace romap::session {
 class Ingest {
  public:
   // Masks may come so long after newer frames than their own, by the frames' timestamps.
-  Ingest(const CameraModel& camera, double mask_patience_s);
+  Ingest(const CameraModel& camera, double max_mask_delay_s);
 
   // INVALID_ARGUMENT naming what is wrong with the frame; then the frame counts as never sent.
   absl::StatusOr<std::shared_ptr<const Frame>> Accept(const FrameInput& input);
@@ -42,7 +42,7 @@ class Ingest {
 
   CameraModel camera_;     // as the client gave it
   UndistortionMaps maps_;  // empty for a pinhole
-  double mask_patience_s_;
+  double max_mask_delay_s_;
   bool any_forgotten_ = false;
   std::deque<AcceptedFrame> accepted_;  // by id and time; the newest, and those at most the patience behind it
 };

@@ -33,7 +33,7 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       pool_(pool),
       mesher_(mesher),
       recorder_(std::move(recorder)),
-      ingest_(options.camera, config.objects.mask_patience_s),
+      ingest_(options.camera, config.objects.max_mask_delay_s),
       tracker_(config.slam, options.pose_use, &local_map_),
       sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
       object_mapper_(config.objects),

@@ -120,11 +120,12 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
   std::vector<FeatureMatch> matches;
   for (size_t i = 0; i < best_of_first.size(); ++i) {
     const Best& best = best_of_first[i];
-    if (best.feature < 0 || best.distance > config.max_descriptor_distance) continue;
+    if (best.feature < 0 || best.distance > kMaxMatchDistance_bits) continue;
     const Best& back = best_of_second[static_cast<size_t>(best.feature)];
     if (back.feature != static_cast<int>(i)) continue;
-    const double ratio = config.descriptor_ratio;
-    if (best.distance >= ratio * best.second_distance || back.distance >= ratio * back.second_distance) continue;
+    if (best.distance >= kMaxMatchRatio * best.second_distance ||
+        back.distance >= kMaxMatchRatio * back.second_distance)
+      continue;
     matches.push_back({static_cast<int>(i), best.feature, best.distance});
   }
   return matches;

@@ -11,6 +11,9 @@
 namespace romap::slam {
 namespace {
 
+constexpr int kMinGapFrames = 2;      // between keyframes, unless the camera is very fast
+constexpr int kMaxWaitFrames = 3;     // for which a due keyframe waits for a sharp frame with masks
+constexpr double kSharpShare = 0.75;  // of the median sharpness of the recent frames: a sharp frame reaches it
 constexpr size_t kSharpnessWindowFrames = 15;
 constexpr int kMaskMemoryFrames = 30;    // masks that last came longer ago are not waited for
 constexpr double kStandingStill = 0.15;  // progress below which passing time makes no keyframe
@@ -29,7 +32,7 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
   const bool is_good = IsGood(frame, view.sharpness);
   ++frames_since_keyframe_;
   if (last_keyframe_ && !IsDue(view)) return false;
-  if (last_keyframe_ && !is_good && frames_due_ <= config_.keyframe_wait_frames) return false;
+  if (last_keyframe_ && !is_good && frames_due_ <= kMaxWaitFrames) return false;
   Take(std::move(view));
   return true;
 }
@@ -44,7 +47,7 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
     return true;
   }
   scene_depth_mu_ = quality.scene_depth_mu;
-  const double progress = Progress(T_world_camera) * config_.tracking_keyframe_share;
+  const double progress = Progress(T_world_camera);
   const bool timed_out = progress > kStandingStill && frames_since_keyframe_ >= config_.keyframe_max_gap_frames;
   const bool runs_out = (quality.tracked_share < kRunsOut && progress > kStandingStill) || quality.has_unseen_depth;
   const bool is_urgent = quality.tracked_share < kUrgent || progress > kVeryFast;
@@ -54,7 +57,7 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
   frames_due_ = is_due ? frames_due_ + 1 : 0;
   if (!is_due) return false;
   // A fast camera would be too far off by the time of the next sharp frame.
-  const bool may_wait = !is_urgent && progress < kTooFarToWait && frames_due_ <= config_.keyframe_wait_frames;
+  const bool may_wait = !is_urgent && progress < kTooFarToWait && frames_due_ <= kMaxWaitFrames;
   if (!is_good && may_wait) return false;
   Take(std::move(view));
   return true;
@@ -77,7 +80,7 @@ bool KeyframeSelector::IsDue(const DepthView& view) {
     }
   }
 
-  const bool moved = progress >= 1 && frames_since_keyframe_ >= config_.keyframe_min_gap_frames;
+  const bool moved = progress >= 1 && frames_since_keyframe_ >= kMinGapFrames;
   const bool timed_out = progress > kStandingStill && frames_since_keyframe_ >= config_.keyframe_max_gap_frames;
   const bool is_due = moved || timed_out || progress > kVeryFast;
   frames_due_ = is_due ? frames_due_ + 1 : 0;
@@ -102,7 +105,7 @@ bool KeyframeSelector::IsGood(const Frame& frame, double sharpness) {
   recent_sharpness_.push_back(sharpness);
   if (recent_sharpness_.size() > kSharpnessWindowFrames) recent_sharpness_.pop_front();
   const double typical = Median(std::vector<double>(recent_sharpness_.begin(), recent_sharpness_.end()));
-  return has_what_comes && sharpness >= config_.keyframe_sharpness_ratio * typical;
+  return has_what_comes && sharpness >= kSharpShare * typical;
 }
 
 }  // namespace romap::slam

@@ -6,6 +6,9 @@
 namespace romap::slam {
 namespace {
 
+// A new point must have this many observations when this many keyframes have followed it, or it is removed.
+constexpr uint64_t kTrialKeyframes = 3;
+constexpr int kTrialObservations = 3;
 constexpr double kRedundantShare = 0.97;
 constexpr int kOtherKeyframes = 3;
 constexpr size_t kMaxGone = 2;  // at once, so that adjustment can settle
@@ -34,9 +37,8 @@ void CullPoints(const SlamConfig& config, SlamMap& map) {
   std::vector<MapPointId> gone;
   std::vector<std::pair<uint64_t, MapPointId>> by_age;
   for (const auto& [id, track] : map.points()) {
-    const bool trial_is_over =
-        map.keyframe_count() - track.born_keyframe >= static_cast<uint64_t>(config.trial_keyframes);
-    if (trial_is_over && track.point.observations < config.trial_observations) {
+    const bool trial_is_over = map.keyframe_count() - track.born_keyframe >= kTrialKeyframes;
+    if (trial_is_over && track.point.observations < kTrialObservations) {
       gone.push_back(id);
     } else {
       by_age.emplace_back(track.latest_keyframe, id);

@@ -19,6 +19,7 @@ constexpr int kMaxDistance = 60;       // Hamming, bits
 constexpr double kRatio = 0.85;
 constexpr double kMinMotionShare = 0.012;  // of the image's width: median motion of the features worth a try
 constexpr int kMaxWait_frames = 90;        // a first view that led to nothing for so long is given up
+constexpr double kMinParallax_deg = 1.5;   // median over the points of the two first views
 constexpr double kMinKeptShare = 0.15;     // of the first view's features must still be followed
 constexpr double kSpacingShare = 0.03;     // of the image's width: motion after which one more view is followed
 constexpr size_t kMaxFollowed = 4;
@@ -114,7 +115,7 @@ std::optional<MapStart> MonocularStart::Try(const FollowedView& view, const std:
                      config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
   }
   TwoViewOptions options;
-  options.min_parallax_deg = config_.start_parallax_deg;
+  options.min_parallax_deg = kMinParallax_deg;
   options.seed = config_.Seed(sight->frame_id);
   const TwoViewResult result = SolveTwoView(sight->camera, pairs, options);
   if (result.outcome != TwoViewOutcome::kOk) {

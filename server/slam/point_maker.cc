@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
 constexpr double kMaxSizeRatio = 1.9;        // between the sizes that two features of one point claim to have
+constexpr double kSearchRadius_px = 4;       // around the projection of a known point
 constexpr double kFuseRadius_px = 2.5;
 constexpr int kFuseDistance = 50;  // Hamming, bits
 
@@ -64,7 +65,7 @@ void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPoi
   using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
   std::vector<Claim> claims;
   ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
-  const ProjectionSearch search{.radius_px = config_.search_radius_px, .max_distance = config_.max_descriptor_distance};
+  const ProjectionSearch search{.radius_px = kSearchRadius_px, .max_distance = kMaxMatchDistance_bits};
   const std::vector<uint8_t> tied = TiedFeatures(keyframe);
   for (const MapPointId id : candidates) {
     const PointTrack* track = map_->FindPoint(id);
@@ -79,7 +80,7 @@ void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPoi
 
 std::optional<int> PointMaker::FindFreeFeature(const PointTrack& track, const MapKeyframe& keyframe) const {
   ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
-  const ProjectionSearch search{.radius_px = config_.search_radius_px, .max_distance = config_.max_descriptor_distance};
+  const ProjectionSearch search{.radius_px = kSearchRadius_px, .max_distance = kMaxMatchDistance_bits};
   const auto found = matcher.Find(LooksOf(track), search, {});
   if (!found || keyframe.points[static_cast<size_t>(found->feature)]) return std::nullopt;
   return found->feature;

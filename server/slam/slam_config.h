@@ -8,12 +8,7 @@ namespace romap::slam {
 struct SlamConfig {
   double keyframe_rotation_deg = 3.0;
   double keyframe_translation_ratio = 0.04;
-  int keyframe_min_gap_frames = 2;
   int keyframe_max_gap_frames = 30;
-  int keyframe_wait_frames = 3;
-  double keyframe_sharpness_ratio = 0.75;
-  double tracking_keyframe_share = 1.0;
-  double start_parallax_deg = 1.5;
 
   int scene_features = 1000;
   int object_features = 600;
@@ -24,18 +19,12 @@ struct SlamConfig {
 
   int matched_keyframes = 4;
   int window_keyframes = 10;
-  int window_iterations = 8;
   int max_keyframes = 2000;
   bool close_loops = true;
   bool refine_lens = true;
   int max_points = 20000;
   double min_parallax_deg = 2.0;
   double pixel_sigma_px = 1.0;
-  double search_radius_px = 4.0;
-  int max_descriptor_distance = 60;
-  double descriptor_ratio = 0.8;
-  int trial_keyframes = 3;
-  int trial_observations = 3;
   double depth_sigma_ratio = 0.02;
   double prior_sigma_rad = 0.01;
   double prior_sigma_mu = 0.02;
@@ -59,15 +48,6 @@ struct SlamConfig {
     fields.Add(
         "keyframe_max_gap_frames", &keyframe_max_gap_frames,
         {.unit = "frames", .min = 1, .max = 10000, .help = "A moving camera gets a keyframe at least this often"});
-    fields.Add(
-        "keyframe_wait_frames", &keyframe_wait_frames,
-        {.unit = "frames", .min = 0, .max = 30, .help = "How long a due keyframe waits for a sharp, masked frame"});
-    fields.Add("keyframe_sharpness_ratio", &keyframe_sharpness_ratio,
-               {.min = 0, .max = 2, .help = "Sharp is what reaches this share of the recent frames' median sharpness"});
-    fields.Add("tracking_keyframe_share", &tracking_keyframe_share,
-               {.min = 0.05, .max = 5, .help = "Turn and way count so much when the camera is tracked from images"});
-    fields.Add("start_parallax_deg", &start_parallax_deg,
-               {.unit = "deg", .min = 0.1, .max = 20, .help = "Median parallax of the two views a map begins with"});
   }
 
   void FeatureFields(ConfigFields& fields) {
@@ -93,8 +73,6 @@ struct SlamConfig {
                {.min = 1, .max = 20, .help = "Earlier keyframes that a new one is matched with to find new points"});
     fields.Add("window_keyframes", &window_keyframes,
                {.min = 2, .max = 60, .help = "Keyframes whose poses local bundle adjustment refines"});
-    fields.Add("window_iterations", &window_iterations,
-               {.min = 1, .max = 50, .help = "Iterations of local bundle adjustment at most"});
     fields.Add("max_keyframes", &max_keyframes,
                {.min = 10, .max = 100000, .help = "Keyframes in the map; beyond, the least needed go"});
     fields.Add("close_loops", &close_loops, {.help = "Correct the map when a known place is seen again"});
@@ -105,16 +83,6 @@ struct SlamConfig {
                {.unit = "deg", .min = 0.1, .max = 30, .help = "Angle between two rays that makes a point of them"});
     fields.Add("pixel_sigma_px", &pixel_sigma_px,
                {.unit = "px", .min = 0.1, .max = 10, .help = "Standard deviation of a feature of the finest octave"});
-    fields.Add("search_radius_px", &search_radius_px,
-               {.unit = "px", .min = 1, .max = 50, .help = "How far from its projection a known point is looked for"});
-    fields.Add("max_descriptor_distance", &max_descriptor_distance,
-               {.unit = "bits", .min = 10, .max = 128, .help = "Hamming distance of two ORB descriptors of one point"});
-    fields.Add("descriptor_ratio", &descriptor_ratio,
-               {.min = 0.1, .max = 1, .help = "Best over second best distance of an unambiguous match"});
-    fields.Add("trial_keyframes", &trial_keyframes,
-               {.unit = "keyframes", .min = 1, .max = 100, .help = "Time a new point has to prove itself"});
-    fields.Add("trial_observations", &trial_observations,
-               {.min = 2, .max = 20, .help = "Observations it needs by then"});
     fields.Add("depth_sigma_ratio", &depth_sigma_ratio,
                {.min = 0.0001, .max = 1, .help = "Standard deviation of a depth image over the depth"});
     fields.Add("seed", &seed, {.min = 0, .max = 1e9, .help = "Of all random samples; same input, same seed, same map"});

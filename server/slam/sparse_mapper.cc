@@ -17,6 +17,7 @@ namespace romap::slam {
 namespace {
 
 constexpr int kMinSharedPoints = 15;
+constexpr int kMaxWindowIterations = 8;  // of local bundle adjustment; it has converged by then
 constexpr size_t kMaxLocalPoints = 8000;
 constexpr size_t kPlacesTold = 60;       // keyframes whose place tracking learns, besides those around
 constexpr int kGiveUpAfter_frames = 45;  // a camera lost so long in a map so young begins anew
@@ -269,7 +270,7 @@ void SparseMapper::AdjustWindow(const MapKeyframe& keyframe) {
   // Every second adjustment at least is carried through.
   const std::atomic<bool>* abort = window_was_cut_short_ ? nullptr : &hurry_;
   const BundleSummary summary =
-      AdjustBundle(problem.bundle, {.max_iterations = config_.window_iterations, .dense = true, .abort = abort});
+      AdjustBundle(problem.bundle, {.max_iterations = kMaxWindowIterations, .dense = true, .abort = abort});
   window_was_cut_short_ = summary.aborted;
   if (summary.usable) ApplyWindow(problem, *map_);
   figures_.window_s.push_back(Seconds(std::chrono::steady_clock::now() - begin));

@@ -3,7 +3,7 @@
 //   feature_bench DIR [--every N] [--set slam.FIELD=VALUE]...
 //
 // Prints the user time per image, and for frames 1, 5, 10 and 20 apart: the matches (mutually nearest descriptors
-// within SlamConfig::max_descriptor_distance that pass SlamConfig::descriptor_ratio), how many of those whose depth is
+// within kMaxMatchDistance_bits that pass kMaxMatchRatio), how many of those whose depth is
 // known are correct, the share of the features that should be seen again and are matched correctly (recall), and how
 // evenly correct matches lie (cells of 40 x 40 pixels that hold one). Every N-th frame is the first of a pair.
 
@@ -133,8 +133,8 @@ void Judge(const std::vector<slam::Feature>& first, const Frame& first_frame, co
     const std::optional<Eigen::Vector2d> true_px = TruePixel(first[i], first_frame, second_frame);
     score.visible += true_px ? 1 : 0;
     const Nearest there = FindNearest(first[i], second);
-    if (there.index < 0 || there.distance > config.max_descriptor_distance ||
-        there.distance >= config.descriptor_ratio * there.second_distance) {
+    if (there.index < 0 || there.distance > slam::kMaxMatchDistance_bits ||
+        there.distance >= slam::kMaxMatchRatio * there.second_distance) {
       continue;
     }
     const slam::Feature& other = second[static_cast<size_t>(there.index)];

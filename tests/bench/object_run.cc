@@ -33,7 +33,7 @@ std::vector<std::string> ClassNames(const files::Sequence& sequence) {
 class Runner {
  public:
   Runner(const files::Sequence& sequence, const ObjectRunOptions& options)
-      : ingest_(sequence.camera(), options.objects.mask_patience_s),
+      : ingest_(sequence.camera(), options.objects.max_mask_delay_s),
         damager_(options.damage, ClassNames(sequence)),
         tracker_(options.slam, options.poses, &local_map_),
         sparse_mapper_(options.slam, &local_map_, /*inline_adjustment=*/true),

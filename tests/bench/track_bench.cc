@@ -133,7 +133,7 @@ class Run {
       return 2;
     }
     cv::setNumThreads(1);
-    session::Ingest ingest(sequence->camera(), /*mask_patience_s=*/0);
+    session::Ingest ingest(sequence->camera(), /*max_mask_delay_s=*/0);
     std::thread mapping;
     if (!options_.one_thread) {
       mapping = std::thread([this] {

@@ -75,7 +75,7 @@ absl::StatusOr<Run> LookAtSequence(const files::Sequence& sequence) {
   slam::LocalMapSlot local_map;
   slam::Tracker tracker(slam, PoseUse::kGiven, &local_map);
   slam::SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
-  session::Ingest ingest(sequence.camera(), /*mask_patience_s=*/0);
+  session::Ingest ingest(sequence.camera(), /*max_mask_delay_s=*/0);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));

@@ -93,7 +93,7 @@ FieldModel::FieldModel(const NerfConfig& config, uint64_t seed)
       table(static_cast<size_t>(layout.entries) * kFeaturesPerLevel),
       mlp(layout.features, config.hidden_width, config.hidden_layers),
       density_bias(config.field == "density" ? static_cast<float>(config.density_bias) : 0.0f),
-      sharpness(config.field == "sdf" ? static_cast<float>(config.first_sharpness) : 0.0f) {
+      sharpness(config.field == "sdf" ? static_cast<float>(config.initial_sharpness) : 0.0f) {
   for (size_t i = 0; i < table.size(); ++i) table[i] = 1e-4f * (2.0f * RandomUniform(seed, 0, i) - 1.0f);
   const int used_inputs = UsedInputs(layout);
   const float in_bound = std::sqrt(6.0f / static_cast<float>(used_inputs + mlp.hidden));

@@ -17,6 +17,8 @@ namespace {
 
 constexpr int kChunkSamples = 1024;  // activations of a chunk stay in the second-level cache
 
+constexpr float kMaxDepthError = 0.2f;  // box sides: larger depth errors are outliers
+
 constexpr size_t kPrefetchVisits = 24;       // how far ahead cells of the occupancy are fetched
 constexpr size_t kOptimiserBlock = 1 << 15;  // parameters that a thread takes at a time
 
@@ -37,7 +39,7 @@ LossWeights MakeLossWeights(const NerfConfig& config) {
   w.density = config.field == "density" ? static_cast<float>(config.density_weight) : 0.0f;
   w.depth = static_cast<float>(config.depth_weight);
   w.contrast = static_cast<float>(config.contrast_weight);
-  w.depth_limit = static_cast<float>(config.depth_limit);
+  w.depth_limit = kMaxDepthError;
   w.random_background = config.random_background;
   return w;
 }
@@ -199,7 +201,7 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
   for (int r = 0; r < worker.ray_count; ++r) worker.rays[static_cast<size_t>(r)] = source.ray(step, first_ray + r);
   const SamplingRule rule{.occupied_bits = occupancy.bits(),
                           .extent = source.extent,
-                          .finest_step = static_cast<float>(config_.finest_sample_step),
+                          .finest_step = static_cast<float>(config_.min_sample_spacing),
                           .min_samples = std::min(config_.min_samples_per_ray, config_.max_samples_per_ray),
                           .max_samples = config_.max_samples_per_ray,
                           .skip_empty = config_.sampling == "occupied"};
@@ -219,9 +221,9 @@ void FieldTrainer::RenderChunk(const StepSource& source, const Occupancy& occupa
     CompositeRays(worker);
   }
   // About half of the samples remain: the others lie in empty space or behind the surface.
-  const int active =
-      kernels_->keep_active(static_cast<float>(config_.gradient_cut), 1.0f / static_cast<float>(config_.rays_per_step),
-                            model_.layout.features, model_.mlp.hidden, chunk);
+  const int active = kernels_->keep_active(static_cast<float>(config_.min_sample_gradient),
+                                           1.0f / static_cast<float>(config_.rays_per_step), model_.layout.features,
+                                           model_.mlp.hidden, chunk);
   worker.Book(TrainPhase::kRender);
   kernels_->mlp_backward(model_.mlp, active, chunk.features.data(), chunk.hidden.data(), chunk.d_raw.data(),
                          worker.mlp_gradient.data());
@@ -253,8 +255,8 @@ void FieldTrainer::CompositeRays(Worker& worker) {
 
 // Surfaces get sharper by the same factor with every step.
 float FieldTrainer::SharpnessAt(float progress) const {
-  const double first = config_.first_sharpness;
-  return static_cast<float>(first * std::pow(config_.last_sharpness / first, progress));
+  const double first = config_.initial_sharpness;
+  return static_cast<float>(first * std::pow(config_.final_sharpness / first, progress));
 }
 
 void FieldTrainer::RenderDistances(const StepSource& source, uint64_t step, int first_ray, Worker& worker) {

@@ -29,7 +29,7 @@ std::vector<RayResult> RenderRays(const FieldModel& model, const NerfConfig& con
   const KernelTable& kernels = SimdKernels();
   const SamplingRule rule{.occupied_bits = space.occupied_bits,
                           .extent = space.extent,
-                          .finest_step = static_cast<float>(config.finest_sample_step),
+                          .finest_step = static_cast<float>(config.min_sample_spacing),
                           .min_samples = std::min(config.min_samples_per_ray, config.max_samples_per_ray),
                           .max_samples = config.max_samples_per_ray,
                           .skip_empty = config.sampling == "occupied"};

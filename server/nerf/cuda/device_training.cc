@@ -39,7 +39,7 @@ void FillRays(const StepSource& source, uint64_t step, std::span<Ray> rays) {
 }
 
 SampleBudget MakeBudget(const NerfConfig& config) {
-  return {.finest_step = static_cast<float>(config.finest_sample_step),
+  return {.finest_step = static_cast<float>(config.min_sample_spacing),
           .least = std::min(config.min_samples_per_ray, config.max_samples_per_ray),
           .most = config.max_samples_per_ray,
           .skip_empty = config.sampling == "occupied"};
@@ -122,7 +122,7 @@ void DeviceTraining::DescribeStep(const NerfConfig& config, const FieldModel& mo
                   .rays_per_step = rays_per_step_,
                   .budget = MakeBudget(config),
                   .loss_weights = MakeLossWeights(config),
-                  .gradient_cut = static_cast<float>(config.gradient_cut),
+                  .gradient_cut = static_cast<float>(config.min_sample_gradient),
                   .occupied_bits = occupied_bits_.data(),
                   .cell_visits = cell_visits_.data(),
                   .cell_weight = cell_weight_.data(),

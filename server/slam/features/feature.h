@@ -12,6 +12,11 @@ using Descriptor = std::array<uint64_t, 4>;
 // Without an instruction that counts bits, which not every x86-64 has, std::popcount calls a function for each word.
 // Here all words are counted side by side: first in pairs of bits, then in 4, 8 and 16 bits, each as wide as its sum
 // needs.
+// Two descriptors match when their distance is at most this (of 256 bits) and below this share of the distance to the
+// second best match.
+inline constexpr int kMaxMatchDistance_bits = 60;
+inline constexpr double kMaxMatchRatio = 0.8;
+
 inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
   constexpr uint64_t kOf2 = 0x5555555555555555, kOf4 = 0x3333333333333333;
   constexpr uint64_t kOf8 = 0x0f0f0f0f0f0f0f0f, kOf16 = 0x00ff00ff00ff00ff;

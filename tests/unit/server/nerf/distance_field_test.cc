@@ -98,7 +98,7 @@ TEST(DistanceFieldTest, SurfaceGetsSharperAsThePlanIsFulfilled) {
   field.Train(180, 1);
   const SurfaceOptics late = field.Snapshot().optics;
   EXPECT_GT(late.surface_density_per_mu, 5 * early.surface_density_per_mu);
-  EXPECT_NEAR(late.raw_per_efold, 1 / (config.last_sharpness * nerf::kDistancePerRaw), 1e-4);
+  EXPECT_NEAR(late.raw_per_efold, 1 / (config.final_sharpness * nerf::kDistancePerRaw), 1e-4);
 }
 
 TEST(FieldSurfaceTest, DensityIsMeasuredPerMapUnitAndDistancesByTheirSharpness) {
@@ -109,7 +109,7 @@ TEST(FieldSurfaceTest, DensityIsMeasuredPerMapUnitAndDistancesByTheirSharpness) 
   FieldSnapshot snapshot;
   DescribeSurface(config, model, box, snapshot);
   EXPECT_FLOAT_EQ(snapshot.surface_level, static_cast<float>(config.surface_level));
-  EXPECT_FLOAT_EQ(snapshot.connect_level, static_cast<float>(config.surface_level - config.connect_margin));
+  EXPECT_FLOAT_EQ(snapshot.connect_level, static_cast<float>(config.surface_level - 2));
   EXPECT_NEAR(snapshot.optics.surface_density_per_mu, std::exp(config.surface_level) / 2, 1e-4);
   EXPECT_EQ(snapshot.optics.raw_per_efold, 1);
   config.field = "sdf";

@@ -259,7 +259,7 @@ TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
   const testing::BallScene scene;
   NerfConfig config = SmallConfig();
   config.full_budget_steps = 40;  // far too few
-  config.least_loss_fall = 0.05;
+  config.min_loss_decrease = 0.05;
   config.max_extra_steps = 2000;
   const ObjectField eager = TrainedOn(scene, scene.Views(), config);
   EXPECT_GT(eager.steps(), 60u);
@@ -269,7 +269,7 @@ TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
   config.max_extra_steps = 0;
   EXPECT_EQ(TrainedOn(scene, scene.Views(), config).steps(), 40u);
   config.max_extra_steps = 2000;
-  config.least_loss_fall = 1;
+  config.min_loss_decrease = 1;
   EXPECT_EQ(TrainedOn(scene, scene.Views(), config).steps(), 40u);
 }
 

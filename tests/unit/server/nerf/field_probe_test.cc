@@ -11,21 +11,9 @@ namespace {
 using testing::BallScene;
 
 TEST(FieldProbeTest, LossIsTheMeanOverTheViewsThatCount) {
-  const ProbeReport report{{{0.1f, 0.2f, 0.2f}, {0.3f, 0.0f, 0.4f}, {9.0f, 9.0f, 9.0f}}, {}};
+  const ProbeReport report{{{0.1f, 0.2f, 0.2f}, {0.3f, 0.0f, 0.4f}, {9.0f, 9.0f, 9.0f}}};
   EXPECT_NEAR(report.Loss(std::vector<float>{1, 1, 0}), 0.5 * (0.1 + 0.2 + 0.3 + 0.2), 1e-6);
   EXPECT_EQ(report.Loss(std::vector<float>{0, 0, 0}), 0);
-}
-
-TEST(FieldProbeTest, NeedFollowsTheResidualButLeavesSomeToAll) {
-  ProbeReport report;
-  report.tiles = {0.1f, 0.1f, 0.1f, 0.5f, 0.0f};  // 0: a tile without pixels
-  const std::vector<float> need = report.NeedOfTiles(0.5);
-  EXPECT_NEAR(need[0], 0.5 + 0.5 * 0.5, 1e-5);
-  EXPECT_NEAR(need[3], 0.5 + 0.5 * 2.5, 1e-5);
-  for (float n : report.NeedOfTiles(0)) EXPECT_EQ(n, 1);
-  report.tiles = std::vector<float>(100, 0.001f);
-  report.tiles[7] = 50;
-  EXPECT_NEAR(report.NeedOfTiles(1)[7], 4, 1e-5) << "one tile cannot take all";
 }
 
 TEST(FieldProbeTest, SeesWhichRaysMeetTheBoxAndHowAnEmptySpaceDiffersFromTheViews) {

@@ -44,7 +44,6 @@ class PixelSamplerTest : public ::testing::Test {
     const ObjectView& view = views_[pixel.view];
     return view.ray_kind.at<uint8_t>(pixel.v_px - view.roi_px.y, pixel.u_px - view.roi_px.x);
   }
-  std::vector<float> Ones(size_t per_view) const { return std::vector<float>(views_.size() * per_view, 1.0f); }
 
   testing::BallScene scene_;
   NerfConfig config_;
@@ -67,7 +66,7 @@ TEST_F(PixelSamplerTest, ChoosesObjectPixelsAndABandOfBackgroundButNoOccluders) 
       EXPECT_EQ(pixel.rgb, (std::array<uint8_t, 3>{bgr[2], bgr[1], bgr[0]}));
       if (is_object) continue;
       const cv::Mat is_mask = views_[pixel.view].ray_kind == static_cast<int>(RayKind::kObject);
-      const int reach = config_.background_band_px;
+      constexpr int reach = 6;
       const cv::Rect around(pixel.u_px - reach, pixel.v_px - reach, 2 * reach + 1, 2 * reach + 1);
       EXPECT_GT(cv::countNonZero(is_mask(around & cv::Rect({0, 0}, is_mask.size()))), 0);
     }
@@ -103,13 +102,13 @@ TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
 TEST_F(PixelSamplerTest, WeightsSayHowOftenAViewIsChosen) {
   PixelSampler sampler = Build();
   const std::vector<int> even = ObjectRaysOfViews(sampler, 100);
-  sampler.Weigh(std::vector<float>{1, 0, 3, 1}, Ones(PixelSampler::kTiles));
+  sampler.Weigh(std::vector<float>{1, 0, 3, 1});
   const std::vector<int> weighed = ObjectRaysOfViews(sampler, 100);
   EXPECT_EQ(weighed[1], 0);
   const auto often = [&](size_t v) { return static_cast<double>(weighed[v]) / even[v]; };
   EXPECT_NEAR(often(2) / often(0), 3, 0.05);
   EXPECT_NEAR(often(3) / often(0), 1, 0.05);
-  sampler.Weigh(std::vector<float>(4, 0.0f), Ones(PixelSampler::kTiles));
+  sampler.Weigh(std::vector<float>(4, 0.0f));
   EXPECT_EQ(ObjectRaysOfViews(sampler, 100), even) << "nothing to prefer is no preference";
 }
 
@@ -182,7 +181,7 @@ TEST_F(PixelSamplerTest, ObjectPixelsComeInPairsOfOneViewSomePixelsApart) {
     EXPECT_EQ(other.pixel.view, pixel.view);
     const double apart_px = std::hypot(pixel.u_px - other.pixel.u_px, pixel.v_px - other.pixel.v_px);
     const int mask_px = cv::countNonZero(views_[pixel.view].ray_kind == static_cast<int>(RayKind::kObject));
-    const double wanted_px = config_.contrast_distance * std::sqrt(mask_px);
+    const double wanted_px = 0.1 * std::sqrt(mask_px);
     EXPECT_GE(apart_px, 0.5 * wanted_px - 1);
     EXPECT_LE(apart_px, 1.5 * wanted_px + 1);
     EXPECT_EQ(KindAt(pixel), static_cast<uint8_t>(RayKind::kObject));

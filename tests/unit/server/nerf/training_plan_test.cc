@@ -28,7 +28,7 @@ TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
 
 TEST(TrainingPlanTest, StepsBeyondThePlanAreEarnedByTheLoss) {
   NerfConfig config;
-  config.least_loss_fall = 0.1;
+  config.min_loss_decrease = 0.1;
   config.max_extra_steps = 120;
   const auto full = static_cast<uint64_t>(config.full_budget_steps);
   TrainingPlan plan(config);

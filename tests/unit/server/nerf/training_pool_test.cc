@@ -29,7 +29,7 @@ NerfConfig TinyConfig() {
   config.full_budget_steps = 40;
   config.slice_steps = 5;
   config.snapshot_interval_steps = 10;
-  config.settle_time_s = 3600;
+  config.completion_delay_s = 3600;
   config.max_extra_steps = 0;
   return config;
 }
@@ -111,7 +111,7 @@ TEST(TrainingPoolTest, BudgetGrowsWithViews) {
 
 TEST(TrainingPoolTest, CompletesAnObjectThatGetsNoMoreViews) {
   NerfConfig config = TinyConfig();
-  config.settle_time_s = 0.05;
+  config.completion_delay_s = 0.05;
   Inbox inbox;
   TrainingPool pool(config, 1);
   const uint64_t client = pool.Register(inbox.Sink());
@@ -249,8 +249,8 @@ TEST(TrainingPoolTest, TellsWhatIsWrongWithAnObject) {
 TEST(TrainingPoolTest, TimeIsLimitedButNotByHand) {
   NerfConfig config = TinyConfig();
   config.full_budget_steps = 100000;
-  config.most_time_s = 0.02;
-  config.most_time_per_view_s = 0.002;
+  config.max_training_time_s = 0.02;
+  config.max_training_time_per_view_s = 0.002;
   {
     Inbox inbox;
     TrainingPool pool(config, 1);
@@ -265,7 +265,7 @@ TEST(TrainingPoolTest, TimeIsLimitedButNotByHand) {
     EXPECT_EQ(pool.GetProgress(client).progress, 1.0);
   }
   config.full_budget_steps = 200;
-  config.most_time_s = config.most_time_per_view_s = 0;
+  config.max_training_time_s = config.max_training_time_per_view_s = 0;
   TrainingPool pool(config, 0);
   const uint64_t client = pool.Register([](FieldSnapshot) {});
   pool.Offer(client, Offer(1, 5));
@@ -278,7 +278,7 @@ TEST(TrainingPoolTest, WhatComesBeyondThePlansGoesWhereTheLossFallsFastest) {
   NerfConfig config = TinyConfig();
   config.probe_interval_steps = 10;
   config.max_extra_steps = 100000;
-  config.least_loss_fall = 0;
+  config.min_loss_decrease = 0;
   ObjectViews shown = Offer(1, 5), black = Offer(2, 5);
   for (ObjectView& view : black.new_views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
   Inbox inbox;
@@ -322,7 +322,7 @@ TEST(TrainingPoolTest, DivergedTrainingNeverLeaves) {
 TEST(TrainingPoolTest, WithoutWorkersItTrainsByHandAndAlwaysAlike) {
   const auto train = [](std::vector<uint64_t>* steps_seen) {
     NerfConfig config = TinyConfig();
-    config.settle_time_s = 0;  // nothing may depend on time
+    config.completion_delay_s = 0;  // nothing may depend on time
     config.snapshot_interval_s = 0;
     Inbox inbox;
     TrainingPool pool(config, 0);

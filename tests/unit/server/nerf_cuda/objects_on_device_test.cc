@@ -30,9 +30,9 @@ NerfConfig TinyConfig() {
   config.max_samples_per_ray = 8;
   config.slice_steps = 4;
   config.probe_interval_steps = 10;
-  config.settle_time_s = 3600;
+  config.completion_delay_s = 3600;
   config.max_extra_steps = 0;
-  config.most_time_s = 3600;
+  config.max_training_time_s = 3600;
   return config;
 }
 
@@ -70,8 +70,8 @@ TEST_F(ObjectsOnDeviceTest, AnObjectLearnsOnTheDeviceWhatItLearnsOnTheCpu) {
 
 TEST_F(ObjectsOnDeviceTest, TimeOnADeviceIsLimitedToo) {
   NerfConfig config = TinyConfig();
-  config.most_time_s = 0.001;
-  config.most_time_per_view_s = 0;
+  config.max_training_time_s = 0.001;
+  config.max_training_time_per_view_s = 0;
   TrainingPool pool(config, 1);
   const uint64_t client = pool.Register([](FieldSnapshot) {});
   const testing::BallScene scene = TinyScene(1);

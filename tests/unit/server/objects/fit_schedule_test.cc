@@ -67,9 +67,9 @@ struct Boxes {
   std::vector<std::string> log;
 };
 
-Boxes Map(const SyntheticWorld& world, int fits_per_keyframe) {
+Boxes Map(const SyntheticWorld& world, int cuboid_fits_per_keyframe) {
   ObjectsConfig config;
-  config.fits_per_keyframe = fits_per_keyframe;
+  config.cuboid_fits_per_keyframe = cuboid_fits_per_keyframe;
   ObjectMapper mapper(config);
   Boxes boxes;
   const auto take = [&](const ObjectOutput& output) {

@@ -329,7 +329,7 @@ TEST(IngestTest, BadLateMasksCountAsNeverSent) {
 TEST(IngestTest, LateMasksMayComeUntilThePatienceIsOver) {
   Ingest ingest(kCamera, kMaskPatience_s);
   for (uint64_t id = 1; id <= 30; ++id) ASSERT_EQ(Fault(ingest, GoodFrame(id)), "accepted");
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(4)), HasSubstr("more than 1 s (objects.mask_patience_s) behind"));
+  EXPECT_THAT(MaskFault(ingest, GoodMasks(4)), HasSubstr("more than 1 s (objects.max_mask_delay_s) behind"));
   EXPECT_EQ(MaskFault(ingest, GoodMasks(5)), "accepted");
   EXPECT_EQ(MaskFault(ingest, GoodMasks(30)), "accepted");
   Ingest impatient(kCamera, 0);

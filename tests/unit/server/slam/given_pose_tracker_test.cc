@@ -106,7 +106,7 @@ TEST(GivenPoseTracker, ADueKeyframeWaitsForASharpFrameButNotForEver) {
     frames.push_back(world.Render(static_cast<uint64_t>(i), TexturedWorld::OrbitPose(i < 10 ? 0 : 4 + 0.1 * i)));
     if (i >= 10) cv::blur(frames.back()->image_bgr, frames.back()->image_bgr, {15, 1});
   }
-  EXPECT_THAT(Keyframes(frames), ElementsAre(0, 10 + static_cast<uint64_t>(SlamConfig{}.keyframe_wait_frames)));
+  EXPECT_THAT(Keyframes(frames), ElementsAre(0, 10 + 3));
   frames[12] = world.Render(12, TexturedWorld::OrbitPose(5.2));
   EXPECT_THAT(Keyframes(frames), ElementsAre(0, 12));
 }
