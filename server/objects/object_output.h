@@ -3,7 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/messages.h"
+#include "common/map_events.h"
+#include "common/stage_messages.h"
 
 namespace romap::objects {
 
