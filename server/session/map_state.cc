@@ -86,7 +86,7 @@ void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId refere
                            const SE3<Camera, Camera>& T_reference_camera) {
   std::lock_guard lock(mutex_);
   if (ack.accepted && ack.T_world_camera) {
-    if (reference) references_.try_emplace(reference, *ack.T_world_camera * T_reference_camera.Inverse());
+    if (reference) references_.try_emplace(reference, ScaledPose{*ack.T_world_camera * T_reference_camera.Inverse()});
     trajectory_.push_back({ack, timestamp_ns, reference, T_reference_camera});
   }
   Send(ack);
@@ -95,7 +95,7 @@ void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId refere
 void MapState::Correct(const MapCorrection& correction) {
   std::lock_guard lock(mutex_);
   for (const KeyframeCorrection& keyframe : correction.keyframes) {
-    Reference& reference = references_[keyframe.id];
+    ScaledPose& reference = references_[keyframe.id];
     reference.T_world_camera = keyframe.T_world_camera;
     reference.scale *= keyframe.S_new_old.scale();
   }
@@ -103,9 +103,7 @@ void MapState::Correct(const MapCorrection& correction) {
 
 SE3<World, Camera> MapState::PoseNow(const TrajectoryEntry& entry) const {
   if (!entry.reference) return *entry.ack.T_world_camera;
-  const Reference& reference = references_.at(entry.reference);
-  return reference.T_world_camera * SE3<Camera, Camera>(entry.T_reference_camera.rotation(),
-                                                        reference.scale * entry.T_reference_camera.translation());
+  return references_.at(entry.reference).Compose(entry.T_reference_camera);
 }
 
 void MapState::Acknowledge(MasksAck ack) {

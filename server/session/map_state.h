@@ -11,6 +11,7 @@
 
 #include "common/map_events.h"
 #include "common/mapping_service.h"
+#include "common/scaled_pose.h"
 #include "common/stage_messages.h"
 #include "server/session/mesh_place.h"
 #include "server/session/outbox.h"
@@ -62,10 +63,6 @@ class MapState {
     KeyframeId reference;
     SE3<Camera, Camera> T_reference_camera;
   };
-  struct Reference {
-    SE3<World, Camera> T_world_camera;
-    double scale = 1;  // product of its scale corrections
-  };
 
   void Send(const MapEvent& event);
   void ApplyUpdate(ObjectUpdate update);
@@ -77,7 +74,7 @@ class MapState {
   std::map<ObjectId, Object> objects_;
   std::set<ObjectId> gone_;
   std::vector<TrajectoryEntry> trajectory_;
-  std::map<KeyframeId, Reference> references_;
+  std::map<KeyframeId, ScaledPose> references_;
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

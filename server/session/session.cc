@@ -19,7 +19,8 @@ constexpr int kSlicesPerKeyframe = 4;
 
 // Does the local map that tracking works with change by this frame?
 bool ChangesMap(const slam::TrackedImage& image) {
-  return !image.pose_given && (image.tracked.is_keyframe || image.start || image.tracked.state == TrackingState::kLost);
+  return !image.pose_given &&
+         (image.tracked.is_keyframe || image.initial_views || image.tracked.state == TrackingState::kLost);
 }
 
 }  // namespace
@@ -125,8 +126,8 @@ void Session::TakeMasks(const Arrival& arrival) {
 // A live stream does not wait for mapping: an ordinary frame that finds no room is tracked, but says nothing of
 // objects.
 void Session::QueueLive(slam::TrackedImage image) {
-  if (image.tracked.is_keyframe) sparse_mapper_.Hurry(++keyframes_waiting_ > 0);
-  const bool must_be_mapped = image.tracked.is_keyframe || image.start;
+  if (image.tracked.is_keyframe) sparse_mapper_.RequestEarlyStop(++keyframes_waiting_ > 0);
+  const bool must_be_mapped = image.tracked.is_keyframe || image.initial_views;
   MappingTask task = std::move(image);
   if (tracked_.TryPush(task)) return;
   if (must_be_mapped) {
@@ -177,7 +178,8 @@ void Session::Map(const MappingTask& task) {
     return;
   }
   const slam::TrackedImage& image = std::get<slam::TrackedImage>(task);
-  if (options_.mode == FrameMode::kLive && image.tracked.is_keyframe) sparse_mapper_.Hurry(--keyframes_waiting_ > 0);
+  if (options_.mode == FrameMode::kLive && image.tracked.is_keyframe)
+    sparse_mapper_.RequestEarlyStop(--keyframes_waiting_ > 0);
   if (!stopping_) MapFrame(image);
   if (ChangesMap(image)) CountMapChange(-1);
 }
@@ -190,7 +192,7 @@ void Session::MapMasks(const FrameMasks& masks) {
 
 void Session::MapFrame(const slam::TrackedImage& image) {
   const slam::MappedFrame mapped = sparse_mapper_.Process(image);
-  if (mapped.begun_anew) Publish(object_mapper_.Reset());
+  if (mapped.was_reset) Publish(object_mapper_.Reset());
   if (mapped.correction) Correct(*mapped.correction);
   Publish(object_mapper_.ObserveFrame(mapped.tracked));
   if (mapped.view) {

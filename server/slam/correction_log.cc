@@ -34,7 +34,7 @@ void CorrectionLog::Tell(const KeyframeView& view, double scale) {
 MapCorrection CorrectionLog::Take(const SlamMap& map) {
   MapCorrection correction;
   for (auto& [id, told] : keyframes_) {
-    const auto now = map.Place(id);
+    const auto now = map.KeyframePose(id);
     if (!now) continue;
     const double turn_rad = now->T_world_camera.rotation().angularDistance(told.T_world_camera.rotation());
     const double way_mu = (now->T_world_camera.translation() - told.T_world_camera.translation()).norm();

@@ -10,7 +10,7 @@ namespace romap::slam {
 namespace {
 
 constexpr int kCell_px = 16;
-constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighbourhood
+constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighborhood
 
 // z by the depth image, 0 where there is none or where the surface jumps.
 double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
@@ -67,61 +67,61 @@ bool FrameFeatures::HasDepth() const {
 
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
                                                        const RadialCorrection& lens) {
-  auto sight = std::make_shared<FrameFeatures>();
-  sight->frame_id = frame.frame_id;
-  sight->timestamp_ns = frame.timestamp_ns;
-  sight->camera = frame.camera;
-  sight->features = std::move(features);
-  const size_t count = sight->features.size();
-  sight->ranges_mu.assign(count, 0);
-  sight->has_masks = frame.has_masks;
-  const MaskPlaces places(frame.labels);
+  auto made = std::make_shared<FrameFeatures>();
+  made->frame_id = frame.frame_id;
+  made->timestamp_ns = frame.timestamp_ns;
+  made->camera = frame.camera;
+  made->features = std::move(features);
+  const size_t count = made->features.size();
+  made->ranges_mu.assign(count, 0);
+  made->has_masks = frame.has_masks;
+  const MaskZones zones(frame.labels);
   for (size_t i = 0; i < count; ++i) {
-    const Feature& feature = sight->features[i];
-    sight->seen_px.push_back(feature.pixel_px);
+    const Feature& feature = made->features[i];
+    made->image_px.push_back(feature.pixel_px);
     const Eigen::Vector3d ray = frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y());
-    sight->bearings_camera.push_back(ray.normalized());
-    if (!frame.depth_mu.empty()) sight->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
-    sight->mask_places.push_back(places.At(feature.pixel_px, feature.octave_scale, feature.label));
+    made->bearings_camera.push_back(ray.normalized());
+    if (!frame.depth_mu.empty()) made->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
+    made->mask_zones.push_back(zones.At(feature.pixel_px, feature.octave_scale, feature.label));
   }
-  sight->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, sight->features);
-  return WithLens(std::move(sight), lens);
+  made->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, made->features);
+  return WithLens(std::move(made), lens);
 }
 
-std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> sight,
+std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame,
                                               const RadialCorrection& lens) {
-  if (sight->lens == lens) return sight;
-  auto corrected = std::make_shared<FrameFeatures>(*sight);
+  if (frame->lens == lens) return frame;
+  auto corrected = std::make_shared<FrameFeatures>(*frame);
   corrected->lens = lens;
-  const CameraModel& camera = sight->camera;
-  for (size_t i = 0; i < sight->size(); ++i) {
-    const Eigen::Vector2d pixel_px = lens.Undistort(camera, sight->seen_px[i].cast<double>());
+  const CameraModel& camera = frame->camera;
+  for (size_t i = 0; i < frame->size(); ++i) {
+    const Eigen::Vector2d pixel_px = lens.Undistort(camera, frame->image_px[i].cast<double>());
     const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
     corrected->features[i].pixel_px = pixel_px.cast<float>();
     corrected->bearings_camera[i] = ray.normalized();
-    const double depth_mu = sight->ranges_mu[i] * sight->bearings_camera[i].z();
+    const double depth_mu = frame->ranges_mu[i] * frame->bearings_camera[i].z();
     corrected->ranges_mu[i] = depth_mu * ray.norm();
   }
   corrected->grid = FeatureGrid(camera.width_px, camera.height_px, corrected->features);
   return corrected;
 }
 
-std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& sight, const cv::Mat& labels, int mask_erosion_px) {
-  auto masked = std::make_shared<FrameFeatures>(sight);
+std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& frame, const cv::Mat& labels, int mask_erosion_px) {
+  auto masked = std::make_shared<FrameFeatures>(frame);
   masked->has_masks = true;
-  const MaskPlaces places(labels);
-  for (size_t i = 0; i < sight.size(); ++i) {
+  const MaskZones zones(labels);
+  for (size_t i = 0; i < frame.size(); ++i) {
     Feature& feature = masked->features[i];
     const auto erosion_px = static_cast<int>(std::lround(mask_erosion_px * feature.octave_scale));
-    feature.label = LabelAt(labels, sight.seen_px[i], erosion_px);
-    masked->mask_places[i] = places.At(sight.seen_px[i], feature.octave_scale, feature.label);
+    feature.label = LabelAt(labels, frame.image_px[i], erosion_px);
+    masked->mask_zones[i] = zones.At(frame.image_px[i], feature.octave_scale, feature.label);
   }
   return masked;
 }
 
-std::vector<Feature> SeenFeatures(const FrameFeatures& sight) {
-  std::vector<Feature> features = sight.features;
-  for (size_t i = 0; i < features.size(); ++i) features[i].pixel_px = sight.seen_px[i];
+std::vector<Feature> UncorrectedFeatures(const FrameFeatures& frame) {
+  std::vector<Feature> features = frame.features;
+  for (size_t i = 0; i < features.size(); ++i) features[i].pixel_px = frame.image_px[i];
   return features;
 }
 

@@ -7,8 +7,8 @@
 
 #include "common/stage_messages.h"
 #include "server/slam/features/feature.h"
-#include "server/slam/mask_places.h"
-#include "server/slam/optimise/radial_correction.h"
+#include "server/slam/mask_zones.h"
+#include "server/slam/optimize/radial_correction.h"
 
 namespace romap::slam {
 
@@ -28,33 +28,33 @@ class FeatureGrid {
   std::vector<int> members_;
 };
 
-// A frame as slam keeps it: without its image. Immutable once made, so that threads may share it.
+// The features of one frame, which slam keeps instead of the image. Immutable once made, so that threads may share it.
 struct FrameFeatures {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
-  CameraModel camera = {};     // pinhole
-  bool has_masks = false;      // or have come since
-  RadialCorrection lens = {};  // by which features and bearings were corrected
-  std::vector<Feature> features = {};
-  std::vector<Eigen::Vector2f> seen_px = {};          // where the picture shows them, before that
-  std::vector<Eigen::Vector3d> bearings_camera = {};  // unit length; one per feature, as all below
-  std::vector<double> ranges_mu = {};                 // by the depth image along the bearing, 0 = unknown
-  std::vector<MaskPlace> mask_places = {};
+  CameraModel camera = {};                            // pinhole
+  bool has_masks = false;                             // also true when the masks arrived after the frame
+  RadialCorrection lens = {};                         // applied to `features` and `bearings_camera`
+  std::vector<Feature> features = {};                 // pixels corrected by `lens`
+  std::vector<Eigen::Vector2f> image_px = {};         // per feature: its pixel in the image, before the correction
+  std::vector<Eigen::Vector3d> bearings_camera = {};  // per feature: unit length
+  std::vector<double> ranges_mu = {};     // per feature: distance along the bearing by the depth image, 0 = unknown
+  std::vector<MaskZone> mask_zones = {};  // per feature
   FeatureGrid grid = {};
 
   size_t size() const { return features.size(); }
   bool HasDepth() const;
 };
 
-// `features` are where the picture shows them.
+// `features` have the pixels of the image, without the correction by `lens`.
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
                                                        const RadialCorrection& lens = {});
-// The same frame, its features corrected by another lens. The same object, if it is no other.
-std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> sight, const RadialCorrection& lens);
-// The same frame, its features labelled by masks that came after it, as FeatureExtractor does it. `labels`: CV_16UC1 of
-// the frame's size.
-std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& sight, const cv::Mat& labels, int mask_erosion_px);
-// The features where the picture shows them.
-std::vector<Feature> SeenFeatures(const FrameFeatures& sight);
+// The same frame with its features corrected by another lens. Returns `frame` itself if it has this lens.
+std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame, const RadialCorrection& lens);
+// The same frame with its features labeled by masks that arrived after it, in the same way as FeatureExtractor does.
+// `labels`: CV_16UC1 of the frame's size.
+std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& frame, const cv::Mat& labels, int mask_erosion_px);
+// The features with their pixels in the image, before the lens correction.
+std::vector<Feature> UncorrectedFeatures(const FrameFeatures& frame);
 
 }  // namespace romap::slam

@@ -12,8 +12,9 @@
 
 #include "common/geometry.h"
 #include "common/ids.h"
+#include "common/scaled_pose.h"
 #include "server/slam/features/feature.h"
-#include "server/slam/optimise/radial_correction.h"
+#include "server/slam/optimize/radial_correction.h"
 
 namespace romap::slam {
 
@@ -26,30 +27,24 @@ struct LocalPoint {
   Descriptor descriptor{};
 };
 
-// Where a keyframe is and how the scale of the map around it changed since it was made.
-struct KeyframePlace {
-  SE3<World, Camera> T_world_camera;
-  double scale = 1;
-};
-
 // The part of the sparse map around the camera, as of one moment: what the mapping thread hands to the tracking thread.
 // Immutable, so that neither ever waits for the other.
 struct LocalMap {
-  uint64_t keyframes_done = 0;                    // keyframes that are in the map
-  int generation = 0;                             // grows when the map is begun anew
-  RadialCorrection lens;                          // for the features of frames that are tracked against it
-  KeyframeId reference;                           // the newest keyframe
-  int reference_points = 0;                       // well-placed points that it sees
-  std::map<KeyframeId, KeyframePlace> keyframes;  // the newest ones and those around
+  uint64_t keyframes_done = 0;                 // keyframes that are in the map
+  int generation = 0;                          // grows when the map is begun anew
+  RadialCorrection lens;                       // for the features of frames that are tracked against it
+  KeyframeId reference;                        // the newest keyframe
+  int reference_points = 0;                    // well-placed points that it sees
+  std::map<KeyframeId, ScaledPose> keyframes;  // the newest ones and those around
   std::vector<LocalPoint> points;
   std::unordered_map<MapPointId, int> index;  // into `points`
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
   // The newest frame that was found again while the camera was lost.
-  struct Relocalisation {
+  struct Relocalization {
     uint64_t frame_id = 0;
     SE3<World, Camera> T_world_camera;
   };
-  std::optional<Relocalisation> relocalised;
+  std::optional<Relocalization> relocalized;
 };
 
 // Hands the newest local map from one thread to another.

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/slam/optimise/pose_graph.h"
+#include "server/slam/optimize/pose_graph.h"
 #include "server/slam/point_maker.h"
 
 namespace romap::slam {
@@ -16,8 +16,8 @@ namespace {
 
 constexpr int kMinSharedPoints = 15;
 constexpr int kStrongSharedPoints = 80;  // an edge of the pose graph besides parents and loops
-constexpr double kLoopWeight = 3;        // over that of an edge between neighbours
-constexpr size_t kFusedNeighbours = 12;
+constexpr double kLoopWeight = 3;        // over that of an edge between neighbors
+constexpr size_t kFusedNeighbors = 12;
 
 using Similarities = std::map<KeyframeId, Sim3<World, Camera>>;
 
@@ -55,7 +55,7 @@ void Write(const Similarities& before, const Similarities& after, SlamMap& map) 
     keyframe.scale *= S_new_old.scale();
   }
   for (auto& [id, track] : map.points()) {
-    const Sim3<World, World>& S_new_old = moved.at(track.sights.front().keyframe);
+    const Sim3<World, World>& S_new_old = moved.at(track.observations.front().keyframe);
     track.point.position_world = S_new_old * track.point.position_world;
     map.Refresh(track);
   }
@@ -90,7 +90,7 @@ bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, 
       PoseGraphNode& node = nodes[static_cast<size_t>(node_of.at(keyframe->id))];
       if (!node.fixed) node.S_world_camera = S_new_old * before.at(keyframe->id);
     }
-    const PoseGraphSummary summary = OptimisePoseGraph(nodes, edges, {.fix_scale = fix_scale});
+    const PoseGraphSummary summary = OptimizePoseGraph(nodes, edges, {.fix_scale = fix_scale});
     spdlog::info(
         "slam: loop from {} to {}: off by {:.0f} px, scale by {:.3f}; pose graph of {} keyframes and {} edges, "
         "cost {:.3g} -> {:.3g}",
@@ -109,8 +109,8 @@ bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, 
 
   for (const auto& [seen, known] : loop.same_points) map.MergePoints(seen, known);
   PointMaker maker(config, &map);
-  if (old_side.size() > kFusedNeighbours) old_side.resize(kFusedNeighbours);
-  if (new_side.size() > kFusedNeighbours) new_side.resize(kFusedNeighbours);
+  if (old_side.size() > kFusedNeighbors) old_side.resize(kFusedNeighbors);
+  if (new_side.size() > kFusedNeighbors) new_side.resize(kFusedNeighbors);
   for (MapKeyframe* keyframe : new_side) maker.FuseDuplicates(*keyframe, old_side);
   return drifted;
 }

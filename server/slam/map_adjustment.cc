@@ -29,14 +29,14 @@ class ProblemBuilder {
         {.T_world_camera = keyframe.T_world_camera(), .fixed = fixed || keyframe.pose_given, .prior = keyframe.prior});
   }
 
-  // The point and its sights from keyframes that were added.
+  // The point and its observations from keyframes that were added.
   void AddPoint(const PointTrack& track) {
     const auto point = static_cast<int>(problem_.points.size());
     bool seen = false;
-    for (const PointSight& sight : track.sights) {
-      const auto camera = camera_of_.find(sight.keyframe);
+    for (const FeatureRef& observation : track.observations) {
+      const auto camera = camera_of_.find(observation.keyframe);
       if (camera == camera_of_.end()) continue;
-      problem_.bundle.observations.push_back(Observe(camera->second, point, sight));
+      problem_.bundle.observations.push_back(Observe(camera->second, point, observation));
       seen = true;
     }
     if (!seen) return;
@@ -48,10 +48,10 @@ class ProblemBuilder {
   MapProblem Take() { return std::move(problem_); }
 
  private:
-  BundleObservation Observe(int camera, int point, const PointSight& sight) const {
-    const FrameFeatures& seen = *map_.FindKeyframe(sight.keyframe)->sight;
-    const auto i = static_cast<size_t>(sight.feature);
-    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? seen.seen_px[i] : seen.features[i].pixel_px;
+  BundleObservation Observe(int camera, int point, const FeatureRef& ref) const {
+    const FrameFeatures& seen = *map_.FindKeyframe(ref.keyframe)->frame;
+    const auto i = static_cast<size_t>(ref.feature);
+    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? seen.image_px[i] : seen.features[i].pixel_px;
     BundleObservation observation{.camera = camera,
                                   .point = point,
                                   .pixel_px = pixel_px.cast<double>(),
@@ -85,7 +85,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   }
   std::map<KeyframeId, int> around;
   for (const MapPointId point : points) {
-    for (const PointSight& sight : map.FindPoint(point)->sights) ++around[sight.keyframe];
+    for (const FeatureRef& observation : map.FindPoint(point)->observations) ++around[observation.keyframe];
   }
   for (const MapKeyframe* keyframe : window) around.erase(keyframe->id);
   std::vector<std::pair<int, KeyframeId>> holding;
@@ -108,7 +108,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   return builder.Take();
 }
 
-MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config, bool find_lens) {
+MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find_lens) {
   const MapKeyframe& first = map.keyframes().begin()->second;
   ProblemBuilder builder(map, config, first.camera());
   if (find_lens) builder.FindLens();
@@ -128,12 +128,12 @@ void ApplyWindow(const MapProblem& problem, SlamMap& map) {
   }
   for (const BundleObservation& observation : problem.bundle.observations) {
     if (!observation.outlier) continue;
-    map.RemoveSight(problem.points[static_cast<size_t>(observation.point)],
-                    problem.keyframes[static_cast<size_t>(observation.camera)]);
+    map.RemoveObservation(problem.points[static_cast<size_t>(observation.point)],
+                          problem.keyframes[static_cast<size_t>(observation.camera)]);
   }
 }
 
-void ApplyWhole(const MapProblem& problem, SlamMap& map) {
+void ApplyGlobal(const MapProblem& problem, SlamMap& map) {
   if (problem.bundle.lens) map.CorrectLens(problem.bundle.lens->correction);
   // What happened to the space around each keyframe.
   std::map<KeyframeId, Sim3<World, World>> moved;
@@ -158,15 +158,15 @@ void ApplyWhole(const MapProblem& problem, SlamMap& map) {
     solved.insert(track->point.id);
   }
   for (auto& [id, track] : map.points()) {
-    if (solved.contains(id) || track.sights.empty()) continue;
-    const auto it = moved.find(track.sights.front().keyframe);
+    if (solved.contains(id) || track.observations.empty()) continue;
+    const auto it = moved.find(track.observations.front().keyframe);
     if (it != moved.end()) track.point.position_world = it->second * track.point.position_world;
   }
   for (const BundleObservation& observation : problem.bundle.observations) {
     if (!observation.outlier) continue;
     const KeyframeId keyframe = problem.keyframes[static_cast<size_t>(observation.camera)];
     if (map.FindKeyframe(keyframe) == nullptr) continue;
-    map.RemoveSight(problem.points[static_cast<size_t>(observation.point)], keyframe);
+    map.RemoveObservation(problem.points[static_cast<size_t>(observation.point)], keyframe);
   }
   for (auto& [id, track] : map.points()) map.Refresh(track);
 }

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <vector>
 
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
@@ -24,13 +24,13 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
 
 // Everything. The first keyframe stays, unless priors hold the map; without depth the scale is free, and damping keeps
 // it where it is. `find_lens`: what is left of the lens is found along with it.
-MapProblem WholeProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
+MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
 
-// Writes the solution of a window back and drops the sights that it calls outliers.
+// Writes the solution of a window back and drops the outlier observations.
 void ApplyWindow(const MapProblem& problem, SlamMap& map);
 
 // Writes back a solution that was found while the map went on: keyframes and points that came meanwhile go along with
 // the keyframe they hang on.
-void ApplyWhole(const MapProblem& problem, SlamMap& map);
+void ApplyGlobal(const MapProblem& problem, SlamMap& map);
 
 }  // namespace romap::slam

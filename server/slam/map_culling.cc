@@ -20,10 +20,10 @@ bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
     if (!keyframe.points[i]) continue;
     ++points;
     int as_good = 0;
-    for (const PointSight& sight : map.FindPoint(keyframe.points[i])->sights) {
-      if (sight.keyframe == keyframe.id) continue;
-      const auto& features = map.FindKeyframe(sight.keyframe)->features();
-      as_good += features[static_cast<size_t>(sight.feature)].octave <= keyframe.features()[i].octave + 1 ? 1 : 0;
+    for (const FeatureRef& observation : map.FindPoint(keyframe.points[i])->observations) {
+      if (observation.keyframe == keyframe.id) continue;
+      const auto& features = map.FindKeyframe(observation.keyframe)->features();
+      as_good += features[static_cast<size_t>(observation.feature)].octave <= keyframe.features()[i].octave + 1 ? 1 : 0;
       if (as_good == kOtherKeyframes) break;
     }
     redundant += as_good == kOtherKeyframes ? 1 : 0;

@@ -15,7 +15,7 @@ constexpr size_t kMaxPassedFrames = 512;
 MapKeyframe* KeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
   // Late masks are of new keyframes; these are in the order of their frames.
   for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
-    const uint64_t of_keyframe = it->second.sight->frame_id;
+    const uint64_t of_keyframe = it->second.frame->frame_id;
     if (of_keyframe == frame_id) return &it->second;
     if (of_keyframe < frame_id) break;
   }
@@ -38,8 +38,8 @@ void MaskVoter::ObserveFrame(const TrackedFrame& tracked, SlamMap& map) {
 
 void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
   if (MapKeyframe* keyframe = KeyframeOfFrame(masks.frame_id, map)) {
-    if (!keyframe->sight->has_masks) {
-      keyframe->sight = WithMasks(*keyframe->sight, masks.labels, config_.mask_erosion_px);
+    if (!keyframe->frame->has_masks) {
+      keyframe->frame = WithMasks(*keyframe->frame, masks.labels, config_.mask_erosion_px);
     }
     return;
   }
@@ -52,11 +52,10 @@ void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
 
 void MaskVoter::Vote(const PassedFrame& frame, const cv::Mat& labels, SlamMap& map) const {
   const MapKeyframe* reference = map.FindKeyframe(frame.reference);
-  if (reference == nullptr || reference->sight->has_masks || labels.empty()) return;
-  const SE3<Camera, Camera>& T = frame.T_reference_camera;
+  if (reference == nullptr || reference->frame->has_masks || labels.empty()) return;
   const SE3<Camera, World> T_camera_world =
-      SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation()).Inverse() * reference->T_camera_world();
-  const MaskPlaces places(labels);
+      ScaleTranslation(frame.T_reference_camera, reference->scale).Inverse() * reference->T_camera_world();
+  const MaskZones zones(labels);
   for (const MapPointId id : reference->points) {
     if (!id) continue;
     PointTrack& track = *map.FindPoint(id);
@@ -68,7 +67,7 @@ void MaskVoter::Vote(const PassedFrame& frame, const cv::Mat& labels, SlamMap& m
     if (!inside) continue;
     const double octave_scale = std::clamp(track.size_mu * frame.camera.fx_px / p_camera.norm(), 1.0, kMaxOctaveScale);
     const int erosion_px = static_cast<int>(std::lround(config_.mask_erosion_px * octave_scale));
-    track.votes.Add(places.At(pixel_px, octave_scale, LabelAt(labels, pixel_px, erosion_px)));
+    track.votes.Add(zones.At(pixel_px, octave_scale, LabelAt(labels, pixel_px, erosion_px)));
   }
 }
 

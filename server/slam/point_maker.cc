@@ -31,7 +31,7 @@ std::vector<uint8_t> TiedFeatures(const MapKeyframe& keyframe) {
 
 }  // namespace
 
-LocalPoint LooksOf(const PointTrack& track) {
+LocalPoint MakeLocalPoint(const PointTrack& track) {
   return {.id = track.point.id,
           .position_world = track.point.position_world,
           .direction_world = track.direction_world,
@@ -47,16 +47,16 @@ SlamConfig PointMaker::Generous(SlamConfig config) {
 
 bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
   if (keyframe.points[static_cast<size_t>(feature)]) return false;
-  const Sight sight = map_->SightOf(keyframe, feature);
+  const ObservedRay ray = map_->RayOf(keyframe, feature);
   if (!keyframe.pose_given) {
-    if (!Agrees(sight, track.point.position_world)) return false;
-    return map_->AddSight(track, keyframe, feature);
+    if (!Agrees(ray, track.point.position_world)) return false;
+    return map_->AddObservation(track, keyframe, feature);
   }
-  std::vector<Sight> sights = map_->SightsOf(track);
-  sights.push_back(sight);
-  const Eigen::Vector3d p_world = RefinePoint(sights, track.point.position_world);
-  if (!std::all_of(sights.begin(), sights.end(), [&](const Sight& s) { return Agrees(s, p_world); })) return false;
-  if (!map_->AddSight(track, keyframe, feature)) return false;
+  std::vector<ObservedRay> rays = map_->RaysOf(track);
+  rays.push_back(ray);
+  const Eigen::Vector3d p_world = RefinePoint(rays, track.point.position_world);
+  if (!std::all_of(rays.begin(), rays.end(), [&](const ObservedRay& s) { return Agrees(s, p_world); })) return false;
+  if (!map_->AddObservation(track, keyframe, feature)) return false;
   track.point.position_world = p_world;
   return true;
 }
@@ -64,13 +64,13 @@ bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
 void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPointId>& candidates) {
   using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
   std::vector<Claim> claims;
-  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  ProjectionMatcher matcher(*keyframe.frame, keyframe.T_world_camera());
   const ProjectionSearch search{.radius_px = kSearchRadius_px, .max_distance = kMaxMatchDistance_bits};
   const std::vector<uint8_t> tied = TiedFeatures(keyframe);
   for (const MapPointId id : candidates) {
     const PointTrack* track = map_->FindPoint(id);
     if (track == nullptr) continue;
-    if (const auto found = matcher.Find(LooksOf(*track), search, tied)) {
+    if (const auto found = matcher.Find(MakeLocalPoint(*track), search, tied)) {
       claims.emplace_back(found->distance, track->point.id, found->feature);
     }
   }
@@ -79,9 +79,9 @@ void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPoi
 }
 
 std::optional<int> PointMaker::FindFreeFeature(const PointTrack& track, const MapKeyframe& keyframe) const {
-  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  ProjectionMatcher matcher(*keyframe.frame, keyframe.T_world_camera());
   const ProjectionSearch search{.radius_px = kSearchRadius_px, .max_distance = kMaxMatchDistance_bits};
-  const auto found = matcher.Find(LooksOf(track), search, {});
+  const auto found = matcher.Find(MakeLocalPoint(track), search, {});
   if (!found || keyframe.points[static_cast<size_t>(found->feature)]) return std::nullopt;
   return found->feature;
 }
@@ -105,30 +105,30 @@ void PointMaker::MakePointsByParallax(MapKeyframe& keyframe, const std::vector<M
 
 PointTrack* PointMaker::MakePoint(MapKeyframe& keyframe, int feature, MapKeyframe& other, int other_feature) {
   if (keyframe.points[static_cast<size_t>(feature)]) return nullptr;
-  const Sight sight = map_->SightOf(keyframe, feature);
-  const Sight other_sight = map_->SightOf(other, other_feature);
-  const std::optional<Eigen::Vector3d> start = IntersectRays(sight, other_sight);
+  const ObservedRay ray = map_->RayOf(keyframe, feature);
+  const ObservedRay other_ray = map_->RayOf(other, other_feature);
+  const std::optional<Eigen::Vector3d> start = IntersectRays(ray, other_ray);
   if (!start) return nullptr;
-  const Eigen::Vector3d p_world = RefinePoint({sight, other_sight}, *start);
-  if (!Agrees(sight, p_world) || !Agrees(other_sight, p_world)) return nullptr;
-  if (Parallax_rad(sight, other_sight, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
-  const double size_mu = sight.bearing_sigma_rad * (p_world - sight.center_world).norm();
-  const double other_size_mu = other_sight.bearing_sigma_rad * (p_world - other_sight.center_world).norm();
+  const Eigen::Vector3d p_world = RefinePoint({ray, other_ray}, *start);
+  if (!Agrees(ray, p_world) || !Agrees(other_ray, p_world)) return nullptr;
+  if (Parallax_rad(ray, other_ray, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
+  const double size_mu = ray.bearing_sigma_rad * (p_world - ray.center_world).norm();
+  const double other_size_mu = other_ray.bearing_sigma_rad * (p_world - other_ray.center_world).norm();
   if (std::max(size_mu, other_size_mu) > kMaxSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
 
   PointTrack& track = map_->AddPoint(p_world);
-  map_->AddSight(track, other, other_feature);
-  map_->AddSight(track, keyframe, feature);
+  map_->AddObservation(track, other, other_feature);
+  map_->AddObservation(track, keyframe, feature);
   map_->Refresh(track);
   return &track;
 }
 
 void PointMaker::MakePointsByDepth(MapKeyframe& keyframe) {
   for (size_t i = 0; i < keyframe.points.size(); ++i) {
-    const double range_mu = keyframe.sight->ranges_mu[i];
+    const double range_mu = keyframe.frame->ranges_mu[i];
     if (keyframe.points[i] || range_mu <= 0) continue;
     PointTrack& track = map_->AddPoint(keyframe.center_world() + range_mu * keyframe.BearingWorld(i));
-    map_->AddSight(track, keyframe, static_cast<int>(i));
+    map_->AddObservation(track, keyframe, static_cast<int>(i));
     map_->Refresh(track);
   }
 }
@@ -165,16 +165,17 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
 }
 
 int PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& points) {
-  ProjectionMatcher matcher(*keyframe.sight, keyframe.T_world_camera());
+  ProjectionMatcher matcher(*keyframe.frame, keyframe.T_world_camera());
   const ProjectionSearch search{.radius_px = kFuseRadius_px, .max_distance = kFuseDistance};
   int fused = 0;
   for (const MapPointId id : points) {
     PointTrack* track = map_->FindPoint(id);
     if (track == nullptr) continue;
-    const bool seen_here = std::any_of(track->sights.begin(), track->sights.end(),
-                                       [&](const PointSight& sight) { return sight.keyframe == keyframe.id; });
+    const bool seen_here =
+        std::any_of(track->observations.begin(), track->observations.end(),
+                    [&](const FeatureRef& observation) { return observation.keyframe == keyframe.id; });
     if (seen_here) continue;
-    const auto found = matcher.Find(LooksOf(*track), search, {});
+    const auto found = matcher.Find(MakeLocalPoint(*track), search, {});
     if (!found) continue;
     const MapPointId there = keyframe.points[static_cast<size_t>(found->feature)];
     if (!there) {
@@ -183,23 +184,23 @@ int PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& p
     }
     // The one that more keyframes saw stays.
     const PointTrack* other = map_->FindPoint(there);
-    const bool keep_other = other->sights.size() >= track->sights.size();
+    const bool keep_other = other->observations.size() >= track->observations.size();
     map_->MergePoints(keep_other ? track->point.id : there, keep_other ? there : track->point.id);
     ++fused;
   }
   return fused;
 }
 
-void PointMaker::FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbours) {
+void PointMaker::FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbors) {
   const auto points_of = [](const MapKeyframe& of) {
     std::vector<MapPointId> points;
     std::copy_if(of.points.begin(), of.points.end(), std::back_inserter(points),
                  [](MapPointId id) { return bool(id); });
     return points;
   };
-  for (MapKeyframe* neighbour : neighbours) {
-    FuseInto(*neighbour, points_of(keyframe));
-    FuseInto(keyframe, points_of(*neighbour));
+  for (MapKeyframe* neighbor : neighbors) {
+    FuseInto(*neighbor, points_of(keyframe));
+    FuseInto(keyframe, points_of(*neighbor));
   }
 }
 

@@ -8,10 +8,10 @@
 
 namespace romap::slam {
 
-LocalPoint LooksOf(const PointTrack& track);
+LocalPoint MakeLocalPoint(const PointTrack& track);
 
 // Finds known points in a new keyframe and makes new ones. Where poses were given they are exact and points are checked
-// strictly against all their sights; where they were estimated, adjustment and culling see to that later.
+// strictly against all their observations; where they were estimated, adjustment and culling see to that later.
 class PointMaker {
  public:
   PointMaker(const SlamConfig& config, SlamMap* map) : config_(config), map_(map) {}
@@ -26,8 +26,8 @@ class PointMaker {
   void MakePointsByParallax(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& others);
   // New points from the depth image.
   void MakePointsByDepth(MapKeyframe& keyframe);
-  // Points of `neighbours` and of `keyframe` that turn out to be the same become one.
-  void FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbours);
+  // Points of `neighbors` and of `keyframe` that turn out to be the same become one.
+  void FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbors);
   // Earlier keyframes with enough baseline to make points with: those that share most points come first.
   std::vector<MapKeyframe*> KeyframesToMatch(const MapKeyframe& keyframe) const;
 

@@ -33,14 +33,14 @@ std::optional<ProjectionMatcher::Expected> ProjectionMatcher::Expect(const Local
   return Expected{pixel_px, point.size_mu * camera.fx_px / range_mu};
 }
 
-std::optional<Sighting> ProjectionMatcher::Find(const LocalPoint& point, const ProjectionSearch& search,
-                                                std::span<const uint8_t> taken) {
+std::optional<FoundFeature> ProjectionMatcher::Find(const LocalPoint& point, const ProjectionSearch& search,
+                                                    std::span<const uint8_t> taken) {
   const std::optional<Expected> expected = Expect(point, search.min_view_cosine);
   if (!expected) return std::nullopt;
   const double scale = expected->octave_scale;
   const double radius_px = search.radius_px * std::clamp(scale, 1.0, 3.0);
   frame_.grid.Near(expected->pixel_px, radius_px, near_);
-  std::optional<Sighting> best;
+  std::optional<FoundFeature> best;
   int second_distance = 256;
   for (const int index : near_) {
     const auto i = static_cast<size_t>(index);
@@ -69,7 +69,7 @@ std::vector<PointMatch> ProjectionMatcher::MatchAll(std::span<const LocalPoint> 
   std::vector<PointMatch> matches;
   std::vector<int> match_of_feature(frame_.size(), -1);
   for (size_t i = 0; i < points.size(); ++i) {
-    const std::optional<Sighting> found = Find(points[i], search, taken);
+    const std::optional<FoundFeature> found = Find(points[i], search, taken);
     if (!found) continue;
     const PointMatch match{static_cast<int>(i), found->feature, found->distance};
     int& rival = match_of_feature[static_cast<size_t>(found->feature)];
@@ -83,8 +83,8 @@ std::vector<PointMatch> ProjectionMatcher::MatchAll(std::span<const LocalPoint> 
   return matches;
 }
 
-std::vector<PointMatch> MatchByLooks(std::span<const LocalPoint> points, const FrameFeatures& frame, int max_distance,
-                                     double ratio) {
+std::vector<PointMatch> MatchByDescriptors(std::span<const LocalPoint> points, const FrameFeatures& frame,
+                                           int max_distance, double ratio) {
   std::vector<Descriptor> of_points, of_features;
   of_points.reserve(points.size());
   of_features.reserve(frame.size());

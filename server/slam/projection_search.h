@@ -20,7 +20,7 @@ struct ProjectionSearch {
 };
 
 // Where a point was found.
-struct Sighting {
+struct FoundFeature {
   int feature = 0;
   int distance = 0;  // Hamming, bits
 };
@@ -45,7 +45,8 @@ class ProjectionMatcher {
   std::optional<Expected> Expect(const LocalPoint& point, double min_view_cosine) const;
 
   // The feature that shows the point. Features with a non-zero entry in `taken` (empty: none) are passed over.
-  std::optional<Sighting> Find(const LocalPoint& point, const ProjectionSearch& search, std::span<const uint8_t> taken);
+  std::optional<FoundFeature> Find(const LocalPoint& point, const ProjectionSearch& search,
+                                   std::span<const uint8_t> taken);
 
   // One-to-one matches: where two points claim a feature, the one that looks more like it gets it.
   std::vector<PointMatch> MatchAll(std::span<const LocalPoint> points, const ProjectionSearch& search,
@@ -59,7 +60,7 @@ class ProjectionMatcher {
 };
 
 // Points and features alike by their looks alone: mutual best, and clearly better than the second best.
-std::vector<PointMatch> MatchByLooks(std::span<const LocalPoint> points, const FrameFeatures& frame, int max_distance,
-                                     double ratio);
+std::vector<PointMatch> MatchByDescriptors(std::span<const LocalPoint> points, const FrameFeatures& frame,
+                                           int max_distance, double ratio);
 
 }  // namespace romap::slam

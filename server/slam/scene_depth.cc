@@ -41,13 +41,13 @@ cv::Matx33d PlaneHomography(const DepthView& first, const DepthView& second, dou
 cv::Mat BlockCosts(const DepthView& first, const DepthView& second, double depth_mu) {
   cv::Mat warped, valid;
   const cv::Matx33d H = PlaneHomography(first, second, depth_mu);
-  const cv::Size size = first.grey.size();
-  cv::warpPerspective(second.grey, warped, H, size, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
-  const cv::Mat inside(second.grey.size(), CV_8UC1, cv::Scalar(255));
+  const cv::Size size = first.gray.size();
+  cv::warpPerspective(second.gray, warped, H, size, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+  const cv::Mat inside(second.gray.size(), CV_8UC1, cv::Scalar(255));
   cv::warpPerspective(inside, valid, H, size, cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
 
   cv::Mat difference, costs, coverage;
-  cv::absdiff(first.grey, warped, difference);
+  cv::absdiff(first.gray, warped, difference);
   const cv::Size blocks(size.width / kBlock_px, size.height / kBlock_px);
   const cv::Rect whole(0, 0, blocks.width * kBlock_px, blocks.height * kBlock_px);
   difference(whole).convertTo(difference, CV_32F);
@@ -72,10 +72,10 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
 
 // At half the image's size: motion blur that matters is still seen, noise is not.
 double Sharpness(const cv::Mat& image_bgr) {
-  cv::Mat half, grey, laplacian;
+  cv::Mat half, gray, laplacian;
   cv::resize(image_bgr, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  cv::cvtColor(half, grey, cv::COLOR_BGR2GRAY);
-  cv::Laplacian(grey, laplacian, CV_16S);
+  cv::cvtColor(half, gray, cv::COLOR_BGR2GRAY);
+  cv::Laplacian(gray, laplacian, CV_16S);
   cv::Scalar mean, deviation;
   cv::meanStdDev(laplacian, mean, deviation);
   return deviation[0] * deviation[0];
@@ -88,14 +88,14 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
   DepthView view{.camera = frame.camera, .T_world_camera = T_world_camera};
   cv::Mat small;
   cv::resize(frame.image_bgr, small, {}, scale, scale, cv::INTER_AREA);
-  cv::cvtColor(small, view.grey, cv::COLOR_BGR2GRAY);
-  const double scale_x = static_cast<double>(view.grey.cols) / frame.image_bgr.cols;
-  const double scale_y = static_cast<double>(view.grey.rows) / frame.image_bgr.rows;
-  view.camera.width_px = view.grey.cols;
-  view.camera.height_px = view.grey.rows;
+  cv::cvtColor(small, view.gray, cv::COLOR_BGR2GRAY);
+  const double scale_x = static_cast<double>(view.gray.cols) / frame.image_bgr.cols;
+  const double scale_y = static_cast<double>(view.gray.rows) / frame.image_bgr.rows;
+  view.camera.width_px = view.gray.cols;
+  view.camera.height_px = view.gray.rows;
   view.camera.fx_px *= scale_x;
   view.camera.fy_px *= scale_y;
-  view.camera.cx_px = (view.camera.cx_px + 0.5) * scale_x - 0.5;  // pixel centres are at integer coordinates
+  view.camera.cx_px = (view.camera.cx_px + 0.5) * scale_x - 0.5;  // pixel centers are at integer coordinates
   view.camera.cy_px = (view.camera.cy_px + 0.5) * scale_y - 0.5;
   view.sharpness = Sharpness(frame.image_bgr);
   if (!frame.depth_mu.empty()) view.sensor_depth_mu = MedianDepth(frame.depth_mu);
@@ -105,7 +105,7 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
 std::optional<double> SceneDepth(const DepthView& first, const DepthView& second) {
   if (first.sensor_depth_mu) return first.sensor_depth_mu;
   const double baseline_mu = (first.T_world_camera.translation() - second.T_world_camera.translation()).norm();
-  if (!(baseline_mu > 0) || first.grey.cols < kBlock_px || first.grey.rows < kBlock_px) return std::nullopt;
+  if (!(baseline_mu > 0) || first.gray.cols < kBlock_px || first.gray.rows < kBlock_px) return std::nullopt;
 
   std::array<double, kDepths> depths_mu;
   std::vector<cv::Mat> costs;

@@ -7,12 +7,12 @@
 
 namespace romap::slam {
 
-// A small grey copy of a frame with what is needed to measure depth against another one, and its sharpness.
+// A small gray copy of a frame with what is needed to measure depth against another one, and its sharpness.
 struct DepthView {
-  CameraModel camera;  // of `grey`
+  CameraModel camera;  // of `gray`
   SE3<World, Camera> T_world_camera;
-  cv::Mat grey = {};     // CV_8UC1, about 160 px wide
-  double sharpness = 0;  // variance of the Laplacian, grey levels squared; compares frames of one scene
+  cv::Mat gray = {};     // CV_8UC1, about 160 px wide
+  double sharpness = 0;  // variance of the Laplacian, gray levels squared; compares frames of one scene
   std::optional<double> sensor_depth_mu = {};  // median of the frame's depth image
 };
 

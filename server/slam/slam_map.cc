@@ -10,21 +10,21 @@ namespace romap::slam {
 namespace {
 
 size_t FeatureOf(const PointTrack& track, KeyframeId keyframe) {
-  const auto it = std::find_if(track.sights.begin(), track.sights.end(),
-                               [&](const PointSight& sight) { return sight.keyframe == keyframe; });
-  return static_cast<size_t>(it - track.sights.begin());
+  const auto it = std::find_if(track.observations.begin(), track.observations.end(),
+                               [&](const FeatureRef& observation) { return observation.keyframe == keyframe; });
+  return static_cast<size_t>(it - track.observations.begin());
 }
 
 }  // namespace
 
-MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> sight,
+MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> frame,
                                   const SE3<World, Camera>& T_world_camera) {
   const KeyframeId id{++keyframe_count_};
   MapKeyframe& keyframe = keyframes_[id];
   keyframe.id = id;
-  keyframe.points.resize(sight->size());
-  keyframe.scene_features = sight->size();
-  keyframe.sight = WithLens(std::move(sight), lens_);
+  keyframe.points.resize(frame->size());
+  keyframe.scene_features = frame->size();
+  keyframe.frame = WithLens(std::move(frame), lens_);
   keyframe.SetPose(T_world_camera);
   return keyframe;
 }
@@ -38,40 +38,41 @@ PointTrack& SlamMap::AddPoint(const Eigen::Vector3d& position_world) {
   return track;
 }
 
-bool SlamMap::AddSight(PointTrack& track, MapKeyframe& keyframe, int feature) {
+bool SlamMap::AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature) {
   MapPointId& tied = keyframe.points[static_cast<size_t>(feature)];
-  if (tied || FeatureOf(track, keyframe.id) < track.sights.size()) return false;
+  if (tied || FeatureOf(track, keyframe.id) < track.observations.size()) return false;
   tied = track.point.id;
-  const auto after = std::find_if(track.sights.begin(), track.sights.end(),
-                                  [&](const PointSight& sight) { return sight.keyframe > keyframe.id; });
-  track.sights.insert(after, {keyframe.id, feature});
-  track.point.observations = static_cast<int>(track.sights.size());
+  const auto after = std::find_if(track.observations.begin(), track.observations.end(),
+                                  [&](const FeatureRef& observation) { return observation.keyframe > keyframe.id; });
+  track.observations.insert(after, {keyframe.id, feature});
+  track.point.observations = static_cast<int>(track.observations.size());
   track.latest_keyframe = std::max(track.latest_keyframe, keyframe.id.value);
   return true;
 }
 
-void SlamMap::RemoveSight(MapPointId point, KeyframeId keyframe_id) {
+void SlamMap::RemoveObservation(MapPointId point, KeyframeId keyframe_id) {
   PointTrack* track = FindPoint(point);
   if (track == nullptr) return;
   const size_t index = FeatureOf(*track, keyframe_id);
-  if (index == track->sights.size()) return;
+  if (index == track->observations.size()) return;
   MapKeyframe& keyframe = keyframes_.at(keyframe_id);
-  const auto feature = static_cast<size_t>(track->sights[index].feature);
+  const auto feature = static_cast<size_t>(track->observations[index].feature);
   keyframe.points[feature] = {};
-  track->sights.erase(track->sights.begin() + static_cast<std::ptrdiff_t>(index));
-  track->point.observations = static_cast<int>(track->sights.size());
-  const auto has_depth = [&](const PointSight& sight) {
-    return keyframes_.at(sight.keyframe).sight->ranges_mu[static_cast<size_t>(sight.feature)] > 0;
+  track->observations.erase(track->observations.begin() + static_cast<std::ptrdiff_t>(index));
+  track->point.observations = static_cast<int>(track->observations.size());
+  const auto has_depth = [&](const FeatureRef& observation) {
+    return keyframes_.at(observation.keyframe).frame->ranges_mu[static_cast<size_t>(observation.feature)] > 0;
   };
-  const bool placed = track->sights.size() >= 2 || (track->sights.size() == 1 && has_depth(track->sights[0]));
+  const bool placed =
+      track->observations.size() >= 2 || (track->observations.size() == 1 && has_depth(track->observations[0]));
   if (!placed) RemovePoint(track->point.id);
 }
 
 void SlamMap::RemovePoint(MapPointId point) {
   const auto it = points_.find(point);
   if (it == points_.end()) return;
-  for (const PointSight& sight : it->second.sights) {
-    keyframes_.at(sight.keyframe).points[static_cast<size_t>(sight.feature)] = {};
+  for (const FeatureRef& observation : it->second.observations) {
+    keyframes_.at(observation.keyframe).points[static_cast<size_t>(observation.feature)] = {};
   }
   points_.erase(it);
   removed_points_.push_back(point);
@@ -81,11 +82,12 @@ void SlamMap::MergePoints(MapPointId from, MapPointId into) {
   const auto source = points_.find(from);
   PointTrack* target = FindPoint(into);
   if (source == points_.end() || target == nullptr || target->point.id == from) return;
-  const std::vector<PointSight> sights = source->second.sights;
+  const std::vector<FeatureRef> observations = source->second.observations;
   target->votes.Add(source->second.votes);
   RemovePoint(from);
   merged_into_[from] = target->point.id;
-  for (const PointSight& sight : sights) AddSight(*target, keyframes_.at(sight.keyframe), sight.feature);
+  for (const FeatureRef& observation : observations)
+    AddObservation(*target, keyframes_.at(observation.keyframe), observation.feature);
   Refresh(*target);
 }
 
@@ -93,12 +95,11 @@ void SlamMap::RemoveKeyframe(KeyframeId id) {
   MapKeyframe& keyframe = keyframes_.at(id);
   const std::vector<MapPointId> points = keyframe.points;
   for (const MapPointId point : points) {
-    if (point) RemoveSight(point, id);
+    if (point) RemoveObservation(point, id);
   }
   const MapKeyframe& parent = keyframes_.at(keyframe.parent);
-  const SE3<Camera, Camera> T_parent_this = parent.T_camera_world() * keyframe.T_world_camera();
   removed_keyframes_[id] = {.parent = parent.id,
-                            .T_parent_this = {T_parent_this.rotation(), T_parent_this.translation() / parent.scale},
+                            .T_parent_this = parent.scaled_pose().Relative(keyframe.T_world_camera()),
                             .relative_scale = keyframe.scale / parent.scale};
   for (auto& [other_id, other] : keyframes_) {
     if (other.parent == id) other.parent = parent.id;
@@ -118,37 +119,34 @@ MapKeyframe* SlamMap::FindKeyframe(KeyframeId keyframe) {
   return it == keyframes_.end() ? nullptr : &it->second;
 }
 
-std::optional<SlamMap::Pose> SlamMap::Place(KeyframeId id) const {
-  if (const MapKeyframe* keyframe = FindKeyframe(id)) return Pose{keyframe->T_world_camera(), keyframe->scale};
+std::optional<ScaledPose> SlamMap::KeyframePose(KeyframeId id) const {
+  if (const MapKeyframe* keyframe = FindKeyframe(id)) return keyframe->scaled_pose();
   const auto removed = removed_keyframes_.find(id);
   if (removed == removed_keyframes_.end()) return std::nullopt;
-  const std::optional<Pose> parent = Place(removed->second.parent);
+  const std::optional<ScaledPose> parent = KeyframePose(removed->second.parent);
   if (!parent) return std::nullopt;
-  const SE3<Camera, Camera>& T_parent_this = removed->second.T_parent_this;
-  return Pose{parent->T_world_camera *
-                  SE3<Camera, Camera>(T_parent_this.rotation(), parent->scale * T_parent_this.translation()),
-              parent->scale * removed->second.relative_scale};
+  return ScaledPose{parent->Compose(removed->second.T_parent_this), parent->scale * removed->second.relative_scale};
 }
 
 std::vector<std::pair<KeyframeId, int>> SlamMap::Covisible(const MapKeyframe& keyframe, int min_shared) const {
   std::unordered_map<KeyframeId, int> shared;
   for (const MapPointId point : keyframe.points) {
     if (!point) continue;
-    for (const PointSight& sight : points_.at(point).sights) ++shared[sight.keyframe];
+    for (const FeatureRef& observation : points_.at(point).observations) ++shared[observation.keyframe];
   }
   shared.erase(keyframe.id);
-  std::vector<std::pair<KeyframeId, int>> neighbours;
+  std::vector<std::pair<KeyframeId, int>> neighbors;
   for (const auto& [id, count] : shared) {
-    if (count >= min_shared) neighbours.emplace_back(id, count);
+    if (count >= min_shared) neighbors.emplace_back(id, count);
   }
-  std::sort(neighbours.begin(), neighbours.end(),
+  std::sort(neighbors.begin(), neighbors.end(),
             [](const auto& a, const auto& b) { return std::pair(a.second, a.first) > std::pair(b.second, b.first); });
-  return neighbours;
+  return neighbors;
 }
 
-Sight SlamMap::SightOf(const MapKeyframe& keyframe, int feature) const {
+ObservedRay SlamMap::RayOf(const MapKeyframe& keyframe, int feature) const {
   const auto i = static_cast<size_t>(feature);
-  const double range_mu = keyframe.sight->ranges_mu[i];
+  const double range_mu = keyframe.frame->ranges_mu[i];
   return {.center_world = keyframe.center_world(),
           .bearing_world = keyframe.BearingWorld(i),
           .bearing_sigma_rad = config_.pixel_sigma_px * keyframe.features()[i].octave_scale / keyframe.camera().fx_px,
@@ -156,31 +154,31 @@ Sight SlamMap::SightOf(const MapKeyframe& keyframe, int feature) const {
           .range_sigma_mu = config_.depth_sigma_ratio * range_mu};
 }
 
-std::vector<Sight> SlamMap::SightsOf(const PointTrack& track, size_t max_sights) const {
-  std::vector<Sight> sights;
-  const size_t count = track.sights.size();
-  const size_t taken = std::min(count, max_sights);
-  sights.reserve(taken);
+std::vector<ObservedRay> SlamMap::RaysOf(const PointTrack& track, size_t max_rays) const {
+  std::vector<ObservedRay> rays;
+  const size_t count = track.observations.size();
+  const size_t taken = std::min(count, max_rays);
+  rays.reserve(taken);
   for (size_t i = 0; i < taken; ++i) {
     // Spread over time, the first and the newest among them.
-    const PointSight& sight = track.sights[taken < 2 ? 0 : i * (count - 1) / (taken - 1)];
-    sights.push_back(SightOf(keyframes_.at(sight.keyframe), sight.feature));
+    const FeatureRef& observation = track.observations[taken < 2 ? 0 : i * (count - 1) / (taken - 1)];
+    rays.push_back(RayOf(keyframes_.at(observation.keyframe), observation.feature));
   }
-  return sights;
+  return rays;
 }
 
 void SlamMap::Refresh(PointTrack& track) const {
-  if (track.sights.empty()) return;
+  if (track.observations.empty()) return;
   constexpr size_t kMaxLooks = 12;
-  const size_t count = track.sights.size();
+  const size_t count = track.observations.size();
   const size_t looks = std::min(count, kMaxLooks);
   std::vector<Descriptor> descriptors;
   Eigen::Vector3d directions = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> rays;
   for (size_t i = 0; i < looks; ++i) {
-    const PointSight& sight = track.sights[looks < 2 ? 0 : i * (count - 1) / (looks - 1)];
-    const MapKeyframe& keyframe = keyframes_.at(sight.keyframe);
-    descriptors.push_back(keyframe.features()[static_cast<size_t>(sight.feature)].descriptor);
+    const FeatureRef& observation = track.observations[looks < 2 ? 0 : i * (count - 1) / (looks - 1)];
+    const MapKeyframe& keyframe = keyframes_.at(observation.keyframe);
+    descriptors.push_back(keyframe.features()[static_cast<size_t>(observation.feature)].descriptor);
     rays.push_back((track.point.position_world - keyframe.center_world()).normalized());
     directions += rays.back();
   }
@@ -191,7 +189,7 @@ void SlamMap::Refresh(PointTrack& track) const {
   }
   track.point.max_parallax_rad = std::acos(std::clamp(least_cosine, -1.0, 1.0));
 
-  const PointSight& newest = track.sights.back();
+  const FeatureRef& newest = track.observations.back();
   const MapKeyframe& keyframe = keyframes_.at(newest.keyframe);
   const Feature& feature = keyframe.features()[static_cast<size_t>(newest.feature)];
   track.size_mu =
@@ -209,7 +207,7 @@ void SlamMap::Refresh(PointTrack& track) const {
 
 void SlamMap::CorrectLens(const RadialCorrection& lens) {
   lens_ = lens;
-  for (auto& [id, keyframe] : keyframes_) keyframe.sight = WithLens(keyframe.sight, lens);
+  for (auto& [id, keyframe] : keyframes_) keyframe.frame = WithLens(keyframe.frame, lens);
 }
 
 void SlamMap::Transform(const Sim3<World, World>& S_new_old) {

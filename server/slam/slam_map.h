@@ -8,9 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/scaled_pose.h"
 #include "common/stage_messages.h"
 #include "server/slam/frame_features.h"
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/triangulation.h"
 
@@ -19,7 +20,7 @@ namespace romap::slam {
 // A keyframe of the sparse map.
 struct MapKeyframe {
   KeyframeId id;
-  std::shared_ptr<const FrameFeatures> sight;
+  std::shared_ptr<const FrameFeatures> frame;
   bool pose_given = false;              // by the client: nothing may move it
   std::optional<PosePrior> prior = {};  // what the client believes of its pose
   size_t scene_features = 0;            // the first ones: those that an ordinary frame has too
@@ -28,13 +29,14 @@ struct MapKeyframe {
   std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, found by their looks
   double scale = 1;  // product of all scale corrections of the map around it
 
-  const std::vector<Feature>& features() const { return sight->features; }
-  const CameraModel& camera() const { return sight->camera; }
+  const std::vector<Feature>& features() const { return frame->features; }
+  const CameraModel& camera() const { return frame->camera; }
   const SE3<World, Camera>& T_world_camera() const { return T_world_camera_; }
   const SE3<Camera, World>& T_camera_world() const { return T_camera_world_; }
+  ScaledPose scaled_pose() const { return {T_world_camera_, scale}; }
   const Eigen::Vector3d& center_world() const { return T_world_camera_.translation(); }
   Eigen::Vector3d BearingWorld(size_t feature) const {
-    return T_world_camera_.rotation() * sight->bearings_camera[feature];
+    return T_world_camera_.rotation() * frame->bearings_camera[feature];
   }
   void SetPose(const SE3<World, Camera>& T_world_camera) {
     T_world_camera_ = T_world_camera;
@@ -46,7 +48,7 @@ struct MapKeyframe {
   SE3<Camera, World> T_camera_world_;
 };
 
-struct PointSight {
+struct FeatureRef {
   KeyframeId keyframe;
   int feature = 0;
 };
@@ -54,7 +56,7 @@ struct PointSight {
 // A map point with all that is needed to find it again and to place it better.
 struct PointTrack {
   MapPoint point;
-  std::vector<PointSight> sights = {};                         // by keyframe
+  std::vector<FeatureRef> observations = {};                   // by keyframe
   Descriptor descriptor{};                                     // the sight's that differs least from all others
   Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of the rays that saw it
   double size_mu = 0;          // width of one pixel of the feature's own octave at the point: size that does not change
@@ -72,16 +74,16 @@ class SlamMap {
   explicit SlamMap(const SlamConfig& config, uint64_t keyframes_used = 0, uint64_t points_used = 0)
       : config_(config), keyframe_count_(keyframes_used), point_count_(points_used) {}
 
-  MapKeyframe& AddKeyframe(std::shared_ptr<const FrameFeatures> sight, const SE3<World, Camera>& T_world_camera);
+  MapKeyframe& AddKeyframe(std::shared_ptr<const FrameFeatures> frame, const SE3<World, Camera>& T_world_camera);
   PointTrack& AddPoint(const Eigen::Vector3d& position_world);
   // Ties a feature to a point. False and nothing changed: the feature has a point or the point is seen there already.
-  bool AddSight(PointTrack& track, MapKeyframe& keyframe, int feature);
+  bool AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature);
   // Unties them. A point that is left with fewer than two sights (one, if depth gave it) goes.
-  void RemoveSight(MapPointId point, KeyframeId keyframe);
+  void RemoveObservation(MapPointId point, KeyframeId keyframe);
   void RemovePoint(MapPointId point);
   // `from` is gone; its sights count for `into` where that is possible.
   void MergePoints(MapPointId from, MapPointId into);
-  // Its children are given to its parent; its place relative to that is remembered (see Place).
+  // Its children are given to its parent; its place relative to that is remembered (see KeyframePose).
   void RemoveKeyframe(KeyframeId keyframe);
 
   // nullptr: unknown or gone. A merged point answers for those that became it.
@@ -92,19 +94,15 @@ class SlamMap {
     return const_cast<SlamMap*>(this)->FindKeyframe(keyframe);
   }
 
-  // Where a keyframe is now, also one that was removed (it goes along with its parent), and its scale.
-  struct Pose {
-    SE3<World, Camera> T_world_camera;
-    double scale = 1;
-  };
-  std::optional<Pose> Place(KeyframeId keyframe) const;
+  // The current pose of a keyframe. One that was removed moves with its parent.
+  std::optional<ScaledPose> KeyframePose(KeyframeId keyframe) const;
 
   // Keyframes that share at least `min_shared` points with this one, most first (then the newest).
   std::vector<std::pair<KeyframeId, int>> Covisible(const MapKeyframe& keyframe, int min_shared) const;
 
-  Sight SightOf(const MapKeyframe& keyframe, int feature) const;
-  // A diverse selection of at most `max_sights` sights.
-  std::vector<Sight> SightsOf(const PointTrack& track, size_t max_sights = 16) const;
+  ObservedRay RayOf(const MapKeyframe& keyframe, int feature) const;
+  // A diverse selection of at most `max_rays` sights.
+  std::vector<ObservedRay> RaysOf(const PointTrack& track, size_t max_rays = 16) const;
   // Looks, direction, size and parallax anew, after its sights or the map around it changed.
   void Refresh(PointTrack& track) const;
 

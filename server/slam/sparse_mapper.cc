@@ -40,15 +40,15 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bo
   BeginAnew();
 }
 
-SparseMapper::~SparseMapper() { DropWholeAdjustment(); }
+SparseMapper::~SparseMapper() { DropGlobalAdjustment(); }
 
 void SparseMapper::BeginAnew() {
-  DropWholeAdjustment();
+  DropGlobalAdjustment();
   const uint64_t keyframes = map_ ? map_->keyframe_count() : 0;
   const uint64_t points = map_ ? map_->point_count() : 0;
   map_ = std::make_unique<SlamMap>(config_, keyframes, points);
   maker_ = std::make_unique<PointMaker>(config_, map_.get());
-  places_ = std::make_unique<PlaceRecogniser>(config_, map_.get());
+  places_ = std::make_unique<PlaceRecognizer>(config_, map_.get());
   corrections_.Forget();
   up_ = WorldUp(keyframes);
   mask_voter_.Forget();
@@ -61,13 +61,13 @@ void SparseMapper::BeginAnew() {
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
-  bool moved = TakeWholeAdjustment(/*wait=*/false);
+  bool moved = TakeGlobalAdjustment(/*wait=*/false);
   const bool lost = image.tracked.state == TrackingState::kLost;
   const bool tracked = !lost && image.tracked.state != TrackingState::kInitializing;
   const bool fits = image.pose_given || image.generation == generation_;
-  if (image.start) {
-    mapped.begun_anew = !map_->keyframes().empty();
-    if (Begin(*image.start, *image.tracked.frame)) {
+  if (image.initial_views) {
+    mapped.was_reset = !map_->keyframes().empty();
+    if (Begin(*image.initial_views, *image.tracked.frame)) {
       mapped.tracked.state = TrackingState::kTracking;
       mapped.tracked.is_keyframe = true;
       mapped.tracked.reference = latest_;
@@ -100,7 +100,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
       spdlog::info("slam: the camera is lost in a map of {} keyframes, it is begun anew", map_->keyframes().size());
       BeginAnew();
       ++generation_;
-      mapped.begun_anew = true;
+      mapped.was_reset = true;
       PublishLocalMap({});
       return mapped;
     }
@@ -119,10 +119,10 @@ void SparseMapper::ObserveMasks(const FrameMasks& masks) {
 }
 
 MapCorrection SparseMapper::Finish() {
-  TakeWholeAdjustment(/*wait=*/true);
+  TakeGlobalAdjustment(/*wait=*/true);
   if (!world_is_given_ && map_->keyframes().size() > 2) {
-    StartWholeAdjustment();
-    TakeWholeAdjustment(/*wait=*/true);
+    StartGlobalAdjustment();
+    TakeGlobalAdjustment(/*wait=*/true);
     TurnUp(/*is_last=*/true);
   }
   return corrections_.Take(*map_);
@@ -130,16 +130,13 @@ MapCorrection SparseMapper::Finish() {
 
 // The frame's pose in the world as it is now.
 void SparseMapper::Place(TrackedFrame& tracked) const {
-  const auto reference = map_->Place(tracked.reference);
-  if (!reference) return;
-  const SE3<Camera, Camera>& T = tracked.T_reference_camera;
-  tracked.T_world_camera =
-      reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+  const auto reference = map_->KeyframePose(tracked.reference);
+  if (reference) tracked.T_world_camera = reference->Compose(tracked.T_reference_camera);
 }
 
 // ------------------------------------------------------------------------------------------------ the first views
 
-bool SparseMapper::Begin(const MapStart& start, const Frame& frame) {
+bool SparseMapper::Begin(const InitialViews& start, const Frame& frame) {
   BeginAnew();
   ++generation_;
   world_is_given_ = false;
@@ -164,27 +161,27 @@ bool SparseMapper::Begin(const MapStart& start, const Frame& frame) {
   return true;
 }
 
-bool SparseMapper::BeginFromTwoViews(const MapStart& start, const SE3<World, Camera>& T_world_first) {
+bool SparseMapper::BeginFromTwoViews(const InitialViews& start, const SE3<World, Camera>& T_world_first) {
   constexpr size_t kMinPoints = 40;
   constexpr double kMaxRms_px = 2;
   if (start.points.size() < kMinPoints) return false;
   std::vector<double> depths;
-  for (const MapStart::Point& point : start.points) depths.push_back(point.p_first.z());
+  for (const InitialViews::Point& point : start.points) depths.push_back(point.p_first.z());
   const double unit = 1 / Median(std::move(depths));  // the scene's median depth becomes one map unit
   MapKeyframe& first = map_->AddKeyframe(start.first, T_world_first);
   const SE3<Camera, Camera> T_first_second(start.T_first_second.rotation(), unit * start.T_first_second.translation());
   MapKeyframe& second = map_->AddKeyframe(start.second, T_world_first * T_first_second);
   second.parent = first.id;
-  for (const MapStart::Point& point : start.points) {
+  for (const InitialViews::Point& point : start.points) {
     PointTrack& track = map_->AddPoint(T_world_first * Eigen::Vector3d(unit * point.p_first));
-    map_->AddSight(track, first, point.first_feature);
-    map_->AddSight(track, second, point.second_feature);
+    map_->AddObservation(track, first, point.first_feature);
+    map_->AddObservation(track, second, point.second_feature);
     map_->Refresh(track);
   }
-  MapProblem problem = WholeProblem(*map_, config_, /*find_lens=*/false);
+  MapProblem problem = GlobalProblem(*map_, config_, /*find_lens=*/false);
   const BundleSummary summary = AdjustBundle(problem.bundle, {.max_iterations = 20, .dense = true});
   if (!summary.usable || summary.final_rms_px > kMaxRms_px) return false;
-  ApplyWhole(problem, *map_);
+  ApplyGlobal(problem, *map_);
   latest_ = second.id;
   return map_->points().size() >= kMinPoints;
 }
@@ -192,21 +189,21 @@ bool SparseMapper::BeginFromTwoViews(const MapStart& start, const SE3<World, Cam
 // ------------------------------------------------------------------------------------------------ keyframes
 
 MapKeyframe& SparseMapper::InsertKeyframe(const TrackedImage& image) {
-  std::shared_ptr<const FrameFeatures> sight = image.sight;
+  std::shared_ptr<const FrameFeatures> features = image.features;
   const Frame& frame = *image.tracked.frame;
   if (!image.pose_given) {
     // Objects are small: their corners are worth a second look.
-    const std::vector<Feature> more = extractor_.ExtractObjects(frame, SeenFeatures(*sight));
+    const std::vector<Feature> more = extractor_.ExtractObjects(frame, UncorrectedFeatures(*features));
     if (!more.empty()) {
-      std::vector<Feature> all = SeenFeatures(*sight);
+      std::vector<Feature> all = UncorrectedFeatures(*features);
       all.insert(all.end(), more.begin(), more.end());
-      sight = MakeFrameFeatures(frame, std::move(all));
+      features = MakeFrameFeatures(frame, std::move(all));
     }
   }
   TrackedFrame tracked = image.tracked;
   Place(tracked);
-  MapKeyframe& keyframe = map_->AddKeyframe(std::move(sight), tracked.T_world_camera);
-  keyframe.scene_features = image.sight->size();
+  MapKeyframe& keyframe = map_->AddKeyframe(std::move(features), tracked.T_world_camera);
+  keyframe.scene_features = image.features->size();
   keyframe.pose_given = image.pose_given;
   if (!image.pose_given && frame.T_world_camera && world_is_given_) {
     keyframe.prior = PosePrior{.T_world_camera = *frame.T_world_camera,
@@ -215,7 +212,8 @@ MapKeyframe& SparseMapper::InsertKeyframe(const TrackedImage& image) {
   }
   for (size_t i = 0; i < image.points.size(); ++i) {
     if (!image.points[i]) continue;
-    if (PointTrack* track = map_->FindPoint(image.points[i])) map_->AddSight(*track, keyframe, static_cast<int>(i));
+    if (PointTrack* track = map_->FindPoint(image.points[i]))
+      map_->AddObservation(*track, keyframe, static_cast<int>(i));
   }
   return keyframe;
 }
@@ -232,10 +230,10 @@ KeyframeView SparseMapper::AddKeyframe(const TrackedImage& image) {
     for (const auto& [id, track] : map_->points()) all.push_back(id);
     maker_->FindKnownPoints(keyframe, all);
   } else {
-    maker_->FindKnownPoints(keyframe, PointsOf(Neighbourhood(keyframe, 20, 5)));
+    maker_->FindKnownPoints(keyframe, PointsOf(Neighborhood(keyframe, 20, 5)));
   }
-  const auto neighbours = map_->Covisible(keyframe, 1);
-  keyframe.parent = neighbours.empty() ? latest_ : neighbours.front().first;
+  const auto neighbors = map_->Covisible(keyframe, 1);
+  keyframe.parent = neighbors.empty() ? latest_ : neighbors.front().first;
   latest_ = keyframe.id;
   const auto known =
       std::count_if(keyframe.points.begin(), keyframe.points.end(), [](MapPointId id) { return bool(id); });
@@ -245,7 +243,7 @@ KeyframeView SparseMapper::AddKeyframe(const TrackedImage& image) {
   maker_->MakePointsByDepth(keyframe);
   if (!keyframe.pose_given) {
     std::vector<MapKeyframe*> around;
-    for (const KeyframeId id : Neighbourhood(keyframe, 8, 0)) around.push_back(map_->FindKeyframe(id));
+    for (const KeyframeId id : Neighborhood(keyframe, 8, 0)) around.push_back(map_->FindKeyframe(id));
     maker_->FuseDuplicates(keyframe, around);
   }
   for (const MapPointId id : keyframe.points) {
@@ -268,7 +266,7 @@ void SparseMapper::AdjustWindow(const MapKeyframe& keyframe) {
   const auto begin = std::chrono::steady_clock::now();
   MapProblem problem = WindowProblem(*map_, keyframe, config_);
   // Every second adjustment at least is carried through.
-  const std::atomic<bool>* abort = window_was_cut_short_ ? nullptr : &hurry_;
+  const std::atomic<bool>* abort = window_was_cut_short_ ? nullptr : &early_stop_requested_;
   const BundleSummary summary =
       AdjustBundle(problem.bundle, {.max_iterations = kMaxWindowIterations, .dense = true, .abort = abort});
   window_was_cut_short_ = summary.aborted;
@@ -283,19 +281,19 @@ void SparseMapper::CloseLoops(const MapKeyframe& keyframe) {
     if (map_->keyframe_count() < next_whole_) return;
     // Priors tell of the whole map's scale, which windows alone learn too late.
     next_whole_ += world_is_given_ ? kWholePeriodWithPriors_keyframes : next_whole_;
-    if (!whole_) StartWholeAdjustment();
+    if (!whole_) StartGlobalAdjustment();
     return;
   }
-  DropWholeAdjustment();  // it knows nothing of the loop
+  DropGlobalAdjustment();  // it knows nothing of the loop
   if (CloseLoop(*loop, metric_ || world_is_given_, config_, *map_)) {
     ++figures_.loops;
-    StartWholeAdjustment();
+    StartGlobalAdjustment();
   } else {
     ++figures_.sewn;
   }
 }
 
-std::vector<KeyframeId> SparseMapper::Neighbourhood(const MapKeyframe& keyframe, size_t first, size_t second) const {
+std::vector<KeyframeId> SparseMapper::Neighborhood(const MapKeyframe& keyframe, size_t first, size_t second) const {
   std::vector<KeyframeId> ids;
   std::set<KeyframeId> known = {keyframe.id};
   auto around = map_->Covisible(keyframe, kMinSharedPoints);
@@ -336,7 +334,7 @@ KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyfra
     if (!keyframe.points[i]) continue;
     const Feature& feature = keyframe.features()[i];
     view.observations.push_back(
-        {.point = keyframe.points[i], .pixel_px = keyframe.sight->seen_px[i], .label = feature.label});
+        {.point = keyframe.points[i], .pixel_px = keyframe.frame->image_px[i], .label = feature.label});
     view.points.push_back(map_->FindPoint(keyframe.points[i])->point);
   }
   view.removed_points = map_->TakeRemovedPoints();
@@ -345,10 +343,10 @@ KeyframeView SparseMapper::MakeView(const TrackedFrame& tracked, const MapKeyfra
 
 // ------------------------------------------------------------------------------------------------ the whole map
 
-void SparseMapper::StartWholeAdjustment() {
-  DropWholeAdjustment();
-  whole_ = std::make_unique<WholeAdjustment>();
-  whole_->problem = WholeProblem(*map_, config_, MayFindLens());
+void SparseMapper::StartGlobalAdjustment() {
+  DropGlobalAdjustment();
+  whole_ = std::make_unique<GlobalAdjustment>();
+  whole_->problem = GlobalProblem(*map_, config_, MayFindLens());
   const auto solve = [whole = whole_.get()] {
     whole->summary =
         AdjustBundle(whole->problem.bundle, {.max_iterations = 20, .function_tolerance = 1e-6, .abort = &whole->abort});
@@ -367,7 +365,7 @@ bool SparseMapper::MayFindLens() const {
   return config_.refine_lens && !world_is_given_ && map_->keyframes().size() >= kKeyframesToFindLens;
 }
 
-bool SparseMapper::TakeWholeAdjustment(bool wait) {
+bool SparseMapper::TakeGlobalAdjustment(bool wait) {
   if (!whole_ || (!wait && !whole_->done)) return false;
   if (whole_->thread.joinable()) whole_->thread.join();
   const BundleSummary& summary = whole_->summary;
@@ -377,7 +375,7 @@ bool SparseMapper::TakeWholeAdjustment(bool wait) {
   if (whole_->problem.bundle.lens) spdlog::debug("slam: lens k1 {:.4f}", whole_->problem.bundle.lens->correction.k1);
   const bool usable = summary.usable;
   if (usable) {
-    ApplyWhole(whole_->problem, *map_);
+    ApplyGlobal(whole_->problem, *map_);
     up_.LookAgain();
   }
   whole_ = nullptr;
@@ -385,7 +383,7 @@ bool SparseMapper::TakeWholeAdjustment(bool wait) {
   return usable;
 }
 
-void SparseMapper::DropWholeAdjustment() {
+void SparseMapper::DropGlobalAdjustment() {
   if (!whole_) return;
   whole_->abort = true;
   if (whole_->thread.joinable()) whole_->thread.join();
@@ -398,10 +396,10 @@ bool SparseMapper::TurnUp(bool is_last) {
   figures_.up_confidence = up_.confidence();
   if (!R_new_old) return false;
   const bool was_adjusting = whole_ != nullptr;
-  DropWholeAdjustment();
+  DropGlobalAdjustment();
   map_->Transform({1.0, *R_new_old, Eigen::Vector3d::Zero()});
   up_.Turned(*R_new_old);
-  if (was_adjusting) StartWholeAdjustment();
+  if (was_adjusting) StartGlobalAdjustment();
   return true;
 }
 
@@ -409,29 +407,29 @@ bool SparseMapper::TurnUp(bool is_last) {
 
 void SparseMapper::FindLostCamera(const TrackedImage& image) {
   if (map_->keyframes().empty()) return;
-  const auto found = places_->FindCamera(*image.sight);
+  const auto found = places_->FindCamera(*image.features);
   if (!found) return;
-  ++figures_.relocalisations;
-  PublishLocalMap(found->place, LocalMap::Relocalisation{.frame_id = image.sight->frame_id,
+  ++figures_.relocalizations;
+  PublishLocalMap(found->place, LocalMap::Relocalization{.frame_id = image.features->frame_id,
 
                                                          .T_world_camera = found->T_world_camera});
 }
 
-void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised) {
+void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalization> relocalized) {
   auto local = std::make_shared<LocalMap>();
   local->keyframes_done = map_->keyframe_count();
   local->generation = generation_;
   local->lens = map_->lens();
   local->reference = around;
-  local->relocalised = relocalised;
+  local->relocalized = relocalized;
   const MapKeyframe* center = map_->FindKeyframe(around);
   if (center != nullptr) {
-    std::vector<KeyframeId> keyframes = Neighbourhood(*center, 20, 5);
+    std::vector<KeyframeId> keyframes = Neighborhood(*center, 20, 5);
     keyframes.insert(keyframes.begin(), around);
     for (const MapPointId id : PointsOf(keyframes)) {
       const PointTrack& track = *map_->FindPoint(id);
       local->index[id] = static_cast<int>(local->points.size());
-      local->points.push_back(LooksOf(track));
+      local->points.push_back(MakeLocalPoint(track));
     }
     const int well_placed = std::min(kMinObservationsWellPlaced, static_cast<int>(map_->keyframes().size()));
     for (size_t i = 0; i < center->scene_features; ++i) {
@@ -443,7 +441,7 @@ void SparseMapper::PublishLocalMap(KeyframeId around, std::optional<LocalMap::Re
       keyframes.push_back(KeyframeId{id});
     }
     for (const KeyframeId id : keyframes) {
-      if (const auto place = map_->Place(id)) local->keyframes[id] = {place->T_world_camera, place->scale};
+      if (const auto pose = map_->KeyframePose(id)) local->keyframes[id] = *pose;
     }
   }
   slot_->Put(std::move(local));

@@ -13,7 +13,7 @@
 #include "server/slam/local_map.h"
 #include "server/slam/map_adjustment.h"
 #include "server/slam/mask_voter.h"
-#include "server/slam/place_recogniser.h"
+#include "server/slam/place_recognizer.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
@@ -27,12 +27,12 @@ struct MappedFrame {
   TrackedFrame tracked;                          // its pose in the world as it is now
   std::optional<MapCorrection> correction = {};  // of what was handed on before; comes before `view`
   std::optional<KeyframeView> view = {};         // of a keyframe
-  bool begun_anew = false;                       // all that was handed on before is void
+  bool was_reset = false;                        // all that was handed on before is void
 };
 
 // The mapping side of slam: makes the sparse map out of what tracking says, keeps it consistent (local and whole bundle
 // adjustment, loops, gravity), finds lost cameras again, and hands the map around the camera to tracking. For one
-// thread; only Hurry() may be called from others.
+// thread; only RequestEarlyStop() may be called from others.
 //
 // A point is tied to an object by the labels of its observations, one per keyframe that sees it. They are evidence, not
 // verdicts: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks, or
@@ -51,7 +51,7 @@ class SparseMapper {
   // No more frames: waits for adjustments under way; what moved by them.
   MapCorrection Finish();
   // So many keyframes wait: bundle adjustment ends early.
-  void Hurry(bool keyframes_wait) { hurry_ = keyframes_wait; }
+  void RequestEarlyStop(bool keyframes_wait) { early_stop_requested_ = keyframes_wait; }
 
   size_t points() const { return map_->points().size(); }
   size_t keyframes() const { return map_->keyframe_count(); }
@@ -62,13 +62,13 @@ class SparseMapper {
     std::vector<double> window_s;  // per local bundle adjustment
     int loops = 0;                 // closed with a correction
     int sewn = 0;                  // closed without one
-    int relocalisations = 0;
+    int relocalizations = 0;
     double up_confidence = 0;
   };
   const Figures& figures() const { return figures_; }
 
  private:
-  struct WholeAdjustment {
+  struct GlobalAdjustment {
     MapProblem problem;
     BundleSummary summary;
     std::atomic<bool> abort = false;
@@ -77,21 +77,21 @@ class SparseMapper {
   };
 
   void BeginAnew();
-  bool Begin(const MapStart& start, const Frame& frame);
-  bool BeginFromTwoViews(const MapStart& start, const SE3<World, Camera>& T_world_first);
+  bool Begin(const InitialViews& start, const Frame& frame);
+  bool BeginFromTwoViews(const InitialViews& start, const SE3<World, Camera>& T_world_first);
   KeyframeView AddKeyframe(const TrackedImage& image);
   MapKeyframe& InsertKeyframe(const TrackedImage& image);
   void FindLostCamera(const TrackedImage& image);
-  std::vector<KeyframeId> Neighbourhood(const MapKeyframe& keyframe, size_t first, size_t second) const;
+  std::vector<KeyframeId> Neighborhood(const MapKeyframe& keyframe, size_t first, size_t second) const;
   std::vector<MapPointId> PointsOf(const std::vector<KeyframeId>& keyframes) const;
   void AdjustWindow(const MapKeyframe& keyframe);
   void CloseLoops(const MapKeyframe& keyframe);
-  void StartWholeAdjustment();
+  void StartGlobalAdjustment();
   bool MayFindLens() const;
-  bool TakeWholeAdjustment(bool wait);
-  void DropWholeAdjustment();
+  bool TakeGlobalAdjustment(bool wait);
+  void DropGlobalAdjustment();
   bool TurnUp(bool is_last = false);
-  void PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalisation> relocalised = {});
+  void PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalization> relocalized = {});
   KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe);
   void Place(TrackedFrame& tracked) const;
 
@@ -101,11 +101,11 @@ class SparseMapper {
   FeatureExtractor extractor_;
   std::unique_ptr<SlamMap> map_;
   std::unique_ptr<PointMaker> maker_;
-  std::unique_ptr<PlaceRecogniser> places_;
+  std::unique_ptr<PlaceRecognizer> places_;
   CorrectionLog corrections_;
   WorldUp up_;
   MaskVoter mask_voter_;
-  std::unique_ptr<WholeAdjustment> whole_;
+  std::unique_ptr<GlobalAdjustment> whole_;
   Figures figures_;
 
   int generation_ = 0;
@@ -115,7 +115,7 @@ class SparseMapper {
   uint64_t next_whole_ = 10;  // keyframes at which the whole bundle is adjusted, loop or not
   int frames_lost_ = 0;
   bool window_was_cut_short_ = false;
-  std::atomic<bool> hurry_ = false;
+  std::atomic<bool> early_stop_requested_ = false;
 };
 
 }  // namespace romap::slam

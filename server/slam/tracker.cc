@@ -55,7 +55,7 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       slot_(local_map),
       extractor_(config),
       given_(config),
-      monocular_start_(config),
+      monocular_initializer_(config),
       selector_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
@@ -69,9 +69,9 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
                               map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
     if (!map_suffices) return TakeGivenPose(std::move(frame));
   }
-  auto sight = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
-  if (!has_map || waiting_for_map_) return Initialise(std::move(frame), std::move(sight));
-  return TrackByImage(std::move(frame), std::move(sight));
+  auto features = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
+  if (!has_map || waiting_for_map_) return Initialize(std::move(frame), std::move(features));
+  return TrackByImage(std::move(frame), std::move(features));
 }
 
 // ------------------------------------------------------------------------------------------------ poses that are given
@@ -92,40 +92,40 @@ TrackedImage Tracker::TakeGivenPose(std::shared_ptr<const Frame> frame) {
   last_prior_ = pose;
   last_timestamp_ns_ = frame->timestamp_ns;
   last_points_.clear();
-  if (!image.pose_given) HangOnReference(image.tracked);
+  if (!image.pose_given) AnchorToReference(image.tracked);
   if (!image.tracked.is_keyframe) return image;
-  image.sight = MakeFrameFeatures(*frame, extractor_.Extract(*frame));
-  image.points.resize(image.sight->size());
+  image.features = MakeFrameFeatures(*frame, extractor_.Extract(*frame));
+  image.points.resize(image.features->size());
   ++keyframes_sent_;
   return image;
 }
 
 // ------------------------------------------------------------------------------------------------ the first views
 
-TrackedImage Tracker::Initialise(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> sight) {
+TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features) {
   TrackedImage image;
   image.generation = map_ ? map_->generation : 0;
   image.tracked.frame = frame;
   image.tracked.state = TrackingState::kInitializing;
-  image.sight = sight;
+  image.features = features;
   if (waiting_for_map_) {
     image.tracked.reason = "the map is being made";
     return image;
   }
   const auto with_depth =
-      std::count_if(sight->ranges_mu.begin(), sight->ranges_mu.end(), [](double r) { return r > 0; });
+      std::count_if(features->ranges_mu.begin(), features->ranges_mu.end(), [](double r) { return r > 0; });
   if (with_depth >= kStartDepthPoints) {
-    image.start = MapStart{.first = sight};
+    image.initial_views = InitialViews{.first = features};
     image.tracked.reason = "a view with depth, the map begins";
-    monocular_start_.Reset();
+    monocular_initializer_.Reset();
   } else {
-    image.start = monocular_start_.Offer(sight, &image.tracked.reason);
+    image.initial_views = monocular_initializer_.Offer(features, &image.tracked.reason);
   }
-  if (!image.start) return image;
+  if (!image.initial_views) return image;
   waiting_for_map_ = true;
   waiting_generation_ = image.generation;
   world_is_given_ = false;
-  keyframes_sent_ += image.start->second ? 2 : 1;
+  keyframes_sent_ += image.initial_views->second ? 2 : 1;
   last_pose_.reset();
   motion_.reset();
   return image;
@@ -136,8 +136,8 @@ TrackedImage Tracker::Initialise(std::shared_ptr<const Frame> frame, std::shared
 void Tracker::TakeNewestMap() {
   const std::shared_ptr<const LocalMap> newest = slot_->Get();
   if (!newest || newest == map_) return;
-  const bool begun_anew = !map_ || newest->generation != map_->generation;
-  if (begun_anew) {
+  const bool was_reset = !map_ || newest->generation != map_->generation;
+  if (was_reset) {
     if (waiting_for_map_ && newest->generation > waiting_generation_) {
       waiting_for_map_ = false;
       // The start's newest view is where the camera was a moment ago.
@@ -152,7 +152,7 @@ void Tracker::TakeNewestMap() {
       motion_.reset();
     } else if (newest->points.empty() && !world_is_given_) {
       state_ = TrackingState::kInitializing;
-      monocular_start_.Reset();
+      monocular_initializer_.Reset();
       last_pose_.reset();
       motion_.reset();
     }
@@ -163,10 +163,9 @@ void Tracker::TakeNewestMap() {
     const auto after = newest->keyframes.find(map_->reference);
     if (before != map_->keyframes.end() && after != newest->keyframes.end()) {
       const double scale = after->second.scale / before->second.scale;
-      const SE3<Camera, Camera> from_reference = before->second.T_world_camera.Inverse() * *last_pose_;
-      last_pose_ = after->second.T_world_camera *
-                   SE3<Camera, Camera>(from_reference.rotation(), scale * from_reference.translation());
-      if (motion_) motion_ = SE3<Camera, Camera>(motion_->rotation(), scale * motion_->translation());
+      const SE3<Camera, Camera> T_reference_last = before->second.T_world_camera.Inverse() * *last_pose_;
+      last_pose_ = ScaledPose{after->second.T_world_camera, scale}.Compose(T_reference_last);
+      if (motion_) motion_ = ScaleTranslation(*motion_, scale);
     }
   }
   map_ = newest;
@@ -186,41 +185,41 @@ SE3<World, Camera> Tracker::Predict(const Frame& frame) const {
   return *last_pose_ * SE3<Camera, Camera>(rotation, share * motion_->translation());
 }
 
-TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> sight) {
+TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features) {
   TrackedImage image;
   image.tracked.frame = frame;
   image.tracked.up_world = map_->up_world;
-  image.sight = sight;
+  image.features = features;
   image.generation = map_->generation;
-  if (sight->size() < static_cast<size_t>(kMinFeatures)) {
-    Lose(fmt::format("too little texture: {} features", sight->size()), image);
+  if (features->size() < static_cast<size_t>(kMinFeatures)) {
+    Lose(fmt::format("too little texture: {} features", features->size()), image);
     return image;
   }
-  if (const std::optional<Attempt> attempt = FindCamera(*frame, *sight)) {
-    Accept(*frame, *sight, *attempt, image);
+  if (const std::optional<Attempt> attempt = FindCamera(*frame, *features)) {
+    Accept(*frame, *features, *attempt, image);
   } else {
     Lose("the image does not fit the map", image);
   }
   return image;
 }
 
-std::optional<Tracker::Attempt> Tracker::FindCamera(const Frame& frame, const FrameFeatures& sight) {
+std::optional<Tracker::Attempt> Tracker::FindCamera(const Frame& frame, const FrameFeatures& features) {
   std::optional<Attempt> first;
   if (last_pose_) {
     const bool lost = state_ == TrackingState::kLost;
     const SE3<World, Camera> start = lost ? *last_pose_ : Predict(frame);
-    if (!lost) first = FollowLastPoints(sight, start, kFollowRadius_px);
-    if (!first) first = FollowLastPoints(sight, start, kWideRadius_px);
-    if (!first) first = FindByLooks(sight);
+    if (!lost) first = FollowLastPoints(features, start, kFollowRadius_px);
+    if (!first) first = FollowLastPoints(features, start, kWideRadius_px);
+    if (!first) first = FindByLooks(features);
   }
   if (first) {
-    if (auto whole = UseWholeLocalMap(sight, *first)) return whole;
+    if (auto whole = UseWholeLocalMap(features, *first)) return whole;
   }
-  return FindAroundRelocalisation(sight);
+  return TrackNearRelocalization(features);
 }
 
-std::optional<Tracker::Attempt> Tracker::FollowLastPoints(const FrameFeatures& sight, const SE3<World, Camera>& start,
-                                                          double radius_px) const {
+std::optional<Tracker::Attempt> Tracker::FollowLastPoints(const FrameFeatures& features,
+                                                          const SE3<World, Camera>& start, double radius_px) const {
   std::vector<LocalPoint> points;
   std::vector<int> index_of;
   const auto take = [&](int index) {
@@ -236,16 +235,16 @@ std::optional<Tracker::Attempt> Tracker::FollowLastPoints(const FrameFeatures& s
     index_of.clear();
     for (size_t i = 0; i < map_->points.size(); ++i) take(static_cast<int>(i));
   }
-  ProjectionMatcher matcher(sight, start);
+  ProjectionMatcher matcher(features, start);
   const ProjectionSearch search{.radius_px = radius_px, .max_distance = kMaxDistance, .ratio = 0.9};
-  std::vector<int> point_of_feature(sight.size(), -1);
+  std::vector<int> point_of_feature(features.size(), -1);
   for (const PointMatch& match : matcher.MatchAll(points, search, {})) {
     point_of_feature[static_cast<size_t>(match.feature)] = index_of[static_cast<size_t>(match.point)];
   }
-  return Refine(sight, start, std::move(point_of_feature), kMinFirstInliers);
+  return Refine(features, start, std::move(point_of_feature), kMinFirstInliers);
 }
 
-std::optional<Tracker::Attempt> Tracker::FindByLooks(const FrameFeatures& sight) const {
+std::optional<Tracker::Attempt> Tracker::FindByLooks(const FrameFeatures& features) const {
   std::vector<LocalPoint> points;
   std::vector<int> index_of;
   for (const MapPointId id : last_points_) {
@@ -255,52 +254,52 @@ std::optional<Tracker::Attempt> Tracker::FindByLooks(const FrameFeatures& sight)
     index_of.push_back(it->second);
   }
   std::vector<PoseObservation> observations;
-  std::vector<PointMatch> matches = MatchByLooks(points, sight, kMaxLooksDistance, kLooksRatio);
+  std::vector<PointMatch> matches = MatchByDescriptors(points, features, kMaxLooksDistance, kLooksRatio);
   for (const PointMatch& match : matches) {
-    const Feature& feature = sight.features[static_cast<size_t>(match.feature)];
+    const Feature& feature = features.features[static_cast<size_t>(match.feature)];
     observations.push_back({.p_world = points[static_cast<size_t>(match.point)].position_world,
                             .pixel_px = feature.pixel_px.cast<double>(),
                             .sigma_px = config_.pixel_sigma_px * feature.octave_scale});
   }
-  const auto pose =
-      SolvePnp(sight.camera, observations, {.min_inliers = kMinFirstInliers, .seed = config_.Seed(sight.frame_id)});
+  const auto pose = SolvePnp(features.camera, observations,
+                             {.min_inliers = kMinFirstInliers, .seed = config_.Seed(features.frame_id)});
   if (!pose) return std::nullopt;
-  std::vector<int> point_of_feature(sight.size(), -1);
+  std::vector<int> point_of_feature(features.size(), -1);
   for (size_t i = 0; i < matches.size(); ++i) {
     if (pose->inlier[i] == 0) continue;
     point_of_feature[static_cast<size_t>(matches[i].feature)] = index_of[static_cast<size_t>(matches[i].point)];
   }
-  return Refine(sight, pose->T_world_camera, std::move(point_of_feature), kMinFirstInliers);
+  return Refine(features, pose->T_world_camera, std::move(point_of_feature), kMinFirstInliers);
 }
 
-std::optional<Tracker::Attempt> Tracker::FindAroundRelocalisation(const FrameFeatures& sight) const {
-  if (state_ != TrackingState::kLost || !map_->relocalised || map_->relocalised->frame_id < lost_since_frame_) {
+std::optional<Tracker::Attempt> Tracker::TrackNearRelocalization(const FrameFeatures& features) const {
+  if (state_ != TrackingState::kLost || !map_->relocalized || map_->relocalized->frame_id < lost_since_frame_) {
     return std::nullopt;
   }
   // The camera has moved on since that frame: all points, in a wide area.
-  const SE3<World, Camera>& start = map_->relocalised->T_world_camera;
-  ProjectionMatcher matcher(sight, start);
+  const SE3<World, Camera>& start = map_->relocalized->T_world_camera;
+  ProjectionMatcher matcher(features, start);
   const ProjectionSearch search{.radius_px = kWideRadius_px, .max_distance = kMaxLooksDistance, .ratio = 0.8};
-  std::vector<int> point_of_feature(sight.size(), -1);
+  std::vector<int> point_of_feature(features.size(), -1);
   for (const PointMatch& match : matcher.MatchAll(map_->points, search, {})) {
     point_of_feature[static_cast<size_t>(match.feature)] = match.point;
   }
-  const auto first = Refine(sight, start, std::move(point_of_feature), kMinFirstInliers);
-  return first ? UseWholeLocalMap(sight, *first) : std::nullopt;
+  const auto first = Refine(features, start, std::move(point_of_feature), kMinFirstInliers);
+  return first ? UseWholeLocalMap(features, *first) : std::nullopt;
 }
 
-std::optional<Tracker::Attempt> Tracker::UseWholeLocalMap(const FrameFeatures& sight, const Attempt& first) const {
+std::optional<Tracker::Attempt> Tracker::UseWholeLocalMap(const FrameFeatures& features, const Attempt& first) const {
   std::vector<int> point_of_feature = first.point_of_feature;
-  std::vector<uint8_t> taken(sight.size(), 0);
+  std::vector<uint8_t> taken(features.size(), 0);
   std::vector<uint8_t> seen(map_->points.size(), 0);
   for (size_t i = 0; i < point_of_feature.size(); ++i) {
     if (point_of_feature[i] < 0) continue;
     taken[i] = 1;
     seen[static_cast<size_t>(point_of_feature[i])] = 1;
   }
-  ProjectionMatcher matcher(sight, first.T_world_camera);
+  ProjectionMatcher matcher(features, first.T_world_camera);
   const ProjectionSearch search{.radius_px = kLocalRadius_px, .max_distance = kMaxDistance, .ratio = 0.9};
-  std::vector<int> distance_of(sight.size(), 256);
+  std::vector<int> distance_of(features.size(), 256);
   for (size_t p = 0; p < map_->points.size(); ++p) {
     if (seen[p] != 0) continue;
     const auto found = matcher.Find(map_->points[p], search, taken);
@@ -310,7 +309,7 @@ std::optional<Tracker::Attempt> Tracker::UseWholeLocalMap(const FrameFeatures& s
   }
   const bool unproven = state_ == TrackingState::kLost || frames_since_found_ < kProvenAfter_frames;
   const int min_inliers = unproven ? kMinInliersAfterLoss : kMinInliers;
-  auto attempt = Refine(sight, first.T_world_camera, std::move(point_of_feature), min_inliers);
+  auto attempt = Refine(features, first.T_world_camera, std::move(point_of_feature), min_inliers);
   if (attempt && attempt->inliers < kMinInlierShare * attempt->matches) return std::nullopt;
   if (attempt && last_pose_ && state_ == TrackingState::kTracking) {
     const double depth_mu = MedianDepth_mu(*map_, attempt->T_world_camera, attempt->point_of_feature);
@@ -320,25 +319,25 @@ std::optional<Tracker::Attempt> Tracker::UseWholeLocalMap(const FrameFeatures& s
   return attempt;
 }
 
-std::optional<Tracker::Attempt> Tracker::Refine(const FrameFeatures& sight, const SE3<World, Camera>& start,
+std::optional<Tracker::Attempt> Tracker::Refine(const FrameFeatures& features, const SE3<World, Camera>& start,
                                                 std::vector<int> point_of_feature, int min_inliers) const {
   std::vector<PoseObservation> observations;
   std::vector<size_t> feature_of;
   for (size_t i = 0; i < point_of_feature.size(); ++i) {
     if (point_of_feature[i] < 0) continue;
-    const Feature& feature = sight.features[i];
+    const Feature& feature = features.features[i];
     PoseObservation observation{.p_world = map_->points[static_cast<size_t>(point_of_feature[i])].position_world,
                                 .pixel_px = feature.pixel_px.cast<double>(),
                                 .sigma_px = config_.pixel_sigma_px * feature.octave_scale};
-    if (sight.ranges_mu[i] > 0) {
-      observation.depth_mu = sight.ranges_mu[i] * sight.bearings_camera[i].z();
+    if (features.ranges_mu[i] > 0) {
+      observation.depth_mu = features.ranges_mu[i] * features.bearings_camera[i].z();
       observation.depth_sigma_mu = config_.depth_sigma_ratio * observation.depth_mu;
     }
     observations.push_back(observation);
     feature_of.push_back(i);
   }
   if (observations.size() < static_cast<size_t>(min_inliers)) return std::nullopt;
-  const PoseEstimate pose = RefinePose(sight.camera, start, observations);
+  const PoseEstimate pose = RefinePose(features.camera, start, observations);
   if (pose.inliers < min_inliers || !pose.T_world_camera.IsFinite()) return std::nullopt;
   for (size_t i = 0; i < observations.size(); ++i) {
     if (pose.inlier[i] == 0) point_of_feature[feature_of[i]] = -1;
@@ -351,23 +350,21 @@ std::optional<Tracker::Attempt> Tracker::Refine(const FrameFeatures& sight, cons
 
 // ------------------------------------------------------------------------------------------------ after the attempt
 
-void Tracker::HangOnReference(TrackedFrame& tracked) const {
+void Tracker::AnchorToReference(TrackedFrame& tracked) const {
   if (!map_) return;
   const auto reference = map_->keyframes.find(map_->reference);
   if (reference == map_->keyframes.end()) return;
-  const SE3<Camera, Camera> T_reference_camera = reference->second.T_world_camera.Inverse() * tracked.T_world_camera;
   tracked.reference = map_->reference;
-  tracked.T_reference_camera = {T_reference_camera.rotation(),
-                                T_reference_camera.translation() / reference->second.scale};
+  tracked.T_reference_camera = reference->second.Relative(tracked.T_world_camera);
 }
 
-void Tracker::Accept(const Frame& frame, const FrameFeatures& sight, const Attempt& attempt, TrackedImage& image) {
+void Tracker::Accept(const Frame& frame, const FrameFeatures& features, const Attempt& attempt, TrackedImage& image) {
   const bool was_lost = state_ == TrackingState::kLost;
   frames_since_found_ = was_lost ? 0 : frames_since_found_ + 1;
   state_ = TrackingState::kTracking;
   image.tracked.state = was_lost ? TrackingState::kRelocalized : TrackingState::kTracking;
   image.tracked.T_world_camera = attempt.T_world_camera;
-  HangOnReference(image.tracked);
+  AnchorToReference(image.tracked);
 
   motion_.reset();
   if (last_pose_ && !was_lost) {
@@ -381,17 +378,17 @@ void Tracker::Accept(const Frame& frame, const FrameFeatures& sight, const Attem
   for (const int point : attempt.point_of_feature) {
     if (point >= 0) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
   }
-  image.tracked.is_keyframe = DecideKeyframe(frame, sight, attempt);
+  image.tracked.is_keyframe = DecideKeyframe(frame, features, attempt);
   if (!image.tracked.is_keyframe) return;
   ++keyframes_sent_;
-  image.points.resize(sight.size());
-  for (size_t i = 0; i < sight.size(); ++i) {
+  image.points.resize(features.size());
+  for (size_t i = 0; i < features.size(); ++i) {
     const int point = attempt.point_of_feature[i];
     if (point >= 0) image.points[i] = map_->points[static_cast<size_t>(point)].id;
   }
 }
 
-bool Tracker::DecideKeyframe(const Frame& frame, const FrameFeatures& sight, const Attempt& attempt) {
+bool Tracker::DecideKeyframe(const Frame& frame, const FrameFeatures& features, const Attempt& attempt) {
   // A pose that was just found again must hold for a while before the map is built on it.
   if (frames_since_found_ < 2 && map_->keyframes_done > 4) return false;
   const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
@@ -399,7 +396,7 @@ bool Tracker::DecideKeyframe(const Frame& frame, const FrameFeatures& sight, con
   quality.scene_depth_mu = MedianDepth_mu(*map_, attempt.T_world_camera, attempt.point_of_feature);
   quality.tracked_share = attempt.inliers / std::max(1.0, static_cast<double>(map_->reference_points));
   quality.keyframes_waiting = static_cast<int>(waiting);
-  quality.has_unseen_depth = sight.HasDepth() && attempt.inliers < 100;
+  quality.has_unseen_depth = features.HasDepth() && attempt.inliers < 100;
   return selector_.IsKeyframe(frame, attempt.T_world_camera, quality);
 }
 

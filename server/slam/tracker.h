@@ -16,7 +16,7 @@
 #include "server/slam/given_pose_tracker.h"
 #include "server/slam/keyframe_selector.h"
 #include "server/slam/local_map.h"
-#include "server/slam/monocular_start.h"
+#include "server/slam/monocular_initializer.h"
 #include "server/slam/slam_config.h"
 
 namespace romap::slam {
@@ -24,11 +24,11 @@ namespace romap::slam {
 // What tracking says of one frame, for the mapping thread.
 struct TrackedImage {
   TrackedFrame tracked;
-  std::shared_ptr<const FrameFeatures> sight = {};  // none: the pose was given and the frame is no keyframe
-  std::vector<MapPointId> points = {};              // keyframes: per feature of `sight`, 0 = none
-  std::optional<MapStart> start = {};               // a map may begin with this frame
-  bool pose_given = false;                          // by the client: nothing may correct it
-  int generation = 0;                               // of the local map it was tracked against
+  std::shared_ptr<const FrameFeatures> features = {};  // none: the pose was given and the frame is no keyframe
+  std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
+  std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
+  bool pose_given = false;                             // by the client: nothing may correct it
+  int generation = 0;                                  // of the local map it was tracked against
 };
 
 // Turns frames into frames with camera poses: takes the poses that come with them, or tracks the camera from the images
@@ -57,23 +57,23 @@ class Tracker {
   };
 
   TrackedImage TakeGivenPose(std::shared_ptr<const Frame> frame);
-  TrackedImage Initialise(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> sight);
-  TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> sight);
+  TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
+  TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
   void TakeNewestMap();
   SE3<World, Camera> Predict(const Frame& frame) const;
-  std::optional<Attempt> FindCamera(const Frame& frame, const FrameFeatures& sight);
-  std::optional<Attempt> FollowLastPoints(const FrameFeatures& sight, const SE3<World, Camera>& start,
+  std::optional<Attempt> FindCamera(const Frame& frame, const FrameFeatures& features);
+  std::optional<Attempt> FollowLastPoints(const FrameFeatures& features, const SE3<World, Camera>& start,
                                           double radius_px) const;
-  std::optional<Attempt> FindByLooks(const FrameFeatures& sight) const;
-  std::optional<Attempt> FindAroundRelocalisation(const FrameFeatures& sight) const;
-  std::optional<Attempt> UseWholeLocalMap(const FrameFeatures& sight, const Attempt& first) const;
-  std::optional<Attempt> Refine(const FrameFeatures& sight, const SE3<World, Camera>& start,
+  std::optional<Attempt> FindByLooks(const FrameFeatures& features) const;
+  std::optional<Attempt> TrackNearRelocalization(const FrameFeatures& features) const;
+  std::optional<Attempt> UseWholeLocalMap(const FrameFeatures& features, const Attempt& first) const;
+  std::optional<Attempt> Refine(const FrameFeatures& features, const SE3<World, Camera>& start,
                                 std::vector<int> point_of_feature, int min_inliers) const;
-  void Accept(const Frame& frame, const FrameFeatures& sight, const Attempt& attempt, TrackedImage& image);
+  void Accept(const Frame& frame, const FrameFeatures& features, const Attempt& attempt, TrackedImage& image);
   void Lose(const std::string& why, TrackedImage& image);
-  bool DecideKeyframe(const Frame& frame, const FrameFeatures& sight, const Attempt& attempt);
-  void HangOnReference(TrackedFrame& tracked) const;
+  bool DecideKeyframe(const Frame& frame, const FrameFeatures& features, const Attempt& attempt);
+  void AnchorToReference(TrackedFrame& tracked) const;
 
   const SlamConfig config_;
   const PoseUse pose_use_;
@@ -81,7 +81,7 @@ class Tracker {
 
   FeatureExtractor extractor_;
   GivenPoseTracker given_;
-  MonocularStart monocular_start_;
+  MonocularInitializer monocular_initializer_;
   KeyframeSelector selector_;
   std::shared_ptr<const LocalMap> map_;
 

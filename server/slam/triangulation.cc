@@ -24,67 +24,66 @@ double HuberCost(double chi2, double bound) { return chi2 <= bound ? chi2 : 2 * 
 
 // With offset d = p - c and bearing b, the error across the ray is e = (I - b b^T) d / (b^T d), in radians for small
 // angles; its derivative is taken with the distance b^T d held fixed.
-void Accumulate(const Sight& sight, const Eigen::Vector3d& p_world, Normals& normals) {
-  const Eigen::Vector3d offset = p_world - sight.center_world;
-  const double along = sight.bearing_world.dot(offset);
+void Accumulate(const ObservedRay& ray, const Eigen::Vector3d& p_world, Normals& normals) {
+  const Eigen::Vector3d offset = p_world - ray.center_world;
+  const double along = ray.bearing_world.dot(offset);
   if (along <= 0) {
     normals.cost = std::numeric_limits<double>::infinity();
     return;
   }
-  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - sight.bearing_world * sight.bearing_world.transpose();
-  const double scale = 1 / (along * sight.bearing_sigma_rad);
-  const double chi2 = BearingChi2(sight, p_world);
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray.bearing_world * ray.bearing_world.transpose();
+  const double scale = 1 / (along * ray.bearing_sigma_rad);
+  const double chi2 = BearingChi2(ray, p_world);
   const double weight = HuberWeight(chi2, kBearingChi2Bound) * scale * scale;
   normals.hessian += weight * across;
   normals.gradient += weight * across * offset;
   normals.cost += HuberCost(chi2, kBearingChi2Bound);
 
-  if (sight.range_mu <= 0) return;
-  const double error = (along - sight.range_mu) / sight.range_sigma_mu;
-  const double range_weight =
-      HuberWeight(error * error, kRangeChi2Bound) / (sight.range_sigma_mu * sight.range_sigma_mu);
-  normals.hessian += range_weight * sight.bearing_world * sight.bearing_world.transpose();
-  normals.gradient += range_weight * (along - sight.range_mu) * sight.bearing_world;
+  if (ray.range_mu <= 0) return;
+  const double error = (along - ray.range_mu) / ray.range_sigma_mu;
+  const double range_weight = HuberWeight(error * error, kRangeChi2Bound) / (ray.range_sigma_mu * ray.range_sigma_mu);
+  normals.hessian += range_weight * ray.bearing_world * ray.bearing_world.transpose();
+  normals.gradient += range_weight * (along - ray.range_mu) * ray.bearing_world;
   normals.cost += HuberCost(error * error, kRangeChi2Bound);
 }
 
-Normals AccumulateAll(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world) {
+Normals AccumulateAll(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world) {
   Normals normals;
-  for (const Sight& sight : sights) Accumulate(sight, p_world, normals);
+  for (const ObservedRay& ray : rays) Accumulate(ray, p_world, normals);
   return normals;
 }
 
 }  // namespace
 
-double BearingChi2(const Sight& sight, const Eigen::Vector3d& p_world) {
-  const Eigen::Vector3d offset = p_world - sight.center_world;
-  const double along = sight.bearing_world.dot(offset);
+double BearingChi2(const ObservedRay& ray, const Eigen::Vector3d& p_world) {
+  const Eigen::Vector3d offset = p_world - ray.center_world;
+  const double along = ray.bearing_world.dot(offset);
   if (along <= 0) return std::numeric_limits<double>::infinity();
-  const double error_rad = (offset - along * sight.bearing_world).norm() / along;
-  return error_rad * error_rad / (sight.bearing_sigma_rad * sight.bearing_sigma_rad);
+  const double error_rad = (offset - along * ray.bearing_world).norm() / along;
+  return error_rad * error_rad / (ray.bearing_sigma_rad * ray.bearing_sigma_rad);
 }
 
-bool Agrees(const Sight& sight, const Eigen::Vector3d& p_world) {
-  if (BearingChi2(sight, p_world) > kBearingChi2Bound) return false;
-  const double range_mu = (p_world - sight.center_world).norm();
-  return sight.range_mu <= 0 || std::abs(range_mu - sight.range_mu) <= 3 * sight.range_sigma_mu;
+bool Agrees(const ObservedRay& ray, const Eigen::Vector3d& p_world) {
+  if (BearingChi2(ray, p_world) > kBearingChi2Bound) return false;
+  const double range_mu = (p_world - ray.center_world).norm();
+  return ray.range_mu <= 0 || std::abs(range_mu - ray.range_mu) <= 3 * ray.range_sigma_mu;
 }
 
-double Parallax_rad(const Sight& a, const Sight& b, const Eigen::Vector3d& p_world) {
+double Parallax_rad(const ObservedRay& a, const ObservedRay& b, const Eigen::Vector3d& p_world) {
   const Eigen::Vector3d ray_a = p_world - a.center_world;
   const Eigen::Vector3d ray_b = p_world - b.center_world;
   return std::atan2(ray_a.cross(ray_b).norm(), ray_a.dot(ray_b));
 }
 
-double MaxParallax_rad(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world) {
+double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world) {
   double largest_rad = 0;
-  for (size_t i = 0; i < sights.size(); ++i) {
-    for (size_t j = 0; j < i; ++j) largest_rad = std::max(largest_rad, Parallax_rad(sights[i], sights[j], p_world));
+  for (size_t i = 0; i < rays.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) largest_rad = std::max(largest_rad, Parallax_rad(rays[i], rays[j], p_world));
   }
   return largest_rad;
 }
 
-std::optional<Eigen::Vector3d> IntersectRays(const Sight& a, const Sight& b) {
+std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b) {
   const Eigen::Vector3d baseline = b.center_world - a.center_world;
   const double cosine = a.bearing_world.dot(b.bearing_world);
   const double determinant = 1 - cosine * cosine;
@@ -95,16 +94,16 @@ std::optional<Eigen::Vector3d> IntersectRays(const Sight& a, const Sight& b) {
   return 0.5 * (a.center_world + along_a * a.bearing_world + b.center_world + along_b * b.bearing_world);
 }
 
-Eigen::Vector3d RefinePoint(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world) {
+Eigen::Vector3d RefinePoint(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world) {
   Eigen::Vector3d best = p_world;
-  Normals normals = AccumulateAll(sights, best);
+  Normals normals = AccumulateAll(rays, best);
   for (int iteration = 0; iteration < kMaxIterations && std::isfinite(normals.cost); ++iteration) {
     const Eigen::Vector3d step = -normals.hessian.ldlt().solve(normals.gradient);
     if (!step.allFinite()) break;
     const Eigen::Vector3d candidate = best + step;
-    const Normals after = AccumulateAll(sights, candidate);
+    const Normals after = AccumulateAll(rays, candidate);
     if (!(after.cost < normals.cost)) break;
-    const double distance = (candidate - sights.front().center_world).norm();
+    const double distance = (candidate - rays.front().center_world).norm();
     best = candidate;
     normals = after;
     if (step.norm() < kConverged * distance) break;

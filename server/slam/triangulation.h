@@ -6,8 +6,8 @@
 
 namespace romap::slam {
 
-// One sight of a point: a ray with its uncertainty, and where a depth image was there, how far the point was.
-struct Sight {
+// One ray of a point: a ray with its uncertainty, and where a depth image was there, how far the point was.
+struct ObservedRay {
   Eigen::Vector3d center_world = Eigen::Vector3d::Zero();    // of the camera, map units
   Eigen::Vector3d bearing_world = Eigen::Vector3d::UnitZ();  // unit length, from the camera to the point
   double bearing_sigma_rad = 1e-3;                           // standard deviation across the ray, per axis
@@ -19,20 +19,20 @@ struct Sight {
 inline constexpr double kBearingChi2Bound = 5.991;
 
 // Squared error of the bearing in units of its variance; infinite for a point behind the camera.
-double BearingChi2(const Sight& sight, const Eigen::Vector3d& p_world);
+double BearingChi2(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 
-// Does the point lie where the sight says, within the 95 % bound of its bearing and three sigmas of its range?
-bool Agrees(const Sight& sight, const Eigen::Vector3d& p_world);
+// Does the point lie where the ray says, within the 95 % bound of its bearing and three sigmas of its range?
+bool Agrees(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 
-// Angle between the rays from two camera centres to a point.
-double Parallax_rad(const Sight& a, const Sight& b, const Eigen::Vector3d& p_world);
-double MaxParallax_rad(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world);
+// Angle between the rays from two camera centers to a point.
+double Parallax_rad(const ObservedRay& a, const ObservedRay& b, const Eigen::Vector3d& p_world);
+double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
 // The point closest to two rays (midpoint method). nullopt: parallel, or behind a camera.
-std::optional<Eigen::Vector3d> IntersectRays(const Sight& a, const Sight& b);
+std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b);
 
-// The point that fits all sights best: Gauss-Newton on the errors of bearings and ranges with Huber weights (at the
+// The point that fits all rays best: Gauss-Newton on the errors of bearings and ranges with Huber weights (at the
 // bounds above), poses held fixed. Starts at and falls back to `p_world` when a step fails to improve.
-Eigen::Vector3d RefinePoint(const std::vector<Sight>& sights, const Eigen::Vector3d& p_world);
+Eigen::Vector3d RefinePoint(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
 }  // namespace romap::slam

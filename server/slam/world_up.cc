@@ -38,13 +38,13 @@ Evidence Gather(const SlamMap& map) {
   Evidence evidence;
   for (const auto& [id, track] : map.points()) {
     MaskVotes votes = track.votes;
-    for (const PointSight& sight : track.sights) {
-      votes.Add(map.FindKeyframe(sight.keyframe)->sight->mask_places[static_cast<size_t>(sight.feature)]);
+    for (const FeatureRef& observation : track.observations) {
+      votes.Add(map.FindKeyframe(observation.keyframe)->frame->mask_zones[static_cast<size_t>(observation.feature)]);
     }
     if (votes.total() == 0) continue;  // masks are late, or seldom: what it lies on is not known yet
     if (2 * votes.inside > votes.total()) {
       evidence.object_points.push_back(track.point.position_world);
-    } else if (IsBackground(votes) && track.sights.size() >= 2) {
+    } else if (IsBackground(votes) && track.observations.size() >= 2) {
       // One pixel across the ray, magnified along it by what parallax leaves.
       const double parallax_rad = std::max(track.point.max_parallax_rad, 0.02);
       evidence.points.push_back({.position_world = track.point.position_world,

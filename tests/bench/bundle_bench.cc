@@ -13,7 +13,7 @@
 #include <string>
 
 #include "tests/bench/user_seconds.h"
-#include "tests/unit/server/slam/optimise/bundle_world.h"
+#include "tests/unit/server/slam/optimize/bundle_world.h"
 
 namespace romap::measure {
 namespace {

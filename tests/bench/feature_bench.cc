@@ -61,13 +61,13 @@ std::vector<slam::Feature> OpenCvOrb(const Frame& frame, const slam::SlamConfig&
       cv::ORB::create(config.scene_features, static_cast<float>(slam::kOctaveFactor), slam::kOctaves, 31, 0, 2,
                       cv::ORB::HARRIS_SCORE, 31, config.scene_fast_threshold);
   std::vector<cv::KeyPoint> keypoints;
-  cv::Mat grey, descriptors;
-  cv::cvtColor(frame.image_bgr, grey, cv::COLOR_BGR2GRAY);
-  orb->detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
+  cv::Mat gray, descriptors;
+  cv::cvtColor(frame.image_bgr, gray, cv::COLOR_BGR2GRAY);
+  orb->detectAndCompute(gray, cv::noArray(), keypoints, descriptors);
   std::vector<slam::Feature> features(keypoints.size());
   for (size_t i = 0; i < keypoints.size(); ++i) {
     const auto scale = static_cast<float>(std::pow(slam::kOctaveFactor, keypoints[i].octave));
-    const float shift_px = 0.5F * (scale - 1);  // to pixel centres at integer coordinates
+    const float shift_px = 0.5F * (scale - 1);  // to pixel centers at integer coordinates
     features[i].pixel_px = {keypoints[i].pt.x + shift_px, keypoints[i].pt.y + shift_px};
     features[i].octave = keypoints[i].octave;
     features[i].octave_scale = scale;

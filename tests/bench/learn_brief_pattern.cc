@@ -5,7 +5,7 @@
 //
 // Random tests are tried on corners of generated pictures (dead leaves: Lee, Mumford and Huang, IJCV 2001), each corner
 // seen twice, the second time with other noise and a little warped. Tests that differ much between corners and little
-// between two sights of one corner come first; from the top of that list, those are taken that are correlated with none
+// between two views of one corner come first; from the top of that list, those are taken that are correlated with none
 // taken before (the greedy search of Rublee et al., ICCV 2011).
 
 #include <algorithm>
@@ -31,9 +31,9 @@ constexpr int kPictures = 60;
 constexpr int kLeaves = 700;
 constexpr int kCornersPerOctave = 60;
 constexpr size_t kCandidates = 20000;
-constexpr double kNoise = 4;               // grey levels
-constexpr double kWarp = 0.12;             // of the second sight's affine map, standard deviation
-constexpr double kShift_px = 0.7;          // of the second sight's corner
+constexpr double kNoise = 4;               // gray levels
+constexpr double kWarp = 0.12;             // of the second view's affine map, standard deviation
+constexpr double kShift_px = 0.7;          // of the second view's corner
 constexpr double kMaxImbalance = 0.1;      // of a test's share of ones from a half
 constexpr double kFirstCorrelation = 0.1;  // allowed between two tests; raised until there are enough
 constexpr double kCorrelationStep = 0.02;
@@ -46,7 +46,7 @@ double Normal(std::mt19937& random) {
   return radius * std::cos(2 * std::numbers::pi * Uniform(random));
 }
 
-// Random ellipses and rectangles that hide each other, many small and few large, each with a shade and a slope of grey.
+// Random ellipses and rectangles that hide each other, many small and few large, each with a shade and a slope of gray.
 cv::Mat DeadLeaves(std::mt19937& random) {
   cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < kLeaves; ++i) {
@@ -55,15 +55,15 @@ cv::Mat DeadLeaves(std::mt19937& random) {
         cv::Point2f(static_cast<float>(640 * Uniform(random)), static_cast<float>(480 * Uniform(random))),
         cv::Size2f(static_cast<float>(2 * size_px), static_cast<float>(2 * size_px * (0.3 + 0.7 * Uniform(random)))),
         static_cast<float>(360 * Uniform(random)));
-    const cv::Scalar grey(255 * Uniform(random));
+    const cv::Scalar gray(255 * Uniform(random));
     if (Uniform(random) < 0.4) {
-      cv::ellipse(picture, leaf, grey, cv::FILLED, cv::LINE_AA);
+      cv::ellipse(picture, leaf, gray, cv::FILLED, cv::LINE_AA);
     } else {
       std::array<cv::Point2f, 4> corners;
       leaf.points(corners.data());
       std::array<cv::Point, 4> pixels;
       std::copy(corners.begin(), corners.end(), pixels.begin());
-      cv::fillConvexPoly(picture, pixels, grey, cv::LINE_AA);
+      cv::fillConvexPoly(picture, pixels, gray, cv::LINE_AA);
     }
   }
   cv::GaussianBlur(picture, picture, {0, 0}, 0.8);
@@ -77,7 +77,7 @@ cv::Mat WithNoise(const cv::Mat& picture, uint64_t seed) {
   return noisy;
 }
 
-// The grey values around a corner, turned upright.
+// The gray values around a corner, turned upright.
 constexpr int kSide_px = 2 * slam::kPatchRadius_px + 1;
 using Patch = std::array<uint8_t, kSide_px * kSide_px>;
 
@@ -98,17 +98,17 @@ Patch CutPatch(const cv::Mat& smooth, int x_px, int y_px, const slam::PatchDirec
   return patch;
 }
 
-struct Sights {
+struct Views {
   std::vector<Patch> first;
   std::vector<Patch> second;
 };
 
-void AddSights(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Sights& sights) {
-  constexpr int kMargin_px = slam::kPatchBorder_px + 4;  // for the second sight's shift
+void AddViews(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Views& views) {
+  constexpr int kMargin_px = slam::kPatchBorder_px + 4;  // for the second view's shift
   slam::ImagePyramid one, other;
-  const cv::Mat one_grey = WithNoise(picture, 2 * seed), other_grey = WithNoise(picture, 2 * seed + 1);
-  one.Build(one_grey, 64);
-  other.Build(other_grey, 64);
+  const cv::Mat one_gray = WithNoise(picture, 2 * seed), other_gray = WithNoise(picture, 2 * seed + 1);
+  one.Build(one_gray, 64);
+  other.Build(other_gray, 64);
   for (int octave = 0; octave < one.octaves(); ++octave) {
     const cv::Mat& image = one.sharp(octave);
     const cv::Rect part(kMargin_px, kMargin_px, image.cols - 2 * kMargin_px, image.rows - 2 * kMargin_px);
@@ -119,10 +119,10 @@ void AddSights(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Sigh
       const int other_x_px = x_px + shift(), other_y_px = y_px + shift();
       const cv::Matx22d warp(1 + kWarp * Normal(random), kWarp * Normal(random), kWarp * Normal(random),
                              1 + kWarp * Normal(random));
-      sights.first.push_back(
+      views.first.push_back(
           CutPatch(one.smooth(octave), x_px, y_px, slam::IntensityCentroid(image, x_px, y_px), cv::Matx22d::eye()));
-      sights.second.push_back(CutPatch(other.smooth(octave), other_x_px, other_y_px,
-                                       slam::IntensityCentroid(other.sharp(octave), other_x_px, other_y_px), warp));
+      views.second.push_back(CutPatch(other.smooth(octave), other_x_px, other_y_px,
+                                      slam::IntensityCentroid(other.sharp(octave), other_x_px, other_y_px), warp));
     }
   }
 }
@@ -172,16 +172,16 @@ struct Candidate {
 
 // Sorted by how well the test alone tells same from different corners: distance of the means of the two outcomes, in
 // standard deviations.
-std::vector<Candidate> RankCandidates(const Sights& sights, std::mt19937& random) {
-  const size_t count = sights.first.size();
+std::vector<Candidate> RankCandidates(const Views& views, std::mt19937& random) {
+  const size_t count = views.first.size();
   const Bits zeros((count + 63) / 64, 0);
   std::vector<Candidate> candidates;
   while (candidates.size() < kCandidates) {
     Candidate candidate{.test = DrawTest(random), .bits = {}};
-    candidate.bits = Outcomes(candidate.test, sights.first);
+    candidate.bits = Outcomes(candidate.test, views.first);
     const double ones = ShareDiffering(candidate.bits, zeros, count);
     if (std::abs(ones - 0.5) > kMaxImbalance) continue;
-    const double flips = ShareDiffering(candidate.bits, Outcomes(candidate.test, sights.second), count);
+    const double flips = ShareDiffering(candidate.bits, Outcomes(candidate.test, views.second), count);
     const double differs = 2 * ones * (1 - ones);
     candidate.merit = (differs - flips) / std::sqrt(differs * (1 - differs) + flips * (1 - flips));
     candidates.push_back(std::move(candidate));
@@ -219,10 +219,10 @@ void PrintTable(const std::vector<slam::BriefTest>& tests) {
 
 int Main() {
   std::mt19937 random(1);
-  Sights sights;
-  for (uint64_t i = 0; i < kPictures; ++i) AddSights(DeadLeaves(random), i, random, sights);
-  std::fprintf(stderr, "%zu corners\n", sights.first.size());
-  PrintTable(TakeUncorrelated(RankCandidates(sights, random), sights.first.size()));
+  Views views;
+  for (uint64_t i = 0; i < kPictures; ++i) AddViews(DeadLeaves(random), i, random, views);
+  std::fprintf(stderr, "%zu corners\n", views.first.size());
+  PrintTable(TakeUncorrelated(RankCandidates(views, random), views.first.size()));
   return 0;
 }
 

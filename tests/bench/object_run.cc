@@ -42,7 +42,7 @@ class Runner {
   absl::Status Take(const FrameInput& input) {
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest_.Accept(input));
     const slam::MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
-    if (mapped.begun_anew) {
+    if (mapped.was_reset) {
       Record(object_mapper_.Reset());
       tracked_.clear();
     }
@@ -100,10 +100,8 @@ class Runner {
 
   SE3<World, Camera> PoseNow(const Tracked& tracked) const {
     if (!tracked.reference) return tracked.T_world_camera;
-    const auto reference = sparse_mapper_.map().Place(tracked.reference);
-    if (!reference) return tracked.T_world_camera;
-    const SE3<Camera, Camera>& T = tracked.T_reference_camera;
-    return reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+    const auto reference = sparse_mapper_.map().KeyframePose(tracked.reference);
+    return reference ? reference->Compose(tracked.T_reference_camera) : tracked.T_world_camera;
   }
 
   void Record(const objects::ObjectOutput& output) {

@@ -172,11 +172,11 @@ class Run {
 
  private:
   void TimeOrb(const Frame& frame, cv::ORB& orb) {
-    cv::Mat grey, descriptors;
+    cv::Mat gray, descriptors;
     std::vector<cv::KeyPoint> keypoints;
-    cv::cvtColor(frame.image_bgr, grey, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(frame.image_bgr, gray, cv::COLOR_BGR2GRAY);
     const Clock::time_point begin = Clock::now();
-    orb.detectAndCompute(grey, cv::noArray(), keypoints, descriptors);
+    orb.detectAndCompute(gray, cv::noArray(), keypoints, descriptors);
     orb_s_.push_back(Seconds(Clock::now() - begin));
   }
 
@@ -199,22 +199,22 @@ class Run {
       lost_frames_ += fmt::format(" {}", frame->frame_id);
     }
     const bool has_pose = state == TrackingState::kTracking || state == TrackingState::kRelocalized;
-    if (state == TrackingState::kRelocalized) relocalised_ += fmt::format(" {}", frame->frame_id);
+    if (state == TrackingState::kRelocalized) relocalized_ += fmt::format(" {}", frame->frame_id);
     if (has_pose) {
       live_.push_back({1e-9 * static_cast<double>(frame->timestamp_ns), image.tracked});
       live_.back().tracked.frame = nullptr;
     }
     if (options_.one_thread) return Map(image);
     const bool is_keyframe = image.tracked.is_keyframe;
-    if (is_keyframe) mapper_.Hurry(++waiting_ > 0);
+    if (is_keyframe) mapper_.RequestEarlyStop(++waiting_ > 0);
     queue_.Push(std::move(image));
   }
 
   void Map(const slam::TrackedImage& image) {
-    if (image.tracked.is_keyframe) mapper_.Hurry(--waiting_ > 0);
+    if (image.tracked.is_keyframe) mapper_.RequestEarlyStop(--waiting_ > 0);
     const Clock::time_point begin = Clock::now();
     const slam::MappedFrame mapped = mapper_.Process(image);
-    if (mapped.begun_anew) ++begun_anew_;
+    if (mapped.was_reset) ++resets_;
     if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
     const TrackedFrame& tracked = mapped.tracked;
     if (tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalized) {
@@ -226,11 +226,8 @@ class Run {
   void Report(size_t keyframes_kept) {
     for (Said& said : final_) {
       if (!said.tracked.reference) continue;
-      const auto reference = mapper_.map().Place(said.tracked.reference);
-      if (!reference) continue;
-      const SE3<Camera, Camera>& T = said.tracked.T_reference_camera;
-      said.tracked.T_world_camera =
-          reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+      const auto reference = mapper_.map().KeyframePose(said.tracked.reference);
+      if (reference) said.tracked.T_world_camera = reference->Compose(said.tracked.T_reference_camera);
     }
     if (!options_.out.empty()) {
       std::filesystem::create_directories(options_.out);
@@ -243,13 +240,13 @@ class Run {
                100.0 * static_cast<double>(after - lost_) / static_cast<double>(std::max<size_t>(1, after)), lost_,
                first_tracked_);
     if (lost_ > 0) fmt::print("lost:{}\n", lost_frames_);
-    if (!relocalised_.empty()) fmt::print("relocalised:{}\n", relocalised_);
+    if (!relocalized_.empty()) fmt::print("relocalized:{}\n", relocalized_);
     if (!tracking_began_) fmt::print("never initialised: {}\n", reason_);
     ReportError(keyframes_kept);
     const auto& figures = mapper_.figures();
     fmt::print(
         "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
-        mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, begun_anew_,
+        mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, resets_,
         figures.up_confidence);
     const double orb_ms = 1e3 * QuantileOrZero(orb_s_, 0.5);
     fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
@@ -305,10 +302,10 @@ class Run {
   std::vector<Said> live_, final_;
   std::vector<double> orb_s_, track_s_, map_s_;
   size_t frames_ = 0, initialising_ = 0, lost_ = 0;
-  int begun_anew_ = 0;
+  int resets_ = 0;
   bool tracking_began_ = false;
   uint64_t first_tracked_ = 0;
-  std::string lost_frames_, relocalised_, reason_;
+  std::string lost_frames_, relocalized_, reason_;
 };
 
 }  // namespace

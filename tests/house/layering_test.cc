@@ -42,7 +42,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/slam/", {"server/slam/", "common/"}},
     {"server/slam/features/", {"server/slam/features/", "server/slam/slam_config.h", "common/"}},
     {"server/slam/geometry/", {"server/slam/geometry/", "common/"}},
-    {"server/slam/optimise/", {"server/slam/optimise/", "common/"}},
+    {"server/slam/optimize/", {"server/slam/optimize/", "common/"}},
     {"server/slam/places/", {"server/slam/places/", "server/slam/features/", "server/slam/slam_config.h", "common/"}},
     {"server/objects/", {"server/objects/", "common/"}},
     {"server/objects/lines/", {"server/objects/lines/", "common/"}},

@@ -6,7 +6,7 @@
 
 namespace romap::slam {
 
-using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST score in grey levels
+using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST score in gray levels
 
 // FAST-9 corners (Rosten and Drummond, ECCV 2006) of the part of a CV_8UC1 image, with coordinates of the whole image,
 // row by row. Only the strongest of adjacent ones counts.

@@ -64,8 +64,8 @@ void FeatureExtractor::LookAt(const Frame& frame) {
   if (picture_.data == picture.data && picture_.size() == picture.size() && picture_frame_id_ == frame.frame_id) return;
   picture_ = picture;
   picture_frame_id_ = frame.frame_id;
-  if (picture.channels() == 3) cv::cvtColor(picture, grey_, cv::COLOR_BGR2GRAY);
-  pyramid_.Build(picture.channels() == 3 ? grey_ : picture, kMinImageSide_px);
+  if (picture.channels() == 3) cv::cvtColor(picture, gray_, cv::COLOR_BGR2GRAY);
+  pyramid_.Build(picture.channels() == 3 ? gray_ : picture, kMinImageSide_px);
 }
 
 std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame, int octave,

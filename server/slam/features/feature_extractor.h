@@ -55,7 +55,7 @@ class FeatureExtractor {
   std::vector<Feature> Describe(const Frame& frame, const std::vector<Candidate>& candidates);
 
   const SlamConfig config_;
-  cv::Mat grey_;
+  cv::Mat gray_;
   cv::Mat picture_;  // what the pyramid shows; holding it keeps its memory from becoming another picture's
   uint64_t picture_frame_id_ = 0;
   ImagePyramid pyramid_;

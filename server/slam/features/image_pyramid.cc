@@ -13,16 +13,16 @@ constexpr double kSmoothingSigma_px = 2;
 
 }  // namespace
 
-void ImagePyramid::Build(const cv::Mat& grey, int min_side_px) {
+void ImagePyramid::Build(const cv::Mat& gray, int min_side_px) {
   octaves_ = 0;
   is_smoothed_.fill(false);
   for (size_t i = 0; i < kOctaves; ++i) {
     const double scale = std::pow(kOctaveFactor, i);
-    const cv::Size size(static_cast<int>(std::lround(grey.cols / scale)),
-                        static_cast<int>(std::lround(grey.rows / scale)));
+    const cv::Size size(static_cast<int>(std::lround(gray.cols / scale)),
+                        static_cast<int>(std::lround(gray.rows / scale)));
     if (std::min(size.width, size.height) < min_side_px) return;
     if (i == 0) {
-      sharp_[i] = grey;
+      sharp_[i] = gray;
     } else {
       cv::resize(sharp_[i - 1], sharp_[i], size, 0, 0, cv::INTER_LINEAR);
     }
@@ -39,7 +39,7 @@ const cv::Mat& ImagePyramid::smooth(int octave) {
   return smooth_[i];
 }
 
-// cv::resize makes the outer edges of both images meet, not the centres of their first pixels; sizes are whole pixels,
+// cv::resize makes the outer edges of both images meet, not the centers of their first pixels; sizes are whole pixels,
 // so that the ratio is not quite that of the octaves.
 Eigen::Vector2f ImagePyramid::ToFullSize(int octave, const cv::Point2f& pixel_px) const {
   const cv::Mat& full = sharp_[0];

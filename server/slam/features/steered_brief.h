@@ -19,11 +19,11 @@ struct PatchDirection {
   float sine = 0;
 };
 
-// From the corner to the centroid of the grey values in the circle around it (intensity centroid, Rosin 1999, as used
+// From the corner to the centroid of the gray values in the circle around it (intensity centroid, Rosin 1999, as used
 // by Rublee et al., ICCV 2011). `image` is CV_8UC1; the pixel lies at least kPatchBorder_px inside it.
 PatchDirection IntensityCentroid(const cv::Mat& image, int x_px, int y_px);
 
-// One binary test: the bit is set when the grey value at the first point is less than that at the second. Offsets from
+// One binary test: the bit is set when the gray value at the first point is less than that at the second. Offsets from
 // the corner, in pixels, for the direction (1, 0).
 struct BriefTest {
   int8_t first_x_px = 0;

@@ -23,7 +23,7 @@ size_t NearestCenter(std::span<const Descriptor> centers, const Descriptor& desc
   return best;
 }
 
-// Moves every centre to the bitwise majority of the entries that are nearest to it: one round of k-majority (Grana et
+// Moves every center to the bitwise majority of the entries that are nearest to it: one round of k-majority (Grana et
 // al., "A fast approach for integrating ORB descriptors in the bag of words model", 2013).
 void MoveToMajority(std::span<const DescriptorTree::Entry> entries, std::vector<Descriptor>& centers) {
   std::vector<std::array<int, 256>> ones(centers.size(), std::array<int, 256>{});
@@ -63,7 +63,7 @@ void DescriptorTree::Insert(const Entry& entry) {
 
 std::vector<Descriptor> DescriptorTree::PickCenters(std::span<const Entry> entries) {
   std::vector<Descriptor> centers;
-  // A descriptor that is already a centre is drawn in vain; a few draws more than needed make up for that.
+  // A descriptor that is already a center is drawn in vain; a few draws more than needed make up for that.
   for (size_t draw = 0; draw < 2 * kBranching && centers.size() < kBranching; ++draw) {
     const Descriptor& drawn = entries[random_() % entries.size()].descriptor;
     if (std::ranges::find(centers, drawn) == centers.end()) centers.push_back(drawn);

@@ -10,8 +10,8 @@
 namespace romap::slam {
 
 // A tree of binary descriptors that grows with what is put into it, so that it needs no vocabulary trained beforehand.
-// Every inner node has up to kBranching centres, a descriptor goes to the child with the nearest one, and a leaf that
-// gets too full splits around centres that are bitwise majorities of its own descriptors (after the hierarchical
+// Every inner node has up to kBranching centers, a descriptor goes to the child with the nearest one, and a leaf that
+// gets too full splits around centers that are bitwise majorities of its own descriptors (after the hierarchical
 // clustering trees of Muja and Lowe, "Fast Matching of Binary Features", CRV 2012). The order of insertion shapes the
 // tree; the same order and seed give the same tree.
 class DescriptorTree {
@@ -38,14 +38,14 @@ class DescriptorTree {
   void RemoveOwners(std::span<const uint8_t> gone);
 
   // Puts up to `max_leaves` leaves where descriptors near to this one may be into `search.leaves`, the most likely
-  // first: best-bin-first by the distance to the centres passed by.
+  // first: best-bin-first by the distance to the centers passed by.
   void FindLeaves(const Descriptor& descriptor, int max_leaves, Search& search) const;
   std::span<const Entry> entries(uint32_t leaf) const { return nodes_[leaf].entries; }
 
   size_t bytes() const;  // of all arrays
 
  private:
-  // Small leaves cost fewer comparisons and lose more neighbours across their borders.
+  // Small leaves cost fewer comparisons and lose more neighbors across their borders.
   static constexpr size_t kLeafEntries = 256;
 
   struct Node {

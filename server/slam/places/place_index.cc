@@ -9,7 +9,7 @@ namespace {
 // ORB features of one corner differ by some 10-20 % of their 256 bits between views, those of different corners by
 // half.
 constexpr int kMaxDistanceBits = 50;
-// How many words a feature is looked for in. One alone loses most neighbours across its border.
+// How many words a feature is looked for in. One alone loses most neighbors across its border.
 constexpr int kLeavesPerFeature = 2;
 
 // The votes of one query.
@@ -27,7 +27,7 @@ class Votes {
   double Count(double keyframes) {
     const double weight = std::log((keyframes + 1) / (static_cast<double>(seen_.size()) + 0.5));
     for (const uint32_t slot : seen_) {
-      // A stray neighbour is likely to be far, a true one to be near.
+      // A stray neighbor is likely to be far, a true one to be near.
       votes_[slot] += weight * (1 - static_cast<double>(nearest_[slot]) / (kMaxDistanceBits + 1));
       nearest_[slot] = kNone;
     }

@@ -36,7 +36,7 @@ class EpipolarMatcherTest : public ::testing::Test {
                                   const std::vector<Feature>& features) {
     MapKeyframe keyframe;
     keyframe.id = id;
-    keyframe.sight = MakeFrameFeatures(frame, features);
+    keyframe.frame = MakeFrameFeatures(frame, features);
     keyframe.points.resize(features.size());
     keyframe.SetPose(pose);
     return keyframe;

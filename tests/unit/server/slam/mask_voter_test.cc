@@ -25,8 +25,8 @@ class MaskVoterTest : public ::testing::Test {
     second_ = AddKeyframe(5, 0.2);
     for (int i = 0; i < kPoints; ++i) {
       PointTrack& track = map_.AddPoint(PointAt(i));
-      map_.AddSight(track, *map_.FindKeyframe(first_), i);
-      map_.AddSight(track, *map_.FindKeyframe(second_), i);
+      map_.AddObservation(track, *map_.FindKeyframe(first_), i);
+      map_.AddObservation(track, *map_.FindKeyframe(second_), i);
       map_.Refresh(track);
       points_.push_back(track.point.id);
     }
@@ -83,19 +83,19 @@ class MaskVoterTest : public ::testing::Test {
 };
 
 TEST_F(MaskVoterTest, LateMasksLabelTheFeaturesOfAKeyframe) {
-  const std::shared_ptr<const FrameFeatures> before = map_.FindKeyframe(first_)->sight;
+  const std::shared_ptr<const FrameFeatures> before = map_.FindKeyframe(first_)->frame;
   voter_.ObserveMasks({.frame_id = 1, .labels = MaskUntil(90), .instances = {}}, map_);
-  const FrameFeatures& after = *map_.FindKeyframe(first_)->sight;
+  const FrameFeatures& after = *map_.FindKeyframe(first_)->frame;
   EXPECT_TRUE(after.has_masks);
   for (size_t i = 0; i < kPoints; ++i) {
     const bool inside = i < 4;  // pixels 20, 40, 60, 80
     EXPECT_EQ(after.features[i].label, inside ? kLabel : 0) << i;
-    EXPECT_EQ(after.mask_places[i] == MaskPlace::kInside, inside) << i;
+    EXPECT_EQ(after.mask_zones[i] == MaskZone::kInside, inside) << i;
   }
   // Whoever shares the sight keeps what it was.
   EXPECT_FALSE(before->has_masks);
   EXPECT_EQ(before->features[0].label, 0);
-  EXPECT_FALSE(map_.FindKeyframe(second_)->sight->has_masks);
+  EXPECT_FALSE(map_.FindKeyframe(second_)->frame->has_masks);
   // Masks do not come twice.
   voter_.ObserveMasks({.frame_id = 1, .labels = MaskUntil(300), .instances = {}}, map_);
   EXPECT_EQ(map_.FindKeyframe(first_)->features()[10].label, 0);
@@ -137,8 +137,8 @@ TEST_F(MaskVoterTest, MasksAreOfThePictureThatTheLensGave) {
   map_.CorrectLens({-0.3});
   // The points are where the corrected features are not, so only the projection counts.
   voter_.ObserveFrame(PassingFrame(6, -0.2, MaskUntil(60)), map_);
-  const Eigen::Vector2d seen_px = map_.lens().Distort(camera_, {40, 120});
-  ASSERT_GT(seen_px.x(), 45);
+  const Eigen::Vector2d image_px = map_.lens().Distort(camera_, {40, 120});
+  ASSERT_GT(image_px.x(), 45);
   const double last_inside_px = map_.lens().Distort(camera_, {20, 120}).x();
   ASSERT_LT(last_inside_px, 55);
   EXPECT_EQ(VotesFor(0).inside, 1);
@@ -150,7 +150,7 @@ TEST_F(MaskVoterTest, TheMasksOfAKeyframeSpeakForTheFramesThatHangOnIt) {
   const int before = InsideVotes();
   EXPECT_GT(before, 4);
   voter_.ObserveMasks({.frame_id = 5, .labels = MaskUntil(200), .instances = {}}, map_);
-  ASSERT_TRUE(map_.FindKeyframe(second_)->sight->has_masks);
+  ASSERT_TRUE(map_.FindKeyframe(second_)->frame->has_masks);
   voter_.ObserveFrame(PassingFrame(7, 0, MaskUntil(200)), map_);
   EXPECT_EQ(InsideVotes(), before);
 }

@@ -58,27 +58,27 @@ class ProjectionSearchTest : public ::testing::Test {
                          .size_mu = p_world.norm() / frame.camera.fx_px,
                          .descriptor = descriptor});
     }
-    sight_ = MakeFrameFeatures(frame, features_);
+    frame_ = MakeFrameFeatures(frame, features_);
   }
 
   std::mt19937_64 random_{5};
   std::vector<Feature> features_;
   std::vector<LocalPoint> points_;
-  std::shared_ptr<const FrameFeatures> sight_;
+  std::shared_ptr<const FrameFeatures> frame_;
 };
 
 TEST_F(ProjectionSearchTest, FindsPointsNearTheirProjection) {
   const SE3<World, Camera> close(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.02, 0, 0));
-  const auto matches = ProjectionMatcher(*sight_, close).MatchAll(points_, {.radius_px = 8}, {});
+  const auto matches = ProjectionMatcher(*frame_, close).MatchAll(points_, {.radius_px = 8}, {});
   EXPECT_GE(matches.size(), 58U);
   for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);
   const SE3<World, Camera> far(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.3, 0, 0));
-  EXPECT_LE(ProjectionMatcher(*sight_, far).MatchAll(points_, {.radius_px = 8}, {}).size(), 1U);
+  EXPECT_LE(ProjectionMatcher(*frame_, far).MatchAll(points_, {.radius_px = 8}, {}).size(), 1U);
 }
 
 TEST_F(ProjectionSearchTest, PassesOverWhatCannotBe) {
   const SE3<World, Camera> here;
-  ProjectionMatcher matcher(*sight_, here);
+  ProjectionMatcher matcher(*frame_, here);
   LocalPoint point = points_[0];
   ASSERT_TRUE(matcher.Find(point, {}, {}));
   std::vector<uint8_t> taken(features_.size(), 0);
@@ -100,7 +100,7 @@ TEST_F(ProjectionSearchTest, PassesOverWhatCannotBe) {
 }
 
 TEST_F(ProjectionSearchTest, LooksAloneFindThePointsToo) {
-  const auto matches = MatchByLooks(points_, *sight_, 60, 0.8);
+  const auto matches = MatchByDescriptors(points_, *frame_, 60, 0.8);
   EXPECT_EQ(matches.size(), points_.size());
   for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);
 }

@@ -30,7 +30,7 @@ class SlamMapTest : public ::testing::Test {
 
   PointTrack& AddPoint(int feature, std::initializer_list<MapKeyframe*> keyframes) {
     PointTrack& track = map_.AddPoint({0.1 * feature, 0, 5});
-    for (MapKeyframe* keyframe : keyframes) EXPECT_TRUE(map_.AddSight(track, *keyframe, feature));
+    for (MapKeyframe* keyframe : keyframes) EXPECT_TRUE(map_.AddObservation(track, *keyframe, feature));
     map_.Refresh(track);
     return track;
   }
@@ -44,14 +44,15 @@ class SlamMapTest : public ::testing::Test {
         ++from_keyframes;
         const auto it = map_.points().find(keyframe.points[i]);
         ASSERT_NE(it, map_.points().end());
-        EXPECT_TRUE(std::any_of(it->second.sights.begin(), it->second.sights.end(), [&](const PointSight& sight) {
-          return sight.keyframe == id && sight.feature == static_cast<int>(i);
-        }));
+        EXPECT_TRUE(std::any_of(it->second.observations.begin(), it->second.observations.end(),
+                                [&](const FeatureRef& observation) {
+                                  return observation.keyframe == id && observation.feature == static_cast<int>(i);
+                                }));
       }
     }
     for (const auto& [id, track] : map_.points()) {
-      from_points += track.sights.size();
-      EXPECT_EQ(track.point.observations, static_cast<int>(track.sights.size()));
+      from_points += track.observations.size();
+      EXPECT_EQ(track.point.observations, static_cast<int>(track.observations.size()));
     }
     EXPECT_EQ(from_keyframes, from_points);
   }
@@ -64,8 +65,8 @@ TEST_F(SlamMapTest, AFeatureShowsOnePointAndAPointIsSeenOnceInAKeyframe) {
   MapKeyframe& b = AddKeyframe(1);
   PointTrack& first = AddPoint(3, {&a, &b});
   PointTrack& second = AddPoint(4, {&a, &b});
-  EXPECT_FALSE(map_.AddSight(second, a, 3));
-  EXPECT_FALSE(map_.AddSight(first, a, 7));
+  EXPECT_FALSE(map_.AddObservation(second, a, 3));
+  EXPECT_FALSE(map_.AddObservation(first, a, 7));
   ExpectConsistent();
 }
 
@@ -73,7 +74,7 @@ TEST_F(SlamMapTest, APointThatIsLeftWithOneSightGoes) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   const MapPointId id = AddPoint(3, {&a, &b}).point.id;
-  map_.RemoveSight(id, b.id);
+  map_.RemoveObservation(id, b.id);
   EXPECT_EQ(map_.FindPoint(id), nullptr);
   EXPECT_EQ(map_.TakeRemovedPoints(), std::vector<MapPointId>{id});
   EXPECT_FALSE(a.points[3]);
@@ -89,7 +90,7 @@ TEST_F(SlamMapTest, AMergedPointAnswersForBoth) {
   map_.MergePoints(from, into);
   ASSERT_NE(map_.FindPoint(from), nullptr);
   EXPECT_EQ(map_.FindPoint(from)->point.id, into);
-  EXPECT_EQ(map_.FindPoint(into)->sights.size(), 3U);  // b saw both: once is enough
+  EXPECT_EQ(map_.FindPoint(into)->observations.size(), 3U);  // b saw both: once is enough
   ExpectConsistent();
 }
 
@@ -115,11 +116,11 @@ TEST_F(SlamMapTest, ARemovedKeyframeGoesAlongWithItsParent) {
   // The map grows to twice its size and turns by a quarter around z.
   map_.Transform({2, Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(0, 0, 1)});
-  const auto place = map_.Place(gone);
+  const auto place = map_.KeyframePose(gone);
   ASSERT_TRUE(place);
   EXPECT_LT((place->T_world_camera.translation() - Eigen::Vector3d(0, 2, 1)).norm(), 1e-9);
   EXPECT_DOUBLE_EQ(place->scale, 2);
-  EXPECT_FALSE(map_.Place(KeyframeId{77}));
+  EXPECT_FALSE(map_.KeyframePose(KeyframeId{77}));
 }
 
 TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
@@ -154,23 +155,23 @@ TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
 TEST_F(SlamMapTest, ALensCorrectsAllKeyframesAndThoseThatCome) {
   const RadialCorrection lens{-0.05};
   MapKeyframe& before = AddKeyframe(0);
-  const Eigen::Vector2f seen_px = before.features()[0].pixel_px;
+  const Eigen::Vector2f image_px = before.features()[0].pixel_px;
   map_.CorrectLens(lens);
   MapKeyframe& after = AddKeyframe(1);
   for (const MapKeyframe* keyframe : {&before, &after}) {
     const Eigen::Vector2d pixel_px = keyframe->features()[0].pixel_px.cast<double>();
-    EXPECT_GT((pixel_px - seen_px.cast<double>()).norm(), 1);
-    EXPECT_LT((lens.Distort(keyframe->camera(), pixel_px) - seen_px.cast<double>()).norm(), 0.01);
-    EXPECT_EQ(keyframe->sight->seen_px[0], seen_px);
-    EXPECT_LT((keyframe->camera().Project(keyframe->sight->bearings_camera[0]) - pixel_px).norm(), 0.01);
+    EXPECT_GT((pixel_px - image_px.cast<double>()).norm(), 1);
+    EXPECT_LT((lens.Distort(keyframe->camera(), pixel_px) - image_px.cast<double>()).norm(), 0.01);
+    EXPECT_EQ(keyframe->frame->image_px[0], image_px);
+    EXPECT_LT((keyframe->camera().Project(keyframe->frame->bearings_camera[0]) - pixel_px).norm(), 0.01);
     std::vector<int> near;
-    keyframe->sight->grid.Near(pixel_px, 1, near);
+    keyframe->frame->grid.Near(pixel_px, 1, near);
     EXPECT_NE(std::find(near.begin(), near.end(), 0), near.end());
   }
-  EXPECT_EQ(SeenFeatures(*after.sight)[0].pixel_px, seen_px);
+  EXPECT_EQ(UncorrectedFeatures(*after.frame)[0].pixel_px, image_px);
   // Corrections are of what was seen and do not add up.
   map_.CorrectLens({});
-  EXPECT_LT((before.features()[0].pixel_px - seen_px).norm(), 1e-3);
+  EXPECT_LT((before.features()[0].pixel_px - image_px).norm(), 1e-3);
 }
 
 }  // namespace

@@ -19,8 +19,8 @@ TrackedImage Keyframe(std::shared_ptr<const Frame> frame) {
   image.pose_given = true;
   image.tracked.T_world_camera = *frame->T_world_camera;
   image.tracked.is_keyframe = true;
-  image.sight = MakeFrameFeatures(*frame, FeatureExtractor(SlamConfig{}).Extract(*frame));
-  image.points.resize(image.sight->size());
+  image.features = MakeFrameFeatures(*frame, FeatureExtractor(SlamConfig{}).Extract(*frame));
+  image.points.resize(image.features->size());
   image.tracked.frame = std::move(frame);
   return image;
 }

@@ -52,7 +52,7 @@ class TexturedWorld {
     return LookAt({1.2 * std::cos(angle_rad), 1.2 * std::sin(angle_rad), 1.2}, {0, 0, 0.2});
   }
 
-  // A frame of the world with noise of standard deviation `noise` grey levels, with mask and pose, without depth.
+  // A frame of the world with noise of standard deviation `noise` gray levels, with mask and pose, without depth.
   std::shared_ptr<Frame> Render(uint64_t frame_id, const SE3<World, Camera>& T_world_camera, double noise = 2) const {
     auto frame = std::make_shared<Frame>();
     frame->frame_id = frame_id;
@@ -61,21 +61,21 @@ class TexturedWorld {
     frame->T_world_camera = T_world_camera;
     frame->has_masks = true;
     const cv::Size size(camera_.width_px, camera_.height_px);
-    cv::Mat grey(size, CV_8UC1, cv::Scalar(0));
+    cv::Mat gray(size, CV_8UC1, cv::Scalar(0));
     frame->labels = cv::Mat(size, CV_16UC1, cv::Scalar(0));
 
     cv::Mat layer, inside;
-    cv::warpPerspective(floor_, grey, FromTexture(T_world_camera, floor_, kFloorHalfSide_mu, 0), size, cv::INTER_AREA);
+    cv::warpPerspective(floor_, gray, FromTexture(T_world_camera, floor_, kFloorHalfSide_mu, 0), size, cv::INTER_AREA);
     const cv::Matx33d H = FromTexture(T_world_camera, plate_, kPlateHalfSide_mu, kPlateHeight_mu);
     cv::warpPerspective(plate_, layer, H, size, cv::INTER_AREA);
     cv::warpPerspective(cv::Mat(plate_.size(), CV_8UC1, cv::Scalar(255)), inside, H, size, cv::INTER_NEAREST);
-    layer.copyTo(grey, inside);
+    layer.copyTo(gray, inside);
     frame->labels.setTo(kPlateLabel, inside);
 
     cv::Mat noisy, grain(size, CV_16SC1);
     cv::RNG random(1000 + frame_id);
     random.fill(grain, cv::RNG::NORMAL, 0, noise);
-    cv::add(grey, grain, noisy, cv::noArray(), CV_8U);
+    cv::add(gray, grain, noisy, cv::noArray(), CV_8U);
     cv::cvtColor(noisy, frame->image_bgr, cv::COLOR_GRAY2BGR);
     return frame;
   }
@@ -119,7 +119,7 @@ class TexturedWorld {
     return texture;
   }
 
-  // Texture pixels to image pixels, for a horizontal texture centred above the origin.
+  // Texture pixels to image pixels, for a horizontal texture centerd above the origin.
   cv::Matx33d FromTexture(const SE3<World, Camera>& T_world_camera, const cv::Mat& texture, double half_side_mu,
                           double height_mu) const {
     const double mu_per_px = 2 * half_side_mu / texture.cols;

@@ -44,7 +44,7 @@ class TrackingTest : public ::testing::Test {
     reason_ = image.tracked.reason;
     mapped_ = mapper_->Process(image);
     const TrackingState state = image.tracked.state;
-    if (mapped_.begun_anew) ++begun_anew_;
+    if (mapped_.was_reset) ++resets_;
     if (state == TrackingState::kTracking || state == TrackingState::kRelocalized) {
       frames_.push_back({mapped_.tracked, *frame->T_world_camera});
       frames_.back().tracked.frame = nullptr;
@@ -77,9 +77,8 @@ class TrackingTest : public ::testing::Test {
     std::vector<Eigen::Vector3d> estimated, truth;
     for (const Followed& frame : frames_) {
       SE3<World, Camera> pose = frame.tracked.T_world_camera;
-      if (const auto reference = mapper_->map().Place(frame.tracked.reference)) {
-        const SE3<Camera, Camera>& T = frame.tracked.T_reference_camera;
-        pose = reference->T_world_camera * SE3<Camera, Camera>(T.rotation(), reference->scale * T.translation());
+      if (const auto reference = mapper_->map().KeyframePose(frame.tracked.reference)) {
+        pose = reference->Compose(frame.tracked.T_reference_camera);
       }
       estimated.push_back(pose.translation());
       truth.push_back(frame.truth.translation());
@@ -94,7 +93,7 @@ class TrackingTest : public ::testing::Test {
   // Angle between the map's up, which is z, and the truth's.
   double UpError_deg() const {
     const Followed& last = frames_.back();
-    const auto reference = mapper_->map().Place(last.tracked.reference);
+    const auto reference = mapper_->map().KeyframePose(last.tracked.reference);
     const Eigen::Quaterniond R_world_camera =
         reference->T_world_camera.rotation() * last.tracked.T_reference_camera.rotation();
     const Eigen::Vector3d up_in_map = R_world_camera * (last.truth.rotation().conjugate() * Eigen::Vector3d::UnitZ());
@@ -128,7 +127,7 @@ class TrackingTest : public ::testing::Test {
   std::vector<Followed> frames_;
   MappedFrame mapped_;
   std::string reason_;
-  int begun_anew_ = 0;
+  int resets_ = 0;
 };
 
 TEST_F(TrackingTest, FollowsTheCameraFromImagesAlone) {
@@ -169,7 +168,7 @@ TEST_F(TrackingTest, ACoveredLensIsSurvived) {
   EXPECT_EQ(mapper_->keyframes(), keyframes);
   EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalized) << reason_;
   EXPECT_EQ(Feed(Render(67)), TrackingState::kTracking) << reason_;
-  EXPECT_EQ(begun_anew_, 0);
+  EXPECT_EQ(resets_, 0);
   EXPECT_LT(Error().first, 0.02);
 }
 
@@ -192,7 +191,7 @@ TEST_F(TrackingTest, ACameraThatWasCarriedOffIsFoundAgainInTheSameMap) {
   }
   EXPECT_GE(found_after, 0) << "not found again: " << reason_;
   EXPECT_LE(found_after, 3);
-  EXPECT_EQ(begun_anew_, 0);
+  EXPECT_EQ(resets_, 0);
   EXPECT_LT(Error().first, 0.03);
 }
 
@@ -203,7 +202,7 @@ TEST_F(TrackingTest, AYoungMapThatIsLostForLongIsBegunAnew) {
     frame->image_bgr.setTo(0);
     Feed(frame);
   }
-  EXPECT_EQ(begun_anew_, 1);
+  EXPECT_EQ(resets_, 1);
   int tracked = 0;
   for (int i = 0; i < 40; ++i) {
     tracked += Feed(world_.Render(static_cast<uint64_t>(200 + i), Pose(i))) == TrackingState::kTracking ? 1 : 0;

@@ -55,14 +55,14 @@ class WorldUpTest : public ::testing::Test {
   void AddPoints() {
     for (size_t k = 0; k < points_.size(); ++k) {
       PointTrack& track = map_.AddPoint(points_[k]);
-      for (auto& [id, keyframe] : map_.keyframes()) map_.AddSight(track, keyframe, static_cast<int>(k));
+      for (auto& [id, keyframe] : map_.keyframes()) map_.AddObservation(track, keyframe, static_cast<int>(k));
       map_.Refresh(track);
     }
   }
 
   void TakeMasks() {
     for (auto& [id, keyframe] : map_.keyframes()) {
-      keyframe.sight = WithMasks(*keyframe.sight, masks_[id.value - 1].labels, SlamConfig{}.mask_erosion_px);
+      keyframe.frame = WithMasks(*keyframe.frame, masks_[id.value - 1].labels, SlamConfig{}.mask_erosion_px);
     }
   }
 

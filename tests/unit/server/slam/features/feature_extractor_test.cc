@@ -110,9 +110,9 @@ Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
   const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(source_camera, pixels_px);
   const cv::Mat map(source_camera.height_px, source_camera.width_px, CV_32FC2,
                     const_cast<Eigen::Vector2f*>(pinhole_px.data()));
-  cv::Mat grey;
-  cv::cvtColor(pinhole.image_bgr, grey, cv::COLOR_BGR2GRAY);
-  cv::remap(grey, frame.source_gray, map, cv::noArray(), cv::INTER_CUBIC);
+  cv::Mat gray;
+  cv::cvtColor(pinhole.image_bgr, gray, cv::COLOR_BGR2GRAY);
+  cv::remap(gray, frame.source_gray, map, cv::noArray(), cv::INTER_CUBIC);
   return frame;
 }
 

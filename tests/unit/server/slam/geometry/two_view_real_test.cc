@@ -55,8 +55,8 @@ std::vector<TimedPose> ReadTrajectory(const std::filesystem::path& file) {
 
 View Extract(const std::filesystem::path& image) {
   View view;
-  const cv::Mat grey = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
-  cv::ORB::create(1500)->detectAndCompute(grey, cv::noArray(), view.keypoints, view.descriptors);
+  const cv::Mat gray = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+  cv::ORB::create(1500)->detectAndCompute(gray, cv::noArray(), view.keypoints, view.descriptors);
   return view;
 }
 

@@ -45,7 +45,7 @@ TEST_F(DescriptorTreeTest, KeepsEveryEntryAndFindsItInItsNearestLeaf) {
   for (uint32_t i = 0; i < 5000; i += 97) EXPECT_TRUE(OwnersIn(tree, descriptors[i], 1).contains(i)) << i;
 }
 
-TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbours) {
+TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbors) {
   DescriptorTree tree(1);
   std::vector<Descriptor> descriptors;
   for (uint32_t i = 0; i < 5000; ++i) {

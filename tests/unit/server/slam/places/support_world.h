@@ -21,7 +21,7 @@ class SupportWorld {
     double object_bottom = 0;    // lowest part of the objects that has points, share of their height
     int floor_points = 0;        // 0.75 below the table, seen past it
     int wall_points = 0;         // upright, behind the table
-    int clutter_points = 0;      // on top of the table, unlabelled, up to 0.25 high
+    int clutter_points = 0;      // on top of the table, unlabeled, up to 0.25 high
     double stray_share = 0;      // of the table points: anywhere instead
     double depth_noise = 0.005;  // relative, along the ray
     double sigma_factor = 1;     // stated over true uncertainty

@@ -8,7 +8,7 @@
 
 #include "common/camera_model.h"
 #include "common/geometry.h"
-#include "server/slam/optimise/radial_correction.h"
+#include "server/slam/optimize/radial_correction.h"
 
 namespace romap::slam {
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 
 namespace romap::slam {
 
@@ -17,7 +17,7 @@ struct BundleWorldOptions {
   int fixed_cameras = 2;  // the first ones; they start where they truly are
   int points = 200;
   int sights_per_point = 6;      // by so many consecutive cameras
-  double step_rad = 0.1;         // between neighbours on the orbit
+  double step_rad = 0.1;         // between neighbors on the orbit
   double scale = 1;              // map units; the orbit's radius is 3, the ball's 1
   double pixel_noise_px = 0;     // standard deviation per axis
   double pose_noise_rad = 0;     // of the start, per axis
@@ -47,7 +47,7 @@ inline CameraModel BundleWorldCamera() {
   return camera;
 }
 
-// At `angle_rad` on a circle of radius 3 in the xy plane, looking at its centre.
+// At `angle_rad` on a circle of radius 3 in the xy plane, looking at its center.
 inline SE3<World, Camera> OrbitPose(double angle_rad, double scale) {
   const Eigen::Vector3d outwards(std::cos(angle_rad), std::sin(angle_rad), 0);
   Eigen::Matrix3d R;

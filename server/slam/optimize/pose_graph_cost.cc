@@ -1,4 +1,4 @@
-#include "server/slam/optimise/pose_graph_cost.h"
+#include "server/slam/optimize/pose_graph_cost.h"
 
 #include <cmath>
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "common/camera_model.h"
-#include "server/slam/optimise/bundle_adjustment.h"
-#include "server/slam/optimise/bundle_state.h"
+#include "server/slam/optimize/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_state.h"
 
 namespace romap::slam {
 

@@ -34,7 +34,7 @@ struct PoseGraphSummary {
 // Spreads the error of closed loops over a graph of similarities (Strasdat et al., RSS 2010): residual
 // log(S_a_b^-1 * S_world_a^-1 * S_world_b) in sim(3), translations divided by the graph's typical edge length so that
 // nothing depends on the scale of the map. Ceres, sparse Cholesky, analytic Jacobians. At least one node must be fixed.
-PoseGraphSummary OptimisePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
+PoseGraphSummary OptimizePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
                                    const PoseGraphOptions& options);
 
 }  // namespace romap::slam

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 
 namespace romap::slam {
 

@@ -1,4 +1,4 @@
-#include "server/slam/optimise/pose_graph.h"
+#include "server/slam/optimize/pose_graph.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "server/slam/optimise/pose_graph_cost.h"
-#include "tests/unit/server/slam/optimise/jacobians.h"
+#include "server/slam/optimize/pose_graph_cost.h"
+#include "tests/unit/server/slam/optimize/jacobians.h"
 
 namespace romap::slam {
 namespace {
@@ -73,7 +73,7 @@ TEST(PoseGraph, ALoopSpreadsDriftInPoseAndScale) {
   Loop loop = MakeLoop(100, kDrift);
   const double before_mu = RmsErrorMu(loop);
   ASSERT_GT(before_mu, 0.1);
-  const PoseGraphSummary summary = OptimisePoseGraph(loop.nodes, loop.edges, {});
+  const PoseGraphSummary summary = OptimizePoseGraph(loop.nodes, loop.edges, {});
   EXPECT_TRUE(summary.usable);
   EXPECT_GT(summary.iterations, 0);
   EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
@@ -85,7 +85,7 @@ TEST(PoseGraph, WithFixedScaleScalesStayAndPosesImprove) {
   const Sim3Vector drift = (Sim3Vector() << 0, 0, 0.002, 0, 0, 0.001, 0).finished();
   Loop loop = MakeLoop(100, drift);
   const double before_mu = RmsErrorMu(loop);
-  const PoseGraphSummary summary = OptimisePoseGraph(loop.nodes, loop.edges, {.fix_scale = true});
+  const PoseGraphSummary summary = OptimizePoseGraph(loop.nodes, loop.edges, {.fix_scale = true});
   EXPECT_TRUE(summary.usable);
   for (const PoseGraphNode& node : loop.nodes) EXPECT_EQ(node.S_world_camera.scale(), 1);
   EXPECT_LT(RmsErrorMu(loop), 0.1 * before_mu) << before_mu;
@@ -95,7 +95,7 @@ TEST(PoseGraph, FixedNodesDoNotMoveAtAll) {
   Loop loop = MakeLoop(50, kDrift);
   loop.nodes[20].fixed = true;
   const std::vector<PoseGraphNode> before = loop.nodes;
-  ASSERT_TRUE(OptimisePoseGraph(loop.nodes, loop.edges, {}).usable);
+  ASSERT_TRUE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
   for (const int i : {0, 20}) {
     EXPECT_EQ(loop.nodes[i].S_world_camera.translation(), before[i].S_world_camera.translation());
     EXPECT_EQ(loop.nodes[i].S_world_camera.rotation().coeffs(), before[i].S_world_camera.rotation().coeffs());
@@ -106,10 +106,10 @@ TEST(PoseGraph, FixedNodesDoNotMoveAtAll) {
 
 TEST(PoseGraph, DoesNotDependOnTheUnitOfTheMap) {
   Loop loop = MakeLoop(60, kDrift);
-  ASSERT_TRUE(OptimisePoseGraph(loop.nodes, loop.edges, {}).usable);
+  ASSERT_TRUE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
   for (const double unit : {0.01, 100.0}) {
     Loop scaled = MakeLoop(60, kDrift, unit);
-    ASSERT_TRUE(OptimisePoseGraph(scaled.nodes, scaled.edges, {}).usable);
+    ASSERT_TRUE(OptimizePoseGraph(scaled.nodes, scaled.edges, {}).usable);
     for (size_t i = 0; i < loop.nodes.size(); ++i) {
       EXPECT_LT(
           (scaled.nodes[i].S_world_camera.translation() / unit - loop.nodes[i].S_world_camera.translation()).norm(),
@@ -124,7 +124,7 @@ TEST(PoseGraph, HeavyEdgesBendLess) {
   nodes[0].fixed = true;
   const auto step = [](double x_mu) { return Sim3<Camera, Camera>(1, Eigen::Quaterniond::Identity(), {x_mu, 0, 0}); };
   nodes[1].S_world_camera = Sim3<World, Camera>(1, Eigen::Quaterniond::Identity(), {5, 0, 0});
-  ASSERT_TRUE(OptimisePoseGraph(nodes, {{0, 1, step(1), 3}, {0, 1, step(2), 1}}, {}).usable);
+  ASSERT_TRUE(OptimizePoseGraph(nodes, {{0, 1, step(1), 3}, {0, 1, step(2), 1}}, {}).usable);
   EXPECT_NEAR(nodes[1].S_world_camera.translation().x(), 1.25, 1e-6);
 }
 
@@ -141,15 +141,15 @@ TEST(PoseGraph, FloatingPartsAreRefused) {
   for (const PoseGraphEdge& edge : loop.edges) {
     if (edge.a != 9 && edge.a != 15) cut.push_back(edge);  // nodes 10..15 hang on nothing
   }
-  EXPECT_FALSE(OptimisePoseGraph(loop.nodes, cut, {}).usable);
+  EXPECT_FALSE(OptimizePoseGraph(loop.nodes, cut, {}).usable);
   EXPECT_TRUE(unchanged());
 
   loop.nodes[0].fixed = false;
-  EXPECT_FALSE(OptimisePoseGraph(loop.nodes, loop.edges, {}).usable);
+  EXPECT_FALSE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
   EXPECT_TRUE(unchanged());
-  EXPECT_FALSE(OptimisePoseGraph(loop.nodes, {}, {}).usable);
+  EXPECT_FALSE(OptimizePoseGraph(loop.nodes, {}, {}).usable);
   std::vector<PoseGraphNode> none;
-  EXPECT_FALSE(OptimisePoseGraph(none, {}, {}).usable);
+  EXPECT_FALSE(OptimizePoseGraph(none, {}, {}).usable);
 }
 
 TEST(PoseGraph, BadNumbersAreLeftOutOrRefused) {
@@ -163,13 +163,13 @@ TEST(PoseGraph, BadNumbersAreLeftOutOrRefused) {
   loop.edges.push_back({2, 7, {}, -1});
   loop.edges.push_back({2, 7, Sim3<Camera, Camera>(1, Eigen::Quaterniond::Identity(), {nan, 0, 0}), 1});
   loop.edges.push_back({2, 7, Sim3<Camera, Camera>(0, Eigen::Quaterniond::Identity(), {1, 0, 0}), 1});
-  ASSERT_TRUE(OptimisePoseGraph(clean.nodes, clean.edges, {}).usable);
-  ASSERT_TRUE(OptimisePoseGraph(loop.nodes, loop.edges, {}).usable);
+  ASSERT_TRUE(OptimizePoseGraph(clean.nodes, clean.edges, {}).usable);
+  ASSERT_TRUE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
   for (size_t i = 0; i < loop.nodes.size(); ++i) {
     EXPECT_EQ(loop.nodes[i].S_world_camera.translation(), clean.nodes[i].S_world_camera.translation());
   }
   loop.nodes[3].S_world_camera = Sim3<World, Camera>(1, Eigen::Quaterniond::Identity(), {nan, 0, 0});
-  EXPECT_FALSE(OptimisePoseGraph(loop.nodes, loop.edges, {}).usable);
+  EXPECT_FALSE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "server/slam/place_recogniser.h"
+#include "server/slam/place_recognizer.h"
 
 #include <spdlog/spdlog.h>
 
@@ -24,28 +24,28 @@ constexpr int kMinPoints = 40;        // after a search by projection
 constexpr double kMinInlierShare = 0.5;
 constexpr double kWideRadius_px = 10;
 constexpr double kNarrowRadius_px = 4;
-constexpr size_t kFewNeighbours = 3;
-constexpr size_t kNeighbours = 8;
+constexpr size_t kFewNeighbors = 3;
+constexpr size_t kNeighbors = 8;
 constexpr int kMinSharedPoints = 15;
 constexpr int kMinCommonPoints = 15;
 constexpr uint64_t kMinLoopKeyframes = 10;  // between both ends
 
-std::vector<LocalPoint> LooksOfAll(const SlamMap& map, const std::vector<MapPointId>& ids) {
+std::vector<LocalPoint> MakeLocalPoints(const SlamMap& map, const std::vector<MapPointId>& ids) {
   std::vector<LocalPoint> looks;
-  for (const MapPointId id : ids) looks.push_back(LooksOf(*map.FindPoint(id)));
+  for (const MapPointId id : ids) looks.push_back(MakeLocalPoint(*map.FindPoint(id)));
   return looks;
 }
 
-PoseObservation Observe(const FrameFeatures& sight, int feature, const Eigen::Vector3d& p_world,
+PoseObservation Observe(const FrameFeatures& frame, int feature, const Eigen::Vector3d& p_world,
                         const SlamConfig& config) {
-  const Feature& f = sight.features[static_cast<size_t>(feature)];
+  const Feature& f = frame.features[static_cast<size_t>(feature)];
   return {
       .p_world = p_world, .pixel_px = f.pixel_px.cast<double>(), .sigma_px = config.pixel_sigma_px * f.octave_scale};
 }
 
 }  // namespace
 
-std::vector<MapPointId> PlaceRecogniser::PointsAround(const MapKeyframe& keyframe, size_t neighbours) const {
+std::vector<MapPointId> PlaceRecognizer::PointsAround(const MapKeyframe& keyframe, size_t neighbors) const {
   std::set<MapPointId> points;
   const auto take = [&](const MapKeyframe& from) {
     for (const MapPointId id : from.points) {
@@ -54,36 +54,36 @@ std::vector<MapPointId> PlaceRecogniser::PointsAround(const MapKeyframe& keyfram
   };
   take(keyframe);
   for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) {
-    if (neighbours-- == 0) break;
+    if (neighbors-- == 0) break;
     take(*map_->FindKeyframe(id));
   }
   return {points.begin(), points.end()};
 }
 
-std::optional<PlaceRecogniser::Located> PlaceRecogniser::Locate(const FrameFeatures& sight, const MapKeyframe& place,
+std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatures& frame, const MapKeyframe& place,
                                                                 uint64_t call) const {
-  const std::vector<LocalPoint> points = LooksOfAll(*map_, PointsAround(place, kFewNeighbours));
+  const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(place, kFewNeighbors));
   std::vector<PoseObservation> observations;
-  for (const PointMatch& match : MatchByLooks(points, sight, kMaxDistance, kRatio)) {
+  for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxDistance, kRatio)) {
     observations.push_back(
-        Observe(sight, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
+        Observe(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
   }
-  const auto pose = SolvePnp(sight.camera, observations, {.min_inliers = kMinLooksInliers, .seed = config_.Seed(call)});
+  const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinLooksInliers, .seed = config_.Seed(call)});
   if (!pose) return std::nullopt;
 
-  const std::vector<LocalPoint> around = LooksOfAll(*map_, PointsAround(place, kNeighbours));
+  const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(place, kNeighbors));
   Located located;
   located.T_world_camera = pose->T_world_camera;
   PoseEstimate refined;
   for (const double radius_px : {kWideRadius_px, kNarrowRadius_px}) {
-    ProjectionMatcher matcher(sight, located.T_world_camera);
+    ProjectionMatcher matcher(frame, located.T_world_camera);
     const auto matches = matcher.MatchAll(around, {.radius_px = radius_px, .max_distance = kMaxDistance}, {});
     observations.clear();
     for (const PointMatch& match : matches) {
       observations.push_back(
-          Observe(sight, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
+          Observe(frame, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
     }
-    refined = RefinePose(sight.camera, located.T_world_camera, observations);
+    refined = RefinePose(frame.camera, located.T_world_camera, observations);
     located.T_world_camera = refined.T_world_camera;
     located.points.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
@@ -91,7 +91,7 @@ std::optional<PlaceRecogniser::Located> PlaceRecogniser::Locate(const FrameFeatu
       located.points.emplace_back(around[static_cast<size_t>(matches[i].point)].id, matches[i].feature);
     }
   }
-  spdlog::debug("slam: frame {} looks like {}: {} of {} points", sight.frame_id, place.id.ToString(), refined.inliers,
+  spdlog::debug("slam: frame {} looks like {}: {} of {} points", frame.frame_id, place.id.ToString(), refined.inliers,
                 observations.size());
   if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
     return std::nullopt;
@@ -99,16 +99,16 @@ std::optional<PlaceRecogniser::Located> PlaceRecogniser::Locate(const FrameFeatu
   return located;
 }
 
-std::optional<PlaceRecogniser::Found> PlaceRecogniser::FindCamera(const FrameFeatures& sight) const {
-  for (const PlaceMatch& candidate : index_.Query(sight.features, kCandidates)) {
+std::optional<PlaceRecognizer::Found> PlaceRecognizer::FindCamera(const FrameFeatures& frame) const {
+  for (const PlaceMatch& candidate : index_.Query(frame.features, kCandidates)) {
     const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
     if (place == nullptr) continue;
-    if (const auto located = Locate(sight, *place, sight.frame_id)) return Found{located->T_world_camera, place->id};
+    if (const auto located = Locate(frame, *place, frame.frame_id)) return Found{located->T_world_camera, place->id};
   }
   return std::nullopt;
 }
 
-std::optional<LoopMatch> PlaceRecogniser::FindLoop(const MapKeyframe& keyframe, bool fix_scale) const {
+std::optional<LoopMatch> PlaceRecognizer::FindLoop(const MapKeyframe& keyframe, bool fix_scale) const {
   std::set<KeyframeId> connected = {keyframe.id};
   for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) connected.insert(id);
   int tried = 0;
@@ -120,14 +120,14 @@ std::optional<LoopMatch> PlaceRecogniser::FindLoop(const MapKeyframe& keyframe, 
     if (++tried > kLoopCandidates) break;
     const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
     if (place == nullptr) continue;
-    const auto located = Locate(*keyframe.sight, *place, keyframe.id.value);
+    const auto located = Locate(*keyframe.frame, *place, keyframe.id.value);
     if (!located) continue;
     if (auto loop = MakeLoop(keyframe, *place, *located, fix_scale)) return loop;
   }
   return std::nullopt;
 }
 
-std::optional<LoopMatch> PlaceRecogniser::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place,
+std::optional<LoopMatch> PlaceRecognizer::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place,
                                                    const Located& located, bool fix_scale) const {
   LoopMatch loop{.keyframe = keyframe.id, .place = place.id};
   const SE3<Camera, World>& T_place_world = place.T_camera_world();

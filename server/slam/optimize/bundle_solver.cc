@@ -1,4 +1,4 @@
-#include "server/slam/optimise/bundle_solver.h"
+#include "server/slam/optimize/bundle_solver.h"
 
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
@@ -10,8 +10,8 @@
 #include <memory>
 
 #include "common/statistics.h"
-#include "server/slam/optimise/bundle_state.h"
-#include "server/slam/optimise/reprojection_cost.h"
+#include "server/slam/optimize/bundle_state.h"
+#include "server/slam/optimize/reprojection_cost.h"
 
 namespace romap::slam {
 namespace {

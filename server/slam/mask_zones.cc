@@ -1,4 +1,4 @@
-#include "server/slam/mask_places.h"
+#include "server/slam/mask_zones.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ bool AnyMaskWithin(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int r
 
 }  // namespace
 
-MaskPlaces::MaskPlaces(const cv::Mat& labels) : labels_(labels) {
+MaskZones::MaskZones(const cv::Mat& labels) : labels_(labels) {
   if (labels.empty()) return;
   cv::Mat small;
   const cv::Size size(std::max(1, labels.cols / kShrink), std::max(1, labels.rows / kShrink));
@@ -30,21 +30,21 @@ MaskPlaces::MaskPlaces(const cv::Mat& labels) : labels_(labels) {
   cv::dilate(small > 0, around_, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
 }
 
-MaskPlace MaskPlaces::At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const {
-  if (labels_.empty()) return MaskPlace::kUnknown;
-  if (label != 0) return MaskPlace::kInside;
+MaskZone MaskZones::At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const {
+  if (labels_.empty()) return MaskZone::kUnknown;
+  if (label != 0) return MaskZone::kInside;
   const int u = std::clamp(static_cast<int>(pixel_px.x()) / kShrink, 0, around_.cols - 1);
   const int v = std::clamp(static_cast<int>(pixel_px.y()) / kShrink, 0, around_.rows - 1);
-  if (around_.at<uint8_t>(v, u) == 0) return MaskPlace::kFar;
+  if (around_.at<uint8_t>(v, u) == 0) return MaskZone::kFar;
   const int reach_px = static_cast<int>(std::lround(kBorder_px * octave_scale));
-  return AnyMaskWithin(labels_, pixel_px, reach_px) ? MaskPlace::kBorder : MaskPlace::kNear;
+  return AnyMaskWithin(labels_, pixel_px, reach_px) ? MaskZone::kBorder : MaskZone::kNear;
 }
 
-void MaskVotes::Add(MaskPlace place) {
-  inside += place == MaskPlace::kInside ? 1 : 0;
-  border += place == MaskPlace::kBorder ? 1 : 0;
-  near += place == MaskPlace::kNear ? 1 : 0;
-  far += place == MaskPlace::kFar ? 1 : 0;
+void MaskVotes::Add(MaskZone place) {
+  inside += place == MaskZone::kInside ? 1 : 0;
+  border += place == MaskZone::kBorder ? 1 : 0;
+  near += place == MaskZone::kNear ? 1 : 0;
+  far += place == MaskZone::kFar ? 1 : 0;
 }
 
 void MaskVotes::Add(const MaskVotes& other) {

@@ -1,6 +1,6 @@
-#include "server/slam/optimise/bundle_state.h"
+#include "server/slam/optimize/bundle_state.h"
 
-#include "server/slam/optimise/lie.h"
+#include "server/slam/optimize/lie.h"
 
 namespace romap::slam {
 

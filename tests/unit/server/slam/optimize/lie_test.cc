@@ -1,4 +1,4 @@
-#include "server/slam/optimise/lie.h"
+#include "server/slam/optimize/lie.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "server/slam/optimise/radial_correction.h"
+#include "server/slam/optimize/radial_correction.h"
 
 #include <gtest/gtest.h>
 
-#include "server/slam/optimise/bundle_adjustment.h"
-#include "tests/unit/server/slam/optimise/bundle_world.h"
+#include "server/slam/optimize/bundle_adjustment.h"
+#include "tests/unit/server/slam/optimize/bundle_world.h"
 
 namespace romap::slam {
 namespace {

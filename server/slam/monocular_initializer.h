@@ -13,7 +13,7 @@
 namespace romap::slam {
 
 // From what a map begins: two views without depth, or one with depth.
-struct MapStart {
+struct InitialViews {
   std::shared_ptr<const FrameFeatures> first;
   std::shared_ptr<const FrameFeatures> second = {};  // none: `first` has depth
   SE3<Camera, Camera> T_first_second = {};           // its translation has length 1
@@ -27,12 +27,12 @@ struct MapStart {
 
 // Waits for two views that a map can begin with. A few views are kept and followed from frame to frame until structure
 // and motion come out of one of them and the newest frame (SolveTwoView), or too little of it is left.
-class MonocularStart {
+class MonocularInitializer {
  public:
-  explicit MonocularStart(const SlamConfig& config) : config_(config) {}
+  explicit MonocularInitializer(const SlamConfig& config) : config_(config) {}
 
   // The next frame. Without a result, `reason` says why for people.
-  std::optional<MapStart> Offer(std::shared_ptr<const FrameFeatures> sight, std::string* reason);
+  std::optional<InitialViews> Offer(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
   void Reset() { followed_.clear(); }
 
  private:
@@ -41,17 +41,17 @@ class MonocularStart {
     int second = 0;
   };
   struct FollowedView {
-    std::shared_ptr<const FrameFeatures> sight;
+    std::shared_ptr<const FrameFeatures> frame;
     std::vector<Eigen::Vector2d> latest_px = {};  // where each feature was seen last
     std::vector<Match> matches = {};              // with the newest frame
     double motion_px = 0;                         // median over the matches
     int frames = 0;                               // since it was taken
   };
 
-  void Begin(std::shared_ptr<const FrameFeatures> sight);
-  void Follow(const FrameFeatures& sight, FollowedView& view) const;
-  std::optional<MapStart> Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& sight,
-                              std::string* reason) const;
+  void Begin(std::shared_ptr<const FrameFeatures> frame);
+  void Follow(const FrameFeatures& frame, FollowedView& view) const;
+  std::optional<InitialViews> Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& frame,
+                                  std::string* reason) const;
 
   const SlamConfig config_;
   std::vector<FollowedView> followed_;  // oldest first

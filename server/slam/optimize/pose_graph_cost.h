@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "server/slam/optimise/lie.h"
+#include "server/slam/optimize/lie.h"
 
 namespace romap::slam {
 

@@ -1,8 +1,8 @@
-#include "server/slam/optimise/reprojection_cost.h"
+#include "server/slam/optimize/reprojection_cost.h"
 
 #include <algorithm>
 
-#include "server/slam/optimise/lie.h"
+#include "server/slam/optimize/lie.h"
 
 namespace romap::slam {
 namespace {

@@ -1,12 +1,12 @@
-#include "server/slam/optimise/reprojection_cost.h"
+#include "server/slam/optimize/reprojection_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "server/slam/optimise/lie.h"
-#include "tests/unit/server/slam/optimise/bundle_world.h"
-#include "tests/unit/server/slam/optimise/jacobians.h"
+#include "server/slam/optimize/lie.h"
+#include "tests/unit/server/slam/optimize/bundle_world.h"
+#include "tests/unit/server/slam/optimize/jacobians.h"
 
 namespace romap::slam {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/slam/monocular_start.h"
+#include "server/slam/monocular_initializer.h"
 
 #include <fmt/format.h>
 
@@ -26,26 +26,26 @@ constexpr size_t kMaxFollowed = 4;
 
 }  // namespace
 
-void MonocularStart::Begin(std::shared_ptr<const FrameFeatures> sight) {
-  FollowedView view{.sight = std::move(sight)};
-  for (const Feature& feature : view.sight->features) view.latest_px.push_back(feature.pixel_px.cast<double>());
+void MonocularInitializer::Begin(std::shared_ptr<const FrameFeatures> frame) {
+  FollowedView view{.frame = std::move(frame)};
+  for (const Feature& feature : view.frame->features) view.latest_px.push_back(feature.pixel_px.cast<double>());
   followed_.push_back(std::move(view));
 }
 
-void MonocularStart::Follow(const FrameFeatures& sight, FollowedView& view) const {
-  const double radius_px = kSearchShare * sight.camera.width_px;
-  std::vector<int> first_of(sight.size(), -1);
-  std::vector<int> distance_of(sight.size(), 256);
+void MonocularInitializer::Follow(const FrameFeatures& frame, FollowedView& view) const {
+  const double radius_px = kSearchShare * frame.camera.width_px;
+  std::vector<int> first_of(frame.size(), -1);
+  std::vector<int> distance_of(frame.size(), 256);
   std::vector<int> near;
-  for (size_t i = 0; i < view.sight->size(); ++i) {
-    const Feature& feature = view.sight->features[i];
+  for (size_t i = 0; i < view.frame->size(); ++i) {
+    const Feature& feature = view.frame->features[i];
     if (feature.octave > kMaxOctave) continue;
-    sight.grid.Near(view.latest_px[i], radius_px, near);
+    frame.grid.Near(view.latest_px[i], radius_px, near);
     int best = -1;
     int best_distance = 256;
     int second_distance = 256;
     for (const int index : near) {
-      const Feature& other = sight.features[static_cast<size_t>(index)];
+      const Feature& other = frame.features[static_cast<size_t>(index)];
       if (std::abs(other.octave - feature.octave) > 1) continue;
       const int distance = HammingDistance(feature.descriptor, other.descriptor);
       if (distance < best_distance) {
@@ -68,62 +68,64 @@ void MonocularStart::Follow(const FrameFeatures& sight, FollowedView& view) cons
     if (first_of[k] < 0) continue;
     const auto first = static_cast<size_t>(first_of[k]);
     view.matches.push_back({first_of[k], static_cast<int>(k)});
-    view.latest_px[first] = sight.features[k].pixel_px.cast<double>();
-    motions_px.push_back((sight.features[k].pixel_px - view.sight->features[first].pixel_px).norm());
+    view.latest_px[first] = frame.features[k].pixel_px.cast<double>();
+    motions_px.push_back((frame.features[k].pixel_px - view.frame->features[first].pixel_px).norm());
   }
   view.motion_px = motions_px.empty() ? 0 : Median(std::move(motions_px));
   ++view.frames;
 }
 
-std::optional<MapStart> MonocularStart::Offer(std::shared_ptr<const FrameFeatures> sight, std::string* reason) {
-  if (sight->size() < kMinFeatures) {
-    *reason = fmt::format("too little texture: {} features, {} needed", sight->size(), kMinFeatures);
+std::optional<InitialViews> MonocularInitializer::Offer(std::shared_ptr<const FrameFeatures> frame,
+                                                        std::string* reason) {
+  if (frame->size() < kMinFeatures) {
+    *reason = fmt::format("too little texture: {} features, {} needed", frame->size(), kMinFeatures);
     followed_.clear();
     return std::nullopt;
   }
   *reason = "waiting for a second view";
-  for (FollowedView& view : followed_) Follow(*sight, view);
+  for (FollowedView& view : followed_) Follow(*frame, view);
   const int min_matches = TwoViewOptions{}.min_matches;
   const size_t gone = std::erase_if(followed_, [&](const FollowedView& view) {
     const auto matches = static_cast<double>(view.matches.size());
-    return matches < kMinKeptShare * static_cast<double>(view.sight->size()) || matches < min_matches ||
+    return matches < kMinKeptShare * static_cast<double>(view.frame->size()) || matches < min_matches ||
            view.frames > kMaxWait_frames;
   });
-  if (gone > 0) *reason = "the first view is no longer in sight";
+  if (gone > 0) *reason = "the first view is no longer visible";
   for (auto view = followed_.rbegin(); view != followed_.rend(); ++view) {
-    if (auto start = Try(*view, sight, reason)) {
+    if (auto start = Try(*view, frame, reason)) {
       followed_.clear();
       return start;
     }
   }
-  const bool has_moved_on = followed_.empty() || followed_.back().motion_px > kSpacingShare * sight->camera.width_px;
-  if (has_moved_on && followed_.size() < kMaxFollowed) Begin(std::move(sight));
+  const bool has_moved_on = followed_.empty() || followed_.back().motion_px > kSpacingShare * frame->camera.width_px;
+  if (has_moved_on && followed_.size() < kMaxFollowed) Begin(std::move(frame));
   return std::nullopt;
 }
 
-std::optional<MapStart> MonocularStart::Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& sight,
-                                            std::string* reason) const {
-  if (view.motion_px < kMinMotionShare * sight->camera.width_px) {
+std::optional<InitialViews> MonocularInitializer::Try(const FollowedView& view,
+                                                      const std::shared_ptr<const FrameFeatures>& frame,
+                                                      std::string* reason) const {
+  if (view.motion_px < kMinMotionShare * frame->camera.width_px) {
     *reason = fmt::format("too little parallax: the image moved by {:.1f} px", view.motion_px);
     return std::nullopt;
   }
   std::vector<TwoViewMatch> pairs;
   for (const Match& match : view.matches) {
-    const Feature& a = view.sight->features[static_cast<size_t>(match.first)];
-    const Feature& b = sight->features[static_cast<size_t>(match.second)];
+    const Feature& a = view.frame->features[static_cast<size_t>(match.first)];
+    const Feature& b = frame->features[static_cast<size_t>(match.second)];
     pairs.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
                      config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
   }
   TwoViewOptions options;
   options.min_parallax_deg = kMinParallax_deg;
-  options.seed = config_.Seed(sight->frame_id);
-  const TwoViewResult result = SolveTwoView(sight->camera, pairs, options);
+  options.seed = config_.Seed(frame->frame_id);
+  const TwoViewResult result = SolveTwoView(frame->camera, pairs, options);
   if (result.outcome != TwoViewOutcome::kOk) {
     *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome), pairs.size(),
                           result.points, result.parallax_rad * 180 / std::numbers::pi);
     return std::nullopt;
   }
-  MapStart start{.first = view.sight, .second = sight, .T_first_second = result.T_first_second};
+  InitialViews start{.first = view.frame, .second = frame, .T_first_second = result.T_first_second};
   for (size_t i = 0; i < view.matches.size(); ++i) {
     if (!result.points_first[i]) continue;
     start.points.push_back({view.matches[i].first, view.matches[i].second, *result.points_first[i]});

@@ -1,9 +1,9 @@
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 
 #include <cmath>
 #include <limits>
 
-#include "server/slam/optimise/bundle_solver.h"
+#include "server/slam/optimize/bundle_solver.h"
 
 namespace romap::slam {
 namespace {

@@ -7,7 +7,7 @@
 namespace romap::slam {
 
 // How a place of a picture lies to the picture's instance masks.
-enum class MaskPlace : uint8_t {
+enum class MaskZone : uint8_t {
   kUnknown,  // no detector ran on the picture
   kFar,      // outside of all masks, close to none
   kNear,     // outside of all masks, but close to one
@@ -16,12 +16,12 @@ enum class MaskPlace : uint8_t {
 };
 
 // Tells where places lie in one mask image.
-class MaskPlaces {
+class MaskZones {
  public:
   // `labels`: CV_16UC1, 0 = nothing. Empty: no detector ran. Not written to meanwhile.
-  explicit MaskPlaces(const cv::Mat& labels);
+  explicit MaskZones(const cv::Mat& labels);
   // Of what is `octave_scale` px wide at a pixel of the image, to which the masks give `label` (see LabelAt).
-  MaskPlace At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const;
+  MaskZone At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const;
 
  private:
   cv::Mat labels_;
@@ -36,7 +36,7 @@ struct MaskVotes {
   int far = 0;
 
   int total() const { return inside + border + near + far; }
-  void Add(MaskPlace place);
+  void Add(MaskZone place);
   void Add(const MaskVotes& other);
 };
 

@@ -23,9 +23,9 @@ struct LoopMatch {
 };
 
 // Knows places again by their looks and proves it by their geometry.
-class PlaceRecogniser {
+class PlaceRecognizer {
  public:
-  PlaceRecogniser(const SlamConfig& config, const SlamMap* map) : config_(config), map_(map), index_(1) {}
+  PlaceRecognizer(const SlamConfig& config, const SlamMap* map) : config_(config), map_(map), index_(1) {}
 
   void Add(const MapKeyframe& keyframe) { index_.Add(keyframe.id, keyframe.features()); }
   void Remove(KeyframeId keyframe) { index_.Remove(keyframe); }
@@ -35,7 +35,7 @@ class PlaceRecogniser {
     SE3<World, Camera> T_world_camera;
     KeyframeId place;
   };
-  std::optional<Found> FindCamera(const FrameFeatures& sight) const;
+  std::optional<Found> FindCamera(const FrameFeatures& frame) const;
 
   // An old place in what the keyframe sees, that shares hardly any points with it so far.
   std::optional<LoopMatch> FindLoop(const MapKeyframe& keyframe, bool fix_scale) const;
@@ -47,8 +47,8 @@ class PlaceRecogniser {
     std::vector<std::pair<MapPointId, int>> points;  // with the feature that shows each
   };
 
-  std::vector<MapPointId> PointsAround(const MapKeyframe& keyframe, size_t neighbours) const;
-  std::optional<Located> Locate(const FrameFeatures& sight, const MapKeyframe& place, uint64_t call) const;
+  std::vector<MapPointId> PointsAround(const MapKeyframe& keyframe, size_t neighbors) const;
+  std::optional<Located> Locate(const FrameFeatures& frame, const MapKeyframe& place, uint64_t call) const;
   std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place, const Located& located,
                                     bool fix_scale) const;
 

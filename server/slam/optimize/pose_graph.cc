@@ -1,4 +1,4 @@
-#include "server/slam/optimise/pose_graph.h"
+#include "server/slam/optimize/pose_graph.h"
 
 #include <ceres/ceres.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "common/statistics.h"
-#include "server/slam/optimise/pose_graph_cost.h"
+#include "server/slam/optimize/pose_graph_cost.h"
 
 namespace romap::slam {
 namespace {
@@ -125,21 +125,21 @@ PoseGraphSummary PoseGraphSolver::Run(int max_iterations) {
 }
 
 bool PoseGraphSolver::WriteBack(std::vector<PoseGraphNode>& nodes) const {
-  std::vector<Sim3<World, Camera>> optimised;
+  std::vector<Sim3<World, Camera>> optimized;
   for (const NodeState& state : states_) {
     const Eigen::Map<const Sim3Vector> increment(state.increment.data());
-    optimised.push_back(WithLengthsTimes(unit_mu_, state.start * ExpSim3<Camera>(increment)));
-    if (!optimised.back().IsFinite()) return false;
+    optimized.push_back(WithLengthsTimes(unit_mu_, state.start * ExpSim3<Camera>(increment)));
+    if (!optimized.back().IsFinite()) return false;
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
-    if (!nodes[i].fixed) nodes[i].S_world_camera = optimised[i];
+    if (!nodes[i].fixed) nodes[i].S_world_camera = optimized[i];
   }
   return true;
 }
 
 }  // namespace
 
-PoseGraphSummary OptimisePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
+PoseGraphSummary OptimizePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
                                    const PoseGraphOptions& options) {
   const auto is_finite = [](const PoseGraphNode& node) { return node.S_world_camera.IsFinite(); };
   const std::vector<PoseGraphEdge> sound = SoundEdges(nodes, edges);

@@ -1,4 +1,4 @@
-#include "server/slam/optimise/bundle_adjustment.h"
+#include "server/slam/optimize/bundle_adjustment.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <thread>
 
-#include "tests/unit/server/slam/optimise/bundle_world.h"
+#include "tests/unit/server/slam/optimize/bundle_world.h"
 
 namespace romap::slam {
 namespace {
