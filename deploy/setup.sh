@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
 # Installs what romap needs to build, run and test on Debian 12: only packages of the distribution. Safe to run again:
 # when everything is there it changes nothing and needs no network.
+#
+#   deploy/setup.sh          what the build needs
+#   deploy/setup.sh tests    what the tests need too
 set -euo pipefail
 
 packages=(
@@ -8,8 +11,10 @@ packages=(
   libgrpc++-dev libgrpc-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
   libopencv-dev libopencv-contrib-dev libeigen3-dev libceres-dev libhwy-dev libtbb-dev libnanoflann-dev
   libdraco-dev libspdlog-dev libfmt-dev libyaml-cpp-dev libcli11-dev nlohmann-json3-dev
-  libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev
 )
+if [ "${1:-}" = tests ]; then
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev clang-format dpkg-dev file)
+fi
 
 missing=()
 for package in "${packages[@]}"; do

@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 preset=${1:-ci}
-./deploy/setup.sh
+./deploy/setup.sh tests
 if ! command -v nvcc >/dev/null; then
   echo "run.sh: no nvcc here: the CUDA back end is not compiled"
 fi
