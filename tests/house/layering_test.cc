@@ -105,6 +105,69 @@ TEST(HouseTest, PublicHeadersOfTheSdkIncludeNoGrpc) {
   }
 }
 
+// The folder's namespace: nothing of one folder is defined in the namespace of another.
+std::string NamespaceOf(const std::string& path) {
+  static const std::vector<std::pair<std::string, std::string>> kNamespaces = {
+      {"common/wire/", "romap::wire"},
+      {"common/", "romap"},
+      {"server/slam/", "romap::slam"},
+      {"server/objects/", "romap::objects"},
+      {"server/nerf/cuda/", "romap::nerf::cuda"},
+      {"server/nerf/", "romap::nerf"},
+      {"server/mesh/", "romap::mesh"},
+      {"server/hull/", "romap::hull"},
+      {"server/session/", "romap::session"},
+      {"server/transport/", "romap::transport"},
+      {"client/files/", "romap::files"},
+      {"client/eval/", "romap::eval"},
+      {"client/render/", "romap::render"},
+      {"client/synth/", "romap::synth"},
+      {"client/pictures/", "romap::pictures"},
+      {"client/sdk/", "romap::client"},
+      {"client/bench/", "romap::bench"},
+      {"client/cli/", "romap::cli"},
+  };
+  for (const auto& [folder, name] : kNamespaces) {
+    if (path.starts_with(folder)) return name;
+  }
+  return "";
+}
+
+TEST(HouseTest, EachFolderHasItsNamespace) {
+  const std::regex opening(R"(^namespace (romap[\w:]*) \{)");
+  for (const SourceFile& file : SourceFiles()) {
+    const std::string expected = NamespaceOf(file.path);
+    if (expected.empty()) continue;
+    for (const std::string& line : file.lines) {
+      std::smatch match;
+      if (!std::regex_search(line, match, opening)) continue;
+      const std::string found = match[1];
+      // Highway compiles one namespace per instruction set inside the folder's own.
+      EXPECT_TRUE(found == expected || found == expected + "::HWY_NAMESPACE" ||
+                  found.starts_with(expected + "::internal"))
+          << file.path << " opens " << found << ", expected " << expected;
+    }
+  }
+}
+
+// Two types of one name in one program are confusing even in different namespaces, and undefined behavior in the same.
+TEST(HouseTest, TypeNamesAreUnique) {
+  const std::regex type(R"(^(?:class|struct|enum class) (?:alignas\(\d+\) )?(\w+)(?: final)?(?: :[^:].*)? \{)");
+  std::map<std::string, std::string> defined_in;
+  for (const SourceFile& file : SourceFiles()) {
+    const bool is_product = !file.path.starts_with("tests/");
+    const bool is_header = file.path.ends_with(".h") || file.path.ends_with(".cuh");
+    if (!is_product || !is_header) continue;
+    for (const std::string& line : file.lines) {
+      std::smatch match;
+      if (!std::regex_search(line, match, type)) continue;
+      const auto [entry, is_new] = defined_in.emplace(match[1], file.path);
+      EXPECT_TRUE(is_new) << match[1] << " is defined in " << entry->second << " and in " << file.path;
+    }
+  }
+  EXPECT_GT(defined_in.size(), 200u) << "the pattern no longer finds the types";
+}
+
 TEST(HouseTest, FilesStayReadable) {
   for (const SourceFile& file : SourceFiles()) EXPECT_LE(file.lines.size(), 500u) << file.path;
 }
