@@ -34,43 +34,47 @@ absl::Status RunBench(const Options& options) {
   progress.Done();
   fmt::print("{}\nreport: {}/paper.md and paper.json\n", bench::ToMarkdown(results), bench.out_dir);
   if (results.runs_done == results.runs_planned) return absl::OkStatus();
-  return absl::CancelledError(fmt::format("stopped after {} of {} runs; the report says what there is",
-                                          results.runs_done, results.runs_planned));
+  return absl::CancelledError(
+      fmt::format("interrupted after {} of {} runs; wrote a partial report", results.runs_done, results.runs_planned));
 }
 
 void AddPaperPart(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<Options>();
   bench::PaperBenchOptions& bench = options->bench;
   CLI::App* command = app.add_subcommand(
-      "paper", "Tables 1, 3, 4, an ablation and the convergence plot (Fig. 8) of the paper on a sequence with truth");
-  command->add_option("sequence", bench.sequence_dir, "Folder of the sequence, with objects.yaml and gt/")->required();
-  command->add_option("--out", bench.out_dir, "Folder for paper.md, paper.json, convergence.png and meshes")
+      "paper", "Reproduce Tables 1, 3 and 4, an ablation and the convergence plot (Fig. 8) of the paper");
+  command->add_option("sequence", bench.sequence_dir, "Sequence folder with objects.yaml and gt/")->required();
+  command->add_option("--out", bench.out_dir, "Output folder for paper.md, paper.json, convergence.png and meshes")
       ->required();
-  command->add_flag("--quick", options->quick, "One seed, one subset, the default method and the visual hull");
-  command->add_option("--seeds", bench.seeds, "Trainings of each object, each with another seed")
+  command->add_flag("--quick", options->quick, "Only one seed, one subset, the default method and the visual hull");
+  command->add_option("--seeds", bench.seeds, "Number of trainings per object, each with a different seed")
       ->capture_default_str();
-  command->add_option("--subsets", bench.subsets, "Subsets of the frames: from the first, the second, ..")
+  command->add_option("--subsets", bench.subsets, "Number of frame subsets; subset k starts at frame k")
       ->capture_default_str();
-  command->add_option("--every", bench.every, "A subset takes every so many-th frame")->capture_default_str();
-  command->add_option("--times", bench.times_s, "Training times at which quality is taken [s]")
+  command->add_option("--every", bench.every, "A subset contains every n-th frame")->capture_default_str();
+  command->add_option("--times", bench.times_s, "Training times at which the quality is measured [s]")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--cap", bench.cap_s, "Longest training of one object [s]; longer plans are cut to fit")
+  command->add_option("--cap", bench.cap_s, "Maximal training time per object [s]; longer training plans are shortened")
       ->capture_default_str();
-  command->add_option("--threads", bench.threads, "Threads that train one object")->capture_default_str();
+  command->add_option("--threads", bench.threads, "Number of threads that train one object")->capture_default_str();
   const std::map<std::string, bench::BenchClock> clocks = {{"cpu", bench::BenchClock::kCpu},
                                                            {"wall", bench::BenchClock::kWall}};
-  command->add_option("--clock", bench.clock, "Time is CPU time over threads (other work does not count), or wall time")
+  command
+      ->add_option("--clock", bench.clock,
+                   "Clock for training times: CPU time divided by the number of threads, or wall time")
       ->transform(CLI::CheckedTransformer(clocks))
       ->option_text("cpu|wall [cpu]");
-  command->add_option("--tables", bench.tables, "Which tables; 1 brings 3 and the plot along")
+  command->add_option("--tables", bench.tables, "Tables to compute: 1 (includes 3 and the plot), 4, ablation")
       ->delimiter(',')
       ->check(CLI::IsMember({"1", "4", "ablation"}))
       ->capture_default_str();
-  command->add_option("--methods", bench.methods, "Only these rows, by id")->delimiter(',');
-  command->add_option("--set", bench.settings, "section.field=value for all rows, before their own; repeatable")
+  command->add_option("--methods", bench.methods, "Only these methods, by ID")->delimiter(',');
+  command
+      ->add_option("--set", bench.settings,
+                   "Configuration value for all methods, section.field=value; methods may override it; repeatable")
       ->allow_extra_args(false);
-  command->add_option("--row", options->rows, "'NAME: nerf.field=value ..': one more row of Table 1; repeatable")
+  command->add_option("--row", options->rows, "Additional row of Table 1, 'NAME: nerf.field=value ...'; repeatable")
       ->allow_extra_args(false);
   command->callback([options, chosen] { *chosen = [options] { return RunBench(*options); }; });
 }
@@ -78,7 +82,7 @@ void AddPaperPart(CLI::App& app, Command* chosen) {
 }  // namespace
 
 void AddBenchCommand(CLI::App& app, Command* chosen) {
-  CLI::App* command = app.add_subcommand("bench", "Measure the field engine");
+  CLI::App* command = app.add_subcommand("bench", "Run benchmarks");
   command->require_subcommand(1);
   AddPaperPart(*command, chosen);
 }

@@ -10,7 +10,8 @@ class App;
 
 namespace romap::cli {
 
-// Each command adds itself to the command line; when it is the chosen one, it puts what to do into `chosen`.
+// The action of a command. Each Add*Command() adds a subcommand to the command line; parsing stores the action of the
+// selected one in `chosen`.
 using Command = std::function<absl::Status()>;
 
 void AddRunCommand(CLI::App& app, Command* chosen);
@@ -21,8 +22,8 @@ void AddSynthCommand(CLI::App& app, Command* chosen);
 void AddExportCommand(CLI::App& app, Command* chosen);
 void AddSessionsCommand(CLI::App& app, Command* chosen);
 
-// The whole program: parses, runs, prints one line on failure. Exit code: 0 done, 2 the command line or the input is
-// wrong, 1 anything else, 130 interrupted.
+// Runs the program: parses the command line, executes the command, and prints one line to stderr on failure. Returns an
+// ExitCode.
 int RunCli(int argc, const char* const* argv);
 
 }  // namespace romap::cli

@@ -8,8 +8,8 @@
 
 namespace romap::cli {
 
-// Bounding box of the cuboid's eight corners in the image, in pixels; nullopt unless the whole cuboid lies in front of
-// the camera and inside the image.
+// Bounding box [px] of the projected corners of a cuboid. nullopt unless the whole cuboid is in front of the camera and
+// inside the image.
 std::optional<cv::Rect2d> CuboidOutline(const Cuboid& cuboid, const CameraModel& camera,
                                         const SE3<World, Camera>& T_world_camera);
 

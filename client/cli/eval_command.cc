@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "client/cli/command.h"
 #include "client/eval/eval.h"
+#include "client/files/text_file.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -15,21 +15,18 @@ namespace {
 const std::map<std::string, eval::Alignment> kAlignments = {
     {"none", eval::Alignment::kNone}, {"se3", eval::Alignment::kSe3}, {"sim3", eval::Alignment::kSim3}};
 
-// Prints the table, and writes the figures as JSON where asked.
+// Prints the report as a table and, if `json_path` is not empty, also writes it as JSON.
 template <class Report>
 absl::Status Show(const absl::StatusOr<Report>& report, const std::string& json_path) {
   if (!report.ok()) return report.status();
   fmt::print("{}", eval::FormatTable(*report));
   if (json_path.empty()) return absl::OkStatus();
-  std::ofstream file(json_path);
-  file << ToJson(*report).dump(1) << '\n';
-  if (!file) return InvalidArgument("--json {}: cannot be written", json_path);
-  return absl::OkStatus();
+  return files::WriteFile(json_path, ToJson(*report).dump(1) + "\n");
 }
 
 CLI::App* AddPart(CLI::App& app, const char* name, const char* help, std::string* json_path) {
   CLI::App* command = app.add_subcommand(name, help);
-  command->add_option("--json", *json_path, "Also write the figures to this file");
+  command->add_option("--json", *json_path, "Also write the results to this JSON file");
   return command;
 }
 
@@ -39,16 +36,17 @@ void AddRunPart(CLI::App& app, Command* chosen) {
     bool poses_estimated = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddPart(app, "map", "A whole map, as romap run wrote it, against its sequence", &options->json);
-  command->add_option("map", options->out, "Folder that romap run wrote")->required();
+  CLI::App* command =
+      AddPart(app, "map", "Compare the output of romap run with the ground truth of its sequence", &options->json);
+  command->add_option("map", options->out, "Output folder of romap run")->required();
   command->add_option("sequence", options->sequence, "Folder of the sequence")->required();
   command->add_flag("--poses-estimated", options->poses_estimated,
-                    "The camera was tracked: align by the trajectories, then each mesh by ICP");
+                    "Camera poses were estimated: align the trajectories, then each mesh by ICP");
   command->callback([options, chosen] {
     *chosen = [options] {
       const eval::RunReport report = eval::EvaluateRun(options->out, options->sequence, !options->poses_estimated);
       if (!report.objects && !report.boxes && !report.trajectory) {
-        return NotFound("nothing to compare: {}", fmt::join(report.notes, "; "));
+        return FailedPrecondition("nothing to compare: {}", fmt::join(report.notes, "; "));
       }
       return Show(absl::StatusOr<eval::RunReport>(report), options->json);
     };
@@ -62,17 +60,19 @@ void AddObjectsPart(CLI::App& app, Command* chosen) {
   };
   auto options = std::make_shared<Options>();
   eval::ObjectsEvalOptions& eval = options->eval;
-  CLI::App* command = AddPart(app, "objects", "Accuracy, completion and completion ratio of meshes", &options->json);
-  command->add_option("--pred", eval.predicted_dir, "Folder of meshes")->required();
-  command->add_option("--gt", eval.ground_truth_dir, "Folder of true surfaces")->required();
-  command->add_option("--align", eval.alignment, "Per-object ICP: none, se3 or sim3 (default)")
+  CLI::App* command =
+      AddPart(app, "objects", "Measure accuracy, completion and completion ratio of meshes", &options->json);
+  command->add_option("--pred", eval.predicted_dir, "Folder of predicted meshes")->required();
+  command->add_option("--gt", eval.ground_truth_dir, "Folder of ground-truth surfaces")->required();
+  command->add_option("--align", eval.alignment, "Alignment of each object by ICP: none, se3 or sim3 (default)")
       ->transform(CLI::CheckedTransformer(kAlignments));
   command->add_option("--threshold-cm", eval.thresholds_cm, "Thresholds of the completion ratio [cm]");
-  command->add_option("--est-traj", eval.estimated_trajectory, "Estimated trajectory that places the meshes");
-  command->add_option("--gt-traj", eval.true_trajectory, "True trajectory");
-  command->add_option("--dataset", eval.dataset_dir, "Sequence that tells which predicted points a camera saw");
-  command->add_flag("--no-cap", eval.no_cap, "Leave out the inferred undersides");
-  command->add_option("--samples", eval.samples, "Points per mesh")->capture_default_str();
+  command->add_option("--est-traj", eval.estimated_trajectory, "Estimated trajectory in the world of the meshes");
+  command->add_option("--gt-traj", eval.true_trajectory, "Ground-truth trajectory");
+  command->add_option("--dataset", eval.dataset_dir,
+                      "Sequence with masks and depth that determines which predicted points were visible");
+  command->add_flag("--no-cap", eval.no_cap, "Ignore ground-truth points that were inferred, not measured");
+  command->add_option("--samples", eval.samples, "Number of samples per mesh")->capture_default_str();
   command->callback(
       [options, chosen] { *chosen = [options] { return Show(eval::EvaluateObjects(options->eval), options->json); }; });
 }
@@ -83,11 +83,12 @@ void AddBoxesPart(CLI::App& app, Command* chosen) {
     std::string json;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddPart(app, "boxes", "3D IoU, centre and yaw of cuboids", &options->json);
-  command->add_option("--pred", options->eval.predicted, "cuboids.json")->required();
-  command->add_option("--gt", options->eval.ground_truth, "objects.yaml")->required();
-  command->add_option("--est-traj", options->eval.estimated_trajectory, "Estimated trajectory that places the cuboids");
-  command->add_option("--gt-traj", options->eval.true_trajectory, "True trajectory");
+  CLI::App* command = AddPart(app, "boxes", "Measure 3D IoU, center and yaw errors of cuboids", &options->json);
+  command->add_option("--pred", options->eval.predicted, "Predicted cuboids (cuboids.json)")->required();
+  command->add_option("--gt", options->eval.ground_truth, "Ground-truth cuboids (objects.yaml)")->required();
+  command->add_option("--est-traj", options->eval.estimated_trajectory,
+                      "Estimated trajectory in the world of the cuboids");
+  command->add_option("--gt-traj", options->eval.true_trajectory, "Ground-truth trajectory");
   command->callback(
       [options, chosen] { *chosen = [options] { return Show(eval::EvaluateBoxes(options->eval), options->json); }; });
 }
@@ -98,10 +99,10 @@ void AddTrajectoryPart(CLI::App& app, Command* chosen) {
     std::string json;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddPart(app, "trajectory", "Absolute trajectory error", &options->json);
+  CLI::App* command = AddPart(app, "trajectory", "Measure the absolute trajectory error", &options->json);
   command->add_option("--est", options->eval.estimated, "Estimated trajectory, TUM format")->required();
-  command->add_option("--gt", options->eval.ground_truth, "True trajectory, TUM format")->required();
-  command->add_option("--align", options->eval.alignment, "none, se3 or sim3 (default)")
+  command->add_option("--gt", options->eval.ground_truth, "Ground-truth trajectory, TUM format")->required();
+  command->add_option("--align", options->eval.alignment, "Alignment of the trajectories: none, se3 or sim3 (default)")
       ->transform(CLI::CheckedTransformer(kAlignments));
   command->callback([options, chosen] {
     *chosen = [options] { return Show(eval::EvaluateTrajectory(options->eval), options->json); };

@@ -37,9 +37,9 @@ absl::Status RunExport(const ExportOptions& options) {
 
 void AddExportCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<ExportOptions>();
-  CLI::App* command = app.add_subcommand("export", "Write the map of a server's session to files, as it is now");
-  command->add_option("session", options->session, "The session's id (see: romap sessions)")->required();
-  command->add_option("--out", options->out, "Folder for the files")->required();
+  CLI::App* command = app.add_subcommand("export", "Write the current map of a session to files");
+  command->add_option("session", options->session, "Session ID (see romap sessions)")->required();
+  command->add_option("--out", options->out, "Output folder")->required();
   options->service.AddTo(*command, /*offer_local=*/false);
   command->callback([options, chosen] { *chosen = [options] { return RunExport(*options); }; });
 }

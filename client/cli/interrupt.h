@@ -2,8 +2,8 @@
 
 namespace romap::cli {
 
-// From now on the first Ctrl-C (or SIGTERM) only sets a flag, so that a command can finish and write what there is; the
-// second ends the process at once.
+// Installs a handler for SIGINT and SIGTERM. The first signal sets the flag that Interrupted() returns, so that a
+// command can stop early and write its results; the second signal terminates the process.
 void CatchInterrupts();
 bool Interrupted();
 

@@ -8,7 +8,7 @@
 namespace romap::cli {
 namespace {
 
-constexpr size_t kFaultsKept = 5;
+constexpr size_t kMaxFaults = 5;
 
 }  // namespace
 
@@ -37,9 +37,9 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
     return;
   }
   if (ack.is_keyframe) ++keyframes_;
-  tracking_.initialising += ack.state == TrackingState::kInitializing ? 1 : 0;
+  tracking_.initializing += ack.state == TrackingState::kInitializing ? 1 : 0;
   tracking_.lost += ack.state == TrackingState::kLost ? 1 : 0;
-  tracking_.relocalised += ack.state == TrackingState::kRelocalized ? 1 : 0;
+  tracking_.relocalized += ack.state == TrackingState::kRelocalized ? 1 : 0;
   tracking_.tracked += ack.T_world_camera ? 1 : 0;
   if (!ack.T_world_camera) tracking_.last_reason = ack.state_reason;
   const auto sent = sent_.find(ack.frame_id);
@@ -56,7 +56,7 @@ void MapCollector::ApplyMasksAck(const MasksAck& ack) {
 }
 
 void MapCollector::NoteFault(std::string fault) {
-  if (faults_.size() < kFaultsKept) faults_.push_back(std::move(fault));
+  if (faults_.size() < kMaxFaults) faults_.push_back(std::move(fault));
 }
 
 void MapCollector::Apply(const MapEvent& event) {

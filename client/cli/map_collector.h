@@ -13,16 +13,16 @@
 
 namespace romap::cli {
 
-// What a run keeps of its stream: a copy of the map, the answers to what was sent, and when things arrived. Times are
-// seconds on a steady clock, from construction.
+// Collects the events of a run: a copy of the map, the acknowledgements, and arrival times. Times are seconds since
+// construction. Not thread-safe.
 class MapCollector {
  public:
   struct Arrival {
-    double first_cuboid_s = -1;  // confirmed, with a cuboid; -1 = not yet
+    double first_cuboid_s = -1;  // of the first confirmed cuboid; -1 = none so far
     double first_mesh_s = -1;
   };
 
-  // Call before the frame, or the masks that come after their frame, are handed over.
+  // Call before sending a frame, or the late masks of a frame.
   void NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks);
   void NoteLateMasksSent() { ++late_masks_.sent; }
   void Apply(const MapEvent& event);
@@ -31,26 +31,27 @@ class MapCollector {
   const std::map<ObjectId, ObjectSnapshot>& objects() const { return map_.objects(); }
   Arrival ArrivalOf(ObjectId id) const;
   size_t ConfirmedObjects() const;
-  // Accepted frames with a pose, in the order they were acknowledged.
+  // Poses of the accepted frames, in order of acknowledgement.
   std::vector<files::StampedPose> Trajectory() const;
   const std::optional<Statistics>& statistics() const { return statistics_; }
   size_t sent() const { return sent_.size(); }
   size_t acknowledged() const { return acknowledged_; }
   size_t rejected() const { return rejected_; }
   size_t keyframes() const { return keyframes_; }
-  // How the camera was followed, over the accepted frames.
+  // Tracking states of the accepted frames.
   struct Tracking {
-    size_t initialising = 0, tracked = 0, lost = 0, relocalised = 0;  // the relocalised ones count as tracked too
-    std::string last_reason;  // why the last frame that was not tracked was not; empty: all were
+    size_t initializing = 0, tracked = 0, lost = 0, relocalized = 0;  // relocalized frames also count as tracked
+    std::string last_reason;  // why tracking failed most recently; empty = never
   };
   const Tracking& tracking() const { return tracking_; }
   struct LateMasks {
-    size_t sent = 0, acknowledged = 0, rejected = 0;  // the rejected ones count as acknowledged too
+    size_t sent = 0, acknowledged = 0, rejected = 0;  // rejected masks also count as acknowledged
   };
   size_t sent_with_masks() const { return sent_with_masks_; }
   const LateMasks& late_masks() const { return late_masks_; }
-  const std::vector<std::string>& faults() const { return faults_; }  // the first few, for people
-  // The most that a server's statistics reported; 0 = none came.
+  // Messages of the first few rejected frames and masks.
+  const std::vector<std::string>& faults() const { return faults_; }
+  // Peak memory of the server as reported by its statistics [bytes]; 0 = not reported.
   uint64_t server_peak_bytes() const { return server_peak_bytes_; }
   double last_ack_s() const { return last_ack_s_; }
   double first_sent_s() const { return first_sent_s_; }

@@ -9,6 +9,7 @@
 #include "client/files/glb.h"
 #include "client/files/objects_yaml.h"
 #include "client/files/ply.h"
+#include "client/files/text_file.h"
 #include "common/mesh_codec.h"
 
 namespace romap::cli {
@@ -32,10 +33,10 @@ void MoveToWorld(const SE3<World, Object>& T_world_mesh, double mesh_scale, Mesh
   for (Eigen::Vector3f& normal : mesh.normals) normal = rotation * normal;
 }
 
-absl::Status MakeEmptyFolder(const fs::path& folder) {
+// Creates a folder and removes the meshes in it.
+absl::Status MakeMeshFolder(const fs::path& folder) {
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder.string()));
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return InvalidArgument("cannot make the folder {}: {}", folder.string(), error.message());
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const fs::path extension = entry.path().extension();
     if (extension == ".ply" || extension == ".glb") fs::remove(entry.path(), error);
@@ -61,7 +62,7 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
                     snapshot.object.mesh_scale, entry.mesh_world);
       } else {
         faults->push_back(
-            fmt::format("{}: mesh cannot be decoded: {}", snapshot.object.id.ToString(), Message(mesh.status())));
+            fmt::format("{}: cannot decode the mesh: {}", snapshot.object.id.ToString(), Message(mesh.status())));
       }
     }
     decoded.push_back(std::move(entry));
@@ -81,7 +82,7 @@ std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
 
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects) {
   const fs::path folder = fs::path(dir) / "objects";
-  ROMAP_RETURN_IF_ERROR(MakeEmptyFolder(folder));
+  ROMAP_RETURN_IF_ERROR(MakeMeshFolder(folder));
   files::ObjectsYaml cuboids;
   for (const MapObject& entry : objects) {
     const ObjectUpdate& object = entry.object;

@@ -11,24 +11,24 @@
 
 namespace romap::cli {
 
-// One object of a finished map with its mesh decoded and placed in the world.
+// One object of a map with its decoded mesh in the World frame.
 struct MapObject {
   ObjectUpdate object;
-  std::string file_stem;  // "<id>_<class>", safe as a file name
-  Mesh mesh_world;        // empty when the object has no mesh
-  double train_seconds = 0;
-  uint64_t steps = 0;
+  std::string file_stem;     // "<id>_<class>", with only characters that are safe in file names
+  Mesh mesh_world;           // map units; empty if the object has no mesh
+  double train_seconds = 0;  // of the mesh
+  uint64_t steps = 0;        // training steps of the mesh
 };
 
-// Decodes the meshes of confirmed objects, by id. An object whose mesh cannot be decoded keeps an empty one, and
-// `faults` says why.
+// Decodes the meshes of all objects that are not provisional. If a mesh cannot be decoded, the object gets an empty
+// mesh and a message is added to `faults`.
 std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects, std::vector<std::string>* faults);
 
-// The camera's way as a map has it now, in the order of its frames.
+// The camera trajectory of a map, in order of frames.
 std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
 
-// Writes objects/<id>_<class>.ply and .glb (World frame, map units) and cuboids.json below `dir`, which is made. Meshes
-// of an earlier run in the same folder are removed.
+// Writes objects/<id>_<class>.ply and .glb (World frame, map units) and cuboids.json in `dir`. Creates the folders and
+// removes the meshes of an earlier run. Errors as WriteFile.
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects);
 
 }  // namespace romap::cli

@@ -10,6 +10,7 @@
 
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/mapped_frames.h"
+#include "client/files/text_file.h"
 #include "client/pictures/pictures.h"
 #include "common/lens.h"
 
@@ -17,8 +18,9 @@ namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr size_t kCuboidFrames = 6;  // evenly over the sequence
+constexpr size_t kCuboidFrames = 6;  // evenly spaced over the sequence
 
+// The frame in which the cuboid is largest; nullopt if it is never completely visible.
 std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
                                    const std::vector<PosedFrame>& frames) {
   double best_area_px = 0;
@@ -37,18 +39,20 @@ absl::StatusOr<cv::Mat> LoadImage(const files::Sequence& sequence, size_t index)
   ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(index));
   const cv::Mat buffer(1, static_cast<int>(frame.image.size()), CV_8UC1, const_cast<char*>(frame.image.data()));
   cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
-  if (image.empty()) return InvalidArgument("frame {}: image cannot be decoded", index);
+  if (image.empty()) return InvalidArgument("frame {}: cannot decode the image", index);
   if (!sequence.camera().HasDistortion()) return image;
-  // The map lives in undistorted images, so what is drawn over an image needs one too.
+  // The map projects to undistorted images.
   const UndistortionMaps maps = MakeUndistortionMaps(sequence.camera());
   cv::Mat undistorted;
   cv::remap(image, undistorted, maps.xy, maps.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
   return undistorted;
 }
 
+// The extension of `path` selects the format.
 absl::Status WriteImage(const fs::path& path, const cv::Mat& image) {
-  if (cv::imwrite(path.string(), image)) return absl::OkStatus();
-  return InvalidArgument("cannot write {}", path.string());
+  std::vector<uchar> bytes;
+  if (!cv::imencode(path.extension().string(), image, bytes)) return Internal("{}: cannot encode", path.string());
+  return files::WriteFile(path.string(), std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
 }  // namespace
@@ -59,8 +63,7 @@ absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& seq
   const fs::path folder = fs::path(dir) / "pictures";
   std::error_code error;
   fs::remove_all(folder, error);
-  fs::create_directories(folder, error);
-  if (error) return InvalidArgument("cannot make the folder {}: {}", folder.string(), error.message());
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder.string()));
 
   const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
   CameraModel camera = sequence.camera();
@@ -86,9 +89,7 @@ absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& seq
 absl::Status WriteCuboidPictures(const std::string& folder, const files::Sequence& sequence,
                                  const std::vector<files::StampedPose>& trajectory,
                                  std::span<const ObjectUpdate> objects) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return InvalidArgument("cannot make the folder {}: {}", folder, error.message());
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder));
   const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
   const size_t count = std::min(kCuboidFrames, frames.size());
   for (size_t i = 0; i < count; ++i) {

@@ -10,14 +10,15 @@
 
 namespace romap::cli {
 
-// Writes below `dir`/pictures: <id>_<class>.png, each object's mesh shaded beside its best view; map.png, the whole map
-// from above; and what WriteCuboidPictures writes. `trajectory` holds the camera poses of the frames that were mapped.
+// Writes images to `dir`/pictures: <id>_<class>.png shows the mesh of each object next to its best view, map.png shows
+// the whole map from above, and cuboids_<n>.jpg are those of WriteCuboidPictures. `trajectory` has the camera poses of
+// the mapped frames. Errors as Sequence::Load and WriteFile.
 absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& sequence,
                               const std::vector<files::StampedPose>& trajectory, const std::vector<MapObject>& objects);
 
-// Writes into `folder`, which is made, cuboids_<n>.jpg: the cuboids with id and class drawn into a few frames of the
-// sequence, n counted from 1, as they would look from the poses of `trajectory`. Images with lens distortion are
-// undistorted first. Errors as Sequence::Load, and INVALID_ARGUMENT when a file cannot be written.
+// Writes cuboids_<n>.jpg to `folder` (created if missing): a few frames of the sequence (n = frame number from 1) with
+// the cuboids, ids and classes drawn from the poses of `trajectory`. Distorted images are undistorted first. Errors as
+// Sequence::Load and WriteFile.
 absl::Status WriteCuboidPictures(const std::string& folder, const files::Sequence& sequence,
                                  const std::vector<files::StampedPose>& trajectory,
                                  std::span<const ObjectUpdate> objects);

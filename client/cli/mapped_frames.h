@@ -13,7 +13,7 @@ struct PosedFrame {
   SE3<World, Camera> T_world_camera;
 };
 
-// The frames of a sequence that got a pose, in the order of the sequence.
+// The frames of a sequence that have a pose in `trajectory` (same timestamp), in order.
 std::vector<PosedFrame> MappedFrames(const files::Sequence& sequence,
                                      const std::vector<files::StampedPose>& trajectory);
 

@@ -8,8 +8,8 @@
 
 namespace romap::cli {
 
-// Plays a detector that is slower than the camera: of the masks that frames carry it keeps so many a second, and holds
-// them back for a while. All times are those of the frames' timestamps.
+// Simulates a detector that is slower than the camera: limits the rate of frames with masks, and delays the masks. All
+// times are frame timestamps.
 class MaskSchedule {
  public:
   struct LateMasks {
@@ -17,21 +17,23 @@ class MaskSchedule {
     MasksInput masks;
   };
 
-  // `rate_hz` 0: masks of all frames. `delay_s` 0: masks stay in their frames.
+  // `rate_hz`: maximal rate of frames with masks; 0 = unlimited. `delay_s`: delay of the masks; 0 = send with the
+  // frame.
   MaskSchedule(double rate_hz, double delay_s) : rate_hz_(rate_hz), delay_s_(delay_s) {}
 
-  // Takes the masks out of the frame where they are not to go with it. Call for every frame, in order.
+  // Removes the masks from the frame if they are dropped or delayed. Call for every frame, in order.
   void Apply(FrameInput& frame);
-  // The oldest masks that are held back, if they are due by then; nullopt otherwise.
+  // Returns the oldest delayed masks if they are due by `timestamp_ns`; otherwise nullopt.
   std::optional<LateMasks> TakeDueBy(int64_t timestamp_ns);
 
  private:
+  // Whether the detector processes the frame with this timestamp.
   bool DetectorRuns(int64_t timestamp_ns);
 
   const double rate_hz_, delay_s_;
   std::optional<int64_t> first_timestamp_ns_;
-  int64_t last_slot_ = -1;
-  std::deque<LateMasks> held_back_;
+  int64_t last_period_ = -1;
+  std::deque<LateMasks> delayed_;
 };
 
 }  // namespace romap::cli

@@ -5,7 +5,7 @@
 
 namespace romap::cli {
 
-// A line on stderr that a person can follow: rewritten in place on a terminal, printed now and then elsewhere.
+// A progress bar on stderr. Redraws the line in place on a terminal; otherwise prints a line every few seconds.
 class Progress {
  public:
   explicit Progress(std::string title);
@@ -13,9 +13,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // `fraction` 0..1 of the whole; `text` follows the bar. An estimate of the time left is added once there is one.
+  // Shows the completed `fraction` (0..1), `text`, and an estimate of the remaining time if available.
   void Show(double fraction, const std::string& text);
-  // Leaves the last line standing.
+  // Ends the progress bar; the last line stays visible.
   void Done();
 
  private:

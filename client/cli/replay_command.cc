@@ -29,10 +29,10 @@ struct ReplayOptions {
   ServiceOptions service;
 };
 
-// Share of the progress bar that the frames take; training has the rest.
+// Share of the progress bar for the frames; the remainder is for training.
 constexpr double kFrameShare = 0.6;
 
-// Sends all there is and waits until the map is finished. The events say nothing that the export does not say later.
+// Sends all records and waits until the map is finished. Ignores the events, because the map is exported afterwards.
 absl::Status Feed(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto stream, service.OpenMap(session_id));
   Progress progress("replaying");
@@ -48,19 +48,17 @@ absl::Status Feed(const wire::Recording& recording, MappingService& service, con
     progress.Show(kFrameShare * static_cast<double>(i) / static_cast<double>(recording.size()),
                   fmt::format("record {}/{}", i + 1, recording.size()));
   }
-  if (Interrupted())
-    return absl::CancelledError("interrupted, nothing is written: half a replay compares with nothing");
+  if (Interrupted()) return absl::CancelledError("interrupted; no files were written");
   ROMAP_RETURN_IF_ERROR(service.FinishSession(session_id).status());
   while (!stream->Done() && !Interrupted()) {
     const std::optional<MapEvent> event = stream->Next(std::chrono::milliseconds(50));
     if (const auto* statistics = event ? std::get_if<Statistics>(&*event) : nullptr) {
       progress.Show(kFrameShare + (1 - kFrameShare) * statistics->training_progress,
-                    fmt::format("{} objects still training", statistics->objects_training));
+                    fmt::format("{} objects in training", statistics->objects_training));
     }
   }
   progress.Done();
-  if (Interrupted())
-    return absl::CancelledError("interrupted, nothing is written: half a replay compares with nothing");
+  if (Interrupted()) return absl::CancelledError("interrupted; no files were written");
   return stream->status();
 }
 
@@ -104,15 +102,15 @@ absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& re
 absl::Status RunReplay(ReplayOptions options) {
   ROMAP_ASSIGN_OR_RETURN(const wire::Recording recording, wire::Recording::Open(options.file));
   if (recording.lost_bytes() > 0) {
-    fmt::print(stderr, "romap: {}: the last record is cut off, its {} bytes are left out; {} frames are replayed\n",
-               options.file, recording.lost_bytes(), recording.frames());
+    fmt::print(stderr, "romap: {}: the last record is truncated; ignored {} bytes, replaying {} frames\n", options.file,
+               recording.lost_bytes(), recording.frames());
   }
   options.service.local = true;
-  // In front, so that what the user sets has the last word.
+  // Inserted first, so that --set overrides it.
   if (!options.threads) options.service.settings.insert(options.service.settings.begin(), "session.single_thread=true");
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
   SessionOptions session = recording.options();
-  session.mode = FrameMode::kReplay;  // what a live session dropped is not in the file
+  session.mode = FrameMode::kReplay;  // the recording contains no dropped frames
   ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service->CreateSession(session));
   ROMAP_RETURN_IF_ERROR(Feed(recording, *service, info.id));
   ROMAP_ASSIGN_OR_RETURN(const MapSnapshot snapshot, service->ExportMap(info.id));
@@ -123,14 +121,14 @@ absl::Status RunReplay(ReplayOptions options) {
 
 void AddReplayCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<ReplayOptions>();
-  CLI::App* command = app.add_subcommand(
-      "replay", "Map what a session was fed (session.record_dir) once more, the same way every time");
-  command->add_option("file", options->file, "The recording, <session id>.romaprec")->required();
-  command->add_option("--out", options->out, "Folder for meshes, cuboids, trajectory and figures")->required();
+  CLI::App* command =
+      app.add_subcommand("replay", "Map a recorded session (session.record_dir) again, with reproducible results");
+  command->add_option("file", options->file, "Recording, <session id>.romaprec")->required();
+  command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory and summary")->required();
   command->add_flag("--threads", options->threads,
-                    "Map on several threads as a server does: faster, and not quite the same every time");
-  command->add_option("--config", options->service.config_file, "YAML configuration of the mapping");
-  command->add_option("--set", options->service.settings, "section.field=value of the configuration, repeatable");
+                    "Use multiple threads like a server: faster, but results vary slightly between runs");
+  command->add_option("--config", options->service.config_file, "YAML configuration file");
+  command->add_option("--set", options->service.settings, "Set a configuration value, section.field=value; repeatable");
   command->callback([options, chosen] { *chosen = [options] { return RunReplay(*options); }; });
 }
 

@@ -36,12 +36,8 @@ struct RunOptions {
 };
 
 absl::Status PrepareOutput(const std::string& out) {
-  std::error_code error;
-  for (const char* part : {"objects", "pictures"}) {
-    if (!error) fs::create_directories(fs::path(out) / part, error);
-  }
-  if (error) return InvalidArgument("--out {}: cannot make the folder: {}", out, error.message());
-  return absl::OkStatus();
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder((fs::path(out) / "objects").string()));
+  return files::MakeFolder((fs::path(out) / "pictures").string());
 }
 
 files::SequenceOptions ToSequenceOptions(const RunOptions& options) {
@@ -57,12 +53,12 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
   return snapshots;
 }
 
-// Adds the figures against ground truth, where the sequence has any, to the summary and prints them.
+// Compares the map with the ground truth of the sequence, if any, prints the results and adds them to the summary.
 void Evaluate(const RunOptions& options, bool poses_given, nlohmann::json& summary) {
   const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence_dir, poses_given);
   summary["evaluation"] = ToJson(report);
   if (!report.objects && !report.boxes) return;  // the sequence has no ground truth
-  fmt::print("\nagainst the ground truth of {}:\n{}", options.sequence_dir, eval::FormatTable(report));
+  fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence_dir, eval::FormatTable(report));
 }
 
 absl::Status RunSequence(const RunOptions& options) {
@@ -79,7 +75,7 @@ absl::Status RunSequence(const RunOptions& options) {
   const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
   ROMAP_RETURN_IF_ERROR(files::WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
-  RunSummary summary = Summarise(sequence, result, collector, objects);
+  RunSummary summary = Summarize(sequence, result, collector, objects);
   summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
   if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));
 
@@ -89,15 +85,15 @@ absl::Status RunSequence(const RunOptions& options) {
   const bool poses_given = options.poses == PoseUse::kGiven && sequence.has_poses();
   if (!objects.empty()) Evaluate(options, poses_given, json);
   ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
-  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\npictures: {0}/pictures\nfigures: {0}/summary.json\n", options.out);
-  if (options.stream.keep_session) fmt::print("session {} is kept on the server\n", result.session_id);
+  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
+  if (options.stream.keep_session) fmt::print("session {} remains on the server\n", result.session_id);
   if (!result.status.ok()) {
-    return absl::Status(result.status.code(), fmt::format("{} (the map until then is written; session {} is left for "
-                                                          "'romap export')",
+    return absl::Status(result.status.code(), fmt::format("{} (wrote the partial map; session {} remains on the "
+                                                          "server)",
                                                           Message(result.status), result.session_id));
   }
   if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
-    return InvalidArgument("no frame of {} was accepted; the first: {}", options.sequence_dir,
+    return InvalidArgument("all frames of {} were rejected; first error: {}", options.sequence_dir,
                            summary.faults.empty() ? "" : summary.faults.front());
   }
   return absl::OkStatus();
@@ -107,50 +103,56 @@ absl::Status RunSequence(const RunOptions& options) {
 
 void AddRunCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<RunOptions>();
-  CLI::App* command = app.add_subcommand("run", "Stream a recorded sequence through the mapping and write the map");
-  command->add_option("sequence", options->sequence_dir, "Folder of the sequence")->required();
-  command->add_option("--out", options->out, "Folder for meshes, cuboids, trajectory, pictures and figures")
+  CLI::App* command = app.add_subcommand("run", "Map a recorded sequence and write the map to files");
+  command->add_option("sequence", options->sequence_dir, "Sequence folder")->required();
+  command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory, images and summary")
       ->required();
   options->service.AddTo(*command, /*offer_local=*/true);
   command
       ->add_option("--poses", options->poses,
-                   "Camera poses of the sequence: given (they are the truth), prior (they help tracking and may be "
-                   "corrected) or none (the camera is tracked from the images, as it is in a sequence without poses)")
+                   "Use of the camera poses of the sequence: given (exact), prior (initial values for tracking, which "
+                   "corrects them) or none (the camera is tracked from the images only)")
       ->transform(CLI::CheckedTransformer(kPoseUses))
       ->option_text("given|prior|none [given]");
-  command->add_option("--pose-file", options->sequence.poses, "List of camera poses in the sequence (TUM format)")
+  command
+      ->add_option("--pose-file", options->sequence.poses,
+                   "File with the camera poses in the sequence folder (TUM format)")
       ->capture_default_str();
-  command->add_option("--masks", options->sequence.masks, "List of mask images in the sequence")->capture_default_str();
-  command->add_option("--detections", options->sequence.detections, "What the labels of each frame mean")
+  command->add_option("--masks", options->sequence.masks, "File with the list of mask images in the sequence folder")
+      ->capture_default_str();
+  command
+      ->add_option("--detections", options->sequence.detections,
+                   "File with the class and score of each label in the sequence folder")
       ->capture_default_str();
   command
       ->add_option("--mask-rate", options->stream.mask_rate_hz,
-                   "Send masks of so many frames a second only, as a slow detector has them [Hz]; 0 = all there are")
+                   "Maximal rate of frames with masks [Hz], simulating a slow detector; 0 = unlimited")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--mask-delay", options->stream.mask_delay_s,
-                   "Send each frame without masks at once, and its masks so much later by the frames' timestamps [s]; "
-                   "the server takes them up to objects.max_mask_delay_s")
+                   "Send the masks this long after their frame [s of frame timestamps], simulating a detector delay; "
+                   "the server accepts masks up to objects.max_mask_delay_s late")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--depth", options->sequence.use_depth, "Send the depth images too");
+  command->add_flag("--depth", options->sequence.use_depth, "Also send the depth images");
   command->add_flag("--realtime", options->stream.realtime,
-                    "Send at the recorded rate; frames that the server cannot keep up with are dropped and counted");
+                    "Send frames at the recorded rate; the server drops frames when overloaded");
   command
       ->add_option("--permute-labels", options->permute_labels_seed,
-                   "Rename the labels of every frame at random with this seed, as a detector without a tracker does")
+                   "Permute the labels at random in each frame with this seed, simulating a detector without a tracker")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--first", options->stream.first_frame, "First frame to send (from 0)");
-  command->add_option("--frames", options->stream.frame_count, "How many frames to send")->check(CLI::PositiveNumber);
+  command->add_option("--first", options->stream.first_frame, "Index of the first frame to send");
+  command->add_option("--frames", options->stream.frame_count, "Maximal number of frames to send")
+      ->check(CLI::PositiveNumber);
   command
       ->add_option("--max-training", options->stream.max_training_s,
-                   "Longest wait for training after the last frame [s]")
+                   "Maximal wait for training after the last frame [s]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--name", options->stream.session_name, "Name of the session, for people");
-  command->add_flag("--keep-session", options->stream.keep_session, "Leave the session on the server");
-  command->add_flag("--no-pictures", options->no_pictures, "Do not draw pictures");
+  command->add_option("--name", options->stream.session_name, "Display name of the session");
+  command->add_flag("--keep-session", options->stream.keep_session, "Do not delete the session from the server");
+  command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
   command->callback([options, chosen] {
     options->stream.pose_use = options->poses;
     *chosen = [options] { return RunSequence(*options); };

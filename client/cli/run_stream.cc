@@ -20,14 +20,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
-constexpr std::chrono::seconds kPatience{5};
+constexpr std::chrono::seconds kMaxAckWait{5};
 constexpr double kTrainingAfterInterrupt_s = 3;
-// Share of the progress bar that the frames take; training has the rest.
+// Share of the progress bar for the frames; the remainder is for training.
 constexpr double kFrameShare = 0.6;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// Loads and sends frames on a thread of its own, because Send() waits while the server pushes back.
+// Loads and sends frames on a separate thread, because Send() blocks while the server applies back pressure.
 class Sender {
  public:
   Sender(const files::Sequence& sequence, const StreamOptions& options, MapStream& stream, MapCollector& collector,
@@ -82,7 +82,7 @@ class Sender {
     return absl::OkStatus();
   }
 
-  // Until the recorded time has come, counted from the first frame.
+  // In real-time mode, waits until the recorded time relative to the first frame.
   void WaitFor(int64_t timestamp_ns) const {
     if (!options_.realtime) return;
     std::this_thread::sleep_until(
@@ -122,7 +122,7 @@ class Run {
     stream_.reset();
     if (result_.status.ok()) FetchTrajectory();
     if (result_.status.ok() && !options_.keep_session) {
-      // The map is here; a failure to tidy up on the server does not spoil it.
+      // The map is complete; a failed deletion does not affect it.
       service_.DeleteSession(info.id).IgnoreError();
     }
     return result_;
@@ -131,15 +131,15 @@ class Run {
  private:
   absl::Status SendFrames() {
     Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
-    std::optional<Clock::time_point> patience_ends;
+    std::optional<Clock::time_point> deadline;
     while (!(sender.done() && AllAcknowledged())) {
-      TakeEvent();
+      ReceiveEvent();
       ShowFrames();
-      // Whoever interrupts, or cannot read on, does not want to wait for a server that does not answer.
-      if (!patience_ends && (Interrupted() || (sender.done() && !sender.status().ok()))) {
-        patience_ends = Clock::now() + kPatience;
+      // After an interrupt or a sending error, do not wait long for a server that does not respond.
+      if (!deadline && (Interrupted() || (sender.done() && !sender.status().ok()))) {
+        deadline = Clock::now() + kMaxAckWait;
       }
-      if (patience_ends && Clock::now() > *patience_ends) break;
+      if (deadline && Clock::now() > *deadline) break;
       if (stream_->Done()) {
         sender.Join();
         return StreamEnded();
@@ -148,8 +148,8 @@ class Run {
     result_.mapping_s = collector_.last_ack_s() - collector_.first_sent_s();
     result_.interrupted = Interrupted();
     if (!sender.done()) {
-      stream_->Cancel();  // wakes the sender where it waits for room
-      return absl::DeadlineExceededError("the server stopped taking frames");
+      stream_->Cancel();  // unblocks Send()
+      return absl::DeadlineExceededError("the server stopped accepting frames");
     }
     return sender.status();
   }
@@ -157,11 +157,11 @@ class Run {
   absl::Status Train() {
     ROMAP_RETURN_IF_ERROR(service_.FinishSession(result_.session_id).status());
     const Clock::time_point start = Clock::now();
-    const auto enough = [&] {
+    const auto timed_out = [&] {
       return SecondsSince(start) > (Interrupted() ? kTrainingAfterInterrupt_s : options_.max_training_s);
     };
-    while (!stream_->Done() && !enough()) {
-      TakeEvent();
+    while (!stream_->Done() && !timed_out()) {
+      ReceiveEvent();
       ShowTraining();
     }
     result_.training_s = SecondsSince(start);
@@ -174,13 +174,12 @@ class Run {
     if (const auto map = service_.ExportMap(result_.session_id); map.ok()) {
       result_.trajectory = TrajectoryOf(*map);
     } else {
-      fmt::print(stderr,
-                 "romap: the camera poses are written as they were acknowledged, without later corrections: {}\n",
+      fmt::print(stderr, "romap: the trajectory lacks later corrections because the map could not be exported: {}\n",
                  Message(map.status()));
     }
   }
 
-  void TakeEvent() {
+  void ReceiveEvent() {
     std::optional<MapEvent> event = stream_->Next(kEventWait);
     if (!event) return;
     std::lock_guard lock(collector_mutex_);
@@ -195,7 +194,7 @@ class Run {
 
   absl::Status StreamEnded() {
     if (!stream_->status().ok()) return stream_->status();
-    return absl::UnavailableError("the server ended the stream before all frames were acknowledged");
+    return absl::UnavailableError("the server closed the stream before acknowledging all frames");
   }
 
   size_t TotalFrames() const {
@@ -214,14 +213,14 @@ class Run {
     const Statistics statistics = collector_.statistics().value_or(Statistics{});
     progress_.Show(
         kFrameShare + (1 - kFrameShare) * statistics.training_progress,
-        fmt::format("{} objects, {} still training", collector_.ConfirmedObjects(), statistics.objects_training));
+        fmt::format("{} objects, {} in training", collector_.ConfirmedObjects(), statistics.objects_training));
   }
 
   const files::Sequence& sequence_;
   MappingService& service_;
   const StreamOptions& options_;
   MapCollector& collector_;
-  std::mutex collector_mutex_;  // the sender notes what it sends
+  std::mutex collector_mutex_;  // shared with the sender thread
   std::unique_ptr<MapStream> stream_;
   StreamResult result_;
   Progress progress_{"mapping"};

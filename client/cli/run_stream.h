@@ -15,31 +15,31 @@ namespace romap::cli {
 struct StreamOptions {
   PoseUse pose_use = PoseUse::kGiven;
   std::string session_name;
-  bool realtime = false;    // send at the recorded rate and let the server drop what it cannot keep up with
-  double mask_rate_hz = 0;  // frames whose masks are sent, per second of timestamps; 0 = all
-  double mask_delay_s = 0;  // masks come so much later than their frame, by timestamps; 0 = with it
+  bool realtime = false;    // send at the recorded rate; the server drops frames when overloaded
+  double mask_rate_hz = 0;  // maximal rate of frames with masks, by timestamps; 0 = unlimited
+  double mask_delay_s = 0;  // delay of masks after their frame, by timestamps; 0 = sent with the frame
   size_t first_frame = 0;
   size_t frame_count = SIZE_MAX;
-  double max_training_s = 600;  // longest wait for training after the last frame
-  bool keep_session = false;    // leave the session on the server
+  double max_training_s = 600;  // maximal wait for training after the last frame
+  bool keep_session = false;    // do not delete the session
 };
 
 struct StreamResult {
   std::string session_id;
-  absl::Status status;  // not OK: the stream broke; the collector holds what came until then
-  // The map's, with all corrections that came after the frames were acknowledged. nullopt: the stream broke, or the map
-  // could not be fetched.
+  absl::Status status;  // not OK if the stream failed; the collector has the events received before
+  // The final trajectory of the map, including later corrections. nullopt if the stream failed or the map could not be
+  // exported.
   std::optional<std::vector<files::StampedPose>> trajectory;
   bool interrupted = false;
   bool training_complete = false;
-  double mapping_s = 0;   // from the first frame sent to the last acknowledged
+  double mapping_s = 0;   // from the first sent frame to the last acknowledgement
   double training_s = 0;  // from then to the end of training
 };
 
-// Streams a sequence through a mapping service and collects the map: creates a session, sends every frame, waits until
-// all are acknowledged, finishes the session and waits for the training. Ctrl-C ends the sending, and the training:
-// what there is by then is the map. Shows a progress bar. Fails only when there is no session to begin with; what goes
-// wrong later is in the result, and then the session is left on the server.
+// Streams a sequence to a mapping service and collects the map: creates a session, sends every frame, waits for all
+// acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early.
+// Shows a progress bar. Returns an error if no session could be opened. Later errors are in StreamResult::status; the
+// session then stays on the server.
 absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);
 

@@ -24,7 +24,7 @@ nlohmann::json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; 
 
 }  // namespace
 
-RunSummary Summarise(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
+RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
                      const std::vector<MapObject>& objects) {
   RunSummary summary;
   summary.sequence = sequence.dir();
@@ -99,10 +99,10 @@ nlohmann::json ToJson(const RunSummary& summary) {
             {"sent_late", summary.late_masks.sent},
             {"late_rejected", summary.late_masks.rejected}}},
           {"tracking",
-           {{"initialising", summary.tracking.initialising},
+           {{"initializing", summary.tracking.initializing},
             {"tracked", summary.tracking.tracked},
             {"lost", summary.tracking.lost},
-            {"relocalised", summary.tracking.relocalised}}},
+            {"relocalized", summary.tracking.relocalized}}},
           {"map_points", summary.map_points},
           {"mapping_s", summary.mapping_s},
           {"training_after_last_frame_s", summary.training_s},
@@ -118,26 +118,25 @@ nlohmann::json ToJson(const RunSummary& summary) {
 
 std::string FormatSummary(const RunSummary& summary) {
   std::string text = fmt::format(
-      "{} frames ({} keyframes, {} rejected, {} dropped) in {:.1f} s: {:.1f} frames/s; training went on for {:.1f} "
-      "s{}\n",
+      "{} frames ({} keyframes, {} rejected, {} dropped) in {:.1f} s: {:.1f} frames/s; training took {:.1f} s more{}\n",
       summary.frames_accepted, summary.keyframes, summary.frames_rejected, summary.frames_dropped, summary.mapping_s,
       summary.frames_per_s, summary.training_s,
-      summary.interrupted         ? " (interrupted: the map of what was sent)"
+      summary.interrupted         ? " (interrupted: partial map)"
       : summary.training_complete ? ""
                                   : " (not finished)");
   const MapCollector::Tracking& tracking = summary.tracking;
-  if (tracking.initialising + tracking.lost > 0) {
-    text += fmt::format("camera: {} frames to begin, {} tracked, {} lost, found again {} times", tracking.initialising,
-                        tracking.tracked, tracking.lost, tracking.relocalised);
+  if (tracking.initializing + tracking.lost > 0) {
+    text += fmt::format("camera: {} frames to initialize, {} tracked, {} lost, {} relocalizations",
+                        tracking.initializing, tracking.tracked, tracking.lost, tracking.relocalized);
     text += tracking.tracked == 0 ? fmt::format("; never tracked: {}\n", tracking.last_reason) : "\n";
   }
   if (summary.frames_with_masks < summary.frames_sent) {
-    text += fmt::format("masks: {} frames were sent with theirs, {} got them later, of which {} were rejected\n",
+    text += fmt::format("masks: {} sent with their frames, {} sent late ({} of these rejected)\n",
                         summary.frames_with_masks, summary.late_masks.sent, summary.late_masks.rejected);
   }
-  text += fmt::format("memory: mapping {} MB, client {} MB\n", summary.server_peak_bytes >> 20,
+  text += fmt::format("peak memory: mapping {} MiB, client {} MiB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
-  text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", "object", "centre [map units]",
+  text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", "object", "center [map units]",
                       "size [map units]", "training", "triangles", "first cuboid", "first mesh");
   for (const RunSummary::Object& object : summary.objects) {
     const Eigen::Vector3d& c = object.center_world;
@@ -148,8 +147,8 @@ std::string FormatSummary(const RunSummary& summary) {
                         fmt::format("{:.2f} s", object.train_s), object.triangles, SecondsText(object.first_cuboid_s),
                         SecondsText(object.first_mesh_s));
   }
-  if (summary.objects.empty()) text += "(no objects were mapped)\n";
-  for (const std::string& fault : summary.faults) text += "not accepted: " + fault + "\n";
+  if (summary.objects.empty()) text += "(no objects mapped)\n";
+  for (const std::string& fault : summary.faults) text += "rejected: " + fault + "\n";
   return text;
 }
 

@@ -12,10 +12,10 @@
 
 namespace romap::cli {
 
-// What one run came to: the figures behind summary.json and the table at its end.
+// The results of one run, for summary.json and the final table.
 struct RunSummary {
   struct Object {
-    std::string name;  // the stem of its files
+    std::string name;  // stem of its file names
     std::string class_name;
     Eigen::Vector3d center_world = Eigen::Vector3d::Zero();  // map units
     Eigen::Vector3d half_extents = Eigen::Vector3d::Zero();  // map units
@@ -23,7 +23,8 @@ struct RunSummary {
     uint64_t steps = 0;
     double train_s = 0;
     size_t vertices = 0, triangles = 0;
-    double first_cuboid_s = -1;  // from the sending of the frame in which it could first be tracked; -1 = unknown
+    // Delays after sending the first frame in which the object was trackable; -1 = unknown.
+    double first_cuboid_s = -1;
     double first_mesh_s = -1;
   };
 
@@ -31,7 +32,7 @@ struct RunSummary {
   size_t frames_sent = 0, frames_accepted = 0, frames_rejected = 0, keyframes = 0;
   uint64_t frames_dropped = 0, map_points = 0;
   MapCollector::Tracking tracking;
-  size_t frames_with_masks = 0;  // sent with them
+  size_t frames_with_masks = 0;  // sent together with their masks
   MapCollector::LateMasks late_masks;
   double mapping_s = 0, training_s = 0, frames_per_s = 0;
   double median_latency_ms = 0;
@@ -41,10 +42,10 @@ struct RunSummary {
   std::vector<std::string> faults;
 };
 
-RunSummary Summarise(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
+RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
                      const std::vector<MapObject>& objects);
 nlohmann::json ToJson(const RunSummary& summary);
-// The closing lines for a person.
+// Formats the summary as text.
 std::string FormatSummary(const RunSummary& summary);
 
 }  // namespace romap::cli

@@ -1,9 +1,8 @@
 #include "client/cli/service_options.h"
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <sstream>
 
+#include "client/files/text_file.h"
 #include "client/sdk/remote_mapping_service.h"
 #include "common/status.h"
 #include "server/session/local_mapping_service.h"
@@ -16,11 +15,8 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
   ConfigFields fields;
   config.Fields(fields);
   if (!options.config_file.empty()) {
-    std::ifstream file(options.config_file);
-    if (!file) return NotFound("--config {}: cannot be read", options.config_file);
-    std::stringstream text;
-    text << file.rdbuf();
-    ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text.str(), options.config_file));
+    ROMAP_ASSIGN_OR_RETURN(const std::string text, files::ReadFile(options.config_file));
+    ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text, options.config_file));
   }
   ROMAP_RETURN_IF_ERROR(fields.Set(options.settings));
   return config;
@@ -29,18 +25,18 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
 }  // namespace
 
 void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
-  auto* server_option = app.add_option("--server", server, "HOST:PORT of romap-server")->capture_default_str();
+  auto* server_option = app.add_option("--server", server, "Address of romap-server, HOST:PORT")->capture_default_str();
   if (!offer_local) return;
-  auto* local_flag = app.add_flag("--local", local, "Map in this process, without a server");
+  auto* local_flag = app.add_flag("--local", local, "Map in this process instead of on a server");
   local_flag->excludes(server_option);
-  app.add_option("--config", config_file, "YAML configuration of the mapping (with --local)")->needs(local_flag);
-  app.add_option("--set", settings, "section.field=value of the configuration (with --local), repeatable")
+  app.add_option("--config", config_file, "YAML configuration file (with --local)")->needs(local_flag);
+  app.add_option("--set", settings, "Set a configuration value, section.field=value (with --local); repeatable")
       ->needs(local_flag);
 }
 
 absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
   if (!local) {
-    if (server.find(':') == std::string::npos) return InvalidArgument("--server '{}': expected HOST:PORT", server);
+    if (server.find(':') == std::string::npos) return InvalidArgument("--server: expected HOST:PORT, got '{}'", server);
     ROMAP_ASSIGN_OR_RETURN(auto remote, client::RemoteMappingService::Connect(server));
     return std::unique_ptr<MappingService>(std::move(remote));
   }

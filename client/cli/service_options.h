@@ -12,16 +12,17 @@ class App;
 
 namespace romap::cli {
 
-// Where a command finds its mapping service: a server (the default) or this process.
+// The options that select the mapping service of a command: a server (default) or this process.
 struct ServiceOptions {
   std::string server = "127.0.0.1:50051";
   bool local = false;
   std::string config_file;            // --local only
   std::vector<std::string> settings;  // --local only
 
-  // Adds --server, and with `offer_local` also --local, --config and --set.
+  // Adds --server and, with `offer_local`, --local, --config and --set.
   void AddTo(CLI::App& app, bool offer_local);
-  // UNAVAILABLE when no server answers.
+  // Connects to the server, or creates the service in this process. INVALID_ARGUMENT: malformed address or
+  // configuration. UNAVAILABLE: no server responds. Otherwise as ReadFile for --config.
   absl::StatusOr<std::unique_ptr<MappingService>> Connect() const;
 };
 

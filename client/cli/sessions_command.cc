@@ -50,10 +50,11 @@ absl::Status RunSessions(const SessionsOptions& options) {
 
 void AddSessionsCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<SessionsOptions>();
-  CLI::App* command = app.add_subcommand("sessions", "List the sessions of a server, finish or delete one");
+  CLI::App* command = app.add_subcommand("sessions", "List the sessions of a server; finish or delete a session");
   options->service.AddTo(*command, /*offer_local=*/false);
-  command->add_option("--finish", options->finish, "Finish this session: no more frames, train to the end");
-  command->add_option("--delete", options->remove, "Delete this session and its map");
+  command->add_option("--finish", options->finish,
+                      "ID of a session to finish: accepts no more frames and completes its training");
+  command->add_option("--delete", options->remove, "ID of a session to delete with its map");
   command->callback([options, chosen] { *chosen = [options] { return RunSessions(*options); }; });
 }
 

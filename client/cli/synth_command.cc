@@ -14,7 +14,7 @@ namespace {
 struct SynthCommandOptions {
   synth::SynthOptions synth;
   std::string out;
-  // FIRST:LAST, as given.
+  // Ranges FIRST:LAST as on the command line.
   std::vector<std::string> cuts;
   std::vector<std::string> black;
   std::vector<std::string> blurred;
@@ -40,7 +40,7 @@ absl::Status RunSynth(SynthCommandOptions options) {
   });
   progress.Done();
   if (status.ok()) {
-    fmt::print("{} frames of {} objects with ground truth written to {}\n", options.synth.frames, options.synth.objects,
+    fmt::print("wrote {} frames of {} objects with ground truth to {}\n", options.synth.frames, options.synth.objects,
                options.out);
   }
   return status;
@@ -51,50 +51,53 @@ absl::Status RunSynth(SynthCommandOptions options) {
 void AddSynthCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<SynthCommandOptions>();
   synth::SynthOptions& synth = options->synth;
-  CLI::App* command =
-      app.add_subcommand("synth", "Make a sequence of textured objects on a table, with exact ground truth");
-  command->add_option("--out", options->out, "Folder to write")->required();
+  CLI::App* command = app.add_subcommand(
+      "synth", "Render a synthetic sequence of textured objects on a table, with exact ground truth");
+  command->add_option("--out", options->out, "Output folder")->required();
   const auto add = [&](const char* name, auto& value, const char* help) {
     command->add_option(name, value, help)->capture_default_str();
   };
-  add("--seed", synth.seed, "Everything follows from this number");
+  add("--seed", synth.seed, "Random seed; determines the whole sequence");
   add("--objects", synth.objects, "Number of objects, 1 to 16");
-  add("--identical-pairs", synth.identical_pairs, "So many pairs of the objects are twins");
+  add("--identical-pairs", synth.identical_pairs, "Number of pairs of identical objects");
   add("--frames", synth.frames, "Number of frames");
   add("--fps", synth.fps, "Frames per second");
   const std::map<std::string, synth::PathKind> paths = {{"orbit", synth::PathKind::kOrbit},
                                                         {"handheld", synth::PathKind::kHandheld},
                                                         {"tworounds", synth::PathKind::kTwoRounds}};
-  command->add_option("--path", synth.path, "Way of the camera: orbit, handheld, or tworounds of a larger room")
+  command
+      ->add_option("--path", synth.path,
+                   "Camera path: orbit, handheld, or tworounds (two rounds through a larger room)")
       ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
-  add("--rounds", synth.rounds, "Circles of the orbit, passes along the hand-held arc, or pairs of rounds");
-  add("--unrest", synth.unrest, "How far the hand wanders in height, distance, aim and roll; 1 = calm");
-  add("--elevation", synth.elevation_deg, "Of the camera above the table [deg]");
+  add("--rounds", synth.rounds,
+      "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
+  add("--unrest", synth.unrest, "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+  add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");
   const std::map<std::string, synth::SynthLens> lenses = {{"pinhole", synth::SynthLens::kPinhole},
                                                           {"radtan", synth::SynthLens::kRadialTangential},
                                                           {"fisheye", synth::SynthLens::kFisheye}};
-  command->add_option("--lens", synth.lens, "Of the camera: pinhole, radtan or fisheye")
+  command->add_option("--lens", synth.lens, "Camera lens: pinhole, radtan or fisheye")
       ->transform(CLI::CheckedTransformer(lenses, CLI::ignore_case));
   const std::map<std::string, synth::ImageFormat> formats = {{"png", synth::ImageFormat::kPng},
                                                              {"jpeg", synth::ImageFormat::kJpeg}};
-  command->add_option("--format", synth.format, "Colour images: png or jpeg")
+  command->add_option("--format", synth.format, "Format of the color images: png or jpeg")
       ->transform(CLI::CheckedTransformer(formats, CLI::ignore_case));
-  add("--mask-jitter", synth.mask_jitter_px, "Displace the borders of the masks by about so much [px]");
-  add("--mask-drop", synth.mask_drop_share, "Share of the masks to leave out, 0 to 1");
-  command->add_flag("--permute-labels", synth.permute_labels, "Shuffle the labels in every frame");
-  add("--noise", synth.noise_sigma, "Sigma of the image noise [8-bit levels]");
-  add("--motion-blur", synth.motion_blur_px, "Length of the smear along the camera's motion [px]");
-  add("--defocus", synth.defocus_px, "Sigma of the blur [px]");
+  add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
+  add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
+  command->add_flag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
+  add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
+  add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
+  add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
   const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
     command->add_option(name, texts, help)->type_name("FIRST:LAST");
   };
-  add_ranges("--cut", options->cuts, "Leave out these frames, as if the camera had been carried off");
-  add_ranges("--black", options->black, "Cover the lens in these frames");
-  add_ranges("--blur", options->blurred, "Smear these frames beyond recognition");
-  add("--exposure-jumps", synth.exposure_stops, "Jumps of gain and gamma every second or two [stops]");
-  add("--duplicates", synth.duplicate_share, "Share of the frames that show the picture before them again, 0 to 1");
+  add_ranges("--cut", options->cuts, "Omit these frames, simulating a jump of the camera");
+  add_ranges("--black", options->black, "Make these frames black (covered lens)");
+  add_ranges("--blur", options->blurred, "Blur these frames until tracking is impossible");
+  add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
+  add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
   command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
 }
 

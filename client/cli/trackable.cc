@@ -10,9 +10,9 @@
 namespace romap::cli {
 namespace {
 
-// A mask fits the cuboid when the boxes around both overlap by this much (intersection over union): the outline of a
-// cuboid is larger than that of the object in it.
-constexpr double kFit = 0.35;
+// Minimal intersection over union of the bounding boxes of a mask and a cuboid that fit. Low because the outline of a
+// cuboid is larger than that of the object inside.
+constexpr double kMinOverlap = 0.35;
 
 struct Region {
   cv::Rect box;
@@ -44,7 +44,7 @@ std::map<int, Region> MaskRegions(const files::Sequence& sequence, size_t index)
 bool Fits(const Region& region, const cv::Rect2d& outline) {
   const cv::Rect2d box(region.box);
   const double shared = (box & outline).area();
-  return region.area_px >= kTrackableArea_px && shared > kFit * (box.area() + outline.area() - shared);
+  return region.area_px >= kTrackableArea_px && shared > kMinOverlap * (box.area() + outline.area() - shared);
 }
 
 }  // namespace
@@ -53,7 +53,8 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
                                                 const std::vector<files::StampedPose>& trajectory,
                                                 const std::vector<MapObject>& objects) {
   std::map<ObjectId, size_t> first;
-  std::map<ObjectId, std::vector<Eigen::Vector3d>> directions;  // from which each object was seen so far, unit length
+  std::map<ObjectId, std::vector<Eigen::Vector3d>>
+      directions;  // unit vectors from which each object was visible so far
   for (const PosedFrame& frame : MappedFrames(sequence, trajectory)) {
     if (first.size() == objects.size()) break;
     const std::map<int, Region> regions = MaskRegions(sequence, frame.index);
@@ -61,9 +62,9 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
       if (first.contains(entry.object.id)) continue;
       const auto outline = CuboidOutline(entry.object.cuboid, sequence.camera(), frame.T_world_camera);
       if (!outline) continue;
-      const bool seen = std::any_of(regions.begin(), regions.end(),
-                                    [&](const auto& region) { return Fits(region.second, *outline); });
-      if (!seen) continue;
+      const bool visible = std::any_of(regions.begin(), regions.end(),
+                                       [&](const auto& region) { return Fits(region.second, *outline); });
+      if (!visible) continue;
       const Eigen::Vector3d direction =
           (frame.T_world_camera.translation() - entry.object.cuboid.T_world_object.translation()).normalized();
       std::vector<Eigen::Vector3d>& earlier = directions[entry.object.id];

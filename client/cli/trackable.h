@@ -9,10 +9,10 @@
 
 namespace romap::cli {
 
-// For each object the index of the first mapped frame in which it could be tracked. It counts as seen in a frame when
-// its cuboid lies wholly in the image and a mask of at least kTrackableArea_px pixels fits the cuboid's outline; it
-// could be tracked once it was seen from two directions kTrackableParallax_rad apart, because one direction does not
-// say where a thing is. Objects without such a frame are left out.
+// For each object, the index of the first mapped frame in which it was trackable; objects that never were are omitted.
+// An object is visible in a frame if its cuboid is completely in the image and a mask of at least kTrackableArea_px
+// pixels fits the outline of the cuboid. It is trackable after it was visible from two directions that differ by
+// kTrackableParallax_rad, because a single direction does not determine its position.
 std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
                                                 const std::vector<files::StampedPose>& trajectory,
                                                 const std::vector<MapObject>& objects);

@@ -13,7 +13,7 @@ namespace {
 using PointMatrix = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>;
 
 PointMatrix AsMatrix(const Points& points) {
-  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double), "points lie without gaps");
+  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double), "points must be contiguous");
   return {points.front().data(), 3, static_cast<Eigen::Index>(points.size())};
 }
 
@@ -24,7 +24,7 @@ std::vector<int64_t> TimestampsOf(std::span<const files::StampedPose> poses, int
   return timestamps_ns;
 }
 
-// Pairs of source and target points that one ICP step fits to each other.
+// The pairs of points of one ICP iteration.
 struct Correspondences {
   Points source;
   Points target;
@@ -40,13 +40,13 @@ Correspondences FindCorrespondences(const Points& source, const Points& moved, c
     result.target.push_back(y);
     squared_sum += distance * distance;
   };
-  const Neighbours forward = target_index.Query(moved);
+  const Neighbors forward = target_index.Query(moved);
   const double limit = overlap < 1 ? Quantile(forward.distance, overlap) : std::numeric_limits<double>::infinity();
   for (size_t k = 0; k < source.size(); ++k) {
     if (forward.distance[k] <= limit) add(source[k], target[forward.index[k]], forward.distance[k]);
   }
   if (!symmetric_target.empty()) {
-    const Neighbours backward = NearestIndex(moved).Query(symmetric_target);
+    const Neighbors backward = NearestIndex(moved).Query(symmetric_target);
     for (size_t k = 0; k < symmetric_target.size(); ++k) {
       add(source[backward.index[k]], symmetric_target[k], backward.distance[k]);
     }
@@ -69,26 +69,22 @@ std::string ToString(Alignment alignment) {
   return "unknown";
 }
 
-Points FittedSimilarity::operator*(const Points& points) const {
-  Points moved;
-  moved.reserve(points.size());
-  for (const Eigen::Vector3d& point : points) moved.push_back(*this * point);
-  return moved;
+Points Transform(const Sim3<World, World>& similarity, const Points& points) {
+  Points transformed;
+  transformed.reserve(points.size());
+  for (const Eigen::Vector3d& point : points) transformed.push_back(similarity * point);
+  return transformed;
 }
 
-double FittedSimilarity::RotationAngle_rad() const { return Eigen::AngleAxisd(rotation).angle(); }
-
-std::optional<FittedSimilarity> FitSimilarity(const Points& x, const Points& y, bool with_scale) {
+std::optional<Sim3<World, World>> FitSimilarity(const Points& x, const Points& y, bool with_scale) {
   if (x.empty()) return std::nullopt;
   const PointMatrix from = AsMatrix(x);
   const Eigen::Vector3d mean = from.rowwise().mean();
   if ((from.colwise() - mean).squaredNorm() / static_cast<double>(x.size()) < 1e-18) return std::nullopt;
   const Eigen::Matrix4d matrix = Eigen::umeyama(from, AsMatrix(y), with_scale);
-  FittedSimilarity similarity;
-  similarity.scale = with_scale ? matrix.topLeftCorner<3, 1>().norm() : 1.0;
-  similarity.rotation = matrix.topLeftCorner<3, 3>() / similarity.scale;
-  similarity.translation = matrix.topRightCorner<3, 1>();
-  return similarity;
+  const double scale = with_scale ? matrix.topLeftCorner<3, 1>().norm() : 1.0;
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>() / scale;
+  return Sim3<World, World>(scale, Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>());
 }
 
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
@@ -99,8 +95,9 @@ absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPo
                                          TimestampsOf(ground_truth, 0), std::llround(max_dt_s * 1e9));
   const size_t needed = alignment == Alignment::kNone ? 1 : 3;
   if (fit.pairs.size() < needed) {
-    return InvalidArgument("only {} of {} estimated poses have a ground-truth pose within {:.3f} s, {} are needed",
-                           fit.pairs.size(), estimated.size(), max_dt_s, needed);
+    return InvalidArgument(
+        "only {} of {} estimated poses have a ground-truth pose within {:.3f} s; at least {} required",
+        fit.pairs.size(), estimated.size(), max_dt_s, needed);
   }
   if (alignment == Alignment::kNone) return fit;
   Points x, y;
@@ -108,9 +105,9 @@ absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPo
     x.push_back(estimated[i].T_world_camera.translation());
     y.push_back(ground_truth[j].T_world_camera.translation());
   }
-  const std::optional<FittedSimilarity> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
-  if (!similarity) return InvalidArgument("trajectories cannot be aligned: all estimated positions coincide");
-  fit.gt_from_est = *similarity;
+  const std::optional<Sim3<World, World>> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
+  if (!similarity) return InvalidArgument("cannot align the trajectories: all estimated positions coincide");
+  fit.S_gt_est = *similarity;
   return fit;
 }
 
@@ -120,15 +117,15 @@ std::optional<IcpResult> Icp(const Points& source, const Points& target, const P
   IcpResult result;
   result.rms = std::numeric_limits<double>::infinity();
   for (result.iterations = 1; result.iterations <= options.max_iterations; ++result.iterations) {
-    const Points moved = result.target_from_source * source;
+    const Points moved = Transform(result.S_target_source, source);
     const Correspondences pairs =
         FindCorrespondences(source, moved, target, target_index, symmetric_target, options.overlap);
-    const bool settled = result.rms - pairs.rms < options.tolerance;
+    const bool converged = result.rms - pairs.rms < options.tolerance;
     result.rms = std::min(result.rms, pairs.rms);
-    if (settled) return result;
-    const std::optional<FittedSimilarity> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
-    if (!fit || fit->scale <= 0.2 || fit->scale >= 5) return std::nullopt;
-    result.target_from_source = *fit;
+    if (converged) return result;
+    const std::optional<Sim3<World, World>> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
+    if (!fit || fit->scale() <= 0.2 || fit->scale() >= 5) return std::nullopt;
+    result.S_target_source = *fit;
   }
   result.iterations = options.max_iterations;
   return result;

@@ -9,6 +9,7 @@
 
 #include "client/eval/points.h"
 #include "client/files/tum.h"
+#include "common/geometry.h"
 #include "common/status.h"
 
 namespace romap::eval {
@@ -18,50 +19,42 @@ enum class Alignment { kNone, kSe3, kSim3 };
 // "none", "se3" or "sim3".
 std::string ToString(Alignment alignment);
 
-// y = scale * rotation * x + translation.
-struct FittedSimilarity {
-  double scale = 1;
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+// The similarity of every point.
+Points Transform(const Sim3<World, World>& similarity, const Points& points);
 
-  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
-  Points operator*(const Points& points) const;
-  double RotationAngle_rad() const;
-};
+// Least-squares similarity (rigid transform without `with_scale`) that maps x[i] to y[i] (Umeyama, PAMI 1991). `x` and
+// `y` have the same length. nullopt if there are no points or all points of `x` coincide.
+std::optional<Sim3<World, World>> FitSimilarity(const Points& x, const Points& y, bool with_scale);
 
-// Least-squares similarity (or rigid motion) that takes x[i] to y[i]: Umeyama, PAMI 1991. Same lengths. nullopt when
-// there are no points or all of them coincide.
-std::optional<FittedSimilarity> FitSimilarity(const Points& x, const Points& y, bool with_scale);
-
-// How two trajectories were laid over each other.
+// The alignment of two trajectories.
 struct TrajectoryFit {
-  FittedSimilarity gt_from_est;                  // estimated world to ground-truth world
-  std::vector<std::pair<size_t, size_t>> pairs;  // (estimated, true) poses that belong together, by time
+  Sim3<World, World> S_gt_est;                   // maps the estimated world to the ground-truth world
+  std::vector<std::pair<size_t, size_t>> pairs;  // indices (estimated, true) of associated poses, in order of time
 };
 
-// Pairs the poses of two trajectories (sorted by time) that lie at most max_dt_s apart, one to one, after adding
-// offset_s to the estimated times, and aligns their positions. INVALID_ARGUMENT when fewer than three pairs (kNone:
-// one) are left, or the positions coincide.
+// Associates the poses of two trajectories (sorted by time) one to one within max_dt_s, after adding offset_s to the
+// estimated timestamps, and aligns the positions of the pairs. INVALID_ARGUMENT: fewer than three pairs (one pair for
+// kNone), or all estimated positions coincide.
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
                                                 std::span<const files::StampedPose> ground_truth, Alignment alignment,
                                                 double max_dt_s, double offset_s = 0);
 
 struct IcpOptions {
   bool with_scale = true;
-  double overlap = 1;  // share of the closest source points that count, 0..1
+  double overlap = 1;  // share of source points to use, those with the closest targets; 0..1
   int max_iterations = 200;
-  double tolerance = 1e-7;  // stop when the rms distance falls by less
+  double tolerance = 1e-7;  // stop when the rms distance decreases by less
 };
 
 struct IcpResult {
-  FittedSimilarity target_from_source;
-  double rms = 0;  // distance of the pairs at the end, in the unit of the points
+  Sim3<World, World> S_target_source;
+  double rms = 0;  // final distance of the pairs, in the unit of the points
   int iterations = 0;
 };
 
-// Point-to-point ICP (Besl and McKay, PAMI 1992), from identity, with or without scale: each source point pulls to its
-// nearest target point and, where `symmetric_target` is not empty, each of those points to its nearest source point.
-// nullopt when the scale leaves 0.2..5: the shapes do not belong together.
+// Point-to-point ICP (Besl and McKay, PAMI 1992), starting from identity, with or without scale. Pairs each source
+// point with its nearest target point, and also each point of `symmetric_target` (may be empty) with its nearest source
+// point. nullopt if the scale leaves 0.2..5, i.e. the shapes do not match.
 std::optional<IcpResult> Icp(const Points& source, const Points& target, const Points& symmetric_target,
                              const IcpOptions& options);
 

@@ -15,7 +15,7 @@ constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
-// Corners of the footprint, counter-clockwise.
+// Corners of the footprint in the xy plane, counter-clockwise.
 Polygon Footprint(const YawBox& box) {
   Polygon corners;
   const Eigen::Rotation2Dd turn(box.yaw_rad);
@@ -26,7 +26,7 @@ Polygon Footprint(const YawBox& box) {
   return corners;
 }
 
-// Keeps what lies left of the line a -> b (Sutherland and Hodgman, CACM 1974).
+// The part of a polygon to the left of the line a -> b (Sutherland and Hodgman, CACM 1974).
 Polygon Clip(const Polygon& polygon, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const auto side = [&](const Eigen::Vector2d& p) { return (b - a).x() * (p - a).y() - (b - a).y() * (p - a).x(); };
   Polygon kept;
@@ -51,12 +51,12 @@ double Area(const Polygon& polygon) {
 }
 
 std::vector<YawBox> ToUpright(const files::ObjectsYaml& objects, const Eigen::Quaterniond& z_from_up,
-                              const FittedSimilarity& gt_from_est) {
+                              const Sim3<World, World>& S_gt_est) {
   std::vector<YawBox> boxes;
   for (const files::ObjectRecord& object : objects.objects) {
-    const Eigen::Matrix3d rotation = z_from_up * (gt_from_est.rotation * object.T_world_object.RotationMatrix());
-    boxes.push_back(MakeUpright(rotation, z_from_up * (gt_from_est * object.T_world_object.translation()),
-                                gt_from_est.scale * object.half_extents));
+    const SE3<World, Object> T_gt_object = S_gt_est.Moved(object.T_world_object);
+    boxes.push_back(MakeUpright((z_from_up * T_gt_object.rotation()).toRotationMatrix(),
+                                z_from_up * T_gt_object.translation(), S_gt_est.scale() * object.half_extents));
   }
   return boxes;
 }
@@ -91,16 +91,17 @@ void AddMeans(BoxesReport* report) {
   report->yaw_deg /= count;
 }
 
-absl::StatusOr<FittedSimilarity> WorldAlignment(const BoxesEvalOptions& options) {
+// The transform from the world of the predicted cuboids to that of the true ones.
+absl::StatusOr<Sim3<World, World>> WorldAlignment(const BoxesEvalOptions& options) {
   if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
-    return InvalidArgument("the estimated and the true trajectory go together; one is missing");
+    return InvalidArgument("both or neither of the estimated and the true trajectory must be given");
   }
-  if (options.estimated_trajectory.empty()) return FittedSimilarity{};
+  if (options.estimated_trajectory.empty()) return Sim3<World, World>();
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.true_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
-  return fit.gt_from_est;
+  return fit.S_gt_est;
 }
 
 }  // namespace
@@ -134,11 +135,11 @@ double IntersectionOverUnion(const YawBox& a, const YawBox& b) {
 absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(const files::ObjectsYaml predicted, files::ReadObjects(options.predicted));
   ROMAP_ASSIGN_OR_RETURN(const files::ObjectsYaml truth, files::ReadObjects(options.ground_truth));
-  if (predicted.objects.empty()) return InvalidArgument("{}: no objects in it", options.predicted);
-  if (truth.objects.empty()) return InvalidArgument("{}: no objects in it", options.ground_truth);
-  ROMAP_ASSIGN_OR_RETURN(const FittedSimilarity gt_from_est, WorldAlignment(options));
+  if (predicted.objects.empty()) return InvalidArgument("{}: the file contains no objects", options.predicted);
+  if (truth.objects.empty()) return InvalidArgument("{}: the file contains no objects", options.ground_truth);
+  ROMAP_ASSIGN_OR_RETURN(const auto S_gt_est, WorldAlignment(options));
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
-  const std::vector<YawBox> p = ToUpright(predicted, z_from_up, gt_from_est);
+  const std::vector<YawBox> p = ToUpright(predicted, z_from_up, S_gt_est);
   const std::vector<YawBox> g = ToUpright(truth, z_from_up, {});
 
   Eigen::MatrixXd distance(g.size(), p.size()), iou(g.size(), p.size());
@@ -148,10 +149,10 @@ absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
       iou(i, j) = IntersectionOverUnion(p[j], g[i]);
     }
   }
-  // A distance beyond ten diagonals is no worse than another.
+  // Distances above ten diagonals cost the same.
   const std::vector<int> match = AssignRows(distance.cwiseMin(10) - iou);
   BoxesReport report;
-  report.trajectory_scale = gt_from_est.scale;
+  report.trajectory_scale = S_gt_est.scale();
   std::vector<bool> used(p.size());
   for (size_t i = 0; i < g.size(); ++i) {
     const int j = match[i];
@@ -166,7 +167,7 @@ absl::StatusOr<BoxesReport> EvaluateBoxes(const BoxesEvalOptions& options) {
   }
   AddMeans(&report);
   if (report.matched == 0) {
-    return InvalidArgument("{}: no cuboid is near any true object (another world frame? give both trajectories)",
+    return InvalidArgument("{}: no cuboid is near a true object; if the world frames differ, give both trajectories",
                            options.predicted);
   }
   return report;

@@ -11,27 +11,27 @@
 
 namespace romap::eval {
 
-// All that can be measured of one run against the ground truth its sequence has.
+// The figures of one run against the ground truth of its sequence.
 struct RunReport {
   std::optional<ObjectsReport> objects;
   std::optional<BoxesReport> boxes;
   std::optional<TrajectoryReport> trajectory;
-  std::vector<std::string> notes;  // what was not measured, and why
+  std::vector<std::string> notes;  // figures that could not be measured, with the reason
 };
 
-// Measures what a run wrote to out_dir (objects/*.ply in world frame, cuboids.json, trajectory.txt) against gt/,
-// objects.yaml and groundtruth.txt of the sequence, without the inferred undersides. With `poses_given` the worlds are
-// the same and nothing is aligned; otherwise cuboids and meshes are moved by the Sim3 of the trajectories, and each
-// mesh then by a rigid ICP. Never fails as a whole: what cannot be measured becomes a note.
+// Compares the output of a run in out_dir (objects/*.ply in the World frame, cuboids.json, trajectory.txt) with gt/,
+// objects.yaml and groundtruth.txt of the sequence, ignoring inferred true points. With `poses_given` both worlds are
+// the same and nothing is aligned. Otherwise cuboids and meshes are transformed by the Sim3 that aligns the
+// trajectories, and each mesh is then aligned by a rigid ICP. Figures that cannot be measured are reported in `notes`.
 RunReport EvaluateRun(const std::string& out_dir, const std::string& sequence_dir, bool poses_given);
 
-// Tables for people.
+// Formats a report as text tables.
 std::string FormatTable(const ObjectsReport& report);
 std::string FormatTable(const BoxesReport& report);
 std::string FormatTable(const TrajectoryReport& report);
 std::string FormatTable(const RunReport& report);
 
-// The same for programs; absent figures are null.
+// Converts a report to JSON; absent figures are null.
 nlohmann::ordered_json ToJson(const ObjectsReport& report);
 nlohmann::ordered_json ToJson(const BoxesReport& report);
 nlohmann::ordered_json ToJson(const TrajectoryReport& report);

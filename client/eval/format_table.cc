@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kNumberWidth = 10;
 
-// A number in ten columns, `-` where there is none.
+// A number padded to the column width; `-` if absent.
 std::string Cell(std::optional<double> value) {
   if (!value) return fmt::format("{:>{}}", "-", kNumberWidth);
   return fmt::format("{:>{}.{}f}", *value, kNumberWidth, std::abs(*value) < 100 ? 4 : 2);
@@ -19,7 +19,7 @@ std::string Cell(std::optional<double> value) {
 
 std::string Cell(const std::string& text) { return fmt::format("{:>{}}", text, kNumberWidth); }
 
-// Lines of two names and some cells, printed so that the columns stand below each other.
+// Rows of two names and preformatted cells, with aligned columns.
 class Table {
  public:
   void Add(const std::string& object, const std::string& predicted, const std::string& cells) {
@@ -72,8 +72,8 @@ std::string ObjectsHead(const ObjectsReport& report) {
 std::string FormatTable(const ObjectsReport& report) {
   std::string text = fmt::format("meshes, distances in cm; per-object ICP: {}\n", ToString(report.options.alignment));
   if (!report.options.estimated_trajectory.empty()) {
-    text += fmt::format("moved by the trajectories ({}), scale {:.6f}\n", ToString(report.options.trajectory_alignment),
-                        report.trajectory_scale);
+    text += fmt::format("transformed by the alignment of the trajectories ({}), scale {:.6f}\n",
+                        ToString(report.options.trajectory_alignment), report.trajectory_scale);
   }
   Table table;
   table.Add("object", "predicted", ObjectsHead(report));
@@ -87,10 +87,10 @@ std::string FormatTable(const ObjectsReport& report) {
   table.Add("mean", CountOf(report.matched, report.rows.size()), SurfaceCells(report.mean));
   text += table.ToString();
   if (!report.extra.empty()) {
-    text += fmt::format("predicted without a true object: {}\n", fmt::join(report.extra, ", "));
+    text += fmt::format("predicted meshes without a true object: {}\n", fmt::join(report.extra, ", "));
   }
   if (report.matched == report.rows.size()) return text;
-  text += "missing objects are left out of the mean; with 0 for them the ratios are:";
+  text += "the mean excludes missing objects; counting them as 0, the ratios are:";
   for (const auto& ratio : report.mean.ratios) {
     text += fmt::format("  <{}cm {:.2f}", ratio.threshold_cm, ratio.all_percent_with_missing);
   }
@@ -100,7 +100,7 @@ std::string FormatTable(const ObjectsReport& report) {
 std::string FormatTable(const BoxesReport& report) {
   Table table;
   table.Add("object", "predicted",
-            Cell("IoU3D") + Cell("centre.cm") + Cell("yaw.deg") + Cell("tilt.deg") + "   size ratio");
+            Cell("IoU3D") + Cell("center.cm") + Cell("yaw.deg") + Cell("tilt.deg") + "   size ratio");
   for (const BoxRow& row : report.rows) {
     if (!row.match) {
       table.Add(row.object, "MISSING", Cell(0.0));
@@ -113,14 +113,15 @@ std::string FormatTable(const BoxesReport& report) {
   }
   table.Add("mean", CountOf(report.matched, report.rows.size()),
             Cell(report.iou_matched) + Cell(report.center_cm) + Cell(report.yaw_deg));
-  return fmt::format("cuboids\n{}mean IoU with missing = 0: {:.4f}; predicted without a true object: {}\n",
-                     table.ToString(), report.iou_all,
-                     report.extra.empty() ? "none" : fmt::format("{}", fmt::join(report.extra, ", ")));
+  return fmt::format(
+      "cuboids\n{}mean IoU, missing objects counted as 0: {:.4f}; predicted cuboids without a true object: {}\n",
+      table.ToString(), report.iou_all,
+      report.extra.empty() ? "none" : fmt::format("{}", fmt::join(report.extra, ", ")));
 }
 
 std::string FormatTable(const TrajectoryReport& report) {
   return fmt::format(
-      "trajectory, align {}: {} of {} poses matched (truth has {}), path {:.3f} m, scale {:.6f}\n"
+      "trajectory, alignment {}: {} of {} poses matched ({} true poses), path length {:.3f} m, scale {:.6f}\n"
       "ATE rmse {:.6f} m  mean {:.6f}  median {:.6f}  max {:.6f}\n"
       "rotation rmse {:.4f} deg  max {:.4f}\n",
       ToString(report.alignment), report.matched, report.estimated_poses, report.ground_truth_poses,

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
+#include <random>
 
-#include "client/eval/pcg64.h"
 #include "client/eval/points.h"
 #include "client/eval/seen_frames.h"
 #include "client/files/mesh_file.h"
@@ -17,25 +18,25 @@ namespace romap::eval {
 namespace {
 
 constexpr double kCmPerM = 100;
-constexpr double kMinBoxIou = 0.02;  // overlap from which two boxes may be a pair whatever their distance
-constexpr double kInferredSource = 2;
+constexpr double kMinBoxIou = 0.02;    // boxes with this overlap may be paired regardless of their distance
+constexpr double kInferredSource = 2;  // `source` of points that were inferred, not measured
 
-// A surface as points, each seen by some camera or not.
+// A surface as points, each with its visibility.
 struct Surface {
   std::string name;
   Points points;
-  std::vector<bool> seen;  // as long as points; of true surfaces
+  std::vector<bool> seen;  // whether some camera saw the point, same length as points; true surfaces only
   size_t faces = 0;
 };
 
-// Box of a surface without its outermost percent at each side, along the world's axes.
+// Axis-aligned box of a surface without the outermost percent of points on each side, which may be outliers.
 struct RobustBox {
   Eigen::Vector3d low, high;
   Eigen::Vector3d Center() const { return (low + high) / 2; }
   double Volume() const { return (high - low).prod(); }
 };
 
-// A true and a predicted surface that belong together.
+// The predicted surface that is paired with a true one.
 struct Pair {
   size_t predicted = 0;
   double center_distance_m = 0;
@@ -44,25 +45,25 @@ struct Pair {
 
 absl::Status ValidateOptions(const ObjectsEvalOptions& options) {
   if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
-    return InvalidArgument("the estimated and the true trajectory go together; one is missing");
+    return InvalidArgument("both or neither of the estimated and the true trajectory must be given");
   }
   if (options.icp_overlap < 0.1 || options.icp_overlap > 1) {
-    return InvalidArgument("icp_overlap is {}, should lie in 0.1..1", options.icp_overlap);
+    return InvalidArgument("icp_overlap is {}; expected 0.1..1", options.icp_overlap);
   }
   if (options.samples < 100 || options.icp_points < 100) {
-    return InvalidArgument("samples ({}) and icp_points ({}) should be at least 100", options.samples,
+    return InvalidArgument("samples ({}) and icp_points ({}) must be at least 100", options.samples,
                            options.icp_points);
   }
   if (options.dataset_every < 1)
-    return InvalidArgument("dataset_every is {}, should be positive", options.dataset_every);
+    return InvalidArgument("dataset_every is {}; expected a positive number", options.dataset_every);
   for (const double threshold_cm : options.thresholds_cm) {
-    if (!(threshold_cm > 0)) return InvalidArgument("threshold {} cm should be positive", threshold_cm);
+    if (!(threshold_cm > 0)) return InvalidArgument("threshold is {} cm; expected a positive number", threshold_cm);
   }
   return absl::OkStatus();
 }
 
-// Removes the points of a cloud whose `source` says that nobody measured them.
-void DropCap(const std::vector<double>& source, Surface* surface) {
+// Removes the points of a cloud that were inferred and not measured.
+void RemoveInferredPoints(const std::vector<double>& source, Surface* surface) {
   Surface kept{surface->name, {}, {}, surface->faces};
   for (size_t k = 0; k < source.size(); ++k) {
     if (source[k] == kInferredSource) continue;
@@ -85,22 +86,22 @@ absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const 
     if (surface.faces == 0 && seen != file.scalars.end()) {
       std::transform(seen->second.begin(), seen->second.end(), surface.seen.begin(), [](double s) { return s > 0; });
     }
-    if (surface.faces == 0 && no_cap && source != file.scalars.end()) DropCap(source->second, &surface);
-    if (surface.points.empty()) return InvalidArgument("{}/{}: nothing is left without the inferred cap", dir, name);
+    if (surface.faces == 0 && no_cap && source != file.scalars.end()) RemoveInferredPoints(source->second, &surface);
+    if (surface.points.empty()) return InvalidArgument("{}/{}: all points are inferred", dir, name);
     surfaces.push_back(std::move(surface));
   }
   return surfaces;
 }
 
-// Moves all predicted surfaces into the ground truth's world; returns the scale of that.
-absl::StatusOr<double> MoveByTrajectories(const ObjectsEvalOptions& options, std::vector<Surface>* predicted) {
+// Transforms all predicted surfaces to the ground-truth world by aligning the trajectories. Returns the scale.
+absl::StatusOr<double> AlignByTrajectories(const ObjectsEvalOptions& options, std::vector<Surface>* predicted) {
   if (options.estimated_trajectory.empty()) return 1.0;
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.true_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
-  for (Surface& surface : *predicted) surface.points = fit.gt_from_est * surface.points;
-  return fit.gt_from_est.scale;
+  for (Surface& surface : *predicted) surface.points = Transform(fit.S_gt_est, surface.points);
+  return fit.S_gt_est.scale();
 }
 
 RobustBox BoxOf(const Points& points) {
@@ -116,11 +117,11 @@ RobustBox BoxOf(const Points& points) {
 
 double BoxIou(const RobustBox& a, const RobustBox& b) {
   const double intersection = (a.high.cwiseMin(b.high) - a.low.cwiseMax(b.low)).cwiseMax(0).prod();
-  const double together = a.Volume() + b.Volume() - intersection;
-  return together > 0 ? intersection / together : 0;
+  const double total = a.Volume() + b.Volume() - intersection;
+  return total > 0 ? intersection / total : 0;
 }
 
-// For each true surface its predicted one, by overlap and distance of their boxes.
+// Pairs true and predicted surfaces one to one by the overlap and the distance of their boxes.
 std::vector<std::optional<Pair>> MatchSurfaces(const std::vector<Surface>& truth, const std::vector<Surface>& predicted,
                                                double match_distance) {
   std::vector<RobustBox> true_boxes, predicted_boxes;
@@ -137,7 +138,7 @@ std::vector<std::optional<Pair>> MatchSurfaces(const std::vector<Surface>& truth
   for (size_t i = 0; i < truth.size(); ++i) {
     relative.row(i) /= std::max((true_boxes[i].high - true_boxes[i].low).norm(), 1e-9);
   }
-  // A distance beyond ten diagonals is no worse than another; overlap counts double.
+  // Distances above ten diagonals cost the same; overlap has twice the weight.
   const std::vector<int> match = AssignRows(relative.cwiseMin(10) - 2 * iou);
   std::vector<std::optional<Pair>> pairs(truth.size());
   for (size_t i = 0; i < truth.size(); ++i) {
@@ -148,9 +149,11 @@ std::vector<std::optional<Pair>> MatchSurfaces(const std::vector<Surface>& truth
   return pairs;
 }
 
-Points Subset(const Points& points, size_t count, Pcg64* random) {
-  if (points.size() <= count) return points;
-  return Take(points, random->Choose(static_cast<uint32_t>(points.size()), static_cast<uint32_t>(count)));
+// A random subset of up to `count` points.
+Points Subset(const Points& points, size_t count, std::mt19937_64* random) {
+  Points subset;
+  std::sample(points.begin(), points.end(), std::back_inserter(subset), count, *random);
+  return subset;
 }
 
 Points SeenPoints(const Surface& surface) {
@@ -161,28 +164,29 @@ Points SeenPoints(const Surface& surface) {
   return seen;
 }
 
-// Moves the predicted points onto the true ones by ICP.
-IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, Pcg64* random, Points* predicted) {
+// Aligns the predicted points with the true ones by ICP.
+IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, std::mt19937_64* random,
+                      Points* predicted) {
   const Points source = Subset(*predicted, options.icp_points, random);
   Points symmetric_target;
   if (options.icp == IcpKind::kSymmetric) symmetric_target = Subset(SeenPoints(truth), options.icp_points, random);
   const auto fit = Icp(source, truth.points, symmetric_target,
                        {.with_scale = options.alignment == Alignment::kSim3, .overlap = options.icp_overlap});
   if (!fit) return {.failed = true};
-  *predicted = fit->target_from_source * *predicted;
+  *predicted = Transform(fit->S_target_source, *predicted);
   return {.failed = false,
-          .scale = fit->target_from_source.scale,
-          .rotation_deg = fit->target_from_source.RotationAngle_rad() * 180 / std::numbers::pi,
+          .scale = fit->S_target_source.scale(),
+          .rotation_deg = Eigen::AngleAxisd(fit->S_target_source.rotation()).angle() * 180 / std::numbers::pi,
           .rms_cm = kCmPerM * fit->rms,
           .iterations = fit->iterations};
 }
 
-// Mean of the values whose flag is set, in cm; nullopt when there is none.
-std::optional<double> MeanOf(const std::vector<double>& values_m, const std::vector<bool>& chosen) {
+// Mean of the selected values [cm]; nullopt if none is selected.
+std::optional<double> MeanOf(const std::vector<double>& values_m, const std::vector<bool>& selected) {
   double sum = 0;
   size_t count = 0;
   for (size_t k = 0; k < values_m.size(); ++k) {
-    if (!chosen[k]) continue;
+    if (!selected[k]) continue;
     sum += values_m[k];
     ++count;
   }
@@ -193,12 +197,12 @@ double Share(const std::vector<bool>& flags) {
   return static_cast<double>(std::count(flags.begin(), flags.end(), true)) / static_cast<double>(flags.size());
 }
 
-// Share of the chosen values below the threshold, in percent; nullopt when none is chosen.
-std::optional<double> PercentBelow(const std::vector<double>& values_m, const std::vector<bool>& chosen,
+// Percentage of the selected values below the threshold; nullopt if none is selected.
+std::optional<double> PercentBelow(const std::vector<double>& values_m, const std::vector<bool>& selected,
                                    double threshold_cm) {
   size_t below = 0, count = 0;
   for (size_t k = 0; k < values_m.size(); ++k) {
-    if (!chosen[k]) continue;
+    if (!selected[k]) continue;
     ++count;
     if (kCmPerM * values_m[k] < threshold_cm) ++below;
   }
@@ -206,21 +210,26 @@ std::optional<double> PercentBelow(const std::vector<double>& values_m, const st
   return 100 * static_cast<double>(below) / static_cast<double>(count);
 }
 
-// What of `truth` Completion is measured on: all of it, or a random subset when it is much finer than the prediction.
-Surface CompletionPoints(const Surface& truth, size_t predicted_faces, size_t samples, Pcg64* random) {
+// The points of `truth` that completion is measured on: all of them, or a random subset of `samples` points if there
+// are more and the prediction is a mesh.
+Surface CompletionPoints(const Surface& truth, size_t predicted_faces, size_t samples, std::mt19937_64* random) {
   if (truth.points.size() <= samples || predicted_faces == 0) return truth;
   Surface subset{truth.name, {}, {}, truth.faces};
-  for (const uint32_t k : random->Choose(static_cast<uint32_t>(truth.points.size()), static_cast<uint32_t>(samples))) {
+  std::vector<size_t> indices(truth.points.size()), chosen;
+  std::iota(indices.begin(), indices.end(), size_t{0});
+  std::sample(indices.begin(), indices.end(), std::back_inserter(chosen), samples, *random);
+  for (const size_t k : chosen) {
     subset.points.push_back(truth.points[k]);
     subset.seen.push_back(truth.seen[k]);
   }
   return subset;
 }
 
-// Distances both ways. `predicted` must have been aligned; `frames` and `label` may say more about what was seen.
+// Measures the distances in both directions. `predicted` must be aligned. `frames` (may be null) marks further points
+// of the object with the given mask label as seen.
 void Measure(const Surface& truth, const Points& predicted, const SeenFrames* frames, int64_t label,
-             const ObjectsEvalOptions& options, Pcg64* random, ObjectMatch* match) {
-  const Neighbours to_truth = NearestIndex(truth.points).Query(predicted);
+             const ObjectsEvalOptions& options, std::mt19937_64* random, ObjectMatch* match) {
+  const Neighbors to_truth = NearestIndex(truth.points).Query(predicted);
   std::vector<bool> seen(predicted.size());
   for (size_t k = 0; k < seen.size(); ++k) seen[k] = truth.seen[to_truth.index[k]];
   if (frames != nullptr) {
@@ -228,7 +237,7 @@ void Measure(const Surface& truth, const Points& predicted, const SeenFrames* fr
     for (size_t k = 0; k < seen.size(); ++k) seen[k] = seen[k] || in_frames[k];
   }
   const Surface target = CompletionPoints(truth, match->faces, options.samples, random);
-  const Neighbours to_predicted = NearestIndex(predicted).Query(target.points);
+  const Neighbors to_predicted = NearestIndex(predicted).Query(target.points);
   const std::vector<bool> all_predicted(predicted.size(), true), all_target(target.points.size(), true);
   SurfaceFigures& figures = match->figures;
   figures.accuracy_cm = *MeanOf(to_truth.distance, all_predicted);
@@ -243,7 +252,7 @@ void Measure(const Surface& truth, const Points& predicted, const SeenFrames* fr
   match->true_seen_share = Share(target.seen);
 }
 
-// Mean of what `get` finds in the matched rows, over those that have it.
+// Mean of an optional figure over the matched rows that have it.
 template <class Get>
 std::optional<double> MeanOverRows(const std::vector<ObjectRow>& rows, Get get) {
   double sum = 0;
@@ -282,27 +291,26 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
   ObjectsEvalOptions options = given;
   std::sort(options.thresholds_cm.begin(), options.thresholds_cm.end());
   ROMAP_RETURN_IF_ERROR(ValidateOptions(options));
-  // Another seed for the truth: samples in common would flatter a mesh compared with itself.
+  // Different seeds: with the same samples a mesh compared with itself would have zero error.
   ROMAP_ASSIGN_OR_RETURN(const std::vector<Surface> truth,
                          LoadSurfaces(options.ground_truth_dir, options, options.seed + 1, options.no_cap));
   ROMAP_ASSIGN_OR_RETURN(std::vector<Surface> predicted,
                          LoadSurfaces(options.predicted_dir, options, options.seed, /*no_cap=*/false));
   ObjectsReport report;
   report.options = options;
-  ROMAP_ASSIGN_OR_RETURN(report.trajectory_scale, MoveByTrajectories(options, &predicted));
+  ROMAP_ASSIGN_OR_RETURN(report.trajectory_scale, AlignByTrajectories(options, &predicted));
   std::optional<SeenFrames> frames;
   if (!options.dataset_dir.empty()) {
     ROMAP_ASSIGN_OR_RETURN(frames, SeenFrames::Load(options.dataset_dir, options.dataset_every));
   }
   const std::vector<std::optional<Pair>> pairs = MatchSurfaces(truth, predicted, options.match_distance);
-  Pcg64 random(options.seed);
+  std::mt19937_64 random(options.seed);
   std::vector<bool> used(predicted.size());
   for (size_t i = 0; i < truth.size(); ++i) {
     report.rows.push_back({truth[i].name, std::nullopt});
     if (!pairs[i]) continue;
     const std::optional<int64_t> label = frames ? frames->LabelOf(truth[i].name) : 0;
-    if (!label)
-      return InvalidArgument("{}: its objects.yaml has no object named {}", options.dataset_dir, truth[i].name);
+    if (!label) return InvalidArgument("{}/objects.yaml: no object named {}", options.dataset_dir, truth[i].name);
     Surface& surface = predicted[pairs[i]->predicted];
     ObjectMatch match;
     match.predicted = surface.name;
@@ -319,7 +327,7 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
     if (!used[j]) report.extra.push_back(predicted[j].name);
   }
   if (report.matched == 0) {
-    return InvalidArgument("{}: no mesh overlaps a true object (another world frame? give both trajectories)",
+    return InvalidArgument("{}: no mesh overlaps a true object; if the world frames differ, give both trajectories",
                            options.predicted_dir);
   }
   AddMeans(&report);

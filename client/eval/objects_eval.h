@@ -11,32 +11,33 @@
 
 namespace romap::eval {
 
-// Which correspondences per-object ICP uses: those of the predicted points (as CloudCompare does), or also those of the
-// true points that were seen.
+// The correspondences of per-object ICP: from predicted to true points (as in CloudCompare), or also from the seen true
+// points to predicted ones.
 enum class IcpKind { kOneSided, kSymmetric };
 
 struct ObjectsEvalOptions {
-  std::string predicted_dir;  // meshes (.ply, .obj), any names
-  std::string
-      ground_truth_dir;  // true surfaces; clouds may say per vertex `seen` (0, 1) and `source` (2 = inferred cap)
+  std::string predicted_dir;  // meshes (.ply, .obj) with any names
+  // True surfaces. Point clouds may have the vertex properties `seen` (0 or 1) and `source` (2 = inferred, not
+  // measured).
+  std::string ground_truth_dir;
   Alignment alignment = Alignment::kSim3;  // per-object ICP
   std::vector<double> thresholds_cm{0.4, 1.0};
-  // Both or neither: the meshes are first moved by the alignment of the two trajectories.
+  // Give both or neither. If given, the meshes are first transformed by the alignment of the two trajectories.
   std::string estimated_trajectory;
   std::string true_trajectory;
   Alignment trajectory_alignment = Alignment::kSim3;
   double max_dt_s = 0.02;
-  // Sequence with masks (labels are ids of its objects.yaml), depth and poses: a predicted point also counts as seen
-  // when it lies in its object's mask and at most 2 cm behind the true depth in some frame. Empty: not used.
+  // A sequence with masks (labels are the ids of its objects.yaml), depth and poses. If given, a predicted point also
+  // counts as seen if in some frame it is in the mask of its object and at most 2 cm behind the true depth.
   std::string dataset_dir;
-  int dataset_every = 4;  // use every n-th masked frame of it
+  int dataset_every = 4;  // use every n-th frame with a mask
   size_t samples = 100'000;
   uint32_t seed = 0;
-  double match_distance = 0.5;  // largest centre distance of a pair without overlap, in true diagonals
+  double match_distance = 0.5;  // maximal center distance of a pair without overlap, in diagonals of the true box
   IcpKind icp = IcpKind::kOneSided;
-  double icp_overlap = 1;  // share of the closest predicted points that count in ICP, 0.1..1
+  double icp_overlap = 1;  // share of predicted points that ICP uses, those with the closest targets; 0.1..1
   size_t icp_points = 20'000;
-  bool no_cap = false;  // leave out true points with source = 2
+  bool no_cap = false;  // ignore true points with source = 2
 };
 
 struct Ratio {
@@ -45,18 +46,18 @@ struct Ratio {
   std::optional<double> seen_percent;
 };
 
-// Distances between surfaces sampled as points, and what share of the truth was found. "Seen" columns take only the
-// part of the surface that the cameras saw; nullopt where nothing was seen.
+// Distances between sampled surfaces, and the share of the true surface that was reconstructed. The "seen" figures
+// consider only the part that the cameras saw; nullopt if there is none.
 struct SurfaceFigures {
   double accuracy_cm = 0;  // mean distance from predicted points to the nearest true one
   std::optional<double> accuracy_seen_cm;
   double completion_cm = 0;  // mean distance from true points to the nearest predicted one
   std::optional<double> completion_seen_cm;
-  std::vector<Ratio> ratios;  // share of the true points nearer than a threshold
+  std::vector<Ratio> ratios;  // completion ratio: percentage of true points closer than a threshold
 };
 
 struct IcpFigures {
-  bool failed = false;  // the scale ran away; measured without ICP
+  bool failed = false;  // the scale diverged; the object is measured without ICP
   double scale = 1;
   double rotation_deg = 0;
   double rms_cm = 0;
@@ -68,39 +69,39 @@ struct ObjectMatch {
   double center_distance_cm = 0;  // of the boxes, before ICP
   double box_iou = 0;             // of the axis-aligned boxes, before ICP
   size_t faces = 0;
-  double predicted_seen_share = 0;  // of the predicted points
-  double true_seen_share = 0;       // of the true points
+  double predicted_seen_share = 0;  // share of the predicted points that were seen
+  double true_seen_share = 0;       // share of the true points that were seen
   std::optional<IcpFigures> icp;
   SurfaceFigures figures;
 };
 
 struct ObjectRow {
   std::string object;
-  std::optional<ObjectMatch> match;  // none: no predicted mesh overlaps
+  std::optional<ObjectMatch> match;  // absent if no predicted mesh overlaps
 };
 
 struct ObjectsReport {
   std::vector<ObjectRow> rows;  // one per true object
   size_t matched = 0;
-  // Means over matched objects, each figure over those that have it.
+  // Means over the matched objects that have the figure.
   struct Mean {
     std::optional<double> accuracy_cm, accuracy_seen_cm, completion_cm, completion_seen_cm;
     struct MeanRatio {
       double threshold_cm = 0;
       std::optional<double> all_percent, seen_percent;
-      double all_percent_with_missing = 0;  // missing objects count 0
+      double all_percent_with_missing = 0;  // missing objects count as 0
     };
     std::vector<MeanRatio> ratios;
   } mean;
-  std::vector<std::string> extra;  // predicted without a true object
+  std::vector<std::string> extra;  // predicted meshes without a true object
   double trajectory_scale = 1;
-  ObjectsEvalOptions options;  // that gave these figures
+  ObjectsEvalOptions options;  // as used
 };
 
-// Accuracy, Completion and Completion Ratio of object meshes against true surfaces, paired one to one by overlap.
-// Lengths are metres in the files and centimetres in the report. Two samplings of the same surface of area A are about
-// 0.5 sqrt(A / samples) apart, not 0. NOT_FOUND / INVALID_ARGUMENT: files missing or malformed, options out of range,
-// or no predicted mesh is near any true object (another world frame?).
+// Pairs object meshes one to one with true surfaces and measures accuracy, completion and completion ratio. Lengths are
+// meters in the files and centimeters in the report. Sampling sets a noise floor: two samplings of the same surface of
+// area A are about 0.5 sqrt(A / samples) apart. INVALID_ARGUMENT: options out of range, or no predicted mesh near a
+// true object (e.g. different world frames). Otherwise as ReadMeshFolder, ReadTum and Sequence::Open.
 absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& options);
 
 }  // namespace romap::eval

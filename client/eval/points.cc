@@ -8,8 +8,7 @@
 #include <cmath>
 #include <nanoflann.hpp>
 #include <numeric>
-
-#include "client/eval/pcg64.h"
+#include <random>
 
 namespace romap::eval {
 namespace {
@@ -20,7 +19,7 @@ std::array<Eigen::Vector3d, 3> Corners(const Mesh& mesh, size_t triangle) {
           mesh.vertices[index[2]].cast<double>()};
 }
 
-// Area of all triangles up to and including each.
+// Prefix sums of the triangle areas.
 std::vector<double> CumulativeAreas(const Mesh& mesh) {
   std::vector<double> areas(mesh.triangles.size());
   for (size_t k = 0; k < areas.size(); ++k) {
@@ -41,41 +40,29 @@ absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t se
   }
   const std::vector<double> areas = CumulativeAreas(mesh);
   if (!(areas.back() > 0)) return InvalidArgument("{}: the mesh has no area", name);
-  Pcg64 random(seed);
-  const auto draw = [&] {
-    std::vector<double> numbers(count);
-    std::generate(numbers.begin(), numbers.end(), [&] { return random.NextUniform(); });
-    return numbers;
-  };
-  const std::vector<double> area = draw(), across = draw(), along = draw();
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
   points.reserve(count);
   for (size_t k = 0; k < count; ++k) {
-    const auto found = std::lower_bound(areas.begin(), areas.end(), area[k] * areas.back());
+    const auto found = std::lower_bound(areas.begin(), areas.end(), uniform(random) * areas.back());
     const auto [a, b, c] = Corners(mesh, std::min<size_t>(found - areas.begin(), areas.size() - 1));
-    const double r1 = std::sqrt(across[k]);  // makes the density even instead of dense around corner a
-    const double r2 = along[k];
+    const double r1 = std::sqrt(uniform(random));  // the square root makes the density uniform over the triangle
+    const double r2 = uniform(random);
     points.push_back((1 - r1) * a + r1 * (1 - r2) * b + r1 * r2 * c);
   }
   return points;
-}
-
-Points Take(const Points& points, const std::vector<uint32_t>& indices) {
-  Points taken;
-  taken.reserve(indices.size());
-  for (const uint32_t index : indices) taken.push_back(points[index]);
-  return taken;
 }
 
 struct NearestIndex::Tree {
   explicit Tree(const Points& points)
       : points(points), index(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(/*leaf_max_size=*/12)) {}
 
-  // What nanoflann asks of a data set.
+  // The data set interface of nanoflann.
   size_t kdtree_get_point_count() const { return points.size(); }
   double kdtree_get_pt(size_t k, size_t axis) const { return points[k][static_cast<Eigen::Index>(axis)]; }
   template <class Box>
   bool kdtree_get_bbox(Box&) const {
-    return false;  // nanoflann computes it
+    return false;  // let nanoflann compute it
   }
 
   const Points& points;
@@ -86,9 +73,9 @@ NearestIndex::NearestIndex(const Points& points) : tree_(std::make_unique<Tree>(
 NearestIndex::~NearestIndex() = default;
 NearestIndex::NearestIndex(NearestIndex&&) noexcept = default;
 
-Neighbours NearestIndex::Query(const Points& queries) const {
-  Neighbours result{std::vector<uint32_t>(queries.size()), std::vector<double>(queries.size())};
-  constexpr size_t kGrain = 512;  // queries worth a task of their own
+Neighbors NearestIndex::Query(const Points& queries) const {
+  Neighbors result{std::vector<uint32_t>(queries.size()), std::vector<double>(queries.size())};
+  constexpr size_t kGrain = 512;  // queries per task
   tbb::parallel_for(tbb::blocked_range<size_t>(0, queries.size(), kGrain),
                     [&](const tbb::blocked_range<size_t>& range) {
                       for (size_t k = range.begin(); k < range.end(); ++k) {

@@ -13,20 +13,18 @@ namespace romap::eval {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-// `count` points on the triangles of a mesh, uniform over its area; a mesh without triangles is a point cloud and gives
-// all its vertices. The same seed gives the same points. INVALID_ARGUMENT naming `name`: the mesh has no area.
+// Samples `count` points on the triangles of a mesh, uniformly by area and reproducibly for a seed. Returns all
+// vertices of a mesh without triangles (a point cloud). INVALID_ARGUMENT if the mesh has no area; `name` prefixes the
+// message.
 absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t seed, const std::string& name);
 
-// Points at the given positions of `points`.
-Points Take(const Points& points, const std::vector<uint32_t>& indices);
-
-// For each query point its nearest neighbour among the points of an index.
-struct Neighbours {
-  std::vector<uint32_t> index;
+// The nearest neighbors of a list of query points.
+struct Neighbors {
+  std::vector<uint32_t> index;   // into the points of the index
   std::vector<double> distance;  // in the unit of the points
 };
 
-// Nearest-neighbour search in a fixed set of points (k-d tree). Safe to share between threads.
+// Nearest-neighbor search in a fixed set of points (k-d tree). Thread-safe.
 class NearestIndex {
  public:
   // `points` must not be empty and must outlive the index.
@@ -34,8 +32,8 @@ class NearestIndex {
   ~NearestIndex();
   NearestIndex(NearestIndex&&) noexcept;
 
-  // Runs on all threads of the calling task arena.
-  Neighbours Query(const Points& queries) const;
+  // Runs in parallel on the calling task arena.
+  Neighbors Query(const Points& queries) const;
 
  private:
   struct Tree;

@@ -14,15 +14,15 @@ bool Exists(const std::string& path) {
   return fs::exists(path, error);
 }
 
-// First of the files that is not there; nullopt when all are.
+// The first path that does not exist; nullopt if all exist.
 std::optional<std::string> FirstMissing(const std::vector<std::string>& paths) {
   const auto missing = std::find_if_not(paths.begin(), paths.end(), Exists);
   return missing == paths.end() ? std::nullopt : std::optional(*missing);
 }
 
-// Whether the masks of a sequence can say what was seen of an object: there are masks, depth and poses, labels are ids
-// (no detections of a frame-by-frame detector), and every true surface bears the name of an object.
-bool MasksTellWhatWasSeen(const std::string& sequence_dir) {
+// Whether SeenFrames can determine the visible surface: the sequence has masks, depth and poses, labels are object ids
+// (there is no detections file), and every true surface is named after an object.
+bool CanDetermineVisibility(const std::string& sequence_dir) {
   if (FirstMissing({sequence_dir + "/mask.txt", sequence_dir + "/depth.txt", sequence_dir + "/groundtruth.txt",
                     sequence_dir + "/objects.yaml"}) ||
       Exists(sequence_dir + "/detections.csv")) {
@@ -41,12 +41,12 @@ bool MasksTellWhatWasSeen(const std::string& sequence_dir) {
   return true;
 }
 
-// Puts a result into the report, or a note why there is none.
+// Stores the result of `evaluate` in `target`, or adds a note with the reason why there is none.
 template <class Report, class Evaluate>
 void Add(const std::string& what, const std::vector<std::string>& needed, Evaluate evaluate,
          std::optional<Report>* target, std::vector<std::string>* notes) {
   if (const auto missing = FirstMissing(needed)) {
-    notes->push_back(fmt::format("{} not measured: there is no {}", what, *missing));
+    notes->push_back(fmt::format("{} not measured: {} does not exist", what, *missing));
     return;
   }
   absl::StatusOr<Report> report = evaluate();
@@ -66,7 +66,7 @@ RunReport EvaluateRun(const std::string& out_dir, const std::string& sequence_di
   objects.predicted_dir = out_dir + "/objects";
   objects.ground_truth_dir = sequence_dir + "/gt";
   objects.alignment = poses_given ? Alignment::kNone : Alignment::kSe3;
-  objects.dataset_dir = MasksTellWhatWasSeen(sequence_dir) ? sequence_dir : "";
+  objects.dataset_dir = CanDetermineVisibility(sequence_dir) ? sequence_dir : "";
   objects.no_cap = true;
   BoxesEvalOptions boxes;
   boxes.predicted = out_dir + "/cuboids.json";

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMaxBehind_m = 0.02;
 
-// One channel of 8 or 16 bit as it is in the file; empty when it is something else.
+// Decodes an 8-bit or 16-bit single-channel PNG; empty if it is anything else.
 cv::Mat DecodePng(std::string bytes) {
   try {
     cv::Mat image =
@@ -32,7 +32,8 @@ int ValueAt(const cv::Mat& image, int u_px, int v_px) {
 absl::StatusOr<SeenFrames> SeenFrames::Load(const std::string& sequence_dir, int every) {
   ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
                          files::Sequence::Open(sequence_dir, {.detections = "", .use_depth = true}));
-  if (!sequence.objects()) return NotFound("{}: no objects.yaml there, which says whose label is whose", sequence_dir);
+  if (!sequence.objects())
+    return FailedPrecondition("{}: objects.yaml is missing; it assigns mask labels to objects", sequence_dir);
   SeenFrames frames;
   frames.camera_ = sequence.camera();
   frames.depth_scale_m_ = sequence.depth_scale();
@@ -45,12 +46,12 @@ absl::StatusOr<SeenFrames> SeenFrames::Load(const std::string& sequence_dir, int
     View view{frame.T_world_camera->Inverse(), DecodePng(frame.label_png), DecodePng(frame.depth)};
     const cv::Size size(frames.camera_.width_px, frames.camera_.height_px);
     if (view.labels.size() != size || view.depth.size() != size) {
-      return InvalidArgument("{}: mask or depth at {:.6f} s is not a one-channel PNG of {} x {}", sequence_dir,
-                             static_cast<double>(frame.timestamp_ns) * 1e-9, size.width, size.height);
+      return InvalidArgument("{}: mask or depth at {:.6f} s is not a single-channel PNG of {} x {} pixels",
+                             sequence_dir, static_cast<double>(frame.timestamp_ns) * 1e-9, size.width, size.height);
     }
     frames.views_.push_back(std::move(view));
   }
-  if (frames.views_.empty()) return NotFound("{}: no frame has mask, depth and pose", sequence_dir);
+  if (frames.views_.empty()) return FailedPrecondition("{}: no frame has a mask, depth and a pose", sequence_dir);
   return frames;
 }
 
@@ -72,7 +73,7 @@ bool SeenFrames::SeenIn(const View& view, const Eigen::Vector3d& p_world, int64_
 }
 
 std::vector<bool> SeenFrames::Seen(const Points& points, int64_t label) const {
-  std::vector<char> seen(points.size());  // char: neighbouring bits of vector<bool> share a byte between threads
+  std::vector<char> seen(points.size());  // not vector<bool>: its elements share bytes, which would be a data race
   tbb::parallel_for(size_t{0}, points.size(), [&](size_t k) {
     for (const View& view : views_) {
       if (SeenIn(view, points[k], label)) {

@@ -14,24 +14,25 @@
 
 namespace romap::eval {
 
-// Frames of a sequence with true masks, depths and poses, which tell what part of an object some camera saw.
+// The frames of a sequence with true masks, depth and poses. Determines which part of an object was visible.
 class SeenFrames {
  public:
-  // Every n-th frame that has a mask; of those the ones with depth and pose. NOT_FOUND / INVALID_ARGUMENT when the
-  // sequence lacks one of these altogether.
+  // Loads every n-th frame with a mask, if it also has depth and a pose. FAILED_PRECONDITION if there is no such frame
+  // or no objects.yaml. Otherwise as Sequence::Open and Load.
   static absl::StatusOr<SeenFrames> Load(const std::string& sequence_dir, int every);
 
-  // Label of the object of that name in the masks; nullopt when objects.yaml has no such name.
+  // The mask label of the object with this name; nullopt if objects.yaml has no such object.
   std::optional<int64_t> LabelOf(const std::string& object_name) const;
 
-  // For each point [m, world]: whether some frame has it in the mask of `label` and at most 2 cm behind the true depth.
+  // For each point [World, m]: whether in some frame it is in the mask of `label` and at most 2 cm behind the true
+  // depth.
   std::vector<bool> Seen(const Points& points, int64_t label) const;
 
  private:
   struct View {
     SE3<Camera, World> T_camera_world;
     cv::Mat labels;  // CV_8UC1 or CV_16UC1
-    cv::Mat depth;   // the same, in units of depth_scale_m_
+    cv::Mat depth;   // CV_8UC1 or CV_16UC1, in units of depth_scale_m_
   };
 
   bool SeenIn(const View& view, const Eigen::Vector3d& p_world, int64_t label) const;

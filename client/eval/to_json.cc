@@ -9,7 +9,7 @@ using Json = nlohmann::ordered_json;
 
 Json OrNull(std::optional<double> value) { return value ? Json(*value) : Json(nullptr); }
 
-// The columns that a row and the mean have in common.
+// The figures that a row and the mean have in common.
 template <class Figures>
 void AddSurface(const Figures& figures, Json* json) {
   (*json)["acc_cm"] = OrNull(figures.accuracy_cm);
@@ -78,7 +78,7 @@ Json ToJson(const BoxesReport& report) {
     if (row.match) {
       entry["predicted"] = row.match->predicted;
       entry["iou"] = row.match->iou;
-      entry["centre_cm"] = row.match->center_cm;
+      entry["center_cm"] = row.match->center_cm;
       entry["yaw_deg"] = row.match->yaw_deg;
       entry["tilt_deg"] = row.match->tilt_deg;
       entry["size_ratio"] = row.match->size_ratio;
@@ -87,7 +87,7 @@ Json ToJson(const BoxesReport& report) {
   }
   json["mean"] = {{"iou_all_gt", report.iou_all},
                   {"iou_matched", report.iou_matched},
-                  {"centre_cm", report.center_cm},
+                  {"center_cm", report.center_cm},
                   {"yaw_deg", report.yaw_deg}};
   json["extra"] = report.extra;
   json["traj_scale"] = report.trajectory_scale;

@@ -34,17 +34,16 @@ absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions&
                           .estimated_poses = estimated.size(),
                           .ground_truth_poses = truth.size(),
                           .matched = fit.pairs.size(),
-                          .scale = fit.gt_from_est.scale};
-  const Eigen::Quaterniond rotation(fit.gt_from_est.rotation);
+                          .scale = fit.S_gt_est.scale()};
   std::vector<double> errors_m, angles_deg;
   for (size_t k = 0; k < fit.pairs.size(); ++k) {
-    const SE3<World, Camera>& is = estimated[fit.pairs[k].first].T_world_camera;
-    const SE3<World, Camera>& should = truth[fit.pairs[k].second].T_world_camera;
-    errors_m.push_back((fit.gt_from_est * is.translation() - should.translation()).norm());
-    angles_deg.push_back(should.rotation().angularDistance(rotation * is.rotation()) * kDegPerRad);
+    const SE3<World, Camera> T_gt_camera = fit.S_gt_est.Moved(estimated[fit.pairs[k].first].T_world_camera);
+    const SE3<World, Camera>& T_gt_true = truth[fit.pairs[k].second].T_world_camera;
+    errors_m.push_back((T_gt_camera.translation() - T_gt_true.translation()).norm());
+    angles_deg.push_back(T_gt_true.rotation().angularDistance(T_gt_camera.rotation()) * kDegPerRad);
     if (k == 0) continue;
-    const SE3<World, Camera>& before = truth[fit.pairs[k - 1].second].T_world_camera;
-    report.path_length_m += (should.translation() - before.translation()).norm();
+    const SE3<World, Camera>& T_gt_previous = truth[fit.pairs[k - 1].second].T_world_camera;
+    report.path_length_m += (T_gt_true.translation() - T_gt_previous.translation()).norm();
   }
   report.ate_rmse_m = RootMeanSquare(errors_m);
   report.ate_mean_m = Mean(errors_m);

@@ -12,17 +12,17 @@ struct TrajectoryEvalOptions {
   std::string estimated;     // TUM file
   std::string ground_truth;  // TUM file
   Alignment alignment = Alignment::kSim3;
-  double max_dt_s = 0.02;  // association window
+  double max_dt_s = 0.02;  // maximal time difference of associated poses
   double offset_s = 0;     // added to the estimated timestamps
 };
 
-// Absolute trajectory error (Sturm et al., IROS 2012). Lengths in the ground truth's unit, metres.
+// Absolute trajectory error (Sturm et al., IROS 2012). Lengths are in the unit of the ground truth, meters.
 struct TrajectoryReport {
   Alignment alignment = Alignment::kSim3;
   size_t estimated_poses = 0;
   size_t ground_truth_poses = 0;
   size_t matched = 0;
-  double scale = 1;  // estimated to true
+  double scale = 1;  // from estimated to true lengths
   double path_length_m = 0;
   double ate_rmse_m = 0;
   double ate_mean_m = 0;
@@ -32,7 +32,7 @@ struct TrajectoryReport {
   double rotation_max_deg = 0;
 };
 
-// NOT_FOUND / INVALID_ARGUMENT as ReadTum and AlignTrajectories.
+// Compares two trajectory files. Errors as ReadTum and AlignTrajectories.
 absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options);
 
 }  // namespace romap::eval

@@ -8,8 +8,9 @@
 
 namespace romap::files {
 
-// Pairs (i, j) of the timestamps a[i] and b[j] that lie at most max_dt_ns apart, one to one, closest pairs first;
-// returned by rising i. `a` and `b` must be sorted. With both at about the same rate this is O((n + m) log(n + m)).
+// Greedy one-to-one association of two sorted lists of timestamps [ns]: takes the closest pairs first, up to a distance
+// of max_dt_ns. Returns pairs (i, j) of indices into `a` and `b` in ascending order of i. O((n + m) log(n + m)) for
+// lists of similar rate.
 std::vector<std::pair<size_t, size_t>> AssociateTimestamps(std::span<const int64_t> a, std::span<const int64_t> b,
                                                            int64_t max_dt_ns);
 

@@ -13,14 +13,15 @@ absl::Status ReadOptionalNumber(const YAML::Node& root, const std::string& key, 
                                 double* value) {
   if (!root[key]) return absl::OkStatus();
   ROMAP_ASSIGN_OR_RETURN(*value, YamlNumber(root, key, path));
-  if (*value <= 0) return InvalidArgument("{}: '{}' is {}, should be positive", path, key, *value);
+  if (*value <= 0) return InvalidArgument("{}: '{}' is {}; expected a positive number", path, key, *value);
   return absl::OkStatus();
 }
 
+// Reads an image side [px].
 absl::Status ReadSide(const YAML::Node& root, const std::string& key, const std::string& path, int* side_px) {
   ROMAP_ASSIGN_OR_RETURN(const double number, YamlNumber(root, key, path));
   if (number < 1 || number > 1e6 || number != static_cast<int>(number)) {
-    return InvalidArgument("{}: '{}' is {}, should be a whole number of pixels", path, key, number);
+    return InvalidArgument("{}: '{}' is {}; expected a positive integer [px]", path, key, number);
   }
   *side_px = static_cast<int>(number);
   return absl::OkStatus();
@@ -42,7 +43,7 @@ absl::Status ReadLens(const YAML::Node& root, const std::string& path, CameraMod
   const auto* known = std::find_if(std::begin(kLensNames), std::end(kLensNames),
                                    [&](const LensName& candidate) { return text == candidate.name; });
   if (known == std::end(kLensNames)) {
-    return InvalidArgument("{}:{}: 'lens' is '{}', should be {} or {}", path, node.Mark().line + 1, text,
+    return InvalidArgument("{}:{}: 'lens' is '{}'; expected {} or {}", path, node.Mark().line + 1, text,
                            kLensNames[0].name, kLensNames[1].name);
   }
   camera->lens = known->lens;
@@ -78,7 +79,7 @@ absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& value) {
   const CameraModel& camera = value.camera;
   const LensName& lens = NameOf(camera.lens);
   std::string text = fmt::format(
-      "# the integer pixel (u, v) is the pixel centre\n"
+      "# pixel centers are at integer coordinates\n"
       "width: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\nlens: {}\ndistortion: [{}]  # {}\nfps: {}\n",
       camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, lens.name,
       fmt::join(camera.distortion.begin(), camera.distortion.begin() + CoefficientCount(camera.lens), ", "),

@@ -7,13 +7,14 @@
 
 namespace romap::files {
 
-// A mesh as one binary glTF 2.0 file (Khronos 2021) that any viewer opens. Positions stay as they are; a node rotation
-// turns our z up into glTF's y up. Colours become linear, as glTF wants them (normalised 16 bit, since 8 linear bits
-// show bands). A mesh without triangles becomes points. INVALID_ARGUMENT: a mesh that is not whole (see ValidateMesh),
-// normals or colours of another length.
-absl::StatusOr<std::string> EncodeGlb(const Mesh& mesh, const std::string& name);
-
-// EncodeGlb to a file.
-absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const std::string& name = "object");
+// Writes a mesh as one binary glTF 2.0 file (GLB).
+//
+// Vertices are stored unchanged. A node rotation turns the mesh's z-up frame into glTF's y-up frame. Colors are
+// converted to linear space, as glTF requires, and stored as normalized 16-bit values (8 linear bits show banding). A
+// mesh without triangles is written as a point cloud.
+//
+// INVALID_ARGUMENT: an invalid mesh (see ValidateMesh), a number of normals or colors other than 0 or the number of
+// vertices, or more than 4 GiB of data. Otherwise as WriteFile.
+absl::Status WriteGlb(const std::string& path, const Mesh& mesh);
 
 }  // namespace romap::files

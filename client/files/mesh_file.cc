@@ -6,6 +6,7 @@
 
 #include "client/files/obj.h"
 #include "client/files/ply.h"
+#include "common/file_status.h"
 
 namespace romap::files {
 namespace {
@@ -22,7 +23,7 @@ std::string LowerExtension(const std::filesystem::path& path) {
 absl::StatusOr<MeshFile> ReadMeshFile(const std::string& path) {
   const std::string extension = LowerExtension(path);
   if (extension == ".ply") return ReadPly(path);
-  if (extension != ".obj") return InvalidArgument("{}: neither .ply nor .obj", path);
+  if (extension != ".obj") return InvalidArgument("{}: unknown mesh format; expected a .ply or .obj file", path);
   ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ReadObj(path));
   return MeshFile{std::move(mesh), {}};
 }
@@ -30,16 +31,16 @@ absl::StatusOr<MeshFile> ReadMeshFile(const std::string& path) {
 absl::StatusOr<std::map<std::string, MeshFile>> ReadMeshFolder(const std::string& dir) {
   std::error_code error;
   std::filesystem::directory_iterator entries(dir, error);
-  if (error) return NotFound("{}: no folder of meshes: {}", dir, error.message());
+  if (error) return FileError(dir, "read", error);
   std::map<std::string, MeshFile> meshes;
   for (const std::filesystem::directory_entry& entry : entries) {
     const std::string extension = LowerExtension(entry.path());
     if (extension != ".ply" && extension != ".obj") continue;
     const std::string name = entry.path().stem().string();
-    if (meshes.contains(name)) return InvalidArgument("{}: there are two meshes named {}", dir, name);
+    if (meshes.contains(name)) return InvalidArgument("{}: two meshes are named {}", dir, name);
     ROMAP_ASSIGN_OR_RETURN(meshes[name], ReadMeshFile(entry.path().string()));
   }
-  if (meshes.empty()) return NotFound("{}: holds no .ply or .obj file", dir);
+  if (meshes.empty()) return NotFound("{}: no .ply or .obj files in this folder", dir);
   return meshes;
 }
 
@@ -51,7 +52,8 @@ absl::Status ValidateMesh(const Mesh& mesh, const std::string& name) {
   for (const auto& triangle : mesh.triangles) {
     for (const uint32_t index : triangle) {
       if (index < mesh.vertices.size()) continue;
-      return InvalidArgument("{}: a face names vertex {}, there are 0..{}", name, index, mesh.vertices.size() - 1);
+      return InvalidArgument("{}: vertex index {} in a face is out of range 0..{}", name, index,
+                             mesh.vertices.size() - 1);
     }
   }
   return absl::OkStatus();

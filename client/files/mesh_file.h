@@ -9,25 +9,25 @@
 
 namespace romap::files {
 
-// A mesh, or a point cloud (no triangles), with the further numbers its file holds for each vertex.
+// A mesh or a point cloud (no triangles), with additional values per vertex.
 struct MeshFile {
   Mesh mesh;
   std::map<std::string, std::vector<double>> scalars;  // by property name, each as long as mesh.vertices
 };
 
-// Reads a .ply or .obj file. NOT_FOUND or INVALID_ARGUMENT naming the file and its fault: cut off, garbled, no
-// vertices, vertices that are not finite, triangles with vertices that do not exist, neither .ply nor .obj.
+// Reads a .ply or .obj file. INVALID_ARGUMENT: another extension; truncated or malformed; no vertices; a vertex that is
+// not finite; a triangle with a vertex index out of range. Otherwise as ReadFile.
 absl::StatusOr<MeshFile> ReadMeshFile(const std::string& path);
 
-// All .ply and .obj files of a folder by name without extension. As ReadMeshFile; also NOT_FOUND when there are
-// none and INVALID_ARGUMENT when two have the same name.
+// Reads all .ply and .obj files of a folder. Keys are file names without extension. Errors as ReadMeshFile, and
+// NOT_FOUND if there are none or INVALID_ARGUMENT if two have the same name.
 absl::StatusOr<std::map<std::string, MeshFile>> ReadMeshFolder(const std::string& dir);
 
-// INVALID_ARGUMENT unless there are vertices, all finite, and every triangle's vertices exist. `name` goes into the
-// message.
+// INVALID_ARGUMENT if the mesh has no vertices, a vertex that is not finite, or a triangle with a vertex index out of
+// range. `name` prefixes the message.
 absl::Status ValidateMesh(const Mesh& mesh, const std::string& name);
 
-// Adds the triangles of a convex polygon as a fan around its first corner.
+// Triangulates a convex polygon as a fan around its first vertex.
 void AppendFan(const std::vector<uint32_t>& polygon, std::vector<std::array<uint32_t, 3>>* triangles);
 
 }  // namespace romap::files

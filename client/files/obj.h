@@ -7,8 +7,8 @@
 
 namespace romap::files {
 
-// Reads positions and faces of a Wavefront OBJ file; polygons become fans, everything else is ignored. NOT_FOUND or
-// INVALID_ARGUMENT with file and line.
+// Reads the positions and faces of a Wavefront OBJ file. Polygons become triangle fans; everything else is ignored.
+// INVALID_ARGUMENT names the file and the line or the face. Otherwise as ReadFile.
 absl::StatusOr<Mesh> ReadObj(const std::string& path);
 
 }  // namespace romap::files

@@ -28,18 +28,19 @@ absl::StatusOr<SE3<World, Object>> ReadPose(const YAML::Node& node, const std::s
 }
 
 absl::StatusOr<ObjectRecord> ReadRecord(const YAML::Node& node, size_t index, const std::string& path) {
-  if (!node.IsMap()) return InvalidArgument("{}: entry {} of 'objects' is not a map", path, index + 1);
+  if (!node.IsMap()) return InvalidArgument("{}: entry {} of 'objects' is not a YAML map", path, index + 1);
   ObjectRecord record;
   const std::string where = fmt::format("{}:{}: object {}", path, node.Mark().line + 1, YamlText(node, "id", ""));
   ROMAP_ASSIGN_OR_RETURN(const double id, YamlNumber(node, "id", path));
-  if (id < 0 || id > 9e15 || id != std::floor(id)) return InvalidArgument("{}: the id should be a whole number", where);
+  if (id < 0 || id > 9e15 || id != std::floor(id))
+    return InvalidArgument("{}: 'id' must be a non-negative integer", where);
   record.id = static_cast<int64_t>(id);
   record.class_name = YamlText(node, "class", "");
   record.name = YamlText(node, "name", record.class_name.empty() ? std::to_string(record.id) : record.class_name);
   ROMAP_ASSIGN_OR_RETURN(record.T_world_object, ReadPose(node, path));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<double> half_extents, YamlNumbers(node, "half_extents", 3, path));
   record.half_extents = Eigen::Vector3d(half_extents.data());
-  if (record.half_extents.minCoeff() <= 0) return InvalidArgument("{}: half_extents should be positive", where);
+  if (record.half_extents.minCoeff() <= 0) return InvalidArgument("{}: 'half_extents' must be positive", where);
   if (node["confidence"]) {
     ROMAP_ASSIGN_OR_RETURN(record.confidence, YamlNumber(node, "confidence", path));
   }
@@ -51,14 +52,14 @@ std::vector<double> RowMajor(const SE3<World, Object>& pose) {
   return {matrix.data(), matrix.data() + matrix.size()};
 }
 
-// JSON strings are valid YAML strings: the one way of quoting that suits both.
+// Quotes a string as JSON, which is also valid YAML.
 std::string Quoted(const std::string& text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::string ToYaml(const ObjectsYaml& value) {
   std::string text = fmt::format(
-      "# T_world_object: row-major 4x4, object frame (cuboid centre) to world; half_extents along the object's axes\n"
+      "# T_world_object: row-major 4x4, object frame (cuboid center) to world; half_extents along the object's axes\n"
       "world_up: [{:.9f}, {:.9f}, {:.9f}]\nobjects:\n",
       value.up_world.x(), value.up_world.y(), value.up_world.z());
   for (const ObjectRecord& record : value.objects) {
@@ -91,18 +92,18 @@ std::string ToJson(const ObjectsYaml& value) {
 }  // namespace
 
 absl::StatusOr<ObjectsYaml> ReadObjects(const std::string& path) {
-  // JSON is a subset of YAML, so one reader (and one set of messages) serves both.
+  // JSON is a subset of YAML.
   ROMAP_ASSIGN_OR_RETURN(const YAML::Node root, LoadYamlMap(path));
   ObjectsYaml result;
   if (root["world_up"]) {
     ROMAP_ASSIGN_OR_RETURN(const std::vector<double> up, YamlNumbers(root, "world_up", 3, path));
     result.up_world = Eigen::Vector3d(up.data());
-    if (result.up_world.norm() < 1e-6) return InvalidArgument("{}: 'world_up' has no direction", path);
+    if (result.up_world.norm() < 1e-6) return InvalidArgument("{}: 'world_up' must not be the zero vector", path);
     result.up_world.normalize();
   }
   const YAML::Node objects = root["objects"];
   if (!objects || !(objects.IsSequence() || objects.IsNull())) {
-    return InvalidArgument("{}: should hold a list 'objects:'", path);
+    return InvalidArgument("{}: the list 'objects:' is missing", path);
   }
   for (size_t k = 0; k < objects.size(); ++k) {
     ROMAP_ASSIGN_OR_RETURN(ObjectRecord record, ReadRecord(objects[k], k, path));

@@ -9,10 +9,10 @@ namespace romap::files {
 namespace {
 
 template <class Pixel>
-void Rename(const std::vector<uint32_t>& renamed, cv::Mat* labels) {
+void ReplaceLabels(const std::vector<uint32_t>& new_labels, cv::Mat* labels) {
   for (int y = 0; y < labels->rows; ++y) {
     Pixel* row = labels->ptr<Pixel>(y);
-    for (int x = 0; x < labels->cols; ++x) row[x] = static_cast<Pixel>(renamed[row[x]]);
+    for (int x = 0; x < labels->cols; ++x) row[x] = static_cast<Pixel>(new_labels[row[x]]);
   }
 }
 
@@ -23,18 +23,19 @@ absl::Status PermuteLabels(uint64_t seed, std::string* label_png, std::vector<In
     cv::Mat labels =
         cv::imdecode(cv::Mat(1, static_cast<int>(label_png->size()), CV_8UC1, label_png->data()), cv::IMREAD_UNCHANGED);
     if (labels.type() != CV_8UC1 && labels.type() != CV_16UC1) {
-      return InvalidArgument("mask is not an 8 or 16 bit single-channel PNG");
+      return InvalidArgument("mask is not an 8-bit or 16-bit single-channel image");
     }
-    std::vector<uint32_t> renamed(labels.type() == CV_8UC1 ? 256 : 65536);
-    std::iota(renamed.begin(), renamed.end(), 0);
+    std::vector<uint32_t> new_labels(labels.type() == CV_8UC1 ? 256 : 65536);
+    std::iota(new_labels.begin(), new_labels.end(), 0);
     std::mt19937_64 random(seed);
-    std::shuffle(renamed.begin() + 1, renamed.end(), random);
-    labels.type() == CV_8UC1 ? Rename<uint8_t>(renamed, &labels) : Rename<uint16_t>(renamed, &labels);
+    std::shuffle(new_labels.begin() + 1, new_labels.end(), random);
+    labels.type() == CV_8UC1 ? ReplaceLabels<uint8_t>(new_labels, &labels)
+                             : ReplaceLabels<uint16_t>(new_labels, &labels);
     std::vector<uint8_t> bytes;
     cv::imencode(".png", labels, bytes);
     label_png->assign(bytes.begin(), bytes.end());
     for (Instance& instance : *instances) {
-      if (instance.label < renamed.size()) instance.label = renamed[instance.label];
+      if (instance.label < new_labels.size()) instance.label = new_labels[instance.label];
     }
   } catch (const cv::Exception& e) {
     return InvalidArgument("mask cannot be decoded: {}", e.what());

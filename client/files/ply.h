@@ -11,18 +11,19 @@
 
 namespace romap::files {
 
-// Reads a PLY file (Turk 1994): ASCII, binary little or big endian; any scalar types and orders. x y z become vertices,
-// nx ny nz normals, red green blue (0..255) colours, `vertex_indices` polygons fans of triangles; all further scalars
-// of a vertex, confidence among them, are kept by name. NOT_FOUND or INVALID_ARGUMENT as ReadMeshFile; lengths are
-// checked before memory is taken.
+// Reads a PLY file (Turk 1994): ASCII or binary of either byte order, with any scalar types and property order. x y z
+// become vertices, nx ny nz normals, and red green blue (0..255) colors; `vertex_indices` polygons become triangle
+// fans. All other vertex scalars, including confidence, are returned by name. Counts are validated before allocation.
+// Errors as ReadMeshFile.
 absl::StatusOr<MeshFile> ReadPly(const std::string& path);
 
-// As ReadPly, on bytes in memory; `name` stands for the file in messages.
+// Parses a PLY file in memory. `name` prefixes the messages.
 absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& name);
 
-// Writes binary little endian: float x y z, and where present float nx ny nz, uchar red green blue, float
-// confidence, the scalars (uchar where all are whole numbers of 0..255, else float), faces. INVALID_ARGUMENT when
-// lengths do not fit, confidence comes twice or the disk refuses.
+// Writes a binary little-endian PLY file: float x y z and, if present, float nx ny nz, uchar red green blue, float
+// confidence, `scalars` (uchar if all values are integers in 0..255, otherwise float) and faces. INVALID_ARGUMENT: an
+// invalid mesh (see ValidateMesh), arrays of different lengths, or confidence both in `mesh` and in `scalars`.
+// Otherwise as WriteFile.
 absl::Status WritePly(const std::string& path, const Mesh& mesh,
                       const std::map<std::string, std::vector<double>>& scalars = {});
 

@@ -54,7 +54,7 @@ std::optional<Scalar> ParseScalar(const std::string& name) {
   return std::nullopt;
 }
 
-// The words of the next line; moves `bytes` past it. nullopt at the end.
+// Removes the next line from `bytes` and returns its words. nullopt at the end.
 std::optional<std::vector<std::string>> NextLine(std::string_view* bytes) {
   const size_t end = bytes->find('\n');
   if (end == std::string_view::npos) return std::nullopt;
@@ -111,14 +111,14 @@ bool ParseProperty(const std::vector<std::string>& words, std::vector<Element>* 
 }
 
 absl::StatusOr<Header> ParseHeader(std::string_view bytes, const std::string& name) {
-  if (!bytes.starts_with("ply")) return InvalidArgument("{}: not a PLY file (does not begin with 'ply')", name);
+  if (!bytes.starts_with("ply")) return InvalidArgument("{}: not a PLY file (missing 'ply' signature)", name);
   Header header;
   bool has_layout = false;
   std::string_view rest = bytes;
   while (const auto words = NextLine(&rest)) {
     const std::string keyword = words->empty() ? "" : words->front();
     if (keyword == "end_header") {
-      if (!has_layout) return InvalidArgument("{}: the PLY header names no format", name);
+      if (!has_layout) return InvalidArgument("{}: the PLY header has no format line", name);
       header.body_offset = bytes.size() - rest.size();
       return header;
     }
@@ -126,28 +126,28 @@ absl::StatusOr<Header> ParseHeader(std::string_view bytes, const std::string& na
     if (keyword == "format") ok = has_layout = ParseLayout(*words, &header.layout);
     if (keyword == "element") ok = ParseElement(*words, &header.elements);
     if (keyword == "property") ok = ParseProperty(*words, &header.elements);
-    if (!ok) return InvalidArgument("{}: bad PLY header line '{}'", name, fmt::join(*words, " "));
+    if (!ok) return InvalidArgument("{}: invalid PLY header line '{}'", name, fmt::join(*words, " "));
   }
   return InvalidArgument("{}: the PLY header has no end_header", name);
 }
 
-// Takes one number after the other from the data behind the header.
+// Reads the numbers of the data section in order.
 class Body {
  public:
   Body(std::string_view bytes, Layout layout) : rest_(bytes), layout_(layout) {}
 
-  // False at the end, or at a word that is not a number.
+  // Reads the next number. False at the end of the data or if the next word is not a number.
   bool Next(Scalar type, double* value) {
     return layout_ == Layout::kAscii ? NextWord(value) : NextBinary(type, value);
   }
 
-  // Whether `count` rows of these properties can be there at all.
+  // Whether the remaining data can contain `count` rows of these properties.
   bool CanHold(size_t count, const std::vector<Property>& properties) const {
     size_t row_bytes = 0;
     for (const Property& property : properties) {
       row_bytes += layout_ == Layout::kAscii ? 2 : SizeOf(property.count_type.value_or(property.type));
     }
-    return row_bytes == 0 || count <= (rest_.size() + 1) / row_bytes;  // + 1: the last word needs no blank behind it
+    return row_bytes == 0 || count <= (rest_.size() + 1) / row_bytes;  // + 1: no blank after the last word
   }
 
  private:
@@ -157,7 +157,7 @@ class Body {
     if (begin == std::string_view::npos) return false;
     rest_.remove_prefix(begin);
     const size_t end = std::min(rest_.find_first_of(kBlanks), rest_.size());
-    // from_chars takes "nan" and "inf", which the check of the finished mesh names better than "not a number" would.
+    // from_chars accepts "nan" and "inf"; ValidateMesh rejects them with a better message.
     const auto [parsed, error] = std::from_chars(rest_.data(), rest_.data() + end, *value);
     const bool ok = error == std::errc() && parsed == rest_.data() + end;
     rest_.remove_prefix(end);
@@ -204,7 +204,8 @@ class Body {
 
 bool IsIndex(double value) { return value >= 0 && value <= UINT32_MAX && value == std::floor(value); }
 
-// Reads one list; its numbers go to `polygon`. False when cut off or not whole numbers.
+// Reads one list into `polygon`. Values that are not vertex indices become UINT32_MAX. False if the data is truncated
+// or malformed.
 bool ReadList(const Property& property, Body* body, std::vector<uint32_t>* polygon) {
   polygon->clear();
   double count = 0;
@@ -219,7 +220,8 @@ bool ReadList(const Property& property, Body* body, std::vector<uint32_t>* polyg
 
 using Columns = std::map<std::string, std::vector<double>>;
 
-// Reads all rows of an element: scalars by name, and the polygons of `vertex_indices`.
+// Reads all rows of an element: scalars by name, and the polygons of `vertex_indices`. False if the data is truncated
+// or malformed.
 bool ReadElement(const Element& element, Body* body, Columns* columns,
                  std::vector<std::array<uint32_t, 3>>* triangles) {
   if (!body->CanHold(element.count, element.properties)) return false;
@@ -245,7 +247,7 @@ bool ReadElement(const Element& element, Body* body, Columns* columns,
   return true;
 }
 
-// Takes three columns out of `columns`; false when one is missing (then none is taken).
+// Moves three columns from `columns` to `taken`. False, without changes, if one is missing.
 bool TakeColumns(const std::array<const char*, 3>& names, Columns* columns, std::array<std::vector<double>, 3>* taken) {
   for (const char* name : names) {
     if (!columns->contains(name)) return false;
@@ -277,13 +279,13 @@ absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& nam
     Columns columns;
     std::vector<std::array<uint32_t, 3>> triangles;
     if (!ReadElement(element, &body, &columns, &triangles)) {
-      return InvalidArgument("{}: element '{}' ({} announced) is cut off or malformed", name, element.name,
+      return InvalidArgument("{}: element '{}' ({} rows declared) is truncated or malformed", name, element.name,
                              element.count);
     }
     if (element.name == "face") file.mesh.triangles = std::move(triangles);
     if (element.name != "vertex") continue;
     std::array<std::vector<double>, 3> taken;
-    if (!TakeColumns({"x", "y", "z"}, &columns, &taken)) return InvalidArgument("{}: vertices without x, y, z", name);
+    if (!TakeColumns({"x", "y", "z"}, &columns, &taken)) return InvalidArgument("{}: vertices lack x, y or z", name);
     file.mesh.vertices = ToVectors(taken);
     if (TakeColumns({"nx", "ny", "nz"}, &columns, &taken)) file.mesh.normals = ToVectors(taken);
     if (TakeColumns({"red", "green", "blue"}, &columns, &taken)) {

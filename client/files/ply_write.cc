@@ -8,7 +8,7 @@
 namespace romap::files {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the writers copy native bytes");
+static_assert(std::endian::native == std::endian::little, "values are written in native byte order");
 
 template <class T>
 void Append(const T& value, std::string* bytes) {
@@ -20,10 +20,10 @@ bool FitsBytes(const std::vector<double>& values) {
                      [](double value) { return value >= 0 && value <= 255 && value == std::floor(value); });
 }
 
-// One scalar per vertex and the type it is written as.
+// A scalar property per vertex.
 struct Column {
   const std::vector<double>* values;
-  bool as_bytes;
+  bool as_bytes;  // uchar, otherwise float
 };
 
 std::string Header(const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars) {
@@ -57,11 +57,11 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
     columns.push_back({&values, FitsBytes(values)});
   }
   if (!fits(mesh.normals.size()) || !fits(mesh.colors.size()) || !fits(mesh.confidence.size())) {
-    return InvalidArgument("{}: {} normals, {} confidences and {} colours for {} vertices", path, mesh.normals.size(),
+    return InvalidArgument("{}: {} normals, {} confidences and {} colors for {} vertices", path, mesh.normals.size(),
                            mesh.confidence.size(), mesh.colors.size(), count);
   }
   if (!mesh.confidence.empty() && scalars.contains("confidence")) {
-    return InvalidArgument("{}: confidence both of the mesh and among the scalars", path);
+    return InvalidArgument("{}: 'confidence' is given both by the mesh and by the scalars", path);
   }
   std::string bytes = Header(mesh, scalars);
   bytes.reserve(bytes.size() + 36 * count + 13 * mesh.triangles.size());

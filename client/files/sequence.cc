@@ -19,7 +19,7 @@ struct ListedFile {
   std::string path;
 };
 
-// Detections of one point in time.
+// All detections with the same timestamp.
 struct DetectionSet {
   int64_t timestamp_ns = 0;
   std::vector<Instance> instances;
@@ -32,7 +32,7 @@ std::vector<int64_t> TimestampsOf(const std::vector<T>& items) {
   return timestamps_ns;
 }
 
-// Lines `timestamp filename`, filename relative to the sequence, time strictly rising.
+// Reads lines of `timestamp filename`. The filename is relative to `dir`; timestamps must strictly increase.
 absl::StatusOr<std::vector<ListedFile>> ReadFileList(const std::string& dir, const std::string& name) {
   const std::string path = dir + "/" + name;
   ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ' '));
@@ -40,16 +40,16 @@ absl::StatusOr<std::vector<ListedFile>> ReadFileList(const std::string& dir, con
   for (const TableLine& line : lines) {
     const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
     if (!timestamp_ns || line.fields.size() != 2) {
-      return InvalidArgument("{}:{}: should be 'timestamp filename', seconds first", path, line.number);
+      return InvalidArgument("{}:{}: expected 'timestamp filename' (timestamp in seconds)", path, line.number);
     }
     if (!files.empty() && *timestamp_ns <= files.back().timestamp_ns) {
-      return InvalidArgument("{}:{}: time goes back or stands still ({} after {})", path, line.number, line.fields[0],
+      return InvalidArgument("{}:{}: timestamps must increase; got {} after {}", path, line.number, line.fields[0],
                              FormatSeconds(files.back().timestamp_ns));
     }
     const std::string file = dir + "/" + line.fields[1];
     std::error_code error;
     if (!std::filesystem::is_regular_file(file, error)) {
-      return NotFound("{}:{}: there is no file {}", path, line.number, file);
+      return NotFound("{}:{}: {} does not exist", path, line.number, file);
     }
     files.push_back({*timestamp_ns, file});
   }
@@ -59,16 +59,17 @@ absl::StatusOr<std::vector<ListedFile>> ReadFileList(const std::string& dir, con
 absl::StatusOr<Instance> ParseDetection(const TableLine& line, const std::string& path) {
   const std::vector<std::string>& fields = line.fields;
   if (fields.size() != 3 && fields.size() != 4) {
-    return InvalidArgument("{}:{}: {} fields, should be timestamp,label,class,score", path, line.number, fields.size());
+    return InvalidArgument("{}:{}: {} fields; expected timestamp,label,class[,score]", path, line.number,
+                           fields.size());
   }
   const std::optional<double> label = ParseNumber(fields[1]);
   if (!label || *label < 1 || *label > 65535 || *label != std::floor(*label)) {
-    return InvalidArgument("{}:{}: label '{}' should be a whole number from 1 to 65535", path, line.number, fields[1]);
+    return InvalidArgument("{}:{}: label '{}' must be an integer from 1 to 65535", path, line.number, fields[1]);
   }
-  if (!IsUtf8(fields[2])) return InvalidArgument("{}:{}: the class name is not UTF-8", path, line.number);
+  if (!IsUtf8(fields[2])) return InvalidArgument("{}:{}: class name is not valid UTF-8", path, line.number);
   const std::optional<double> score = fields.size() == 4 ? ParseNumber(fields[3]) : std::optional(1.0);
   if (!score || *score < 0 || *score > 1) {
-    return InvalidArgument("{}:{}: score '{}' should lie between 0 and 1", path, line.number, fields[3]);
+    return InvalidArgument("{}:{}: score '{}' must be a number from 0 to 1", path, line.number, fields[3]);
   }
   return Instance{.label = static_cast<uint32_t>(*label), .class_name = fields[2], .score = *score, .track_id = {}};
 }
@@ -77,12 +78,12 @@ absl::StatusOr<std::vector<DetectionSet>> ReadDetections(const std::string& path
   ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ','));
   std::vector<DetectionSet> sets;
   for (const TableLine& line : lines) {
-    if (&line == &lines.front() && line.fields[0] == "timestamp") continue;  // the header
+    if (&line == &lines.front() && line.fields[0] == "timestamp") continue;  // header
     const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
     if (!timestamp_ns) return InvalidArgument("{}:{}: '{}' is not a timestamp", path, line.number, line.fields[0]);
     ROMAP_ASSIGN_OR_RETURN(Instance instance, ParseDetection(line, path));
     if (!sets.empty() && *timestamp_ns < sets.back().timestamp_ns) {
-      return InvalidArgument("{}:{}: time goes back ({} after {})", path, line.number, line.fields[0],
+      return InvalidArgument("{}:{}: timestamps must not decrease; got {} after {}", path, line.number, line.fields[0],
                              FormatSeconds(sets.back().timestamp_ns));
     }
     if (sets.empty() || sets.back().timestamp_ns != *timestamp_ns) sets.push_back({*timestamp_ns, {}});
@@ -91,8 +92,8 @@ absl::StatusOr<std::vector<DetectionSet>> ReadDetections(const std::string& path
   return sets;
 }
 
-// A file left at its default name is optional, one the caller named is not.
-bool Wanted(const std::string& dir, const std::string& name, const std::string& default_name) {
+// Whether to read a file. A file with its default name is optional.
+bool IsRequested(const std::string& dir, const std::string& name, const std::string& default_name) {
   std::error_code error;
   return !name.empty() && (name != default_name || std::filesystem::exists(dir + "/" + name, error));
 }
@@ -106,7 +107,7 @@ absl::StatusOr<ImageEncoding> EncodingOf(const std::string& bytes, const std::st
 absl::StatusOr<std::string> ReadPng(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
   ROMAP_ASSIGN_OR_RETURN(const ImageEncoding encoding, EncodingOf(bytes, path));
-  if (encoding != ImageEncoding::kPng) return InvalidArgument("{}: should be a PNG (JPEG alters values)", path);
+  if (encoding != ImageEncoding::kPng) return InvalidArgument("{}: expected a PNG file (JPEG is lossy)", path);
   return bytes;
 }
 
@@ -114,19 +115,17 @@ absl::StatusOr<std::string> ReadPng(const std::string& path) {
 
 absl::StatusOr<Sequence> Sequence::Open(const std::string& dir, const SequenceOptions& options) {
   std::error_code error;
-  if (!std::filesystem::is_directory(dir, error)) return NotFound("{}: not a sequence, there is no such folder", dir);
+  if (!std::filesystem::is_directory(dir, error)) return NotFound("{}: no such sequence folder", dir);
+  for (const char* required : {"rgb.txt", "camera.yaml"}) {
+    if (std::filesystem::exists(dir + "/" + required, error)) continue;
+    return NotFound("{}: not a sequence folder; {} is missing", dir, required);
+  }
   Sequence sequence;
   sequence.dir_ = dir;
   sequence.permute_labels_seed_ = options.permute_labels_seed;
-  if (!std::filesystem::exists(sequence.Path("rgb.txt"), error)) {
-    return NotFound("{}: an empty sequence folder, it holds no rgb.txt (lines of 'timestamp filename')", dir);
-  }
-  if (!std::filesystem::exists(sequence.Path("camera.yaml"), error)) {
-    return NotFound("{}: missing calibration, it holds no camera.yaml", dir);
-  }
   ROMAP_ASSIGN_OR_RETURN(sequence.camera_, ReadCameraYaml(sequence.Path("camera.yaml")));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<ListedFile> images, ReadFileList(dir, "rgb.txt"));
-  if (images.empty()) return InvalidArgument("{}/rgb.txt: an empty sequence, it lists no frames", dir);
+  if (images.empty()) return InvalidArgument("{}/rgb.txt: no frames listed", dir);
   for (const ListedFile& image : images) sequence.frames_.push_back({image.timestamp_ns, image.path, {}, {}, {}});
   if (std::filesystem::exists(sequence.Path("objects.yaml"), error)) {
     ROMAP_ASSIGN_OR_RETURN(sequence.objects_, ReadObjects(sequence.Path("objects.yaml")));
@@ -139,12 +138,12 @@ absl::StatusOr<Sequence> Sequence::Open(const std::string& dir, const SequenceOp
 }
 
 absl::Status Sequence::OpenMasks(const SequenceOptions& options) {
-  if (!Wanted(dir_, options.masks, SequenceOptions{}.masks)) return absl::OkStatus();
+  if (!IsRequested(dir_, options.masks, SequenceOptions{}.masks)) return absl::OkStatus();
   return AttachFiles(options.masks, &FrameFiles::mask_path);
 }
 
 absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
-  if (Wanted(dir_, options.detections, SequenceOptions{}.detections)) {
+  if (IsRequested(dir_, options.detections, SequenceOptions{}.detections)) {
     ROMAP_ASSIGN_OR_RETURN(std::vector<DetectionSet> sets, ReadDetections(Path(options.detections)));
     for (const auto& [frame, set] : AssociateTimestamps(Timestamps(), TimestampsOf(sets), HalfFrame_ns())) {
       frames_[frame].instances = std::move(sets[set].instances);
@@ -152,7 +151,7 @@ absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
   } else if (objects_) {
     std::vector<Instance> instances;
     for (const ObjectRecord& object : objects_->objects) {
-      if (object.id < 1 || object.id > 65535) continue;  // not a label a mask can hold
+      if (object.id < 1 || object.id > 65535) continue;  // not representable in a 16-bit mask
       instances.push_back(
           {.label = static_cast<uint32_t>(object.id), .class_name = object.class_name, .score = 1, .track_id = {}});
     }
@@ -162,7 +161,7 @@ absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
 }
 
 absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
-  if (!Wanted(dir_, options.poses, SequenceOptions{}.poses)) return absl::OkStatus();
+  if (!IsRequested(dir_, options.poses, SequenceOptions{}.poses)) return absl::OkStatus();
   ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses)));
   return absl::OkStatus();
 }
@@ -170,7 +169,7 @@ absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
 absl::Status Sequence::OpenDepth(const SequenceOptions& options) {
   if (!options.use_depth) return absl::OkStatus();
   if (camera_.depth_scale <= 0) {
-    return InvalidArgument("{}: depth was asked for, but 'depth_scale' is missing", Path("camera.yaml"));
+    return InvalidArgument("{}: depth images require 'depth_scale'", Path("camera.yaml"));
   }
   return AttachFiles("depth.txt", &FrameFiles::depth_path);
 }
@@ -188,7 +187,9 @@ std::vector<int64_t> Sequence::Timestamps() const { return TimestampsOf(frames_)
 int64_t Sequence::HalfFrame_ns() const { return std::llround(0.5e9 / camera_.fps); }
 
 absl::StatusOr<FrameInput> Sequence::Load(size_t index) const {
-  if (index >= frames_.size()) return InvalidArgument("{}: no frame {}, there are {}", dir_, index, frames_.size());
+  if (index >= frames_.size())
+    return InvalidArgument("{}: frame index {} is out of range; the sequence has {} frames", dir_, index,
+                           frames_.size());
   const FrameFiles& files = frames_[index];
   FrameInput frame;
   frame.frame_id = index + 1;
@@ -200,7 +201,7 @@ absl::StatusOr<FrameInput> Sequence::Load(size_t index) const {
     frame.mask_encoding = MaskEncoding::kLabelPng;
     frame.instances = files.instances;
     if (permute_labels_seed_) {
-      // Any odd multiplier makes the frames' seeds differ; this one is 2^64 divided by the golden ratio.
+      // Any odd multiplier gives different seeds; this one is 2^64 divided by the golden ratio.
       const uint64_t seed = *permute_labels_seed_ + 0x9e3779b97f4a7c15 * (index + 1);
       if (absl::Status status = PermuteLabels(seed, &frame.label_png, &frame.instances); !status.ok()) {
         return InvalidArgument("{}: {}", files.mask_path, Message(status));

@@ -15,48 +15,48 @@
 
 namespace romap::files {
 
-// Which parts of a sequence folder to read. A file left at its default name may be missing; one that was named must
+// Which parts of a sequence folder to read. A file with its default name is optional; a file with another name must
 // exist.
 struct SequenceOptions {
   std::string masks = "mask.txt";             // list of label images; empty = no masks
-  std::string detections = "detections.csv";  // empty = labels are the ids of objects.yaml
-  std::string poses = "groundtruth.txt";      // camera poses to hand to the mapper; empty = none
-  bool use_depth = false;                     // hand over the depth images of depth.txt
-  // Renames the labels of every frame by a random permutation of its own: what a detector without a tracker delivers.
+  std::string detections = "detections.csv";  // class and score per label; empty = labels are the ids of objects.yaml
+  std::string poses = "groundtruth.txt";      // camera poses to send with the frames; empty = none
+  bool use_depth = false;                     // load the depth images of depth.txt
+  // Permutes the labels at random in each frame, like the output of a detector without a tracker.
   std::optional<uint64_t> permute_labels_seed = std::nullopt;
 };
 
-// A recorded sequence in a folder: rgb.txt and camera.yaml, and where they exist mask.txt, detections.csv, depth.txt,
-// groundtruth.txt and objects.yaml. Lists are matched to rgb.txt by time, one to one, within half a frame.
-// Immutable after Open(), so that several threads may Load().
+// A recorded sequence in a folder: rgb.txt and camera.yaml, and optionally mask.txt, detections.csv, depth.txt,
+// groundtruth.txt and objects.yaml. Entries of the lists are associated with those of rgb.txt by time, one to one,
+// within half a frame period. Immutable after Open(); Load() is thread-safe.
 class Sequence {
  public:
-  // Reads the lists, not the images. NOT_FOUND: the folder, or something it must hold, is missing. INVALID_ARGUMENT: a
-  // malformed line (named by file and line), time going back, no frames.
+  // Reads the lists, not the images. INVALID_ARGUMENT: a malformed line (the message names the file and the line),
+  // timestamps that do not increase, or no frames. Otherwise as ReadFile, e.g. NOT_FOUND if a required file is missing.
   static absl::StatusOr<Sequence> Open(const std::string& dir, const SequenceOptions& options = {});
 
   const std::string& dir() const { return dir_; }
   const CameraModel& camera() const { return camera_.camera; }
   double fps() const { return camera_.fps; }
   double depth_scale() const { return camera_.depth_scale; }  // map units per depth unit; 0 = no depth
-  size_t size() const { return frames_.size(); }              // frames, at least 1
+  size_t size() const { return frames_.size(); }              // number of frames, at least 1
   int64_t timestamp_ns(size_t index) const { return frames_[index].timestamp_ns; }
   bool has_mask(size_t index) const { return !frames_[index].mask_path.empty(); }
   bool has_poses() const { return !poses_.empty(); }
   const std::optional<ObjectsYaml>& objects() const { return objects_; }
 
-  // Frame `index` (< size()) with its files' bytes as they are: image, mask (8 or 16 bit label PNG), depth (16 bit
-  // PNG), instances and pose; frame_id = index + 1. Instances come from the detections at the mask's time or, without
-  // such a file, list all objects of objects.yaml. The pose is interpolated, and absent when none lies within 20 ms.
-  // NOT_FOUND / INVALID_ARGUMENT name the file that is missing or not a PNG or JPEG.
+  // Loads frame `index` (< size()): the encoded image, mask (8-bit or 16-bit label PNG) and depth (16-bit PNG), the
+  // instances and the pose; frame_id = index + 1. The instances are the detections at the time of the mask or, without
+  // a detections file, all objects of objects.yaml. The pose is interpolated; it is absent if none is within 20 ms.
+  // INVALID_ARGUMENT names a file that is neither PNG nor JPEG. Otherwise as ReadFile.
   absl::StatusOr<FrameInput> Load(size_t index) const;
 
  private:
   struct FrameFiles {
     int64_t timestamp_ns = 0;
     std::string image_path;
-    std::string mask_path;   // empty = no detector ran on this frame
-    std::string depth_path;  // empty = no depth
+    std::string mask_path;   // empty = the detector did not process this frame
+    std::string depth_path;  // empty = no depth image
     std::vector<Instance> instances;
   };
 
@@ -64,6 +64,7 @@ class Sequence {
   absl::Status OpenDetections(const SequenceOptions& options);
   absl::Status OpenPoses(const SequenceOptions& options);
   absl::Status OpenDepth(const SequenceOptions& options);
+  // Associates the files of a list with the frames and stores their paths in the given member.
   absl::Status AttachFiles(const std::string& list, std::string FrameFiles::*target);
   std::vector<int64_t> Timestamps() const;
   int64_t HalfFrame_ns() const;

@@ -1,11 +1,14 @@
 #include "client/files/text_file.h"
 
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
+
+#include "common/file_status.h"
 
 namespace romap::files {
 namespace {
@@ -34,25 +37,34 @@ std::vector<std::string> Split(std::string_view text, char separator) {
 }  // namespace
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  // Opening a folder succeeds, and reading from it throws.
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return NotFound("{}: no such file", path);
-  if (!std::filesystem::is_regular_file(path, error)) return InvalidArgument("{}: not a regular file", path);
+  if (std::filesystem::is_directory(path, error)) return FileError(path, "read", EISDIR);
+  errno = 0;
   std::ifstream in(path, std::ios::binary);
   std::string bytes;
   if (in) bytes.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
-  if (!in) return InvalidArgument("{}: cannot be read (permissions?)", path);
+  if (!in) return FileError(path, "read");
   return bytes;
 }
 
 absl::Status WriteFile(const std::string& path, std::string_view bytes) {
   const std::string partial = path + ".partial";
+  errno = 0;
   std::ofstream out(partial, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) return InvalidArgument("{}: cannot be written (does the folder exist, is the disk full?)", path);
+  if (!out) return FileError(path, "write");
   std::error_code error;
   std::filesystem::rename(partial, path, error);
-  if (error) return InvalidArgument("{}: cannot be written: {}", path, error.message());
+  if (error) return FileError(path, "write", error);
+  return absl::OkStatus();
+}
+
+absl::Status MakeFolder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) return FileError(path, "create", error);
   return absl::OkStatus();
 }
 
@@ -84,7 +96,7 @@ std::optional<int64_t> ParseSeconds(std::string_view text) {
   if (text.find_first_of("eE") != std::string_view::npos) return std::llround(*approximate_s * 1e9);
   const bool negative = text.starts_with('-');
   int64_t value_ns = 0;
-  int decimals = -1;  // -1 before the point
+  int decimals = -1;  // digits after the decimal point; -1 before it
   bool round_up = false;
   for (const char c : text) {
     if (c == '.') decimals = 0;

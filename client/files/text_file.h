@@ -10,30 +10,33 @@
 
 namespace romap::files {
 
-// Whole file as bytes. NOT_FOUND: no such file; INVALID_ARGUMENT: it is there but cannot be read (e.g. a folder).
+// Reads a whole file. Errors: those of FileError (common/file_status.h), with the reason of the operating system.
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
-// Writes (or replaces) a file so that a reader never sees half of it. INVALID_ARGUMENT when the folder is missing or
-// the disk refuses.
+// Creates or replaces a file atomically: readers see the old or the new contents, never a part. Errors as ReadFile.
 absl::Status WriteFile(const std::string& path, std::string_view bytes);
 
-// One line of a table, with the place to name in an error.
+// Creates a folder and its missing parents. OK if it exists. Errors as ReadFile.
+absl::Status MakeFolder(const std::string& path);
+
+// One line of a text table.
 struct TableLine {
-  int number = 0;  // 1 is the first line of the file
+  int number = 0;  // in the file, from 1
   std::vector<std::string> fields;
 };
 
-// Lines of a text table, cut at `#`, split at any of `separators` with blanks trimmed; empty lines are left out. A
-// blank among the separators swallows runs of blanks; other separators keep empty fields.
+// Reads a text table. `#` starts a comment. Lines are split at `separator` and blanks around fields are removed; empty
+// lines are skipped. The separator ' ' stands for any run of blanks; any other separator preserves empty fields. Errors
+// as ReadFile.
 absl::StatusOr<std::vector<TableLine>> ReadTable(const std::string& path, char separator);
 
-// The whole of `text` as a finite number; nullopt otherwise ("nan" and "inf" are not finite).
+// Parses a finite decimal number that spans the whole text; otherwise nullopt, also for "nan" and "inf".
 std::optional<double> ParseNumber(std::string_view text);
 
-// Decimal seconds to nanoseconds without the rounding of a double, so that "1700000000.123456789" keeps all digits.
+// Parses decimal seconds to nanoseconds exactly: a double would round "1700000000.123456789".
 std::optional<int64_t> ParseSeconds(std::string_view text);
 
-// Nanoseconds as decimal seconds with nine decimals: the inverse of ParseSeconds.
+// Formats nanoseconds as decimal seconds with nine decimals. Inverse of ParseSeconds.
 std::string FormatSeconds(int64_t timestamp_ns);
 
 }  // namespace romap::files

@@ -10,12 +10,12 @@
 namespace romap::files {
 namespace {
 
-// Between poses farther apart than this a camera may have done anything.
+// Interpolation over longer gaps would be unreliable.
 constexpr int64_t kMaxInterpolationGap_ns = 100'000'000;
 
 absl::StatusOr<StampedPose> ParsePose(const TableLine& line, const std::string& path) {
   if (line.fields.size() != 8) {
-    return InvalidArgument("{}:{}: {} fields, a pose line has 8 (t tx ty tz qx qy qz qw)", path, line.number,
+    return InvalidArgument("{}:{}: {} fields; expected 8 (t tx ty tz qx qy qz qw)", path, line.number,
                            line.fields.size());
   }
   const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
@@ -29,7 +29,7 @@ absl::StatusOr<StampedPose> ParsePose(const TableLine& line, const std::string& 
   }
   const Eigen::Quaterniond rotation(x[7], x[4], x[5], x[6]);
   if (std::abs(rotation.norm() - 1) > 0.05) {
-    return InvalidArgument("{}:{}: quaternion of length {:.3f}, should be 1", path, line.number, rotation.norm());
+    return InvalidArgument("{}:{}: quaternion norm is {:.3f}; expected 1", path, line.number, rotation.norm());
   }
   return StampedPose{*timestamp_ns, {rotation, Eigen::Vector3d(x[1], x[2], x[3])}};
 }
@@ -53,7 +53,7 @@ absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path) {
     ROMAP_ASSIGN_OR_RETURN(StampedPose pose, ParsePose(line, path));
     poses.push_back(pose);
   }
-  if (poses.empty()) return InvalidArgument("{}: no poses in it", path);
+  if (poses.empty()) return InvalidArgument("{}: the file contains no poses", path);
   std::stable_sort(poses.begin(), poses.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.timestamp_ns < b.timestamp_ns; });
   return poses;

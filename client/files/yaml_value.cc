@@ -18,10 +18,10 @@ absl::StatusOr<YAML::Node> LoadYamlMap(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
   try {
     YAML::Node root = YAML::Load(text);
-    if (!root.IsMap()) return InvalidArgument("{}: not a YAML map of 'key: value' lines", path);
+    if (!root.IsMap()) return InvalidArgument("{}: expected a YAML map of 'key: value' lines", path);
     return root;
   } catch (const YAML::Exception& e) {
-    return InvalidArgument("{}:{}: not YAML: {}", path, e.mark.line + 1, e.msg);
+    return InvalidArgument("{}:{}: invalid YAML: {}", path, e.mark.line + 1, e.msg);
   }
 }
 
@@ -38,13 +38,13 @@ absl::StatusOr<std::vector<double>> YamlNumbers(const YAML::Node& map, const std
   const YAML::Node node = map[key];
   if (!node) return InvalidArgument("{}:{}: '{}' is missing", path, LineOf(map), key);
   if (!node.IsSequence() || node.size() != count) {
-    return InvalidArgument("{}:{}: '{}' should be a list of {} numbers", path, LineOf(node), key, count);
+    return InvalidArgument("{}:{}: expected '{}' to be a list of {} numbers", path, LineOf(node), key, count);
   }
   std::vector<double> numbers;
   for (const YAML::Node& item : node) {
     const std::optional<double> number = AsNumber(item);
     if (!number)
-      return InvalidArgument("{}:{}: '{}' holds something that is not a finite number", path, LineOf(item), key);
+      return InvalidArgument("{}:{}: '{}' contains a value that is not a finite number", path, LineOf(item), key);
     numbers.push_back(*number);
   }
   return numbers;

@@ -9,19 +9,20 @@
 
 namespace romap::files {
 
-// yaml-cpp throws; these turn its exceptions into statuses that name file and line.
+// Access to YAML values. Converts the exceptions of yaml-cpp to statuses that name the file and the line. `path` is the
+// file name for messages.
 
-// A YAML file whose top level is a map.
+// Loads a YAML file whose top level is a map. INVALID_ARGUMENT if it is malformed; otherwise as ReadFile.
 absl::StatusOr<YAML::Node> LoadYamlMap(const std::string& path);
 
-// map[key] as a finite number; INVALID_ARGUMENT when missing or something else.
+// Returns map[key] as a finite number. INVALID_ARGUMENT if missing or not a finite number.
 absl::StatusOr<double> YamlNumber(const YAML::Node& map, const std::string& key, const std::string& path);
 
-// map[key] as a list of `count` finite numbers.
+// Returns map[key] as a list of `count` finite numbers. INVALID_ARGUMENT if missing or something else.
 absl::StatusOr<std::vector<double>> YamlNumbers(const YAML::Node& map, const std::string& key, size_t count,
                                                 const std::string& path);
 
-// map[key] as text; `fallback` when it is not there or not a scalar.
+// Returns map[key] as text, or `fallback` if it is missing or not a scalar.
 std::string YamlText(const YAML::Node& map, const std::string& key, const std::string& fallback);
 
 }  // namespace romap::files

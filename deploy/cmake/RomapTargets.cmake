@@ -44,6 +44,9 @@ find_package(nlohmann_json CONFIG REQUIRED)
 find_package(TBB CONFIG REQUIRED)
 find_package(draco CONFIG REQUIRED)
 find_package(nanoflann CONFIG REQUIRED)
+find_package(TinyGLTF CONFIG REQUIRED)
+find_package(tinyobjloader CONFIG REQUIRED)
+find_package(utf8cpp CONFIG REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 
 # OpenCV's headers warn under C++20, so they come in as system headers.

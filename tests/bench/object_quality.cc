@@ -83,12 +83,12 @@ struct Job {
   absl::Status status = absl::OkStatus();
 };
 
-absl::StatusOr<eval::FittedSimilarity> TrueFromMap(const files::Sequence& sequence, const ObjectRun& run) {
+absl::StatusOr<Sim3<World, World>> AlignToTruth(const files::Sequence& sequence, const ObjectRun& run) {
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth,
                          files::ReadTum(sequence.dir() + "/groundtruth.txt"));
   ROMAP_ASSIGN_OR_RETURN(const eval::TrajectoryFit fit,
                          eval::AlignTrajectories(run.trajectory, truth, eval::Alignment::kSim3, /*max_dt_s=*/0.02));
-  return fit.gt_from_est;
+  return fit.S_gt_est;
 }
 
 absl::Status Execute(const Job& job) {
@@ -99,14 +99,14 @@ absl::Status Execute(const Job& job) {
   if (!job.picture_dir.empty()) {
     ROMAP_RETURN_IF_ERROR(cli::WriteCuboidPictures(job.picture_dir, *job.sequence, run.trajectory, objects));
   }
-  absl::StatusOr<eval::FittedSimilarity> true_from_map = eval::FittedSimilarity{};
-  if (job.options.poses == PoseUse::kIgnore) true_from_map = TrueFromMap(*job.sequence, run);
-  if (!true_from_map.ok()) {
+  absl::StatusOr<Sim3<World, World>> S_true_map = Sim3<World, World>();
+  if (job.options.poses == PoseUse::kIgnore) S_true_map = AlignToTruth(*job.sequence, run);
+  if (!S_true_map.ok()) {
     // Not tracked: nothing was found.
     job.result->score = ScoreMap(truth, {}, {});
     return absl::OkStatus();
   }
-  job.result->score = ScoreMap(truth, objects, *true_from_map);
+  job.result->score = ScoreMap(truth, objects, *S_true_map);
   return absl::OkStatus();
 }
 

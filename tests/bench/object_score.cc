@@ -62,7 +62,7 @@ size_t MapScore::Found() const {
 size_t MapScore::Extra() const { return mapped.size() - Found(); }
 
 MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
-                  const eval::FittedSimilarity& true_from_map) {
+                  const Sim3<World, World>& S_true_map) {
   const Eigen::Quaterniond z_from_up = RotationFromZTo(truth.up_world).conjugate();
   std::vector<eval::YawBox> true_boxes, boxes;
   MapScore score;
@@ -73,9 +73,9 @@ MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate>
   }
   for (const ObjectUpdate& object : objects) {
     const SE3<World, Object>& T = object.cuboid.T_world_object;
-    const Eigen::Vector3d center_m = true_from_map * T.translation();
-    boxes.push_back(eval::MakeUpright(z_from_up * (true_from_map.rotation * T.RotationMatrix()), z_from_up * center_m,
-                                      true_from_map.scale * object.cuboid.half_extents));
+    const Eigen::Vector3d center_m = S_true_map * T.translation();
+    boxes.push_back(eval::MakeUpright((z_from_up * S_true_map.rotation()) * T.RotationMatrix(), z_from_up * center_m,
+                                      S_true_map.scale() * object.cuboid.half_extents));
     score.mapped.push_back({object, center_m, "", ""});
   }
   if (boxes.empty() || true_boxes.empty()) return score;

@@ -45,8 +45,8 @@ struct MapScore {
 
 // Pairs the objects of a map one to one with the true ones, such that the sum of the distances of their centres is the
 // least. A pair overlaps, and its centres lie no farther apart than half the true box's diagonal; everything else is
-// missing or extra. `true_from_map` takes the map's world to the true one; lengths there are metres.
+// missing or extra. `S_true_map` maps the world of the map to the true world, in meters.
 MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
-                  const eval::FittedSimilarity& true_from_map);
+                  const Sim3<World, World>& S_true_map);
 
 }  // namespace romap::measure

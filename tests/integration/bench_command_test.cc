@@ -1,15 +1,14 @@
-// `romap bench paper` as a user runs it: on a small made sequence, to the end and interrupted.
+// Runs `romap bench paper` like a user on a small synthetic sequence, to completion and interrupted.
 
 #include <gmock/gmock.h>
 #include <signal.h>
 
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "client/synth/synth.h"
+#include "tests/support/streams.h"
 #include "tests/support/subprocess.h"
 
 namespace romap {
@@ -44,7 +43,7 @@ std::vector<std::string> BenchPaper(const testing_support::TemporaryFolder& fold
 
 nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
 
-TEST(BenchCommandTest, AQuickBenchWritesTablesAndPicture) {
+TEST(BenchCommandTest, QuickBenchWritesTablesAndPlot) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   const testing_support::ProcessResult run =
@@ -69,15 +68,12 @@ TEST(BenchCommandTest, AQuickBenchWritesTablesAndPicture) {
   EXPECT_THAT(wrong.err, HasSubstr("method 'fats' is not one of"));
 }
 
-TEST(BenchCommandTest, InterruptedItLeavesWhatThereIs) {
+TEST(BenchCommandTest, InterruptWritesAPartialReport) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   testing_support::BackgroundProcess bench(
       BenchPaper(folder, {"--methods", "fast", "--tables", "1", "--seeds", "500"}));
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-  while (!fs::exists(folder / "out/paper.json") && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
+  ASSERT_TRUE(testing::Eventually([&] { return fs::exists(folder / "out/paper.json"); }));
   bench.Signal(SIGINT);
   const testing_support::ProcessResult end = bench.Wait();
   EXPECT_EQ(end.exit_code, 130) << end.err;

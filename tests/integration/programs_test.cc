@@ -1,4 +1,4 @@
-// The built programs as a user runs them: a made sequence through server and client, and what they say to bad input.
+// Runs the built programs like a user: a synthetic sequence through server and client, and invalid input.
 
 #include <gmock/gmock.h>
 #include <signal.h>
@@ -11,6 +11,7 @@
 
 #include "client/eval/trajectory_eval.h"
 #include "client/synth/synth.h"
+#include "tests/support/streams.h"
 #include "tests/support/subprocess.h"
 
 namespace romap {
@@ -59,12 +60,13 @@ void ExpectMapOfThree(const std::string& out) {
   EXPECT_EQ(ReadJson(out + "/cuboids.json")["objects"].size(), 3u);
   EXPECT_EQ(CountFiles(out + "/objects", ".ply"), 3u);
   EXPECT_EQ(CountFiles(out + "/objects", ".glb"), 3u);
-  EXPECT_GE(CountFiles(out + "/pictures", ".png"), 2u) << "the map, and objects that some frame shows as a whole";
+  EXPECT_GE(CountFiles(out + "/pictures", ".png"), 2u)
+      << "the map, and the objects that are completely visible in some frame";
   EXPECT_EQ(CountFiles(out + "/pictures", ".jpg"), 6u) << "cuboids in frames";
   EXPECT_GT(fs::file_size(out + "/trajectory.txt"), 1000u);
 }
 
-TEST(ProgramsTest, AServerAndAClientMapASequence) {
+TEST(ProgramsTest, ServerAndClientMapASequence) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
@@ -72,12 +74,12 @@ TEST(ProgramsTest, AServerAndAClientMapASequence) {
   ASSERT_NE(address, "");
 
   const testing_support::ProcessResult run = Romap({"run", folder / "sequence", "--server", address, "--out",
-                                                    folder / "map", "--keep-session", "--name", "three things"});
+                                                    folder / "map", "--keep-session", "--name", "three objects"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   ExpectMapOfThree(folder / "map");
 
   const testing_support::ProcessResult sessions = Romap({"sessions", "--server", address});
-  EXPECT_THAT(sessions.out, AllOf(HasSubstr("finished"), HasSubstr("three things")));
+  EXPECT_THAT(sessions.out, AllOf(HasSubstr("finished"), HasSubstr("three objects")));
   const std::string id = ReadJson(folder / "map/summary.json")["session"];
   const testing_support::ProcessResult exported =
       Romap({"export", id, "--server", address, "--out", folder / "export"});
@@ -89,7 +91,7 @@ TEST(ProgramsTest, AServerAndAClientMapASequence) {
   EXPECT_EQ(server.Wait().exit_code, 0);
 }
 
-TEST(ProgramsTest, TracksTheCameraFromTheImagesAndFollowsItsOwnCorrections) {
+TEST(ProgramsTest, TracksTheCameraFromImagesAndWritesTheCorrectedTrajectory) {
   const testing_support::TemporaryFolder folder;
   synth::SynthOptions options = SmallScene();
   options.frames = 80;
@@ -99,12 +101,12 @@ TEST(ProgramsTest, TracksTheCameraFromTheImagesAndFollowsItsOwnCorrections) {
       Romap({"run", folder / "sequence", "--local", "--poses", "none", "--out", folder / "map", "--no-pictures"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const nlohmann::json summary = ReadJson(folder / "map/summary.json");
-  const int initialising = summary["tracking"]["initialising"];
-  EXPECT_GT(initialising, 0);  // no pose was sent
-  EXPECT_LT(initialising, 40);
+  const int initializing = summary["tracking"]["initializing"];
+  EXPECT_GT(initializing, 0);  // no pose was sent
+  EXPECT_LT(initializing, 40);
   EXPECT_EQ(summary["tracking"]["lost"], 0);
-  EXPECT_EQ(summary["tracking"]["tracked"], 80 - initialising);
-  // The written trajectory is that of the map at its end, up to a similarity.
+  EXPECT_EQ(summary["tracking"]["tracked"], 80 - initializing);
+  // The written trajectory is the final one of the map, up to a similarity.
   const auto report = eval::EvaluateTrajectory({.estimated = folder / "map/trajectory.txt",
                                                 .ground_truth = folder / "sequence/groundtruth.txt",
                                                 .alignment = eval::Alignment::kSim3});
@@ -120,13 +122,13 @@ TEST(ProgramsTest, LocalMappingNeedsNoServer) {
   ExpectMapOfThree(folder / "map");
 }
 
-TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
+TEST(ProgramsTest, InterruptWritesThePartialMap) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  // At the recorded rate the sequence takes more than two seconds: time enough to interrupt it.
+  // At the recorded rate sending takes two seconds. The output folder is created right before.
   testing_support::BackgroundProcess run(
       {ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  ASSERT_TRUE(testing::Eventually([&] { return fs::exists(folder / "map/pictures"); }));
   run.Signal(SIGINT);
   const testing_support::ProcessResult result = run.Wait();
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -136,7 +138,7 @@ TEST(ProgramsTest, CtrlCWritesWhatThereIs) {
   EXPECT_LT(summary["frames"]["sent"], 60);
 }
 
-TEST(ProgramsTest, TheConfigurationInDeployIsWhatTheServerHas) {
+TEST(ProgramsTest, DeployedConfigurationMatchesTheDefaults) {
   std::ifstream file(ROMAP_SOURCE_DIR "/deploy/server.yaml");
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   EXPECT_EQ(testing_support::RunProcess({ROMAP_SERVER, "--dump-config"}).out, text)
@@ -147,7 +149,7 @@ TEST(ProgramsTest, TheConfigurationInDeployIsWhatTheServerHas) {
       text);
 }
 
-// ------------------------------------------------------------------------------------------------ bad input
+// ------------------------------------------------------------------------------------------------ invalid input
 
 void ExpectOneLine(const testing_support::ProcessResult& result, int exit_code, const std::string& what) {
   EXPECT_EQ(result.exit_code, exit_code) << result.err;
@@ -155,25 +157,48 @@ void ExpectOneLine(const testing_support::ProcessResult& result, int exit_code, 
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
 }
 
-TEST(BadInputTest, SequenceFoldersThatAreNot) {
+TEST(InvalidInputTest, IncompleteSequenceFolder) {
   const testing_support::TemporaryFolder folder;
-  ExpectOneLine(Romap({"run", folder / "nowhere", "--local", "--out", folder / "map"}), 2, "nowhere");
+  ExpectOneLine(Romap({"run", folder / "nowhere", "--local", "--out", folder / "map"}), 3, "nowhere");
   fs::create_directory(folder / "empty");
-  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2, "rgb.txt");
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 3, "rgb.txt");
   std::ofstream(folder / "empty/rgb.txt") << "0.0 rgb/1.png\n";
-  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2, "camera.yaml");
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 3, "camera.yaml");
 }
 
-TEST(BadInputTest, UnreadableImage) {
+TEST(InvalidInputTest, OutputFolderThatCannotBeCreated) {
+  const testing_support::TemporaryFolder folder;
+  MakeSmallSequence(folder / "sequence");
+  std::ofstream(folder / "file") << "not a folder";
+  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "file/map"}), 3, "file/map");
+  ExpectOneLine(
+      Romap({"run", folder / "sequence", "--local", "--config", folder / "none.yaml", "--out", folder / "map"}), 3,
+      "none.yaml: cannot read: No such file or directory");
+}
+
+TEST(ProgramsTest, HelpDocumentsTheExitCodes) {
+  const testing_support::ProcessResult help = Romap({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("Exit codes:"), HasSubstr("4    the server cannot be reached")));
+}
+
+TEST(ProgramsTest, BothProgramsReportTheSameVersion) {
+  const std::string romap = Romap({"--version"}).out;
+  const std::string server = testing_support::RunProcess({ROMAP_SERVER, "--version"}).out;
+  ASSERT_TRUE(romap.starts_with("romap ")) << romap;
+  EXPECT_EQ(server, "romap-server " + romap.substr(std::string("romap ").size()));
+}
+
+TEST(InvalidInputTest, UnreadableImage) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   for (const auto& entry : fs::directory_iterator(folder / "sequence/rgb")) {
     if (entry.path().filename().string().find("12") != std::string::npos) fs::remove(entry.path());
   }
-  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "map"}), 2, "12");
+  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "map"}), 3, "12");
 }
 
-TEST(BadInputTest, UnknownFlagCommandAndConfigKey) {
+TEST(InvalidInputTest, UnknownFlagCommandAndConfigKey) {
   const testing_support::TemporaryFolder folder;
   ExpectOneLine(Romap({"run", "x", "--frobnicate"}), 2, "frobnicate");
   ExpectOneLine(Romap({"frobnicate"}), 2, "frobnicate");
@@ -186,7 +211,7 @@ TEST(BadInputTest, UnknownFlagCommandAndConfigKey) {
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--frobnicate"}), 2, "frobnicate");
 }
 
-TEST(BadInputTest, NoServerAndPortInUse) {
+TEST(InvalidInputTest, NoServerAndPortInUse) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
@@ -195,7 +220,7 @@ TEST(BadInputTest, NoServerAndPortInUse) {
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);
-  ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 1,
+  ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 4,
                 "cannot connect to romap-server at " + address);
 }
 

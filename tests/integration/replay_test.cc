@@ -1,4 +1,4 @@
-// A session that was recorded, replayed by the built program.
+// Replays a recorded session with the built program.
 
 #include <gmock/gmock.h>
 
@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "client/synth/synth.h"
 #include "tests/support/subprocess.h"
@@ -43,7 +44,7 @@ std::map<std::string, std::string> AllFiles(const std::string& dir) {
 
 class ReplayTest : public ::testing::Test {
  protected:
-  // Maps a small sequence with recording on; the recording's path.
+  // Maps a small sequence with recording enabled. Returns the path of the recording.
   std::string Record(const std::vector<std::string>& more_arguments = {}) const {
     synth::SynthOptions options{.seed = 3, .objects = 2, .frames = 40, .width_px = 240, .height_px = 180};
     EXPECT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
@@ -81,38 +82,38 @@ TEST_F(ReplayTest, TwoReplaysWithLateMasksWriteTheSameBytes) {
   const std::string recording = Record({"--mask-rate", "12.5", "--mask-delay", "0.2"});
   const nlohmann::json run = nlohmann::json::parse(std::ifstream(folder_ / "map/summary.json"));
   EXPECT_EQ(run["masks"]["sent_with_frames"], 0);
-  EXPECT_EQ(run["masks"]["sent_late"], 20) << "25 frames a second: every second frame, all 40 of them";
+  EXPECT_EQ(run["masks"]["sent_late"], 20) << "25 frames/s, masks of every second one of 40 frames";
   EXPECT_EQ(run["masks"]["late_rejected"], 0);
   ExpectTwoEqualReplays(recording);
   const nlohmann::json replay = nlohmann::json::parse(std::ifstream(folder_ / "first/summary.json"));
   EXPECT_EQ(replay["late_masks"], 20);
 }
 
-TEST_F(ReplayTest, ACutOffRecordingIsReplayedAsFarAsItGoes) {
+TEST_F(ReplayTest, ReplaysATruncatedRecordingUpToItsEnd) {
   const std::string recording = Record();
   fs::resize_file(recording, fs::file_size(recording) - 1000);
   const testing_support::ProcessResult replay = Romap({"replay", recording, "--threads", "--out", folder_ / "out"});
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
-  EXPECT_THAT(replay.err, HasSubstr("the last record is cut off"));
+  EXPECT_THAT(replay.err, HasSubstr("the last record is truncated"));
   EXPECT_THAT(replay.out, HasSubstr("39 frames replayed"));
 }
 
-TEST_F(ReplayTest, WhatIsNoRecordingIsRefusedInOneLine) {
+TEST_F(ReplayTest, RejectsInvalidRecordingsWithOneLine) {
   const std::string text = folder_ / "notes.txt";
   std::ofstream(text) << "not a recording at all";
   std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\x9\0\0\0", 4);
-  for (const auto& [file, fault] :
-       {std::pair{text, "should begin with ROMAPREC"},
-        std::pair{folder_ / "old.romaprec", "of version 9, this program reads versions 1 to 2"},
-        std::pair{folder_ / "missing.romaprec", "no such file"}}) {
+  for (const auto& [file, fault, exit_code] :
+       {std::tuple{text, "should begin with ROMAPREC", 2},
+        std::tuple{folder_ / "old.romaprec", "of version 9, this program reads versions 1 to 2", 2},
+        std::tuple{folder_ / "missing.romaprec", "missing.romaprec", 3}}) {
     const testing_support::ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
-    EXPECT_EQ(replay.exit_code, 2);
+    EXPECT_EQ(replay.exit_code, exit_code);
     EXPECT_THAT(replay.err, HasSubstr(fault));
     EXPECT_EQ(std::count(replay.err.begin(), replay.err.end(), '\n'), 1) << replay.err;
   }
 }
 
-TEST_F(ReplayTest, AFolderThatIsNotThereIsSaidBeforeAnyFrameIsSent) {
+TEST_F(ReplayTest, ReportsAMissingRecordingFolderBeforeSendingFrames) {
   synth::SynthOptions options{.seed = 3, .objects = 1, .frames = 2, .width_px = 64, .height_px = 48};
   ASSERT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
   const testing_support::ProcessResult run =

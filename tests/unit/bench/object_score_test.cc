@@ -72,15 +72,12 @@ TEST(ScoreMap, DoesNotTakeWhatIsFarForFound) {
 
 TEST(ScoreMap, MovesTheMapIntoTheTrueWorld) {
   // The map is half as large, turned by 90 degrees and shifted.
-  eval::FittedSimilarity true_from_map;
-  true_from_map.scale = 2;
-  true_from_map.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  true_from_map.translation = {1, 2, 3};
-  const Eigen::Vector3d center_map =
-      true_from_map.rotation.transpose() * (Eigen::Vector3d(0.3, 0, 0.05) - true_from_map.translation) / 2;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
+  const Sim3<World, World> S_true_map(2, turn, {1, 2, 3});
+  const Eigen::Vector3d center_map = S_true_map.Inverse() * Eigen::Vector3d(0.3, 0, 0.05);
   ObjectUpdate object = Mapped(7, center_map, -std::numbers::pi / 2);
   object.cuboid.half_extents /= 2;
-  const MapScore score = ScoreMap(TwoBooks(), std::vector<ObjectUpdate>{object}, true_from_map);
+  const MapScore score = ScoreMap(TwoBooks(), std::vector<ObjectUpdate>{object}, S_true_map);
   ASSERT_EQ(score.Found(), 1U);
   EXPECT_NEAR(score.objects[1].errors.iou, 1, 1e-9);
   EXPECT_NEAR((score.mapped[0].center_m - Eigen::Vector3d(0.3, 0, 0.05)).norm(), 0, 1e-12);

@@ -15,7 +15,7 @@ Cuboid At(double x, double y, double z) {
   return cuboid;
 }
 
-TEST(CuboidOutlineTest, TheNearFaceSpansTheOutline) {
+TEST(CuboidOutlineTest, IsTheBoundingBoxOfTheNearFace) {
   const auto outline = CuboidOutline(At(0, 0, 2.5), kCamera, SE3<World, Camera>());
   ASSERT_TRUE(outline.has_value());
   EXPECT_NEAR(outline->x, 320 - 500 * 0.1 / 2, 1e-9);
@@ -23,7 +23,7 @@ TEST(CuboidOutlineTest, TheNearFaceSpansTheOutline) {
   EXPECT_NEAR(outline->height, 2 * 500 * 0.2 / 2, 1e-9);
 }
 
-TEST(CuboidOutlineTest, NoneBehindTheCameraOrAcrossTheBorder) {
+TEST(CuboidOutlineTest, IsEmptyBehindTheCameraAndAcrossTheImageBorder) {
   EXPECT_FALSE(CuboidOutline(At(0, 0, -2), kCamera, SE3<World, Camera>()));
   EXPECT_FALSE(CuboidOutline(At(0, 0, 0.2), kCamera, SE3<World, Camera>()));
   EXPECT_FALSE(CuboidOutline(At(1.3, 0, 2.5), kCamera, SE3<World, Camera>()));

@@ -31,22 +31,22 @@ TEST(MapCollectorTest, KeepsTheNewestRevisionOnly) {
   EXPECT_EQ(collector.objects().at(ObjectId{1}).mesh->revision, 5u);
 }
 
-TEST(MapCollectorTest, RemovedAndMergedObjectsGo) {
+TEST(MapCollectorTest, DropsRemovedAndMergedObjects) {
   MapCollector collector;
   for (uint64_t id : {1, 2, 3}) collector.Apply(Update(id, 1));
-  collector.Apply(ObjectRemoved{ObjectId{1}, 2, "ghost"});
+  collector.Apply(ObjectRemoved{ObjectId{1}, 2, "false detection"});
   collector.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 2});
   ASSERT_EQ(collector.objects().size(), 1u);
   EXPECT_TRUE(collector.objects().contains(ObjectId{3}));
 }
 
-TEST(MapCollectorTest, AMeshWithoutItsObjectIsIgnored) {
+TEST(MapCollectorTest, IgnoresAMeshOfAnUnknownObject) {
   MapCollector collector;
   collector.Apply(MeshOf(7, 1));
   EXPECT_TRUE(collector.objects().empty());
 }
 
-TEST(MapCollectorTest, ProvisionalObjectsAreNotCounted) {
+TEST(MapCollectorTest, DoesNotCountProvisionalObjects) {
   MapCollector collector;
   collector.Apply(Update(1, 1, ObjectState::kProvisional));
   EXPECT_EQ(collector.ConfirmedObjects(), 0u);
@@ -56,7 +56,7 @@ TEST(MapCollectorTest, ProvisionalObjectsAreNotCounted) {
   EXPECT_GE(collector.ArrivalOf(ObjectId{1}).first_cuboid_s, 0);
 }
 
-TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
+TEST(MapCollectorTest, CountsTrackingStates) {
   MapCollector collector;
   const auto apply = [&](TrackingState state, bool has_pose, const std::string& reason) {
     FrameAck ack;
@@ -69,14 +69,14 @@ TEST(MapCollectorTest, CountsHowTheCameraWasFollowed) {
   apply(TrackingState::kTracking, true, "");
   apply(TrackingState::kLost, false, "dark");
   apply(TrackingState::kRelocalized, true, "");
-  EXPECT_EQ(collector.tracking().initialising, 1U);
+  EXPECT_EQ(collector.tracking().initializing, 1U);
   EXPECT_EQ(collector.tracking().tracked, 2U);
   EXPECT_EQ(collector.tracking().lost, 1U);
-  EXPECT_EQ(collector.tracking().relocalised, 1U);
+  EXPECT_EQ(collector.tracking().relocalized, 1U);
   EXPECT_EQ(collector.tracking().last_reason, "dark");
 }
 
-TEST(MapCollectorTest, AcknowledgementsMakeTheTrajectory) {
+TEST(MapCollectorTest, BuildsTheTrajectoryFromAcknowledgements) {
   MapCollector collector;
   collector.NoteSent(1, 1000, true);
   collector.NoteSent(2, 2000, false);

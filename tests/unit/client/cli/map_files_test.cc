@@ -19,7 +19,7 @@ Mesh Tetrahedron() {
   return mesh;
 }
 
-TEST(MapFilesTest, MeshesAreTurnedShiftedAndScaledIntoTheWorld) {
+TEST(MapFilesTest, TransformsAndScalesMeshesToTheWorldFrame) {
   const auto draco = EncodeDraco(Tetrahedron(), DracoOptions{});
   ASSERT_TRUE(draco.ok());
   ObjectSnapshot snapshot;
@@ -44,7 +44,7 @@ TEST(MapFilesTest, MeshesAreTurnedShiftedAndScaledIntoTheWorld) {
   }
 }
 
-TEST(MapFilesTest, TheTrajectoryOfAMapLeavesOutFramesWithoutPose) {
+TEST(MapFilesTest, TrajectorySkipsFramesWithoutPose) {
   MapSnapshot snapshot;
   FrameAck tracked, untracked;
   tracked.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3));

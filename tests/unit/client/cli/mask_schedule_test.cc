@@ -34,7 +34,7 @@ std::vector<uint64_t> FramesThatKeepTheirMasks(MaskSchedule schedule, uint64_t f
   return ids;
 }
 
-TEST(MaskScheduleTest, ADetectorRunsSoManyTimesASecond) {
+TEST(MaskScheduleTest, LimitsTheRateOfMasks) {
   EXPECT_THAT(FramesThatKeepTheirMasks(MaskSchedule(0, 0), 4), ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(FramesThatKeepTheirMasks(MaskSchedule(5, 0), 14), ElementsAre(1, 6, 11));
   EXPECT_THAT(FramesThatKeepTheirMasks(MaskSchedule(1000, 0), 4), ElementsAre(1, 2, 3, 4));
@@ -42,7 +42,7 @@ TEST(MaskScheduleTest, ADetectorRunsSoManyTimesASecond) {
   EXPECT_EQ(FramesThatKeepTheirMasks(MaskSchedule(10, 0), 250).size(), 100u) << "10 s";
 }
 
-TEST(MaskScheduleTest, TheNextFrameWithMasksGetsTheTurnOfOneWithout) {
+TEST(MaskScheduleTest, UsesTheNextFrameWithMasksIfAFrameHasNone) {
   MaskSchedule schedule(5, 0);
   std::vector<uint64_t> ids;
   for (uint64_t id = 1; id <= 12; ++id) {
@@ -53,9 +53,9 @@ TEST(MaskScheduleTest, TheNextFrameWithMasksGetsTheTurnOfOneWithout) {
   EXPECT_THAT(ids, ElementsAre(1, 8, 11));
 }
 
-TEST(MaskScheduleTest, MasksComeLaterByTheFramesTimestamps) {
+TEST(MaskScheduleTest, DelaysMasksByFrameTimestamps) {
   MaskSchedule schedule(0, 0.1);
-  std::vector<std::pair<uint64_t, uint64_t>> late;  // frame, and the frame before which its masks came
+  std::vector<std::pair<uint64_t, uint64_t>> late;  // frame, and the frame before which its masks were due
   for (uint64_t id = 1; id <= 5; ++id) {
     FrameInput frame = Frame(id);
     while (const auto due = schedule.TakeDueBy(frame.timestamp_ns)) {

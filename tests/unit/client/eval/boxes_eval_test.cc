@@ -18,9 +18,9 @@ using ::testing::HasSubstr;
 
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 
-class BoxesEval : public testing::Test {
+class BoxesEvalTest : public testing::Test {
  protected:
-  BoxesEval() { Write("gt.yaml", {First(), Second()}); }
+  BoxesEvalTest() { Write("gt.yaml", {First(), Second()}); }
 
   static files::ObjectRecord First() { return eval_world::UprightCuboid(1, {0, 0, 0}, 0.3, {0.1, 0.2, 0.05}); }
   static files::ObjectRecord Second() { return eval_world::UprightCuboid(2, {1, 0, 0.1}, -0.5, {0.15, 0.1, 0.2}); }
@@ -39,7 +39,7 @@ class BoxesEval : public testing::Test {
   eval_world::TempFolder folder_;
 };
 
-TEST_F(BoxesEval, BoxesAgainstThemselvesAreExactInAnyOrder) {
+TEST_F(BoxesEvalTest, BoxesComparedWithThemselvesAreExactInAnyOrder) {
   const auto report = Evaluate({Second(), First()});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->matched, 2u);
@@ -48,7 +48,7 @@ TEST_F(BoxesEval, BoxesAgainstThemselvesAreExactInAnyOrder) {
   EXPECT_NEAR(report->center_cm, 0, 1e-6);
 }
 
-TEST_F(BoxesEval, HalfALengthAlongXGivesAThird) {
+TEST_F(BoxesEvalTest, AShiftByHalfALengthGivesAnIouOfOneThird) {
   files::ObjectRecord moved =
       eval_world::UprightCuboid(1, 0.1 * Eigen::Vector3d(std::cos(0.3), std::sin(0.3), 0), 0.3, {0.1, 0.2, 0.05});
   const auto report = Evaluate({moved, Second()});
@@ -56,7 +56,7 @@ TEST_F(BoxesEval, HalfALengthAlongXGivesAThird) {
   EXPECT_NEAR(report->rows[0].match->center_cm, 10, 1e-6);
 }
 
-TEST_F(BoxesEval, AQuarterTurnWithSwappedSidesIsTheSameBox) {
+TEST_F(BoxesEvalTest, AQuarterTurnWithSwappedSidesIsTheSameBox) {
   const auto report = Evaluate({eval_world::UprightCuboid(1, {0, 0, 0}, 0.3 + std::numbers::pi / 2, {0.2, 0.1, 0.05}),
                                 eval_world::UprightCuboid(2, {1, 0, 0.1}, -0.5 + 10 * kRadPerDeg, {0.15, 0.1, 0.2})});
   const BoxFigures& turned = *report->rows[0].match;
@@ -66,12 +66,12 @@ TEST_F(BoxesEval, AQuarterTurnWithSwappedSidesIsTheSameBox) {
   EXPECT_NEAR(report->rows[1].match->yaw_deg, 10, 1e-6);
 }
 
-TEST_F(BoxesEval, TenPercentTooLargeInAllDirections) {
+TEST_F(BoxesEvalTest, TenPercentTooLargeInAllDirectionsGivesTheVolumeRatio) {
   EXPECT_NEAR(Evaluate({eval_world::UprightCuboid(1, {0, 0, 0}, 0.3, {0.11, 0.22, 0.055})})->iou_matched, 1 / 1.331,
               1e-7);
 }
 
-TEST_F(BoxesEval, CountsMissingAndExtraBoxes) {
+TEST_F(BoxesEvalTest, CountsMissingAndExtraBoxes) {
   const auto report = Evaluate({First(), eval_world::UprightCuboid(9, {50, 0, 0}, 0, {1, 1, 1})});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_FALSE(report->rows[1].match.has_value());
@@ -80,22 +80,21 @@ TEST_F(BoxesEval, CountsMissingAndExtraBoxes) {
   EXPECT_THAT(report->extra, ElementsAre("b9"));
 }
 
-TEST_F(BoxesEval, MovesBoxesThroughTheTrajectories) {
-  const FittedSimilarity other = eval_world::OtherWorld();
+TEST_F(BoxesEvalTest, TransformsBoxesByTheTrajectories) {
+  const Sim3<World, World> other = eval_world::OtherWorld();
   std::vector<files::ObjectRecord> moved{First(), Second()};
   for (files::ObjectRecord& object : moved) {
-    object.T_world_object = {Eigen::Matrix3d(other.rotation * object.T_world_object.RotationMatrix()),
-                             other * object.T_world_object.translation()};
-    object.half_extents *= other.scale;
+    object.T_world_object = other.Moved(object.T_world_object);
+    object.half_extents *= other.scale();
   }
-  EXPECT_THAT(std::string(Evaluate(moved).status().message()), HasSubstr("another world frame?"));
+  EXPECT_THAT(std::string(Evaluate(moved).status().message()), HasSubstr("if the world frames differ"));
   ASSERT_TRUE(files::WriteTum(folder_ / "gt.txt", eval_world::Orbit()).ok());
   ASSERT_TRUE(files::WriteTum(folder_ / "est.txt", eval_world::Moved(eval_world::Orbit(), other)).ok());
   BoxesEvalOptions options;
   options.predicted = folder_ / "cuboids.json";
   options.ground_truth = folder_ / "gt.yaml";
   options.estimated_trajectory = folder_ / "est.txt";
-  EXPECT_THAT(std::string(EvaluateBoxes(options).status().message()), HasSubstr("go together"));
+  EXPECT_THAT(std::string(EvaluateBoxes(options).status().message()), HasSubstr("both or neither"));
   options.true_trajectory = folder_ / "gt.txt";
   const auto report = EvaluateBoxes(options);
   ASSERT_TRUE(report.ok()) << report.status();
@@ -103,11 +102,11 @@ TEST_F(BoxesEval, MovesBoxesThroughTheTrajectories) {
   EXPECT_NEAR(report->trajectory_scale, 1 / 0.37, 1e-6);
 }
 
-TEST_F(BoxesEval, RefusesEmptyFiles) {
-  EXPECT_THAT(std::string(Evaluate({}).status().message()), HasSubstr("no objects in it"));
+TEST_F(BoxesEvalTest, RejectsAnEmptyFile) {
+  EXPECT_THAT(std::string(Evaluate({}).status().message()), HasSubstr("contains no objects"));
 }
 
-TEST(IntersectionOverUnion, AgreesWithCountingRandomPoints) {
+TEST(IntersectionOverUnionTest, AgreesWithMonteCarlo) {
   const YawBox a{{0, 0, 0}, -0.5, {0.15, 0.1, 0.2}, 0};
   const YawBox b{{0.04, -0.03, 0.05}, 0.2, {0.12, 0.13, 0.15}, 0};
   const auto inside = [](const YawBox& box, const Eigen::Vector3d& p) {
@@ -127,8 +126,8 @@ TEST(IntersectionOverUnion, AgreesWithCountingRandomPoints) {
   EXPECT_EQ(IntersectionOverUnion(a, {{5, 0, 0}, 0, {1, 1, 1}, 0}), 0);
 }
 
-TEST(MakeUpright, TakesTheAxisClosestToUpAndReportsTheTilt) {
-  // A box lying on its side: its own x axis points up, tilted by 5 degrees.
+TEST(MakeUprightTest, UsesTheAxisClosestToUpAndReportsTheTilt) {
+  // A box on its side: its x axis points up, tilted by 5 degrees.
   const Eigen::Matrix3d rotation = (Eigen::AngleAxisd(5 * kRadPerDeg, Eigen::Vector3d::UnitX()) *
                                     Eigen::AngleAxisd(-90 * kRadPerDeg, Eigen::Vector3d::UnitY()))
                                        .toRotationMatrix();

@@ -1,6 +1,6 @@
 #pragma once
 
-// Small made-up worlds with known answers for the tests of this folder.
+// Small synthetic worlds with known results for the tests of this folder.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@
 
 namespace romap::eval_world {
 
-// A folder of this test's own; gone afterwards.
+// A temporary folder of the current test; removed by the destructor.
 class TempFolder {
  public:
   TempFolder() {
@@ -31,7 +31,7 @@ class TempFolder {
   }
   ~TempFolder() { std::filesystem::remove_all(path_); }
 
-  // Path of something in the folder; its parent folders are made.
+  // Path of a file in the folder. Creates the parent folders.
   std::string operator/(const std::string& name) const {
     const std::filesystem::path path = std::filesystem::path(path_) / name;
     std::filesystem::create_directories(path.parent_path());
@@ -42,7 +42,8 @@ class TempFolder {
   std::string path_;
 };
 
-// Sphere of longitude-latitude quads; faces whose centre is below `min_z` (relative to the centre) are left out.
+// A sphere of longitude-latitude quads, without the faces whose center is below `min_z` (relative to the sphere
+// center).
 inline Mesh Sphere(double radius, const Eigen::Vector3d& center, int around = 120, double min_z = -1e9) {
   const int rings = around / 2;
   Mesh mesh;
@@ -75,18 +76,18 @@ inline Mesh Box(const Eigen::Vector3d& half_extents, const Eigen::Vector3d& cent
   return mesh;
 }
 
-inline Mesh Moved(Mesh mesh, const eval::FittedSimilarity& similarity) {
+inline Mesh Moved(Mesh mesh, const Sim3<World, World>& similarity) {
   for (Eigen::Vector3f& vertex : mesh.vertices) vertex = (similarity * vertex.cast<double>()).cast<float>();
   return mesh;
 }
 
-// A similarity that is far from identity: another world than the ground truth's.
-inline eval::FittedSimilarity OtherWorld() {
-  return {0.37, Eigen::AngleAxisd(1.4, Eigen::Vector3d(0.4, -1.1, 0.8).normalized()).toRotationMatrix(),
+// A similarity far from identity, from the ground-truth world to another one.
+inline Sim3<World, World> OtherWorld() {
+  return {0.37, Eigen::Quaterniond(Eigen::AngleAxisd(1.4, Eigen::Vector3d(0.4, -1.1, 0.8).normalized())),
           Eigen::Vector3d(3, -2, 5)};
 }
 
-// Cameras on a wavy circle of radius 1 that look at the origin, 25 Hz.
+// Camera poses on a wavy circle of radius 1, facing the origin, at 25 Hz.
 inline std::vector<files::StampedPose> Orbit(int count = 200) {
   std::vector<files::StampedPose> poses;
   for (int k = 0; k < count; ++k) {
@@ -102,11 +103,8 @@ inline std::vector<files::StampedPose> Orbit(int count = 200) {
 }
 
 inline std::vector<files::StampedPose> Moved(std::vector<files::StampedPose> poses,
-                                             const eval::FittedSimilarity& similarity) {
-  for (files::StampedPose& pose : poses) {
-    const Eigen::Matrix3d rotation = similarity.rotation * pose.T_world_camera.RotationMatrix();
-    pose.T_world_camera = {rotation, similarity * pose.T_world_camera.translation()};
-  }
+                                             const Sim3<World, World>& similarity) {
+  for (files::StampedPose& pose : poses) pose.T_world_camera = similarity.Moved(pose.T_world_camera);
   return poses;
 }
 
@@ -117,7 +115,7 @@ inline files::ObjectRecord UprightCuboid(int64_t id, const Eigen::Vector3d& cent
           half_extents, {}};
 }
 
-// Mean distance between points of one random sampling of a surface and another of the same: 0.5 / sqrt(density).
+// Mean nearest distance between two random samplings of the same surface: 0.5 / sqrt(density).
 inline double SamplingFloor_cm(double area_cm2, double samples) { return 0.5 * std::sqrt(area_cm2 / samples); }
 
 }  // namespace romap::eval_world

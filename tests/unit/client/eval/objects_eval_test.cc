@@ -28,9 +28,9 @@ const Eigen::Vector3d kBoxHalf(0.1, 0.07, 0.05);
 const double kSphereArea_cm2 = 4 * std::numbers::pi * 100;
 const double kBoxArea_cm2 = 8 * (70 + 50 + 35);
 
-class ObjectsEval : public testing::Test {
+class ObjectsEvalTest : public testing::Test {
  protected:
-  ObjectsEval() {
+  ObjectsEvalTest() {
     options_.predicted_dir = folder_ / "pred";
     options_.ground_truth_dir = folder_ / "gt";
     options_.samples = kSamples;
@@ -54,7 +54,7 @@ class ObjectsEval : public testing::Test {
   ObjectsEvalOptions options_;
 };
 
-TEST_F(ObjectsEval, AMeshAgainstItselfGivesTheSamplingFloor) {
+TEST_F(ObjectsEvalTest, AMeshComparedWithItselfHasTheErrorOfSampling) {
   Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   Put("pred/object_7", eval_world::Box(kBoxHalf, kBoxCenter));
@@ -70,7 +70,7 @@ TEST_F(ObjectsEval, AMeshAgainstItselfGivesTheSamplingFloor) {
               (report->rows[0].match->figures.accuracy_cm + report->rows[1].match->figures.accuracy_cm) / 2, 1e-12);
 }
 
-TEST_F(ObjectsEval, ASphereFiveMillimetresTooLarge) {
+TEST_F(ObjectsEvalTest, MeasuresASphereThatIsFiveMillimetersTooLarge) {
   Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
   Put("pred/a", eval_world::Sphere(0.105, {0, 0, 0}));
   const ObjectMatch match = EvaluateOne();
@@ -86,12 +86,11 @@ TEST_F(ObjectsEval, ASphereFiveMillimetresTooLarge) {
   EXPECT_EQ(EvaluateOne().icp->scale, 1);
 }
 
-TEST_F(ObjectsEval, IcpUndoesScaleTurnAndShift) {
+TEST_F(ObjectsEvalTest, IcpRecoversScaleRotationAndTranslation) {
   const double angle_rad = 0.054;
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(angle_rad, Eigen::Vector3d(0.02, -0.03, 0.04).normalized()).toRotationMatrix();
-  const FittedSimilarity about_center{1.06, turn,
-                                      kBoxCenter - 1.06 * (turn * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005)};
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d(0.02, -0.03, 0.04).normalized()));
+  const Sim3<World, World> about_center(
+      1.06, turn, kBoxCenter - 1.06 * (turn * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005));
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   Put("pred/a", eval_world::Moved(eval_world::Box(kBoxHalf, kBoxCenter), about_center));
   options_.alignment = Alignment::kSim3;
@@ -104,11 +103,12 @@ TEST_F(ObjectsEval, IcpUndoesScaleTurnAndShift) {
   }
 }
 
-TEST_F(ObjectsEval, HalfASphereIsHalfComplete) {
+TEST_F(ObjectsEvalTest, HalfASphereIsHalfComplete) {
   Put("gt/sphere", eval_world::Sphere(0.1, {0, 0, 0}));
   Put("pred/a", eval_world::Sphere(0.1, {0, 0, 0}, 240, /*min_z=*/0));
   const ObjectMatch match = EvaluateOne();
-  // From angle a below the equator the rim is 2 r sin(a / 2) away; mean over the lower half, halved for the whole.
+  // At angle a below the equator the distance to the rim is 2 r sin(a / 2). Mean over the sphere, with 0 for the upper
+  // half.
   double integral_cm = 0;
   const int steps = 10000;
   for (int k = 0; k < steps; ++k) {
@@ -120,7 +120,7 @@ TEST_F(ObjectsEval, HalfASphereIsHalfComplete) {
   EXPECT_NEAR(match.figures.accuracy_cm, eval_world::SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
 }
 
-TEST_F(ObjectsEval, SeenColumnsLeaveOutWhatNoCameraSawAndNoCapTheUnderside) {
+TEST_F(ObjectsEvalTest, SeenFiguresIgnoreUnseenPointsAndNoCapIgnoresInferredPoints) {
   Mesh cloud = eval_world::Sphere(0.1, {0, 0, 0}, 300);
   cloud.triangles.clear();
   std::vector<double> seen, source;
@@ -134,44 +134,45 @@ TEST_F(ObjectsEval, SeenColumnsLeaveOutWhatNoCameraSawAndNoCapTheUnderside) {
   Put("pred/a", predicted);
   const ObjectMatch match = EvaluateOne();
   EXPECT_NEAR(*match.figures.accuracy_seen_cm, 0, 0.1);
-  EXPECT_NEAR(match.figures.accuracy_cm, 2 * 1.44 / 2.44, 0.06) << "the lower half is 2 cm off and 1.44 times larger";
+  EXPECT_NEAR(match.figures.accuracy_cm, 2 * 1.44 / 2.44, 0.06)
+      << "the lower half is 2 cm too large and has 1.44 times the area";
   EXPECT_NEAR(match.true_seen_share, 0.5, 0.01);
   options_.no_cap = true;
-  EXPECT_GT(EvaluateOne().true_seen_share, 0.6) << "of what is left";
+  EXPECT_GT(EvaluateOne().true_seen_share, 0.6) << "of the measured points";
 }
 
-TEST_F(ObjectsEval, MovesMeshesThroughTheTrajectories) {
-  const FittedSimilarity other = eval_world::OtherWorld();
+TEST_F(ObjectsEvalTest, TransformsMeshesByTheTrajectories) {
+  const Sim3<World, World> other = eval_world::OtherWorld();
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   Put("pred/a", eval_world::Moved(eval_world::Box(kBoxHalf, kBoxCenter), other));
-  EXPECT_THAT(Error(), HasSubstr("another world frame?"));
+  EXPECT_THAT(Error(), HasSubstr("if the world frames differ"));
   options_.estimated_trajectory = folder_ / "est.txt";
-  EXPECT_THAT(Error(), HasSubstr("go together"));
+  EXPECT_THAT(Error(), HasSubstr("both or neither"));
   options_.true_trajectory = folder_ / "gt.txt";
   ASSERT_TRUE(files::WriteTum(options_.true_trajectory, eval_world::Orbit()).ok());
   ASSERT_TRUE(files::WriteTum(options_.estimated_trajectory, eval_world::Moved(eval_world::Orbit(), other)).ok());
   EXPECT_NEAR(EvaluateOne().figures.accuracy_cm, eval_world::SamplingFloor_cm(kBoxArea_cm2, kSamples), 0.01);
 }
 
-TEST_F(ObjectsEval, CountsMissingAndExtraMeshes) {
+TEST_F(ObjectsEvalTest, CountsMissingAndExtraMeshes) {
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   Put("gt/far", eval_world::Sphere(0.1, {10, 0, 0}));
   Put("pred/a", eval_world::Box(kBoxHalf, kBoxCenter));
-  Put("pred/ghost", eval_world::Sphere(0.05, {-7, 0, 0}));
+  Put("pred/false_object", eval_world::Sphere(0.05, {-7, 0, 0}));
   const auto report = EvaluateObjects(options_);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->matched, 1u);
   EXPECT_FALSE(report->rows[1].match.has_value());
-  EXPECT_THAT(report->extra, ElementsAre("ghost"));
+  EXPECT_THAT(report->extra, ElementsAre("false_object"));
   EXPECT_NEAR(report->mean.ratios[1].all_percent_with_missing, *report->mean.ratios[1].all_percent / 2, 1e-9);
 }
 
-TEST_F(ObjectsEval, NamesWhatIsWrong) {
+TEST_F(ObjectsEvalTest, NamesTheInvalidInput) {
   options_.predicted_dir = folder_ / "nowhere_at_all/x";
   options_.ground_truth_dir = folder_ / "gt/";
-  EXPECT_THAT(Error(), HasSubstr("holds no .ply or .obj"));
+  EXPECT_THAT(Error(), HasSubstr("no .ply or .obj files"));
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
-  EXPECT_THAT(Error(), HasSubstr("nowhere_at_all/x: no folder of meshes"));
+  EXPECT_THAT(Error(), HasSubstr("nowhere_at_all/x: cannot read: No such file or directory"));
   std::ofstream(folder_ / "pred/broken.ply") << "ply\nformat ascii 1.0\n";
   options_.predicted_dir = folder_ / "pred";
   EXPECT_THAT(Error(), HasSubstr("broken.ply: the PLY header has no end_header"));
@@ -179,13 +180,13 @@ TEST_F(ObjectsEval, NamesWhatIsWrong) {
   EXPECT_THAT(Error(), HasSubstr("icp_overlap"));
   options_.icp_overlap = 1;
   options_.thresholds_cm = {-1};
-  EXPECT_THAT(Error(), HasSubstr("threshold -1 cm"));
+  EXPECT_THAT(Error(), HasSubstr("threshold is -1 cm"));
 }
 
-// One camera 1 m above a plate sees its upper side; the mask leaves out the half with x < 0.
-class ObjectsEvalWithMasks : public ObjectsEval {
+// A camera 1 m above a plate sees its upper side. The mask excludes the half with x < 0.
+class ObjectsEvalWithMasksTest : public ObjectsEvalTest {
  protected:
-  ObjectsEvalWithMasks() {
+  ObjectsEvalWithMasksTest() {
     const std::string root = folder_ / "set";
     const files::CameraYaml camera{{64, 48, 100, 100, 31.5, 23.5, {}}, 10, 0.001};
     EXPECT_TRUE(files::WriteCameraYaml(folder_ / "set/camera.yaml", camera).ok());
@@ -211,12 +212,12 @@ class ObjectsEvalWithMasks : public ObjectsEval {
   }
 };
 
-TEST_F(ObjectsEvalWithMasks, PointsInTheMaskAndNearTheDepthCountAsSeen) {
+TEST_F(ObjectsEvalWithMasksTest, PointsInTheMaskNearTheTrueDepthCountAsSeen) {
   Mesh cloud = eval_world::Box({0.1, 0.1, 0.05}, {0, 0, 0});
   cloud.triangles.clear();
   Put("gt/plate", cloud, {{"seen", std::vector<double>(8, 0)}});
   Mesh points;
-  points.vertices = {{0.05f, 0, 0},        // in the mask, on the depth
+  points.vertices = {{0.05f, 0, 0},        // in the mask, at the true depth
                      {0.05f, 0, -0.015f},  // 1.5 cm behind
                      {0.05f, 0, -0.04f},   // 4 cm behind
                      {-0.05f, 0, 0},       // not in the mask
@@ -226,10 +227,10 @@ TEST_F(ObjectsEvalWithMasks, PointsInTheMaskAndNearTheDepthCountAsSeen) {
   EXPECT_NEAR(EvaluateOne().predicted_seen_share, 2.0 / 5, 1e-12);
 }
 
-TEST_F(ObjectsEvalWithMasks, NamesATrueSurfaceThatIsNoObject) {
+TEST_F(ObjectsEvalWithMasksTest, NamesATrueSurfaceWithoutAnObject) {
   Put("gt/bowl", eval_world::Box(kBoxHalf, {0, 0, 0}));
   Put("pred/a", eval_world::Box(kBoxHalf, {0, 0, 0}));
-  EXPECT_THAT(Error(), HasSubstr("objects.yaml has no object named bowl"));
+  EXPECT_THAT(Error(), HasSubstr("objects.yaml: no object named bowl"));
 }
 
 }  // namespace

@@ -18,29 +18,29 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-class RunEval : public testing::Test {
+class RunEvalTest : public testing::Test {
  protected:
-  // A sequence with one box, and a run that found it in the world that `run_from_true` leads to.
-  void Write(const FittedSimilarity& run_from_true) {
+  // Writes a sequence with one box, and a run that mapped it in the world of `S_run_true`.
+  void Write(const Sim3<World, World>& S_run_true) {
     const Eigen::Vector3d half_extents(0.1, 0.07, 0.05);
     const files::ObjectRecord truth = eval_world::UprightCuboid(1, {0, 0, 0}, 0, half_extents);
     files::ObjectRecord found =
-        eval_world::UprightCuboid(5, run_from_true.translation, 0, run_from_true.scale * half_extents);
-    found.T_world_object = {run_from_true.rotation, run_from_true.translation};
+        eval_world::UprightCuboid(5, S_run_true.translation(), 0, S_run_true.scale() * half_extents);
+    found.T_world_object = S_run_true.Moved(truth.T_world_object);
     EXPECT_TRUE(files::WritePly(folder_ / "set/gt/b1.ply", eval_world::Box(half_extents, {0, 0, 0})).ok());
     EXPECT_TRUE(files::WriteObjects(folder_ / "set/objects.yaml", {.objects = {truth}}).ok());
     EXPECT_TRUE(files::WriteTum(folder_ / "set/groundtruth.txt", eval_world::Orbit()).ok());
-    EXPECT_TRUE(files::WritePly(folder_ / "run/objects/5_box.ply",
-                                Moved(eval_world::Box(half_extents, {0, 0, 0}), run_from_true))
-                    .ok());
+    EXPECT_TRUE(
+        files::WritePly(folder_ / "run/objects/5_box.ply", Moved(eval_world::Box(half_extents, {0, 0, 0}), S_run_true))
+            .ok());
     EXPECT_TRUE(files::WriteObjects(folder_ / "run/cuboids.json", {.objects = {found}}).ok());
-    EXPECT_TRUE(files::WriteTum(folder_ / "run/trajectory.txt", Moved(eval_world::Orbit(), run_from_true)).ok());
+    EXPECT_TRUE(files::WriteTum(folder_ / "run/trajectory.txt", Moved(eval_world::Orbit(), S_run_true)).ok());
   }
 
   eval_world::TempFolder folder_;
 };
 
-TEST_F(RunEval, WithGivenPosesNothingIsAligned) {
+TEST_F(RunEvalTest, DoesNotAlignWithGivenPoses) {
   Write({});
   const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/true);
   EXPECT_THAT(report.notes, SizeIs(0));
@@ -51,7 +51,7 @@ TEST_F(RunEval, WithGivenPosesNothingIsAligned) {
   EXPECT_EQ(report.trajectory->alignment, Alignment::kNone);
 }
 
-TEST_F(RunEval, WithEstimatedPosesTheTrajectoriesGiveTheScale) {
+TEST_F(RunEvalTest, AlignsByTrajectoriesWithEstimatedPoses) {
   Write(eval_world::OtherWorld());
   const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/false);
   EXPECT_THAT(report.notes, SizeIs(0));
@@ -62,7 +62,7 @@ TEST_F(RunEval, WithEstimatedPosesTheTrajectoriesGiveTheScale) {
   EXPECT_LT(report.trajectory->ate_rmse_m, 1e-6);
 }
 
-TEST_F(RunEval, WhatCannotBeMeasuredIsNoted) {
+TEST_F(RunEvalTest, NotesFiguresThatCannotBeMeasured) {
   const RunReport nothing = EvaluateRun(folder_ / "run/x", folder_ / "set/x", true);
   EXPECT_THAT(nothing.notes, SizeIs(3));
   EXPECT_THAT(nothing.notes[0], AllOf(HasSubstr("meshes not measured"), HasSubstr("run/x/objects")));
@@ -70,11 +70,11 @@ TEST_F(RunEval, WhatCannotBeMeasuredIsNoted) {
   ASSERT_TRUE(files::WriteFile(folder_ / "run/cuboids.json", "{\"objects\": 5}").ok());
   const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
   ASSERT_THAT(report.notes, SizeIs(1));
-  EXPECT_THAT(report.notes[0], AllOf(HasSubstr("cuboids not measured"), HasSubstr("should hold a list 'objects:'")));
+  EXPECT_THAT(report.notes[0], AllOf(HasSubstr("cuboids not measured"), HasSubstr("the list 'objects:' is missing")));
   EXPECT_TRUE(report.objects && report.trajectory);
 }
 
-TEST_F(RunEval, TablesAndJsonShowTheFigures) {
+TEST_F(RunEvalTest, TablesAndJsonContainTheFigures) {
   Write({});
   const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
   const std::string table = FormatTable(report);

@@ -16,7 +16,7 @@ using eval_world::OtherWorld;
 using eval_world::TempFolder;
 using ::testing::HasSubstr;
 
-class TrajectoryEval : public testing::Test {
+class TrajectoryEvalTest : public testing::Test {
  protected:
   // Evaluates `estimated` against the orbit.
   absl::StatusOr<TrajectoryReport> Evaluate(const std::vector<files::StampedPose>& estimated, Alignment alignment) {
@@ -29,7 +29,7 @@ class TrajectoryEval : public testing::Test {
   eval_world::TempFolder folder_;
 };
 
-TEST_F(TrajectoryEval, ATrajectoryAgainstItselfIsExact) {
+TEST_F(TrajectoryEvalTest, ATrajectoryComparedWithItselfIsExact) {
   for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
     const auto report = Evaluate(eval_world::Orbit(), alignment);
     ASSERT_TRUE(report.ok()) << report.status();
@@ -38,7 +38,7 @@ TEST_F(TrajectoryEval, ATrajectoryAgainstItselfIsExact) {
   }
 }
 
-TEST_F(TrajectoryEval, UndoesAKnownSimilarity) {
+TEST_F(TrajectoryEvalTest, RecoversAKnownSimilarity) {
   const auto report = Evaluate(Moved(eval_world::Orbit(), eval_world::OtherWorld()), Alignment::kSim3);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_LT(report->ate_rmse_m, 1e-7);
@@ -46,7 +46,7 @@ TEST_F(TrajectoryEval, UndoesAKnownSimilarity) {
   EXPECT_LT(report->rotation_rmse_deg, 1e-4);
 }
 
-TEST_F(TrajectoryEval, RigidAlignmentLeavesTheErrorOfScale) {
+TEST_F(TrajectoryEvalTest, RigidAlignmentLeavesTheScaleError) {
   const auto report = Evaluate(Moved(eval_world::Orbit(), eval_world::OtherWorld()), Alignment::kSe3);
   ASSERT_TRUE(report.ok()) << report.status();
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -59,7 +59,7 @@ TEST_F(TrajectoryEval, RigidAlignmentLeavesTheErrorOfScale) {
   EXPECT_EQ(report->scale, 1);
 }
 
-TEST_F(TrajectoryEval, MeasuresAShiftAndARollAsTheyAre) {
+TEST_F(TrajectoryEvalTest, MeasuresAKnownTranslationAndRoll) {
   std::vector<files::StampedPose> poses = eval_world::Orbit();
   const Eigen::Quaterniond roll(Eigen::AngleAxisd(2 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
   for (files::StampedPose& pose : poses) {
@@ -75,7 +75,7 @@ TEST_F(TrajectoryEval, MeasuresAShiftAndARollAsTheyAre) {
   EXPECT_NEAR(Evaluate(poses, Alignment::kSe3)->ate_rmse_m, 0, 1e-8);
 }
 
-TEST_F(TrajectoryEval, SaysWhyThereIsNothingToCompare) {
+TEST_F(TrajectoryEvalTest, NamesTheReasonWhyAlignmentFails) {
   std::vector<files::StampedPose> late = eval_world::Orbit();
   for (files::StampedPose& pose : late) pose.timestamp_ns += 1'000'000'000'000;
   EXPECT_THAT(std::string(Evaluate(late, Alignment::kSim3).status().message()),

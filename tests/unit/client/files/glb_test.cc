@@ -4,7 +4,11 @@
 
 #include <Eigen/Geometry>
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+
+#include "client/files/text_file.h"
+#include "tests/support/streams.h"
 
 namespace romap::files {
 namespace {
@@ -15,9 +19,15 @@ uint32_t WordAt(const std::string& bytes, size_t offset) {
   return word;
 }
 
-// A GLB taken apart by the rules of the specification.
+// A GLB file, parsed according to the specification.
 struct Glb {
-  explicit Glb(const std::string& bytes) {
+  // Writes the mesh and reads the file.
+  explicit Glb(const Mesh& mesh) {
+    const std::string path =
+        ::testing::TempDir() + "romap_" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".glb";
+    EXPECT_OK(WriteGlb(path, mesh));
+    const std::string bytes = ReadFile(path).value();
+    std::filesystem::remove(path);
     EXPECT_EQ(bytes.substr(0, 4), "glTF");
     EXPECT_EQ(WordAt(bytes, 4), 2u);
     EXPECT_EQ(WordAt(bytes, 8), bytes.size());
@@ -31,15 +41,17 @@ struct Glb {
     EXPECT_GE(binary.size(), document["buffers"][0]["byteLength"].get<size_t>());
   }
 
-  // Items of type T that accessor `index` describes.
+  // The scalars of type T of accessor `index`.
   template <class T>
   std::vector<T> Read(int index, size_t scalars_per_item) const {
     const auto& accessor = document["accessors"][index];
     const auto& view = document["bufferViews"][accessor["bufferView"].get<int>()];
     std::vector<T> items(accessor["count"].get<size_t>() * scalars_per_item);
     EXPECT_EQ(view["byteLength"].get<size_t>(), items.size() * sizeof(T));
-    EXPECT_EQ(view["byteOffset"].get<size_t>() % 4, 0u);
-    std::memcpy(items.data(), binary.data() + view["byteOffset"].get<size_t>(), items.size() * sizeof(T));
+    const size_t offset = view.value("byteOffset", size_t{0});
+    EXPECT_EQ(offset % 4, 0u);
+    EXPECT_LE(offset + items.size() * sizeof(T), binary.size());
+    std::memcpy(items.data(), binary.data() + offset, items.size() * sizeof(T));
     return items;
   }
 
@@ -56,12 +68,11 @@ Mesh Triangle() {
   return mesh;
 }
 
-TEST(Glb, HoldsTheMeshAsTheSpecificationSays) {
-  const auto bytes = EncodeGlb(Triangle(), "cup \"1\"");
-  ASSERT_TRUE(bytes.ok()) << bytes.status();
-  const Glb glb(*bytes);
+TEST(GlbTest, StoresTheMeshAccordingToTheSpecification) {
+  const Glb glb(Triangle());
   EXPECT_EQ(glb.document["asset"]["version"], "2.0");
-  EXPECT_EQ(glb.document["nodes"][0]["name"], "cup \"1\"");
+  EXPECT_EQ(glb.document["scenes"][glb.document["scene"].get<int>()]["nodes"], nlohmann::json({0}));
+  EXPECT_EQ(glb.document["nodes"][0]["mesh"], 0);
   const auto& primitive = glb.document["meshes"][0]["primitives"][0];
   const int position = primitive["attributes"]["POSITION"];
   EXPECT_EQ(glb.Read<float>(position, 3), (std::vector<float>{0, 0, -1, 2, 0, 0, 0, 3, 0}));
@@ -69,41 +80,43 @@ TEST(Glb, HoldsTheMeshAsTheSpecificationSays) {
   EXPECT_EQ(glb.document["accessors"][position]["max"], nlohmann::json({2.0, 3.0, 0.0}));
   EXPECT_EQ(glb.Read<uint32_t>(primitive["indices"], 1), (std::vector<uint32_t>{0, 1, 2}));
   EXPECT_EQ(glb.Read<float>(primitive["attributes"]["NORMAL"], 3), (std::vector<float>{0, 0, 1, 0, 0, 1, 0, 1, 0}))
-      << "of unit length";
+      << "unit length";
   const int color = primitive["attributes"]["COLOR_0"];
   EXPECT_TRUE(glb.document["accessors"][color]["normalized"].get<bool>());
   const auto colors = glb.Read<uint16_t>(color, 4);
   EXPECT_EQ(colors[0], 65535);
-  EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half the light";
+  EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half the linear intensity";
   EXPECT_EQ(colors[3], 65535) << "opaque";
 }
 
-TEST(Glb, TurnsWorldUpIntoGltfUp) {
-  const Glb glb(*EncodeGlb(Triangle(), "t"));
+TEST(GlbTest, RotatesZUpToYUp) {
+  const Glb glb(Triangle());
   const auto q = glb.document["nodes"][0]["rotation"].get<std::vector<double>>();  // x y z w
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   EXPECT_TRUE((rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY(), 1e-12));
   EXPECT_TRUE((rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitX(), 1e-12));
 }
 
-TEST(Glb, MeshWithoutTrianglesIsPoints) {
+TEST(GlbTest, WritesAMeshWithoutTrianglesAsPoints) {
   Mesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 1, 1}};
-  const Glb glb(*EncodeGlb(mesh, "points"));
+  const Glb glb(mesh);
   const auto& primitive = glb.document["meshes"][0]["primitives"][0];
   EXPECT_EQ(primitive["mode"], 0);
   EXPECT_FALSE(primitive.contains("indices"));
   EXPECT_FALSE(primitive["attributes"].contains("COLOR_0"));
 }
 
-TEST(Glb, RefusesBrokenMeshes) {
-  EXPECT_FALSE(EncodeGlb(Mesh(), "empty").ok());
+TEST(GlbTest, RejectsInvalidMeshes) {
+  const std::string path = ::testing::TempDir() + "romap_glb_test_rejected.glb";
+  EXPECT_CODE(WriteGlb(path, Mesh()), absl::StatusCode::kInvalidArgument);
   Mesh mesh = Triangle();
   mesh.normals.pop_back();
-  EXPECT_EQ(EncodeGlb(mesh, "t").status().message(), "t: 2 normals and 3 colours for 3 vertices");
+  EXPECT_EQ(Message(WriteGlb(path, mesh)), path + ": 2 normals and 3 colors for 3 vertices");
   mesh = Triangle();
   mesh.triangles[0][1] = 3;
-  EXPECT_FALSE(EncodeGlb(mesh, "t").ok());
+  EXPECT_CODE(WriteGlb(path, mesh), absl::StatusCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(path));
 }
 
 }  // namespace

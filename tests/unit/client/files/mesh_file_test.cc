@@ -41,7 +41,7 @@ std::string TetrahedronPly() {
   return *bytes;
 }
 
-TEST(Ply, WhatIsWrittenIsReadBack) {
+TEST(PlyTest, RoundTrip) {
   const auto file = ParsePly(TetrahedronPly(), "t.ply");
   ASSERT_TRUE(file.ok()) << file.status();
   const Mesh expected = Tetrahedron();
@@ -53,7 +53,7 @@ TEST(Ply, WhatIsWrittenIsReadBack) {
   EXPECT_THAT(file->scalars.at("weight"), ElementsAre(0.5, -1, 1e3, 2));
 }
 
-TEST(Ply, ConfidenceIsAFloatOfItsOwnWhereTheMeshHasIt) {
+TEST(PlyTest, WritesTheConfidenceOfTheMesh) {
   Mesh mesh = Tetrahedron();
   mesh.confidence = {0, 0.25f, 1, 0.5f};
   const std::string path = TempPath("confident.ply");
@@ -65,15 +65,17 @@ TEST(Ply, ConfidenceIsAFloatOfItsOwnWhereTheMeshHasIt) {
   EXPECT_THAT(file->scalars.at("confidence"), ElementsAre(0, 0.25, 1, 0.5));
   EXPECT_THAT(file->scalars.at("seen"), ElementsAre(0, 1, 1, 0));
   EXPECT_EQ(file->mesh.colors, mesh.colors);
-  EXPECT_THAT(ErrorOf(WritePly(path, mesh, {{"confidence", {0, 1, 1, 0}}})), HasSubstr("confidence both of the mesh"));
+  EXPECT_THAT(ErrorOf(WritePly(path, mesh, {{"confidence", {0, 1, 1, 0}}})),
+              HasSubstr("given both by the mesh and by the scalars"));
   mesh.confidence.pop_back();
   EXPECT_THAT(ErrorOf(WritePly(path, mesh)), HasSubstr("3 confidences"));
   std::filesystem::remove(path);
 }
 
-TEST(Ply, ReadsAsciiWithPolygonsInAnyOrderOfProperties) {
+TEST(PlyTest, ReadsAsciiPolygonsWithPropertiesInAnyOrder) {
   const auto file = ParsePly(
-      "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement vertex 5\r\nproperty uchar seen\r\nproperty double z\r\n"
+      "ply\r\nformat ascii 1.0\r\ncomment hand-written\r\nelement vertex 5\r\nproperty uchar seen\r\nproperty double "
+      "z\r\n"
       "property float y\r\nproperty float x\r\nelement face 2\r\nproperty uchar flags\r\n"
       "property list uchar uint vertex_index\r\nend_header\r\n"
       "1 0 0 0\r\n0 0 0 1\r\n1 0 1 1\r\n1 0 1 0\r\n1 2.5 0.5 0.5\r\n7 4 0 1 2 3\r\n7 3 0 1 4",
@@ -85,7 +87,7 @@ TEST(Ply, ReadsAsciiWithPolygonsInAnyOrderOfProperties) {
   EXPECT_THAT(file->scalars.at("seen"), ElementsAre(1, 0, 1, 1, 1));
 }
 
-TEST(Ply, ReadsBigEndianPointClouds) {
+TEST(PlyTest, ReadsBigEndianPointClouds) {
   const std::string header =
       "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty short y\nproperty double z\n"
       "end_header\n";
@@ -96,7 +98,7 @@ TEST(Ply, ReadsBigEndianPointClouds) {
   EXPECT_TRUE(file->mesh.triangles.empty());
 }
 
-TEST(Ply, SaysWhatIsWrong) {
+TEST(PlyTest, NamesTheErrorInMalformedFiles) {
   const std::string good = TetrahedronPly();
   const auto error = [](const std::string& bytes) { return ErrorOf(ParsePly(bytes, "x.ply").status()); };
   const auto replaced = [&](const std::string& from, const std::string& to) {
@@ -106,27 +108,28 @@ TEST(Ply, SaysWhatIsWrong) {
   EXPECT_THAT(error(""), HasSubstr("x.ply: not a PLY file"));
   EXPECT_THAT(error("plyx"), HasSubstr("no end_header"));
   EXPECT_THAT(error(good.substr(0, 40)), HasSubstr("no end_header"));
-  EXPECT_THAT(error(good.substr(0, good.size() - 7)), HasSubstr("'face' (4 announced) is cut off"));
+  EXPECT_THAT(error(good.substr(0, good.size() - 7)), HasSubstr("'face' (4 rows declared) is truncated"));
   EXPECT_THAT(error(replaced("vertex 4", "vertex 400000000000")), HasSubstr("'vertex'"));
-  EXPECT_THAT(error(replaced("vertex 4", "vertex -4")), HasSubstr("bad PLY header line 'element vertex -4'"));
-  EXPECT_THAT(error(replaced("float y", "quad y")), HasSubstr("bad PLY header line 'property quad y'"));
-  EXPECT_THAT(error(replaced("float y", "float x")), HasSubstr("bad PLY header line 'property float x'"));
-  EXPECT_THAT(error(replaced("float y", "float w")), HasSubstr("without x, y, z"));
-  EXPECT_THAT(error(replaced("binary_little_endian", "binary_middle_endian")), HasSubstr("bad PLY header line"));
-  EXPECT_THAT(error(good.substr(0, good.size() - 4) + std::string("\xff\xff\x00\x00", 4)), HasSubstr("names vertex"));
+  EXPECT_THAT(error(replaced("vertex 4", "vertex -4")), HasSubstr("invalid PLY header line 'element vertex -4'"));
+  EXPECT_THAT(error(replaced("float y", "quad y")), HasSubstr("invalid PLY header line 'property quad y'"));
+  EXPECT_THAT(error(replaced("float y", "float x")), HasSubstr("invalid PLY header line 'property float x'"));
+  EXPECT_THAT(error(replaced("float y", "float w")), HasSubstr("vertices lack x, y or z"));
+  EXPECT_THAT(error(replaced("binary_little_endian", "binary_middle_endian")), HasSubstr("invalid PLY header line"));
+  EXPECT_THAT(error(good.substr(0, good.size() - 4) + std::string("\xff\xff\x00\x00", 4)),
+              HasSubstr("out of range 0..3"));
   std::string nan = good;
   nan.replace(good.find("end_header\n") + 11, 4, std::string("\x00\x00\xc0\x7f", 4));
   EXPECT_THAT(error(nan), HasSubstr("1 vertices are not finite"));
   EXPECT_THAT(error("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
                     "end_header\n0 zero 0\n"),
-              HasSubstr("cut off or malformed"));
+              HasSubstr("truncated or malformed"));
   EXPECT_THAT(error("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
                     "end_header\n"),
               HasSubstr("no vertices"));
 }
 
-// Whatever the damage, the reader answers; sanitizers watch.
-TEST(Ply, SurvivesDamagedFiles) {
+// Sanitizer builds check that damaged files cause no invalid memory access.
+TEST(PlyTest, SurvivesDamagedFiles) {
   const std::string good = TetrahedronPly();
   for (size_t length = 0; length < good.size(); ++length) {
     EXPECT_FALSE(ParsePly(good.substr(0, length), "x.ply").ok()) << length;
@@ -142,15 +145,20 @@ TEST(Ply, SurvivesDamagedFiles) {
   }
 }
 
-TEST(Ply, RefusesToWriteWhatDoesNotFit) {
+TEST(PlyTest, RejectsArraysOfDifferentLengths) {
   EXPECT_THAT(ErrorOf(WritePly(TempPath("x.ply"), Tetrahedron(), {{"seen", {1}}})), HasSubstr("1 values of 'seen'"));
   Mesh mesh = Tetrahedron();
   mesh.colors.pop_back();
-  EXPECT_THAT(ErrorOf(WritePly(TempPath("x.ply"), mesh)), HasSubstr("3 colours for 4 vertices"));
-  EXPECT_THAT(ErrorOf(WritePly("/nowhere/x.ply", Tetrahedron())), HasSubstr("/nowhere/x.ply: cannot be written"));
+  EXPECT_THAT(ErrorOf(WritePly(TempPath("x.ply"), mesh)), HasSubstr("3 colors for 4 vertices"));
 }
 
-TEST(Obj, ReadsPolygonsAndRelativeIndices) {
+TEST(PlyTest, WriteReportsAMissingFolder) {
+  const absl::Status status = WritePly("/nowhere/x.ply", Tetrahedron());
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(ErrorOf(status), "/nowhere/x.ply: cannot write: No such file or directory");
+}
+
+TEST(ObjTest, ReadsPolygonsAndRelativeIndices) {
   const std::string path = TempPath("a.obj");
   std::ofstream(path) << "# quad\nmtllib a.mtl\nv 0 0 0 1 1 1\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\n"
                          "f 1//1 2//1 3//1 4//1\nf -4/1 -1 -2/2/1\n";
@@ -161,25 +169,27 @@ TEST(Obj, ReadsPolygonsAndRelativeIndices) {
   std::filesystem::remove(path);
 }
 
-TEST(Obj, NamesTheLineThatIsWrong) {
+TEST(ObjTest, NamesTheInvalidLineOrFace) {
   const std::string path = TempPath("a.obj");
-  for (const auto& [text, message] :
-       std::vector<std::pair<std::string, std::string>>{{"v 0 0\n", "a.obj:1: should be 'v x y z'"},
-                                                        {"v 0 0 0\nv nan 0 0\n", "a.obj:2"},
-                                                        {"v 0 0 0\nf 0 1 1\n", "a.obj:2: should be 'f a b c...'"},
-                                                        {"v 0 0 0\nf -2 1 1\n", "a.obj:2"},
-                                                        {"v 0 0 0\nf 1 1 9\n", "a face names vertex 8, there are 0..0"},
-                                                        {"# nothing\n", "no vertices"}}) {
+  for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
+           {"v 0 0\n", "a.obj:1: expected 'v x y z'"},
+           {"v 0 0 0\nv nan 0 0\n", "a.obj:2"},
+           {"v 0 0 0\nf 0 1 1\n", "a.obj: face 1: expected 'f a b c ...'"},
+           {"v 0 0 0\nf -2 1 1\n", "a.obj: face 1"},
+           {"v 0 0 0\nf 1 1\n", "a.obj: face 1"},
+           {"v 0 0 0\nf 1 1 1\nf 1 x 1\n", "a.obj: face 2"},
+           {"v 0 0 0\nf 1 1 9\n", "vertex index 8 in a face is out of range 0..0"},
+           {"# nothing\n", "no vertices"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(ErrorOf(ReadObj(path).status()), HasSubstr(message));
   }
   std::filesystem::remove(path);
 }
 
-TEST(MeshFolder, TakesMeshesByNameAndSaysWhenThereAreNone) {
+TEST(MeshFolderTest, ReadsMeshesByName) {
   const std::string dir = TempPath("folder");
   std::filesystem::create_directories(dir);
-  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir).status()), HasSubstr("holds no .ply or .obj"));
+  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir).status()), HasSubstr("no .ply or .obj files"));
   ASSERT_TRUE(WritePly(dir + "/cup.PLY", Tetrahedron()).ok());
   std::ofstream(dir + "/notes.txt") << "not a mesh";
   const auto meshes = ReadMeshFolder(dir);
@@ -187,13 +197,13 @@ TEST(MeshFolder, TakesMeshesByNameAndSaysWhenThereAreNone) {
   EXPECT_EQ(meshes->size(), 1u);
   EXPECT_TRUE(meshes->contains("cup"));
   std::ofstream(dir + "/cup.obj") << "v 0 0 0\n";
-  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir).status()), HasSubstr("two meshes named cup"));
-  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir + "/nowhere").status()), HasSubstr("no folder of meshes"));
-  EXPECT_THAT(ErrorOf(ReadMeshFile(dir + "/notes.txt").status()), HasSubstr("neither .ply nor .obj"));
+  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir).status()), HasSubstr("two meshes are named cup"));
+  EXPECT_THAT(ErrorOf(ReadMeshFolder(dir + "/nowhere").status()), HasSubstr("cannot read: No such file or directory"));
+  EXPECT_THAT(ErrorOf(ReadMeshFile(dir + "/notes.txt").status()), HasSubstr("expected a .ply or .obj file"));
   std::filesystem::remove_all(dir);
 }
 
-TEST(SharedMeshes, ReadsGroundTruthClouds) {
+TEST(MeshFileDataTest, ReadsGroundTruthClouds) {
   const char* data_dir = std::getenv("ROMAP_DATA_DIR");
   if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
   const auto cup = ReadMeshFile(std::string(data_dir) + "/cube_diorama_room/gt/cup.ply");

@@ -16,7 +16,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
-// A sequence of four frames at 10 Hz, written anew for each test.
+// Each test gets a new sequence of four frames at 10 Hz.
 class SequenceTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -41,7 +41,7 @@ class SequenceTest : public testing::Test {
 
   void Put(const std::string& name, const std::string& text) { std::ofstream(dir_ + "/" + name) << text; }
 
-  // Message of the error that Open gives; "" when there is none.
+  // The error message of Open; "" on success.
   std::string OpenError(const SequenceOptions& options = {}) {
     const auto sequence = Sequence::Open(dir_, options);
     return sequence.ok() ? "" : std::string(sequence.status().message());
@@ -50,7 +50,7 @@ class SequenceTest : public testing::Test {
   std::string dir_;
 };
 
-TEST_F(SequenceTest, ReadsImagesAsTheyAreInTheFile) {
+TEST_F(SequenceTest, LoadReturnsTheBytesOfTheImageFile) {
   const auto sequence = Sequence::Open(dir_);
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   EXPECT_EQ(sequence->size(), 4u);
@@ -67,7 +67,7 @@ TEST_F(SequenceTest, ReadsImagesAsTheyAreInTheFile) {
   EXPECT_FALSE(frame->T_world_camera.has_value());
 }
 
-TEST_F(SequenceTest, MatchesSomeMasksByTimeAndTheirDetections) {
+TEST_F(SequenceTest, AssociatesMasksAndDetectionsByTime) {
   Put("mask.txt", "0.004 mask/0.png\n0.196 mask/2.png\n0.9 mask/3.png\n");
   Put("detections.csv", "timestamp,label,class,score\n0.004,1,cup,0.5\n0.004,2,potted plant,0.25\n0.196,1,book,1\n");
   const auto sequence = Sequence::Open(dir_);
@@ -85,7 +85,7 @@ TEST_F(SequenceTest, MatchesSomeMasksByTimeAndTheirDetections) {
   EXPECT_TRUE(sequence->Load(1)->instances.empty());
 }
 
-TEST_F(SequenceTest, WithoutDetectionsLabelsAreThoseOfObjectsYaml) {
+TEST_F(SequenceTest, UsesLabelsOfObjectsYamlWithoutDetections) {
   Put("mask.txt", "0.0 mask/0.png\n0.1 mask/1.png\n");
   Put("objects.yaml",
       "objects:\n  - id: 2\n    name: a\n    class: cup\n    center: [0, 0, 1]\n    yaw: 0.5\n"
@@ -99,18 +99,18 @@ TEST_F(SequenceTest, WithoutDetectionsLabelsAreThoseOfObjectsYaml) {
   EXPECT_EQ(frame->instances[0].class_name, "cup");
 }
 
-TEST_F(SequenceTest, InterpolatesPosesAndLeavesGapsOpen) {
+TEST_F(SequenceTest, InterpolatesPosesButNotAcrossGaps) {
   Put("groundtruth.txt", "-0.01 0 0 0 0 0 0 1\n0.01 2 0 0 0 0 0 1\n0.115 5 0 0 0 0 0 1\n0.15 9 9 9 0 0 0 1\n");
   const auto sequence = Sequence::Open(dir_);
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   EXPECT_NEAR(sequence->Load(0)->T_world_camera->translation().x(), 1, 1e-12);
-  EXPECT_NEAR(sequence->Load(1)->T_world_camera->translation().x(), 5, 1e-12) << "neighbours 105 ms apart: the nearest";
+  EXPECT_NEAR(sequence->Load(1)->T_world_camera->translation().x(), 5, 1e-12) << "neighbors 105 ms apart: nearest pose";
   EXPECT_FALSE(sequence->Load(2)->T_world_camera.has_value());
-  const auto blind = Sequence::Open(dir_, {.poses = ""});
-  EXPECT_FALSE(blind->Load(0)->T_world_camera.has_value());
+  const auto without_poses = Sequence::Open(dir_, {.poses = ""});
+  EXPECT_FALSE(without_poses->Load(0)->T_world_camera.has_value());
 }
 
-TEST_F(SequenceTest, HandsOverDepthOnlyWhenAsked) {
+TEST_F(SequenceTest, LoadsDepthOnlyOnRequest) {
   Put("depth.txt", "0 depth/0.png\n0.1 depth/1.png\n0.2 depth/2.png\n0.3 depth/3.png\n");
   EXPECT_EQ(Sequence::Open(dir_)->Load(1)->depth_encoding, DepthEncoding::kNone);
   const auto frame = Sequence::Open(dir_, {.use_depth = true})->Load(1);
@@ -120,7 +120,7 @@ TEST_F(SequenceTest, HandsOverDepthOnlyWhenAsked) {
   EXPECT_FALSE(frame->depth.empty());
 }
 
-TEST_F(SequenceTest, PermutedLabelsKeepShapesAndClassesButNotNumbers) {
+TEST_F(SequenceTest, PermutedLabelsKeepShapesAndClasses) {
   Put("mask.txt", "0 mask/0.png\n0.1 mask/1.png\n0.2 mask/2.png\n0.3 mask/3.png\n");
   Put("detections.csv", "0,1,cup,1\n0,2,book,1\n0.1,1,cup,1\n0.1,2,book,1\n0.2,1,cup,1\n0.3,1,cup,1\n");
   const auto sequence = Sequence::Open(dir_, {.permute_labels_seed = 7});
@@ -142,25 +142,25 @@ TEST_F(SequenceTest, PermutedLabelsKeepShapesAndClassesButNotNumbers) {
   EXPECT_EQ(sequence->Load(1)->label_png, sequence->Load(1)->label_png) << "the same seed gives the same labels";
 }
 
-TEST_F(SequenceTest, SaysWhatIsMissing) {
-  EXPECT_THAT(std::string(Sequence::Open(dir_ + "/nowhere").status().message()), HasSubstr("no such folder"));
-  EXPECT_THAT(OpenError({.masks = "mask_other.txt"}), HasSubstr("mask_other.txt: no such file"));
-  EXPECT_THAT(OpenError({.use_depth = true}), HasSubstr("depth.txt: no such file"));
+TEST_F(SequenceTest, NamesTheMissingFile) {
+  EXPECT_THAT(std::string(Sequence::Open(dir_ + "/nowhere").status().message()), HasSubstr("no such sequence folder"));
+  EXPECT_THAT(OpenError({.masks = "mask_other.txt"}), HasSubstr("mask_other.txt: cannot read: No such file"));
+  EXPECT_THAT(OpenError({.use_depth = true}), HasSubstr("depth.txt: cannot read: No such file"));
   fs::remove(dir_ + "/camera.yaml");
-  EXPECT_THAT(OpenError(), HasSubstr("missing calibration"));
+  EXPECT_THAT(OpenError(), HasSubstr("camera.yaml is missing"));
   fs::remove(dir_ + "/rgb.txt");
-  EXPECT_THAT(OpenError(), AllOf(HasSubstr(dir_), HasSubstr("empty sequence folder")));
+  EXPECT_THAT(OpenError(), AllOf(HasSubstr(dir_), HasSubstr("rgb.txt is missing")));
 }
 
-TEST_F(SequenceTest, NamesFileAndLineOfWhatIsMalformed) {
+TEST_F(SequenceTest, NamesTheFileAndLineOfMalformedInput) {
   Put("rgb.txt", "0.0 rgb/0.png\n0.1\n");
-  EXPECT_THAT(OpenError(), HasSubstr("rgb.txt:2: should be 'timestamp filename'"));
+  EXPECT_THAT(OpenError(), HasSubstr("rgb.txt:2: expected 'timestamp filename'"));
   Put("rgb.txt", "0.0 rgb/0.png\nnan rgb/1.png\n");
   EXPECT_THAT(OpenError(), HasSubstr("rgb.txt:2"));
   Put("rgb.txt", "0.1 rgb/0.png\n0.0 rgb/1.png\n");
-  EXPECT_THAT(OpenError(), HasSubstr("rgb.txt:2: time goes back"));
+  EXPECT_THAT(OpenError(), HasSubstr("rgb.txt:2: timestamps must increase"));
   Put("rgb.txt", "# nothing\n");
-  EXPECT_THAT(OpenError(), HasSubstr("lists no frames"));
+  EXPECT_THAT(OpenError(), HasSubstr("no frames listed"));
   Put("rgb.txt", "0.0 rgb/missing.png\n");
   EXPECT_THAT(OpenError(), AllOf(HasSubstr("rgb.txt:1"), HasSubstr("rgb/missing.png")));
   Put("rgb.txt", "0.0 rgb/0.png\n");
@@ -172,8 +172,8 @@ TEST_F(SequenceTest, NamesFileAndLineOfWhatIsMalformed) {
   EXPECT_THAT(OpenError(), HasSubstr("camera.yaml"));
 }
 
-TEST_F(SequenceTest, NamesTheFileThatIsNoImage) {
-  Put("rgb/1.png", "not a picture");
+TEST_F(SequenceTest, NamesAFileThatIsNotAnImage) {
+  Put("rgb/1.png", "not an image");
   Put("mask.txt", "0 mask/0.png\n");
   Put("mask/0.png", "");
   const auto sequence = Sequence::Open(dir_);
@@ -183,7 +183,7 @@ TEST_F(SequenceTest, NamesTheFileThatIsNoImage) {
   EXPECT_FALSE(sequence->Load(4).ok());
 }
 
-TEST(SharedSequence, OpensTheRoomWithAllItsParts) {
+TEST(SequenceDataTest, OpensASequenceWithDepthAndMasks) {
   const char* data_dir = std::getenv("ROMAP_DATA_DIR");
   if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
   const auto room = Sequence::Open(std::string(data_dir) + "/cube_diorama_room", {.use_depth = true});
@@ -198,7 +198,7 @@ TEST(SharedSequence, OpensTheRoomWithAllItsParts) {
   }
 }
 
-TEST(SharedSequence, ReadsTheKitchenWithDetectorMasksOnEverySecondFrame) {
+TEST(SequenceDataTest, OpensASequenceWithMasksInEverySecondFrame) {
   const char* data_dir = std::getenv("ROMAP_DATA_DIR");
   if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
   const auto kitchen = Sequence::Open(std::string(data_dir) + "/redkitchen_600",

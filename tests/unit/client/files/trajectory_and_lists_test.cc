@@ -19,7 +19,7 @@ std::string TempPath(const std::string& name) {
   return testing::TempDir() + "romap_" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
 }
 
-TEST(Seconds, KeepAllDigitsOfAUnixTime) {
+TEST(ParseSecondsTest, KeepsAllDigitsOfAUnixTime) {
   EXPECT_EQ(ParseSeconds("1700000000.123456789"), 1700000000123456789);
   EXPECT_EQ(ParseSeconds("0.0333333333"), 33333333);
   EXPECT_EQ(ParseSeconds("0.9999999996"), 1000000000);
@@ -34,7 +34,7 @@ TEST(Seconds, KeepAllDigitsOfAUnixTime) {
   }
 }
 
-TEST(Tables, SplitAtBlanksOrCommasAndKnowTheirLines) {
+TEST(ReadTableTest, SplitsAtBlanksOrCommas) {
   const std::string path = TempPath("table");
   std::ofstream(path) << "# head\n\n 1 \t two  3 # tail\r\na b";
   const auto words = ReadTable(path, ' ');
@@ -46,10 +46,10 @@ TEST(Tables, SplitAtBlanksOrCommasAndKnowTheirLines) {
   EXPECT_THAT((*ReadTable(path, ','))[0].fields, ElementsAre("1", "potted plant", "", ""));
   std::filesystem::remove(path);
   EXPECT_EQ(ReadTable(path, ',').status().code(), absl::StatusCode::kNotFound);
-  EXPECT_THAT(std::string(ReadTable(testing::TempDir(), ',').status().message()), HasSubstr("not a regular file"));
+  EXPECT_EQ(ReadTable(testing::TempDir(), ',').status().code(), absl::StatusCode::kPermissionDenied) << "a folder";
 }
 
-TEST(Association, IsOneToOneAndClosestFirst) {
+TEST(AssociateTimestampsTest, PairsOneToOneAndClosestFirst) {
   const std::vector<int64_t> a{0, 100, 200, 300};
   const std::vector<int64_t> b{95, 104, 190, 1000};
   EXPECT_THAT(AssociateTimestamps(a, b, 10), ElementsAre(Pair(1, 1), Pair(2, 2)));
@@ -58,7 +58,7 @@ TEST(Association, IsOneToOneAndClosestFirst) {
   EXPECT_TRUE(AssociateTimestamps(a, {}, 10).empty());
 }
 
-TEST(Tum, WhatIsWrittenIsReadBackInTimeOrder) {
+TEST(TumTest, RoundTripSortsByTime) {
   const std::string path = TempPath("poses.txt");
   const Eigen::Quaterniond q(Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, -2, 3).normalized()));
   const std::vector<StampedPose> poses{{2'000'000'001, {q, Eigen::Vector3d(1, 2, 3)}},
@@ -73,22 +73,22 @@ TEST(Tum, WhatIsWrittenIsReadBackInTimeOrder) {
   std::filesystem::remove(path);
 }
 
-TEST(Tum, NamesTheLineThatIsWrong) {
+TEST(TumTest, NamesTheInvalidLine) {
   const std::string path = TempPath("poses.txt");
   for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
            {"0 0 0 0 0 0 0 1\n0 1 2 3\n", "poses.txt:2: 4 fields"},
            {"0 nan 0 0 0 0 0 1\n", "poses.txt:1: 'nan' is not a finite number"},
            {"x 0 0 0 0 0 0 1\n", "poses.txt:1: 'x' is not a finite number"},
            {"1e30 0 0 0 0 0 0 1\n", "poses.txt:1: '1e30' is not a finite number"},
-           {"0 0 0 0 0 0 0 2\n", "quaternion of length 2.000"},
-           {"# empty\n", "no poses in it"}}) {
+           {"0 0 0 0 0 0 0 2\n", "quaternion norm is 2.000"},
+           {"# empty\n", "contains no poses"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(std::string(ReadTum(path).status().message()), HasSubstr(message));
   }
   std::filesystem::remove(path);
 }
 
-TEST(PoseAt, TurnsHalfWayBetweenTwoPoses) {
+TEST(PoseAtTest, InterpolatesBetweenTwoPoses) {
   const std::vector<StampedPose> poses{
       {0, {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}},
       {20'000'000, {Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(2, 0, 0)}}};

@@ -19,7 +19,7 @@ std::string TempPath(const std::string& name) {
 
 std::string ErrorOf(const absl::Status& status) { return std::string(status.message()); }
 
-TEST(CameraYaml, WhatIsWrittenIsReadBack) {
+TEST(CameraYamlTest, RoundTrip) {
   const std::string path = TempPath("camera.yaml");
   CameraYaml camera;
   camera.camera = {640, 480, 888.888916015625, 525.7, 319.5, 239.5, {-0.1, 0.02, 1e-4, -2e-4, 3e-3}};
@@ -34,7 +34,7 @@ TEST(CameraYaml, WhatIsWrittenIsReadBack) {
   std::filesystem::remove(path);
 }
 
-TEST(CameraYaml, AFisheyeIsReadBack) {
+TEST(CameraYamlTest, RoundTripOfAFisheyeCamera) {
   const std::string path = TempPath("camera.yaml");
   CameraYaml camera;
   camera.camera = {640, 480, 300, 301, 319.5, 239.5, {-0.01, 0.02, 1e-4, -2e-4, 0}, LensModel::kFisheye};
@@ -45,20 +45,20 @@ TEST(CameraYaml, AFisheyeIsReadBack) {
   std::filesystem::remove(path);
 }
 
-TEST(CameraYaml, SaysWhatIsWrong) {
+TEST(CameraYamlTest, NamesTheError) {
   const std::string path = TempPath("camera.yaml");
   const std::string good = "width: 64\nheight: 48\nfx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\n";
   for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
            {"width: 64\nheight: 48\nfy: 50\n", "'fx' is missing"},
-           {good + "fx: [1\n", "not YAML"},
-           {"just words\n", "not a YAML map"},
-           {"width: 64.5\nheight: 48\n", "'width' is 64.5, should be a whole number"},
+           {good + "fx: [1\n", "invalid YAML"},
+           {"just words\n", "expected a YAML map"},
+           {"width: 64.5\nheight: 48\n", "'width' is 64.5; expected a positive integer"},
            {"width: 64\nheight: .nan\n", "camera.yaml:2: 'height' is not a finite number"},
-           {good + "distortion: [0, 0, 0]\n", "camera.yaml:7: 'distortion' should be a list of 5 numbers"},
+           {good + "distortion: [0, 0, 0]\n", "camera.yaml:7: expected 'distortion' to be a list of 5 numbers"},
            {good + "lens: fisheye\ndistortion: [0, 0, 0, 0, 0]\n",
-            "camera.yaml:8: 'distortion' should be a list of 4 numbers"},
-           {good + "lens: wide\n", "camera.yaml:7: 'lens' is 'wide', should be radial-tangential or fisheye"},
-           {good + "fps: 0\n", "'fps' is 0, should be positive"}}) {
+            "camera.yaml:8: expected 'distortion' to be a list of 4 numbers"},
+           {good + "lens: wide\n", "camera.yaml:7: 'lens' is 'wide'; expected radial-tangential or fisheye"},
+           {good + "fps: 0\n", "'fps' is 0; expected a positive number"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(ErrorOf(ReadCameraYaml(path).status()), HasSubstr(message));
   }
@@ -80,9 +80,9 @@ ObjectsYaml TwoObjects() {
   return objects;
 }
 
-class ObjectsFormat : public testing::TestWithParam<const char*> {};
+class ObjectsFormatTest : public testing::TestWithParam<const char*> {};
 
-TEST_P(ObjectsFormat, WhatIsWrittenIsReadBack) {
+TEST_P(ObjectsFormatTest, RoundTrip) {
   const std::string path = testing::TempDir() + "romap_objects_roundtrip" + GetParam();
   const ObjectsYaml objects = TwoObjects();
   ASSERT_TRUE(WriteObjects(path, objects).ok());
@@ -103,10 +103,10 @@ TEST_P(ObjectsFormat, WhatIsWrittenIsReadBack) {
   std::filesystem::remove(path);
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, ObjectsFormat, testing::Values(".yaml", ".json"),
+INSTANTIATE_TEST_SUITE_P(Formats, ObjectsFormatTest, testing::Values(".yaml", ".json"),
                          [](const auto& info) { return std::string(info.param).substr(1); });
 
-TEST(ObjectsYaml, AcceptsAMapWithoutObjects) {
+TEST(ObjectsYamlTest, AcceptsAnEmptyMap) {
   const std::string path = TempPath("cuboids.json");
   ASSERT_TRUE(WriteObjects(path, {}).ok());
   const auto read = ReadObjects(path);
@@ -115,21 +115,21 @@ TEST(ObjectsYaml, AcceptsAMapWithoutObjects) {
   std::filesystem::remove(path);
 }
 
-TEST(ObjectsYaml, SaysWhichObjectIsWrong) {
+TEST(ObjectsYamlTest, NamesTheInvalidObject) {
   const std::string path = TempPath("objects.yaml");
   const std::string head = "objects:\n  - id: 3\n    yaw: 0\n    center: [0, 0, 0]\n";
   const std::string matrix = "    T_world_object: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, ";
   for (const auto& [text, message] : std::vector<std::pair<std::string, std::string>>{
            {head, "objects.yaml:2: 'half_extents' is missing"},
-           {head + "    half_extents: [1, -1, 1]\n", "objects.yaml:2: object 3: half_extents should be positive"},
-           {head + "    half_extents: [1, 1]\n", "should be a list of 3 numbers"},
+           {head + "    half_extents: [1, -1, 1]\n", "objects.yaml:2: object 3: 'half_extents' must be positive"},
+           {head + "    half_extents: [1, 1]\n", "to be a list of 3 numbers"},
            {head + "    half_extents: [1, .inf, 1]\n", "not a finite number"},
            {head + matrix + "2, 0, 0, 0, 0, 1]\n", "objects.yaml:5: the rotation"},
            {head + matrix + "-1, 0, 0, 0, 0, 1]\n", "right-handed"},
            {"objects:\n  - half_extents: [1, 1, 1]\n", "objects.yaml:2: 'id' is missing"},
-           {"objects:\n  - 5\n", "entry 1 of 'objects' is not a map"},
-           {"world_up: [0, 0, 0]\nobjects:\n", "'world_up' has no direction"},
-           {"things: []\n", "should hold a list 'objects:'"},
+           {"objects:\n  - 5\n", "entry 1 of 'objects' is not a YAML map"},
+           {"world_up: [0, 0, 0]\nobjects:\n", "'world_up' must not be the zero vector"},
+           {"cuboids: []\n", "the list 'objects:' is missing"},
            {"\x01\x02\xff", "objects.yaml"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(ErrorOf(ReadObjects(path).status()), AllOf(HasSubstr("objects.yaml"), HasSubstr(message)));

@@ -1,0 +1,22 @@
+#include "client/cli/exit_code.h"
+
+#include <gtest/gtest.h>
+
+namespace romap::cli {
+namespace {
+
+TEST(ExitCodeTest, FollowsTheDocumentedTable) {
+  EXPECT_EQ(ToExitCode(absl::OkStatus()), 0);
+  EXPECT_EQ(ToExitCode(absl::InternalError("")), 1);
+  EXPECT_EQ(ToExitCode(absl::FailedPreconditionError("")), 1);
+  EXPECT_EQ(ToExitCode(absl::InvalidArgumentError("")), 2);
+  EXPECT_EQ(ToExitCode(absl::NotFoundError("")), 3);
+  EXPECT_EQ(ToExitCode(absl::PermissionDeniedError("")), 3);
+  EXPECT_EQ(ToExitCode(absl::ResourceExhaustedError("")), 3);
+  EXPECT_EQ(ToExitCode(absl::UnavailableError("")), 4);
+  EXPECT_EQ(ToExitCode(absl::DeadlineExceededError("")), 4);
+  EXPECT_EQ(ToExitCode(absl::CancelledError("")), 130);
+}
+
+}  // namespace
+}  // namespace romap::cli
