@@ -15,13 +15,13 @@ constexpr int kPanelWidth_px = 640, kPanelHeight_px = 520;
 constexpr int kLeft_px = 80, kRight_px = 20, kTop_px = 50, kBottom_px = 70;
 constexpr int kLegendHeight_px = 130;
 constexpr double kPaper_s = 2;  // "On average, each object takes about 2 seconds"
-// What of the paper's Table 1 is marked, and how it is called in a picture.
+// The rows of the paper's Table 1 that are marked, and their labels.
 constexpr std::pair<const char*, const char*> kPublishedMarks[] = {
     {"paper", "RO-MAP"}, {"offline", "[33]*"}, {"offline-depth", "[33]* depth"}};
 
 const cv::Scalar kWhite(255, 255, 255), kInk(40, 40, 40), kGrid(225, 225, 225);
 
-// Colours that differ for most eyes, B G R (after Okabe and Ito, 2008).
+// Colors (B, G, R) that are distinguishable with color vision deficiencies (Okabe and Ito, 2008).
 const cv::Scalar kColors[] = {{178, 114, 0}, {0, 94, 213}, {115, 158, 0},  {167, 121, 204},
                               {0, 159, 230}, {60, 60, 60}, {233, 180, 86}, {66, 180, 200}};
 
@@ -37,7 +37,7 @@ void WriteCentered(cv::Mat& image, const std::string& text, cv::Point middle, do
   Write(image, text, {middle.x - size.width / 2, middle.y + size.height / 2}, scale);
 }
 
-// A logarithmic axis over a stretch of pixels; `from` may be larger than `to`.
+// A logarithmic axis over a range of pixels; from_px may be larger than to_px.
 struct LogAxis {
   double low, high;
   int from_px, to_px;
@@ -46,7 +46,7 @@ struct LogAxis {
     const double share = std::log(std::clamp(value, low, high) / low) / std::log(high / low);
     return from_px + static_cast<int>(std::lround(share * (to_px - from_px)));
   }
-  // `digits` times the powers of ten.
+  // The products of `digits` and powers of ten within the axis.
   std::vector<double> Ticks(std::initializer_list<int> digits) const {
     std::vector<double> ticks;
     for (int power = -6; power <= 6; ++power) {
@@ -59,7 +59,7 @@ struct LogAxis {
   }
 };
 
-// A little more than the stretch from the least to the largest value.
+// An axis over the range of the values, with a margin.
 LogAxis AxisOver(const std::vector<double>& values, int from_px, int to_px) {
   double low = 1e300, high = 0;
   for (const double value : values) {
@@ -157,8 +157,7 @@ cv::Mat DrawConvergence(const PaperResults& results) {
     cv::line(picture, at, at + cv::Point(30, 0), ColorOf(i), 3, cv::LINE_AA);
     Write(picture, TitleOf(results, order[i]), at + cv::Point(40, 5));
   }
-  Write(picture,
-        "x: what the paper states for an RTX 4090, drawn at the 2 s per object that it gives for its own method",
+  Write(picture, "x: results of the paper on an RTX 4090, drawn at 2 s per object as stated for its own method",
         {kLeft_px, kPanelHeight_px + kLegendHeight_px - 14}, 0.45);
   return picture;
 }

@@ -6,9 +6,8 @@
 
 namespace romap::bench {
 
-// Accuracy and completion over training time as in the paper's Fig. 8, side by side: one line per method of
-// `results.curves`, both axes logarithmic, the paper's own end results as crosses at its 2 s. CV_8UC3; without
-// curves it has the crosses alone.
+// Plots accuracy and completion over training time side by side, as in Fig. 8 of the paper: one line per method of
+// `results.curves` on logarithmic axes, and the final results of the paper as crosses at 2 s. Returns CV_8UC3.
 cv::Mat DrawConvergence(const PaperResults& results);
 
 }  // namespace romap::bench

@@ -17,8 +17,8 @@ namespace romap::bench::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// `rounds` times ten independent multiply-adds, as many as hide the latency of two units. Returns operations done;
-// `sink` keeps the compiler from leaving them out.
+// Runs `rounds` times ten independent multiply-adds, enough to hide the latency of two FMA units. Returns the number of
+// operations; writing the result to `sink` prevents the compiler from removing them.
 uint64_t RunFma(uint64_t rounds, float* sink) {
   const hn::ScalableTag<float> d;
   constexpr int kSums = 10;
@@ -51,7 +51,7 @@ HWY_EXPORT(RunFma);
 
 double MeasureFmaPeakGflops(int threads, double seconds) {
   using Clock = std::chrono::steady_clock;
-  // The fastest of many short runs: what stands between them is other processes, not the machine.
+  // The fastest of many short runs, because slower ones were interrupted by other processes.
   std::vector<double> best(static_cast<size_t>(threads));
   std::atomic<float> keep = 0;
   {

@@ -12,8 +12,8 @@ namespace romap::bench {
 namespace {
 
 constexpr float kOutside = -1e4f;
-constexpr float kRaw = 10.0f;  // of a possible cell; an empty one has the opposite
-constexpr Rgb8 kGrey = {160, 160, 160};
+constexpr float kRaw = 10.0f;  // of a possibly occupied cell; empty cells have -kRaw
+constexpr Rgb8 kGray = {160, 160, 160};
 
 class HullField : public FieldSampler {
  public:
@@ -21,7 +21,7 @@ class HullField : public FieldSampler {
       : hull_(std::move(hull)), half_extents_(half_extents) {}
 
   void Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const override {
-    std::ranges::fill(rgb, kGrey);
+    std::ranges::fill(rgb, kGray);
     std::ranges::transform(p_object, raw.begin(), [this](const Eigen::Vector3f& p) { return ValueAt(p); });
   }
 
@@ -34,11 +34,10 @@ class HullField : public FieldSampler {
   }
 
   float ValueAt(const Eigen::Vector3f& p_object) const {
-    constexpr float kSlack = 1e-5f;  // rounding must not push the box's own faces outside
+    constexpr float kSlack = 1e-5f;  // tolerance for points on the faces of the box
     const Eigen::Array3f share = (p_object + half_extents_).array() / (2 * half_extents_.array());
     if (!((share >= -kSlack).all() && (share <= 1 + kSlack).all())) return kOutside;
-    const Eigen::Array3f at =
-        share * static_cast<float>(hull_.resolution) - 0.5f;  // in cells, centres at whole numbers
+    const Eigen::Array3f at = share * static_cast<float>(hull_.resolution) - 0.5f;  // in cells; centers are at integers
     const Eigen::Array3i low = at.floor().cast<int>();
     const Eigen::Array3f part = at - low.cast<float>();
     float value = 0;

@@ -9,10 +9,10 @@
 
 namespace romap::bench {
 
-// The visual hull of an object's masks as a field that needs no training: what is left when the learning is taken out.
-// Raw values run from -10 in empty cells, which is clear as air to whoever asks what views see, to 10 in possible ones,
-// trilinear between the cells' centres; the surface lies at 0, halfway. The snapshot takes no hull of its own, so that
-// the surface is not cut along cells. The views must be valid (see ObjectField::AddView), at most 255.
+// The visual hull of an object's masks as a field that needs no training; a baseline for the trained fields. Raw values
+// are -10 at the centers of empty cells, which means fully transparent, and 10 at those of possibly occupied cells,
+// with trilinear interpolation; the surface is at 0. FieldSnapshot::hull stays empty, so that the surface is not
+// clipped along cells. At most 255 views, which must be valid (see ObjectField::AddView).
 FieldSnapshot MakeHullSnapshot(const nerf::NerfConfig& config, const Cuboid& cuboid,
                                const std::vector<ObjectView>& views);
 

@@ -7,6 +7,7 @@
 #include "client/bench/hull_field.h"
 #include "client/eval/eval.h"
 #include "client/files/ply.h"
+#include "client/files/text_file.h"
 #include "server/mesh/extract_mesh.h"
 
 namespace romap::bench {
@@ -14,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where curves have their points [s].
+// The training times at which curves have points [s].
 constexpr double kMarks_s[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3.5, 5, 10, 20, 50, 100, 200, 500};
 
 absl::Status WriteWorldMesh(const FieldSnapshot& snapshot, Mesh mesh, const std::string& path) {
@@ -55,7 +56,7 @@ void FillIn(const TimedTraining& training, ObjectTraining& row) {
 struct MethodRunner::Trained {
   ObjectTraining row;
   const files::ObjectRecord* object = nullptr;
-  FieldSnapshot snapshot;  // without field when training failed
+  FieldSnapshot snapshot;  // without a field if training failed
   std::vector<FieldSnapshot> at_marks;
 };
 
@@ -68,9 +69,9 @@ void MethodRunner::SetFrames(TrueFrames frames) {
 }
 
 const std::vector<ObjectView>& MethodRunner::ViewsOf(const files::ObjectRecord& object, bool with_depth) {
-  const auto [place, is_new] = views_.try_emplace({object.id, with_depth});
-  if (is_new) place->second = MakeTrueViews(frames_, object, with_depth);
-  return place->second;
+  const auto [entry, is_new] = views_.try_emplace({object.id, with_depth});
+  if (is_new) entry->second = MakeTrueViews(frames_, object, with_depth);
+  return entry->second;
 }
 
 absl::StatusOr<MethodRunner::Trained> MethodRunner::Train(const MethodRun& run, const files::ObjectRecord& object,
@@ -114,8 +115,7 @@ absl::StatusOr<Evaluation> MethodRunner::Evaluate(const MethodRun& run, const st
   Evaluation evaluation{.method = run.method.id, .limit_s = limit_s, .seed = run.seed, .subset = run.subset};
   std::error_code error;
   fs::remove_all(dir + "/objects", error);
-  fs::create_directories(dir + "/objects", error);
-  if (error) return InvalidArgument("{}/objects cannot be made: {}", dir, error.message());
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder(dir + "/objects"));
   for (const Trained& one : trained) {
     ObjectTraining& row = evaluation.objects.emplace_back(one.row);
     if (!one.snapshot.field) continue;
@@ -146,7 +146,7 @@ absl::StatusOr<std::vector<CurvePoint>> MethodRunner::Curve(const MethodRun& run
     std::vector<Trained> then = trained;
     bool any = false;
     double train_s = 0;
-    for (Trained& one : then) {  // an object that was done before stays as it was at its end
+    for (Trained& one : then) {  // objects that finished earlier keep their final state
       const bool reached = mark < one.at_marks.size();
       if (reached) one.snapshot = one.at_marks[mark];
       any |= reached;
@@ -171,7 +171,8 @@ absl::StatusOr<MethodOutcome> MethodRunner::Run(const MethodRun& run,
     size_t index = 0;
     for (const files::ObjectRecord& object : sequence_->objects()->objects) {
       const size_t at = index++;
-      if (at < trained.size() && !trained[at].row.limited) continue;  // its plan ended within an earlier limit
+      if (at < trained.size() && !trained[at].row.limited)
+        continue;  // its training plan completed within an earlier limit
       report(object.name);
       ROMAP_ASSIGN_OR_RETURN(Trained one, Train(run, object, run.limits_s[limit], stop));
       trained.resize(std::max(trained.size(), at + 1));

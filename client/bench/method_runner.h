@@ -11,15 +11,15 @@
 
 namespace romap::bench {
 
-// What one method is run with.
+// The parameters of one run of a method.
 struct MethodRun {
   BenchMethod method;
   EngineConfig config;
   int seed = 1;
   int subset = 0;
-  std::vector<double> limits_s = {};  // of training; ascending, the last is the cap and stands for the end
+  std::vector<double> limits_s = {};  // limits of the training time, ascending; the last is the cap
   bool with_curve = false;
-  std::string keep_dir = {};  // for the meshes of the end, in objects/; empty = they are not kept
+  std::string keep_dir = {};  // folder for the final meshes (in objects/); empty = not kept
 };
 
 struct MethodOutcome {
@@ -27,16 +27,17 @@ struct MethodOutcome {
   std::vector<CurvePoint> curve;
 };
 
-// Trains all objects of a sequence by one method after the other and holds them against the truth. Views are made once
-// and shared by all methods.
+// Trains all objects of a sequence with different methods and compares them with the ground truth. The views are
+// created once and shared by all methods.
 class MethodRunner {
  public:
   MethodRunner(const files::Sequence& sequence, std::string scratch_dir, int threads, BenchClock clock);
 
-  // From now on on these frames.
+  // Sets the frames for the following runs.
   void SetFrames(TrueFrames frames);
 
-  // `report` is called with each object's name. CANCELLED: `stop` said so. INTERNAL and such: a mesh cannot be written.
+  // Calls `report` with the name of each object. CANCELLED if `stop` returns true. Errors of writing meshes as
+  // WriteFile.
   absl::StatusOr<MethodOutcome> Run(const MethodRun& run, const std::function<void(const std::string&)>& report,
                                     const std::function<bool()>& stop);
 

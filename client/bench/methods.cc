@@ -10,8 +10,8 @@
 namespace romap::bench {
 namespace {
 
-// A plain MLP on a frequency encoding, and rays through the whole box: what iMAP (Sucar et al., ICCV 2021) and vMAP
-// (Kong et al., CVPR 2023) train per scene or object, with Adam's rate of theirs.
+// A plain MLP with frequency encoding and samples along the whole ray, with the learning rate of iMAP (Sucar et al.,
+// ICCV 2021) and vMAP (Kong et al., CVPR 2023).
 std::vector<std::string> FrequencyMlp(int hidden_width) {
   return {"nerf.encoding=frequency",      "nerf.levels=10",
           "nerf.hidden_layers=4",         fmt::format("nerf.hidden_width={}", hidden_width),
@@ -23,7 +23,7 @@ std::vector<std::string> FrequencyMlp(int hidden_width) {
           "nerf.full_budget_steps=10000", "nerf.max_extra_steps=0"};
 }
 
-// The paper's fields and its surface, which has 64^3 nodes whatever the object's size; then `more`.
+// The configuration of the paper, including its surface extraction with 64^3 nodes for all object sizes, then `more`.
 std::vector<std::string> PaperSettings(const std::vector<std::string>& more) {
   std::vector<std::string> settings = {"nerf.preset=paper", "mesh.adapt_resolution=false", "mesh.resolution=64",
                                        "mesh.min_side_nodes=64"};
@@ -48,7 +48,7 @@ absl::StatusOr<EngineConfig> Configure(const BenchMethod& method, const std::vec
 std::vector<BenchMethod> Table1Methods() {
   return {
       {.id = "fast", .title = "ours, fast"},
-      {.id = "trimmed", .title = "ours, fast, without what no view saw", .settings = {"mesh.trim_unseen=true"}},
+      {.id = "trimmed", .title = "ours, fast, unseen surface removed", .settings = {"mesh.trim_unseen=true"}},
       {.id = "sdf", .title = "ours, signed distances", .settings = {"nerf.field=sdf"}},
       {.id = "paper", .title = "ours, the paper's configuration", .settings = PaperSettings({})},
       {.id = "offline", .title = "[33]*", .settings = PaperSettings({"nerf.density_weight=0"})},
@@ -56,7 +56,7 @@ std::vector<BenchMethod> Table1Methods() {
        .title = "[33]* with true depth",
        .settings = PaperSettings({"nerf.density_weight=0"}),
        .with_depth = true},
-      {.id = "hull", .title = "visual hull, nothing learned", .settings = {"nerf.hull_margin=0"}, .trained = false},
+      {.id = "hull", .title = "visual hull, no training", .settings = {"nerf.hull_margin=0"}, .trained = false},
       {.id = "imap", .title = "iMAP-style MLP 4 x 256, with depth", .settings = FrequencyMlp(256), .with_depth = true},
       {.id = "vmap", .title = "vMAP-style MLP 4 x 32, with depth", .settings = FrequencyMlp(32), .with_depth = true},
   };
@@ -76,7 +76,7 @@ std::vector<BenchMethod> ModelSizeMethods() {
 
 std::vector<BenchMethod> AblationMethods() {
   return {
-      {.id = "all-parts", .title = "everything as it is"},
+      {.id = "all-parts", .title = "all components"},
       {.id = "no-hull", .title = "no visual hull", .settings = {"nerf.carve_hull=false", "nerf.hull_trim_share=0"}},
       {.id = "no-opacity",
        .title = "no opacity loss",
@@ -85,14 +85,14 @@ std::vector<BenchMethod> AblationMethods() {
       {.id = "no-density", .title = "no density loss", .settings = {"nerf.density_weight=0"}},
       {.id = "no-background", .title = "no background rays", .settings = {"nerf.background_share=0"}},
       {.id = "random-background",
-       .title = "random colour behind rays (L_rr)",
+       .title = "random background color (L_rr)",
        .settings = {"nerf.random_background=true"}},
-      {.id = "uniform", .title = "samples all through the box", .settings = {"nerf.sampling=uniform"}},
-      {.id = "all-pieces", .title = "floaters are kept", .settings = {"mesh.min_component_share=0"}},
-      {.id = "open-unseen", .title = "unseen space is not filled", .settings = {"mesh.fill_unseen=false"}},
+      {.id = "uniform", .title = "uniform samples in the box", .settings = {"nerf.sampling=uniform"}},
+      {.id = "all-pieces", .title = "floaters not removed", .settings = {"mesh.min_component_share=0"}},
+      {.id = "open-unseen", .title = "unseen space not filled", .settings = {"mesh.fill_unseen=false"}},
       {.id = "half-width", .title = "16 neurons", .settings = {"nerf.hidden_width=16"}},
-      {.id = "twice-rays", .title = "2048 rays a step", .settings = {"nerf.rays_per_step=2048"}},
-      {.id = "with-depth", .title = "with the true depth", .with_depth = true},
+      {.id = "twice-rays", .title = "2048 rays per step", .settings = {"nerf.rays_per_step=2048"}},
+      {.id = "with-depth", .title = "with true depth", .with_depth = true},
   };
 }
 

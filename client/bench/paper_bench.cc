@@ -18,25 +18,25 @@ namespace {
 namespace fs = std::filesystem;
 
 absl::Status Validate(const PaperBenchOptions& options) {
-  if (options.seeds < 1) return InvalidArgument("{} seeds: there should be at least one", options.seeds);
-  if (options.every < 1) return InvalidArgument("every {}-th frame: should be at least 1", options.every);
+  if (options.seeds < 1) return InvalidArgument("seeds is {}; expected at least 1", options.seeds);
+  if (options.every < 1) return InvalidArgument("every is {}; expected at least 1", options.every);
   if (options.subsets < 1 || options.subsets > options.every) {
-    return InvalidArgument("{} subsets of every {}. frame: should be 1 to {}", options.subsets, options.every,
-                           options.every);
+    return InvalidArgument("subsets is {}; expected 1 to {} (the value of every)", options.subsets, options.every);
   }
   if (options.threads < 1 || options.threads > 64) {
-    return InvalidArgument("{} threads: should be 1 to 64", options.threads);
+    return InvalidArgument("threads is {}; expected 1 to 64", options.threads);
   }
-  if (!(options.cap_s > 0)) return InvalidArgument("cap {} s: should be positive", options.cap_s);
+  if (!(options.cap_s > 0)) return InvalidArgument("cap is {} s; expected a positive number", options.cap_s);
   double before_s = 0;
   for (const double time_s : options.times_s) {
-    if (!(time_s > before_s)) return InvalidArgument("time {} s: should be positive and ascending", time_s);
+    if (!(time_s > before_s))
+      return InvalidArgument("times contain {} s; expected positive, ascending numbers", time_s);
     before_s = time_s;
   }
   return absl::OkStatus();
 }
 
-// The tables with their methods as options name them, chosen or not. One's own rows must be right.
+// All tables with all methods, including the additional rows of `options`.
 absl::StatusOr<std::vector<BenchTable>> AllTables(const PaperBenchOptions& options) {
   std::vector<BenchTable> tables = {{"1", Table1Methods()}, {"4", ModelSizeMethods()}, {"ablation", AblationMethods()}};
   std::set<std::string> known;
@@ -44,34 +44,35 @@ absl::StatusOr<std::vector<BenchTable>> AllTables(const PaperBenchOptions& optio
     for (const BenchMethod& method : table.methods) known.insert(method.id);
   }
   for (const BenchMethod& method : options.more_methods) {
-    if (!known.insert(method.id).second) return InvalidArgument("row '{}' is there already", method.id);
+    if (!known.insert(method.id).second) return InvalidArgument("row '{}' already exists", method.id);
     ROMAP_RETURN_IF_ERROR(Configure(method, options.settings).status());
     tables.front().methods.push_back(method);
   }
   for (const std::string& id : options.methods) {
-    if (!known.contains(id)) return InvalidArgument("method '{}' is not one of {}", id, fmt::join(known, ", "));
+    if (!known.contains(id))
+      return InvalidArgument("unknown method '{}'; expected one of {}", id, fmt::join(known, ", "));
   }
   return tables;
 }
 
-bool IsChosen(const std::vector<std::string>& chosen, const std::string& id) {
+bool Contains(const std::vector<std::string>& chosen, const std::string& id) {
   return std::ranges::find(chosen, id) != chosen.end();
 }
 
-// The chosen tables with the chosen methods.
+// The selected tables with the selected methods.
 absl::StatusOr<std::vector<BenchTable>> ChooseTables(const PaperBenchOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(std::vector<BenchTable> tables, AllTables(options));
-  std::erase_if(tables, [&](const BenchTable& table) { return !IsChosen(options.tables, table.id); });
+  std::erase_if(tables, [&](const BenchTable& table) { return !Contains(options.tables, table.id); });
   for (BenchTable& table : tables) {
     std::erase_if(table.methods, [&](const BenchMethod& method) {
-      return !options.methods.empty() && !IsChosen(options.methods, method.id);
+      return !options.methods.empty() && !Contains(options.methods, method.id);
     });
     for (const BenchMethod& method : table.methods) {
       ROMAP_RETURN_IF_ERROR(Configure(method, options.settings).status());
     }
   }
   std::erase_if(tables, [](const BenchTable& table) { return table.methods.empty(); });
-  if (tables.empty()) return InvalidArgument("no method is left to run");
+  if (tables.empty()) return InvalidArgument("no method selected");
   return tables;
 }
 
@@ -94,7 +95,7 @@ class PaperBench {
     fs::remove_all(options_.out_dir + "/scratch", error);
     if (!status.ok() && !absl::IsCancelled(status)) return status;
     if (!status.ok()) {
-      results_.notes.push_back("Stopped before the end: some rows lack runs.");
+      results_.notes.push_back("Interrupted: some rows lack runs.");
       ROMAP_RETURN_IF_ERROR(WriteReport());
     }
     return std::move(results_);
@@ -113,7 +114,7 @@ class PaperBench {
     for (const BenchTable& table : results_.tables) methods_ += table.methods.size();
   }
 
-  // Every seed on every subset before the next seed, so that what is there at any time is a fair sample.
+  // Runs all subsets before the next seed, so that partial results are balanced.
   absl::Status AllRuns() {
     for (int seed = 1; seed <= options_.seeds; ++seed) {
       for (int subset = 0; subset < options_.subsets; ++subset) {
@@ -129,10 +130,10 @@ class PaperBench {
     ROMAP_ASSIGN_OR_RETURN(TrueFrames frames, LoadTrueFrames(sequence_, options_.every, subset));
     results_.frames_per_subset = static_cast<int>(frames.size());
     runner_.SetFrames(std::move(frames));
-    std::map<std::vector<std::string>, Evaluation> ends;  // of this run, by what decides them
+    std::map<std::vector<std::string>, Evaluation> ends;  // final evaluations of this run by KeyOf()
     for (const BenchTable& table : results_.tables) {
       for (const BenchMethod& method : table.methods) {
-        if (stop_()) return absl::CancelledError("stopped");
+        if (stop_()) return absl::CancelledError("interrupted");
         ROMAP_RETURN_IF_ERROR(OneMethod(table, method, seed, subset, ends));
         ++methods_done_;
       }
@@ -169,7 +170,7 @@ class PaperBench {
     return absl::OkStatus();
   }
 
-  // Methods with the same key are the same under two names.
+  // Methods with equal keys have the same settings.
   static std::vector<std::string> KeyOf(const BenchMethod& method, EngineConfig config) {
     ConfigFields fields;
     config.nerf.Fields(fields);
@@ -214,13 +215,12 @@ absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
   ROMAP_RETURN_IF_ERROR(Validate(options));
   ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
                          files::Sequence::Open(options.sequence_dir, {.use_depth = true}));
-  if (!sequence.objects()) return NotFound("{}: objects.yaml is missing", options.sequence_dir);
+  if (!sequence.objects())
+    return NotFound("{}/objects.yaml does not exist; it must contain the true cuboids", options.sequence_dir);
   if (!fs::is_directory(options.sequence_dir + "/gt")) {
-    return NotFound("{}: no folder gt with true surfaces", options.sequence_dir);
+    return NotFound("{}/gt: no such folder; it must contain the true surfaces", options.sequence_dir);
   }
-  std::error_code error;
-  fs::create_directories(options.out_dir, error);
-  if (error) return InvalidArgument("{} cannot be made: {}", options.out_dir, error.message());
+  ROMAP_RETURN_IF_ERROR(files::MakeFolder(options.out_dir));
   return PaperBench(options, sequence, progress, stop).Run();
 }
 

@@ -12,30 +12,30 @@ namespace romap::bench {
 struct PaperBenchOptions {
   std::string sequence_dir;  // with objects.yaml, masks, poses and gt/
   std::string out_dir;
-  int seeds = 5;    // of the training
-  int subsets = 3;  // of the frames: every `every`-th from 0, 1, ..
+  int seeds = 5;    // training runs with different seeds
+  int subsets = 3;  // frame subsets: every `every`-th frame from frame 0, 1, ...
   int every = 4;
   int threads = 2;
   BenchClock clock = BenchClock::kCpu;
-  std::vector<double> times_s = {1, 5};  // ascending: training times at which quality is taken
-  double cap_s = 20;                     // longest training of one object
+  std::vector<double> times_s = {1, 5};  // training times at which the quality is measured, ascending
+  double cap_s = 20;                     // maximal training time of one object
   std::vector<std::string> tables = {"1", "4", "ablation"};
   std::vector<std::string> methods = {};       // ids; empty = all
-  std::vector<std::string> settings = {};      // "section.field=value" before each method's own
-  std::vector<BenchMethod> more_methods = {};  // rows that are added to Table 1
+  std::vector<std::string> settings = {};      // "section.field=value" for all methods, which may override them
+  std::vector<BenchMethod> more_methods = {};  // additional rows of Table 1
 };
 
-// `options` for a first look: one seed, one subset, the default method and the hull, quality after a second.
+// Reduces `options` to a short run: one seed, one subset, the default method and the visual hull, quality after 1 s.
 PaperBenchOptions Quick(PaperBenchOptions options);
 
-// Regenerates the paper's Tables 1, 3 and 4, an ablation and the convergence plot of Fig. 8 for a sequence with ground
-// truth: trains its objects by all methods on the same true views and holds the surfaces against the truth. Writes
-// paper.md, paper.json and convergence.png into out_dir, anew after each run (seed and subset), and the meshes of the
-// first one into out_dir/meshes/METHOD/objects.
+// Reproduces Tables 1, 3 and 4 of the paper, an ablation and the convergence plot of Fig. 8 for a sequence with ground
+// truth: trains its objects with all methods on the same true views and compares the surfaces with the truth. Writes
+// paper.md, paper.json and convergence.png to out_dir after each run (seed and subset), and the meshes of the first run
+// to out_dir/meshes/METHOD/objects.
 //
-// `progress` is called with the share done (0..1) and what comes next; `stop` is asked now and then and ends the
-// benchmark with what there is: then the results say fewer runs done than planned. INVALID_ARGUMENT: options, settings
-// or the sequence are wrong. NOT_FOUND: a file is missing. What goes wrong with one object is told in the results.
+// Calls `progress` with the completed share (0..1) and a description of the next step. Polls `stop`; if it returns
+// true, returns the partial results, with fewer runs done than planned. INVALID_ARGUMENT: invalid options, settings or
+// sequence. Otherwise as Sequence::Open and WriteFile. Errors of single objects are reported in the results.
 absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,
                                            const std::function<void(double, const std::string&)>& progress,
                                            const std::function<bool()>& stop);

@@ -1,4 +1,4 @@
-// The report for programs.
+// The JSON report.
 #include <nlohmann/json.hpp>
 
 #include "client/bench/paper_results.h"

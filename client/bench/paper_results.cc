@@ -8,7 +8,7 @@
 namespace romap::bench {
 namespace {
 
-// Mean and standard deviation of one figure over evaluations that have it.
+// Sets mean and standard deviation of one figure.
 void Spread(const std::vector<const Evaluation*>& chosen, double PublishedQuality::*figure, MethodMean& mean) {
   double sum = 0, squares = 0;
   for (const Evaluation* e : chosen) sum += (*e->quality).*figure;

@@ -1,4 +1,4 @@
-// The report for people.
+// The Markdown report.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -31,7 +31,7 @@ std::string ClockText(const PaperResults& r) {
   return r.clock == BenchClock::kWall ? "wall time" : fmt::format("CPU time of {} threads / {}", r.threads, r.threads);
 }
 
-// One line of costs and quality; `title` and `paper` around it.
+// The cells of one row of QualityTable().
 std::vector<std::string> QualityCells(const PaperResults& r, const std::string& title, const MethodMean& m,
                                       const std::string& paper) {
   return {title,
@@ -40,7 +40,7 @@ std::vector<std::string> QualityCells(const PaperResults& r, const std::string& 
           fmt::format("{:.2f}", m.quality.below_04_percent),
           fmt::format("{:.2f}", m.quality.below_1_percent),
           fmt::format("{:.0f} %", 100 * m.found_share),
-          fmt::format("{:.0f}{}", m.steps, m.limited ? " (cut)" : ""),
+          fmt::format("{:.0f}{}", m.steps, m.limited ? " (shortened)" : ""),
           fmt::format("{:.2f}", m.train_s),
           fmt::format("{:.2f}", m.wall_s),
           fmt::format("{:.3f}", 1e-3 * m.train_s * FmaPeak(r)),
@@ -61,7 +61,7 @@ std::string QualityTable(const PaperResults& r, const BenchTable& table, double 
     any = true;
     text += Row(QualityCells(r, method.title, *mean, PaperText(method.id)));
   }
-  if (!any) return "Nothing was measured.\n";
+  if (!any) return "No measurements.\n";
   if (table.id == "1" && limit_s == kToTheEnd_s) {
     std::vector<std::string> colmap(QualityHead("").size(), kNothing);
     colmap.front() = "COLMAP";
@@ -102,8 +102,8 @@ std::string Table3(const PaperResults& r) {
   for (const auto& [title, mean] : columns) head.push_back(title);
   head.push_back("paper (RTX 4090) [ms]");
   std::string text = fmt::format(
-      "\n## Table 3: time of one step of one object\n\nBy {}. The object SLAM of the paper's table is not part of "
-      "this: "
+      "\n## Table 3: time of one step of one object\n\nMeasured by {}. Without the object SLAM of the paper's table, "
+      "because "
       "poses and masks are given.\n\n{}",
       ClockText(r), Head(head));
   const auto add = [&](const std::string& part, double MethodMean::*figure, double published) {
@@ -114,10 +114,10 @@ std::string Table3(const PaperResults& r) {
   };
   add("ray sampling", &MethodMean::sampling_ms, kPublishedSampling_ms);
   add("forward and volume rendering", &MethodMean::forward_ms, kPublishedForward_ms);
-  add("backward and optimisation", &MethodMean::backward_ms, kPublishedBackward_ms);
+  add("backward and optimization", &MethodMean::backward_ms, kPublishedBackward_ms);
   add("iteration", &MethodMean::iteration_ms, kPublishedIteration_ms);
   add("surface (in the paper 64^3 nodes)", &MethodMean::mesh_ms, kPublishedMarchingCubes_ms);
-  std::vector<std::string> rate = {"samples trained per second"};
+  std::vector<std::string> rate = {"training samples per second"};
   for (const auto& [title, mean] : columns) rate.push_back(fmt::format("{:.2f} M", 1e-6 * mean.samples_per_s));
   rate.push_back(kNothing);
   return text + Row(rate);
@@ -126,7 +126,7 @@ std::string Table3(const PaperResults& r) {
 std::string Table4(const PaperResults& r) {
   const BenchTable* table = Find(r, "4");
   if (table == nullptr) return "";
-  std::string text = "\n## Table 4: model sizes\n\nAll else is as in the fast preset.\n\n" +
+  std::string text = "\n## Table 4: model sizes\n\nEverything else is as in the fast preset.\n\n" +
                      Head({"model", "accuracy [cm]", "completion [cm]", "iteration [ms]", "steps",
                            "paper (RTX 4090): accuracy / completion / iteration"});
   for (size_t i = 0; i < table->methods.size(); ++i) {
@@ -142,7 +142,7 @@ std::string Table4(const PaperResults& r) {
                  fmt::format("{:.3f} ± {:.3f}", mean->quality.accuracy_cm, mean->spread.accuracy_cm),
                  fmt::format("{:.3f} ± {:.3f}", mean->quality.completion_cm, mean->spread.completion_cm),
                  fmt::format("{:.3f}", mean->iteration_ms),
-                 fmt::format("{:.0f}{}", mean->steps, mean->limited ? " (cut)" : ""), paper});
+                 fmt::format("{:.0f}{}", mean->steps, mean->limited ? " (shortened)" : ""), paper});
   }
   return text;
 }
@@ -150,8 +150,7 @@ std::string Table4(const PaperResults& r) {
 std::string Ablation(const PaperResults& r) {
   const BenchTable* table = Find(r, "ablation");
   if (table == nullptr) return "";
-  return "\n## What each part is worth\n\nThe fast preset with one change at a time.\n\n" +
-         QualityTable(r, *table, kToTheEnd_s);
+  return "\n## Ablation\n\nThe fast preset with one change at a time.\n\n" + QualityTable(r, *table, kToTheEnd_s);
 }
 
 std::string Curves(const PaperResults& r) {
@@ -168,7 +167,7 @@ std::string Curves(const PaperResults& r) {
 }
 
 std::string Settings(const PaperResults& r) {
-  std::string text = "\n## Settings\n\n" + Head({"row", "settings on top of the defaults"});
+  std::string text = "\n## Settings\n\n" + Head({"row", "settings that differ from the defaults"});
   for (const BenchTable& table : r.tables) {
     for (const BenchMethod& method : table.methods) {
       std::string settings = fmt::format("{}", fmt::join(method.settings, " "));
@@ -184,12 +183,14 @@ std::string Settings(const PaperResults& r) {
 
 std::string ToMarkdown(const PaperResults& r) {
   std::string text = fmt::format(
-      "# romap beside the paper's tables\n\n{}: {} objects, {} frames in a subset; means over {} of {} runs (seeds x "
-      "subsets) ± their standard deviation. Poses, masks and cuboids are the true ones. Figures by `romap eval`: the "
-      "mean row, of the surface that some camera saw.\n\nTraining time is per object, by {}. \"peak\" is that time at "
-      "the machine's peak rate of multiply-adds, {:.0f} GFLOP/s on {} threads, measured between the runs: compare it "
-      "where seconds depend on the machine. The paper's own figures were measured on an RTX 4090, with poses from its "
-      "SLAM and meshes laid over the truth by ICP: accuracy / completion / < 0.4 cm / < 1 cm.\n\n",
+      "# romap compared with the tables of the paper\n\n{}: {} objects, {} frames per subset; means over {} of {} runs "
+      "(seeds x subsets) ± standard deviation. Poses, masks and cuboids are the true ones. The figures are the means "
+      "of "
+      "`romap eval` for the surface that some camera saw.\n\nTraining time is per object, measured by {}. \"peak\" is "
+      "this time multiplied by the peak multiply-add rate of the machine, {:.0f} GFLOP/s on {} threads, measured "
+      "between "
+      "the runs; it is comparable between machines. The figures of the paper were measured on an RTX 4090, with poses "
+      "from its SLAM and meshes aligned with the truth by ICP: accuracy / completion / < 0.4 cm / < 1 cm.\n\n",
       r.sequence, r.objects, r.frames_per_subset, r.runs_done, r.runs_planned, ClockText(r), FmaPeak(r), r.threads);
   text += Table1(r) + Table3(r) + Table4(r) + Ablation(r) + Curves(r) + Settings(r);
   if (!r.notes.empty()) {

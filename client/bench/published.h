@@ -5,8 +5,8 @@
 
 namespace romap::bench {
 
-// What RO-MAP (Han et al., RA-L 2023) states, measured on an RTX 4090 with camera poses of its own SLAM, and meshes
-// laid over the truth by ICP. For comparison beside our own figures.
+// Results published for RO-MAP (Han et al., RA-L 2023), measured on an RTX 4090 with camera poses of its own SLAM and
+// meshes aligned with the truth by ICP.
 
 struct PublishedQuality {
   double accuracy_cm, completion_cm, below_04_percent, below_1_percent;
@@ -17,7 +17,7 @@ struct PublishedModelSize {
   double accuracy_cm, completion_cm, iteration_ms;
 };
 
-// Table 1, by the id of our method that stands for the same; nullopt when the paper has nothing like it.
+// Table 1, by the id of the corresponding method here; nullopt if the paper has no such method.
 constexpr std::optional<PublishedQuality> PublishedTable1(std::string_view method) {
   if (method == "fast" || method == "paper" || method == "sdf") return PublishedQuality{0.431, 0.248, 80.85, 98.93};
   if (method == "offline") return PublishedQuality{0.476, 0.228, 83.16, 99.38};
@@ -26,7 +26,7 @@ constexpr std::optional<PublishedQuality> PublishedTable1(std::string_view metho
   return std::nullopt;
 }
 
-// Table 3 [ms]: one step of one object, and its surface.
+// Table 3 [ms]: one step of one object, and surface extraction.
 inline constexpr double kPublishedSampling_ms = 0.0932;
 inline constexpr double kPublishedForward_ms = 0.156;
 inline constexpr double kPublishedBackward_ms = 0.455;

@@ -6,14 +6,14 @@
 
 namespace romap::bench {
 
-// What a second is.
+// The clock of the benchmark.
 enum class BenchClock {
-  kCpu,   // CPU time of this process over the number of threads: what a machine without other work would need, if
-          // threads never waited for each other
-  kWall,  // time that passed
+  kCpu,  // CPU time of this process divided by the number of threads: the time on an idle machine if threads never
+         // waited for each other
+  kWall,  // wall time
 };
 
-// Adds up the time of pieces of work by a clock, and by the wall [s].
+// Accumulates the time of work by a clock, and the wall time [s].
 class Stopwatch {
  public:
   Stopwatch(BenchClock clock, int threads) : clock_(clock), threads_(threads) {}

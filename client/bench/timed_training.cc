@@ -14,7 +14,7 @@ constexpr double kProbe_s = 0.15;
 constexpr double kLongestSlice_s = 0.25;
 
 absl::StatusOr<nerf::ObjectField> MakeField(const TrainingRequest& request, const nerf::NerfConfig& config) {
-  if (request.views->empty()) return FailedPrecondition("an object without views cannot be trained");
+  if (request.views->empty()) return FailedPrecondition("cannot train an object without views");
   nerf::ObjectField field(config, request.views->front().object, request.seed);
   ROMAP_RETURN_IF_ERROR(field.SetBox(request.cuboid));
   for (const ObjectView& view : *request.views) ROMAP_RETURN_IF_ERROR(field.AddView(view));
@@ -68,14 +68,14 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
   ROMAP_ASSIGN_OR_RETURN(nerf::ObjectField field, setup.Time([&] { return MakeField(request, config); }));
   const auto marked = [&] { return result.at_marks.size() < request.marks_s.size(); };
   while (field.steps() < field.AllowedSteps(/*complete=*/true) && training.total_s() < request.limit_s) {
-    if (request.stop && request.stop()) return absl::CancelledError("stopped");
+    if (request.stop && request.stop()) return absl::CancelledError("interrupted");
     const double target_s =
         marked() ? std::min(request.limit_s, request.marks_s[result.at_marks.size()]) : request.limit_s;
     const uint64_t left = field.AllowedSteps(true) - field.steps();
     const int steps = StepsUntil(target_s, training.total_s(), seconds_per_step);
     const int slice = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(steps)));
     const nerf::TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
-    if (stats.steps == 0) break;  // no pixel to learn from
+    if (stats.steps == 0) break;  // no pixels to train on
     AddTo(result.stats, stats);
     while (marked() && training.total_s() >= request.marks_s[result.at_marks.size()]) {
       result.at_marks.push_back(field.Snapshot());

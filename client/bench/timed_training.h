@@ -18,29 +18,29 @@ namespace romap::bench {
 struct TrainingRequest {
   nerf::NerfConfig config;
   Cuboid cuboid;
-  const std::vector<ObjectView>* views = nullptr;  // of one object, all there from the start
+  const std::vector<ObjectView>* views = nullptr;  // of one object
   uint64_t seed = 1;
   int threads = 2;
   BenchClock clock = BenchClock::kCpu;
-  double limit_s = 0;                // of training; a plan that does not fit is shortened before it begins
-  std::vector<double> marks_s = {};  // ascending; a snapshot is taken when training has lasted so long
-  std::function<bool()> stop = {};   // asked every quarter second or so; true ends the training
+  double limit_s = 0;                // of the training time; a longer training plan is shortened in advance
+  std::vector<double> marks_s = {};  // training times for snapshots, ascending
+  std::function<bool()> stop = {};   // polled about every 0.25 s; true ends the training
 };
 
 struct TimedTraining {
   FieldSnapshot snapshot;               // at the end
   std::vector<FieldSnapshot> at_marks;  // one per mark that was reached
-  double train_s = 0;                   // by the clock; with the ray lists and the carving that training begins with
+  double train_s = 0;                   // by the clock, including ray lists and hull carving
   double wall_s = 0;
-  double setup_s = 0;      // of taking the views in, by the clock
-  bool limited = false;    // the plan was longer than the limit allowed
-  nerf::TrainStats stats;  // sums; color_loss of the last slice
+  double setup_s = 0;      // of adding the views, by the clock
+  bool limited = false;    // the training plan exceeded the limit
+  nerf::TrainStats stats;  // sums over all slices; color_loss is of the last slice
 };
 
-// Trains one object from nothing to the end of its plan or to the limit. Where the whole plan does not fit, fewer steps
-// are planned, so that the learning rate falls to its end within the limit; how many fit is found by training a copy
-// for a moment, or taken from `seconds_per_step` when that is positive. It is set to what was measured.
-// CANCELLED: stopped. INVALID_ARGUMENT, FAILED_PRECONDITION: as ObjectField says of box and views.
+// Trains one object until the end of its training plan or the limit. If the plan does not fit, plans fewer steps, so
+// that the learning rate schedule completes within the limit. Estimates the number of steps from `seconds_per_step`, or
+// by training a copy briefly if it is not positive; sets it to the measured value. CANCELLED: stopped.
+// INVALID_ARGUMENT, FAILED_PRECONDITION: invalid box or views, see ObjectField.
 absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double& seconds_per_step);
 
 }  // namespace romap::bench

@@ -8,9 +8,9 @@
 namespace romap::bench {
 namespace {
 
-constexpr int kFewestPixels = 100;
+constexpr int kMinPixels = 100;
 
-// Crop around the projected cuboid, half as large again, and the mask. Empty when a corner is behind the camera.
+// The crop around the mask and the projected cuboid, enlarged by half. Empty if a corner is behind the camera.
 cv::Rect Crop(const Frame& frame, const files::ObjectRecord& object, const cv::Mat& is_object) {
   const SE3<Camera, Object> T_camera_object = frame.T_world_camera->Inverse() * object.T_world_object;
   std::vector<cv::Point2f> corners;
@@ -27,11 +27,11 @@ cv::Rect Crop(const Frame& frame, const files::ObjectRecord& object, const cv::M
 
 absl::Status CheckLabels(const files::Sequence& sequence, const FrameInput& input) {
   for (const files::ObjectRecord& object : sequence.objects()->objects) {
-    const auto named = std::ranges::find(input.instances, static_cast<uint32_t>(object.id), &Instance::label);
-    if (named != input.instances.end() && named->class_name != object.class_name) {
+    const auto instance = std::ranges::find(input.instances, static_cast<uint32_t>(object.id), &Instance::label);
+    if (instance != input.instances.end() && instance->class_name != object.class_name) {
       return InvalidArgument(
-          "{}: label {} of frame {} is a {}, in objects.yaml it is a {}; labels must be the ids there", sequence.dir(),
-          object.id, input.frame_id, named->class_name, object.class_name);
+          "{}: label {} of frame {} has class {}, but {} in objects.yaml; labels must be the ids of objects.yaml",
+          sequence.dir(), object.id, input.frame_id, instance->class_name, object.class_name);
     }
   }
   return absl::OkStatus();
@@ -40,7 +40,8 @@ absl::Status CheckLabels(const files::Sequence& sequence, const FrameInput& inpu
 }  // namespace
 
 absl::StatusOr<TrueFrames> LoadTrueFrames(const files::Sequence& sequence, int every, int offset) {
-  if (!sequence.objects()) return NotFound("{}: objects.yaml with the true cuboids is missing", sequence.dir());
+  if (!sequence.objects())
+    return FailedPrecondition("{}: objects.yaml with the true cuboids is missing", sequence.dir());
   session::Ingest ingest(sequence.camera(), /*max_mask_delay_s=*/0);
   TrueFrames frames;
   for (size_t i = static_cast<size_t>(offset); i < sequence.size(); i += static_cast<size_t>(every)) {
@@ -51,13 +52,13 @@ absl::StatusOr<TrueFrames> LoadTrueFrames(const files::Sequence& sequence, int e
     ROMAP_ASSIGN_OR_RETURN(std::shared_ptr<const Frame> frame, ingest.Accept(input));
     frames.push_back(std::move(frame));
   }
-  if (frames.empty()) return NotFound("{}: no frame has both a mask and a pose", sequence.dir());
+  if (frames.empty()) return FailedPrecondition("{}: no frame has both a mask and a pose", sequence.dir());
   return frames;
 }
 
 std::optional<ObjectView> MakeTrueView(const Frame& frame, const files::ObjectRecord& object, bool with_depth) {
   const cv::Mat is_object = frame.labels == static_cast<int>(object.id);
-  if (cv::countNonZero(is_object) < kFewestPixels) return std::nullopt;
+  if (cv::countNonZero(is_object) < kMinPixels) return std::nullopt;
   const cv::Rect roi = Crop(frame, object, is_object);
   if (roi.empty()) return std::nullopt;
   ObjectView view;

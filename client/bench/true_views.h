@@ -11,20 +11,19 @@
 
 namespace romap::bench {
 
-// What benchmarks of the field engine train on: frames with their true poses and masks, and true cuboids. Nothing is
-// tracked or associated.
+// The training data of the benchmark: frames with true poses and masks. Nothing is tracked or associated.
 using TrueFrames = std::vector<std::shared_ptr<const Frame>>;
 
-// Every `every`-th frame of a sequence from `offset` on, decoded and undistorted as the server does it; frames without
-// mask or pose are left out. Labels must be the ids of objects.yaml. INVALID_ARGUMENT / NOT_FOUND: a file is missing or
-// broken, the detections name a label otherwise than objects.yaml, or no frame is left.
+// Loads every `every`-th frame of a sequence from `offset`, decoded and undistorted as on the server. Skips frames
+// without a mask or a pose. INVALID_ARGUMENT: the labels are not the ids of objects.yaml. FAILED_PRECONDITION: no
+// objects.yaml or no frames. Otherwise as Sequence::Load.
 absl::StatusOr<TrueFrames> LoadTrueFrames(const files::Sequence& sequence, int every, int offset);
 
-// The view of an object in a frame: the crop around its projected cuboid, half as large again, and its mask. nullopt
-// when fewer than 100 pixels show it, or it reaches behind the camera.
+// The view of an object in a frame: the crop around its mask and its projected cuboid, enlarged by half. nullopt if the
+// object has fewer than 100 pixels or extends behind the camera.
 std::optional<ObjectView> MakeTrueView(const Frame& frame, const files::ObjectRecord& object, bool with_depth);
 
-// The views of an object in all frames that show it.
+// The views of an object in all frames.
 std::vector<ObjectView> MakeTrueViews(const TrueFrames& frames, const files::ObjectRecord& object, bool with_depth);
 
 }  // namespace romap::bench

@@ -71,7 +71,7 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
       ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
   add("--rounds", synth.rounds,
       "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
-  add("--unrest", synth.unrest, "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+  add("--hand-motion", synth.hand_motion, "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
   add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "client/files/associate.h"
-#include "common/statistics.h"
 
 namespace romap::eval {
 namespace {
@@ -17,42 +16,11 @@ PointMatrix AsMatrix(const Points& points) {
   return {points.front().data(), 3, static_cast<Eigen::Index>(points.size())};
 }
 
-std::vector<int64_t> TimestampsOf(std::span<const files::StampedPose> poses, int64_t offset_ns) {
+std::vector<int64_t> TimestampsOf(std::span<const files::StampedPose> poses) {
   std::vector<int64_t> timestamps_ns;
   timestamps_ns.reserve(poses.size());
-  for (const files::StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns + offset_ns);
+  for (const files::StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns);
   return timestamps_ns;
-}
-
-// The pairs of points of one ICP iteration.
-struct Correspondences {
-  Points source;
-  Points target;
-  double rms = 0;
-};
-
-Correspondences FindCorrespondences(const Points& source, const Points& moved, const Points& target,
-                                    const NearestIndex& target_index, const Points& symmetric_target, double overlap) {
-  Correspondences result;
-  double squared_sum = 0;
-  const auto add = [&](const Eigen::Vector3d& x, const Eigen::Vector3d& y, double distance) {
-    result.source.push_back(x);
-    result.target.push_back(y);
-    squared_sum += distance * distance;
-  };
-  const Neighbors forward = target_index.Query(moved);
-  const double limit = overlap < 1 ? Quantile(forward.distance, overlap) : std::numeric_limits<double>::infinity();
-  for (size_t k = 0; k < source.size(); ++k) {
-    if (forward.distance[k] <= limit) add(source[k], target[forward.index[k]], forward.distance[k]);
-  }
-  if (!symmetric_target.empty()) {
-    const Neighbors backward = NearestIndex(moved).Query(symmetric_target);
-    for (size_t k = 0; k < symmetric_target.size(); ++k) {
-      add(source[backward.index[k]], symmetric_target[k], backward.distance[k]);
-    }
-  }
-  result.rms = std::sqrt(squared_sum / static_cast<double>(result.source.size()));
-  return result;
 }
 
 }  // namespace
@@ -89,10 +57,10 @@ std::optional<Sim3<World, World>> FitSimilarity(const Points& x, const Points& y
 
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
                                                 std::span<const files::StampedPose> ground_truth, Alignment alignment,
-                                                double max_dt_s, double offset_s) {
+                                                double max_dt_s) {
   TrajectoryFit fit;
-  fit.pairs = files::AssociateTimestamps(TimestampsOf(estimated, std::llround(offset_s * 1e9)),
-                                         TimestampsOf(ground_truth, 0), std::llround(max_dt_s * 1e9));
+  fit.pairs =
+      files::AssociateTimestamps(TimestampsOf(estimated), TimestampsOf(ground_truth), std::llround(max_dt_s * 1e9));
   const size_t needed = alignment == Alignment::kNone ? 1 : 3;
   if (fit.pairs.size() < needed) {
     return InvalidArgument(
@@ -111,19 +79,24 @@ absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPo
   return fit;
 }
 
-std::optional<IcpResult> Icp(const Points& source, const Points& target, const Points& symmetric_target,
-                             const IcpOptions& options) {
+std::optional<IcpResult> Icp(const Points& source, const Points& target, const IcpOptions& options) {
   const NearestIndex target_index(target);
   IcpResult result;
   result.rms = std::numeric_limits<double>::infinity();
   for (result.iterations = 1; result.iterations <= options.max_iterations; ++result.iterations) {
-    const Points moved = Transform(result.S_target_source, source);
-    const Correspondences pairs =
-        FindCorrespondences(source, moved, target, target_index, symmetric_target, options.overlap);
-    const bool converged = result.rms - pairs.rms < options.tolerance;
-    result.rms = std::min(result.rms, pairs.rms);
+    const Neighbors nearest = target_index.Query(Transform(result.S_target_source, source));
+    Points paired;
+    paired.reserve(source.size());
+    double squared_sum = 0;
+    for (size_t k = 0; k < source.size(); ++k) {
+      paired.push_back(target[nearest.index[k]]);
+      squared_sum += nearest.distance[k] * nearest.distance[k];
+    }
+    const double rms = std::sqrt(squared_sum / static_cast<double>(source.size()));
+    const bool converged = result.rms - rms < options.tolerance;
+    result.rms = std::min(result.rms, rms);
     if (converged) return result;
-    const std::optional<Sim3<World, World>> fit = FitSimilarity(pairs.source, pairs.target, options.with_scale);
+    const std::optional<Sim3<World, World>> fit = FitSimilarity(source, paired, options.with_scale);
     if (!fit || fit->scale() <= 0.2 || fit->scale() >= 5) return std::nullopt;
     result.S_target_source = *fit;
   }

@@ -32,16 +32,14 @@ struct TrajectoryFit {
   std::vector<std::pair<size_t, size_t>> pairs;  // indices (estimated, true) of associated poses, in order of time
 };
 
-// Associates the poses of two trajectories (sorted by time) one to one within max_dt_s, after adding offset_s to the
-// estimated timestamps, and aligns the positions of the pairs. INVALID_ARGUMENT: fewer than three pairs (one pair for
-// kNone), or all estimated positions coincide.
+// Associates the poses of two trajectories (sorted by time) one to one within max_dt_s and aligns the positions of the
+// pairs. INVALID_ARGUMENT: fewer than three pairs (one pair for kNone), or all estimated positions coincide.
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
                                                 std::span<const files::StampedPose> ground_truth, Alignment alignment,
-                                                double max_dt_s, double offset_s = 0);
+                                                double max_dt_s);
 
 struct IcpOptions {
   bool with_scale = true;
-  double overlap = 1;  // share of source points to use, those with the closest targets; 0..1
   int max_iterations = 200;
   double tolerance = 1e-7;  // stop when the rms distance decreases by less
 };
@@ -53,9 +51,7 @@ struct IcpResult {
 };
 
 // Point-to-point ICP (Besl and McKay, PAMI 1992), starting from identity, with or without scale. Pairs each source
-// point with its nearest target point, and also each point of `symmetric_target` (may be empty) with its nearest source
-// point. nullopt if the scale leaves 0.2..5, i.e. the shapes do not match.
-std::optional<IcpResult> Icp(const Points& source, const Points& target, const Points& symmetric_target,
-                             const IcpOptions& options);
+// point with its nearest target point. nullopt if the scale leaves 0.2..5, i.e. the shapes do not match.
+std::optional<IcpResult> Icp(const Points& source, const Points& target, const IcpOptions& options);
 
 }  // namespace romap::eval

@@ -47,9 +47,6 @@ absl::Status ValidateOptions(const ObjectsEvalOptions& options) {
   if (options.estimated_trajectory.empty() != options.true_trajectory.empty()) {
     return InvalidArgument("both or neither of the estimated and the true trajectory must be given");
   }
-  if (options.icp_overlap < 0.1 || options.icp_overlap > 1) {
-    return InvalidArgument("icp_overlap is {}; expected 0.1..1", options.icp_overlap);
-  }
   if (options.samples < 100 || options.icp_points < 100) {
     return InvalidArgument("samples ({}) and icp_points ({}) must be at least 100", options.samples,
                            options.icp_points);
@@ -156,22 +153,11 @@ Points Subset(const Points& points, size_t count, std::mt19937_64* random) {
   return subset;
 }
 
-Points SeenPoints(const Surface& surface) {
-  Points seen;
-  for (size_t k = 0; k < surface.points.size(); ++k) {
-    if (surface.seen[k]) seen.push_back(surface.points[k]);
-  }
-  return seen;
-}
-
 // Aligns the predicted points with the true ones by ICP.
 IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, std::mt19937_64* random,
                       Points* predicted) {
   const Points source = Subset(*predicted, options.icp_points, random);
-  Points symmetric_target;
-  if (options.icp == IcpKind::kSymmetric) symmetric_target = Subset(SeenPoints(truth), options.icp_points, random);
-  const auto fit = Icp(source, truth.points, symmetric_target,
-                       {.with_scale = options.alignment == Alignment::kSim3, .overlap = options.icp_overlap});
+  const auto fit = Icp(source, truth.points, {.with_scale = options.alignment == Alignment::kSim3});
   if (!fit) return {.failed = true};
   *predicted = Transform(fit->S_target_source, *predicted);
   return {.failed = false,

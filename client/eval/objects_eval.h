@@ -11,10 +11,6 @@
 
 namespace romap::eval {
 
-// The correspondences of per-object ICP: from predicted to true points (as in CloudCompare), or also from the seen true
-// points to predicted ones.
-enum class IcpKind { kOneSided, kSymmetric };
-
 struct ObjectsEvalOptions {
   std::string predicted_dir;  // meshes (.ply, .obj) with any names
   // True surfaces. Point clouds may have the vertex properties `seen` (0 or 1) and `source` (2 = inferred, not
@@ -34,8 +30,6 @@ struct ObjectsEvalOptions {
   size_t samples = 100'000;
   uint32_t seed = 0;
   double match_distance = 0.5;  // maximal center distance of a pair without overlap, in diagonals of the true box
-  IcpKind icp = IcpKind::kOneSided;
-  double icp_overlap = 1;  // share of predicted points that ICP uses, those with the closest targets; 0.1..1
   size_t icp_points = 20'000;
   bool no_cap = false;  // ignore true points with source = 2
 };

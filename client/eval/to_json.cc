@@ -60,8 +60,6 @@ Json ToJson(const ObjectsReport& report) {
   json["traj_scale"] = report.trajectory_scale;
   const ObjectsEvalOptions& options = report.options;
   json["settings"] = {{"align", ToString(options.alignment)},
-                      {"icp", options.icp == IcpKind::kSymmetric ? "sym" : "cc"},
-                      {"icp_overlap", options.icp_overlap},
                       {"samples", options.samples},
                       {"seed", options.seed},
                       {"thresholds_cm", options.thresholds_cm},

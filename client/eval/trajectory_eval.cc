@@ -29,7 +29,7 @@ absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions&
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.ground_truth));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
-                         AlignTrajectories(estimated, truth, options.alignment, options.max_dt_s, options.offset_s));
+                         AlignTrajectories(estimated, truth, options.alignment, options.max_dt_s));
   TrajectoryReport report{.alignment = options.alignment,
                           .estimated_poses = estimated.size(),
                           .ground_truth_poses = truth.size(),

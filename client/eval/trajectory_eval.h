@@ -13,7 +13,6 @@ struct TrajectoryEvalOptions {
   std::string ground_truth;  // TUM file
   Alignment alignment = Alignment::kSim3;
   double max_dt_s = 0.02;  // maximal time difference of associated poses
-  double offset_s = 0;     // added to the estimated timestamps
 };
 
 // Absolute trajectory error (Sturm et al., IROS 2012). Lengths are in the unit of the ground truth, meters.

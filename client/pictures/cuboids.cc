@@ -16,11 +16,12 @@
 namespace romap::pictures {
 namespace {
 
-// Corners that differ in one bit of their number are joined by an edge.
+// Edges connect the corners whose indices differ in one bit.
 constexpr std::array<std::pair<int, int>, 12> kEdges = {
     {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
 
-// Projected points far outside overflow OpenCV's drawing; the line is cut to the image and a margin first.
+// Clips a line to the image plus a margin, because distant end points would overflow in cv::line. False if nothing is
+// left.
 bool ClipToImage(const CameraModel& camera, cv::Point2d& from, cv::Point2d& to) {
   constexpr double kMargin_px = 16;
   double begin = 0;
@@ -41,7 +42,7 @@ bool ClipToImage(const CameraModel& camera, cv::Point2d& from, cv::Point2d& to) 
   return true;
 }
 
-// The edge's ends in the image, nullopt when none of it lies in front of the near plane and near the image.
+// Projects an edge and clips it at the near plane and at the image. nullopt if nothing is left.
 std::optional<std::pair<cv::Point2d, cv::Point2d>> ProjectEdge(const CameraModel& camera, Eigen::Vector3d from,
                                                                Eigen::Vector3d to, double near_mu) {
   if (from.z() < near_mu && to.z() < near_mu) return std::nullopt;
@@ -55,7 +56,7 @@ std::optional<std::pair<cv::Point2d, cv::Point2d>> ProjectEdge(const CameraModel
   return std::pair{first, last};
 }
 
-// Text on a plate of the object's colour, its lower left corner at `anchor` but never outside the image.
+// Draws text on a filled rectangle with its lower left corner at `anchor`, shifted to stay inside the image.
 void DrawLabel(cv::Mat& image_bgr, const std::string& text, cv::Point anchor, const cv::Scalar& color) {
   constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
   constexpr double kScale = 0.45;
@@ -103,7 +104,7 @@ std::vector<cv::Point> DrawCuboidEdges(cv::Mat& image_bgr, const CameraModel& ca
 }
 
 cv::Scalar ObjectColorBgr(ObjectId id) {
-  // Hues a golden section of the circle apart.
+  // The golden ratio spreads the hues of consecutive ids.
   const double hue = std::fmod(0.05 + 0.618033988749895 * static_cast<double>(id.value % 100000), 1.0);
   cv::Mat pixel(1, 1, CV_8UC3, cv::Scalar(180 * hue, 210, 245));
   cv::cvtColor(pixel, pixel, cv::COLOR_HSV2BGR);
@@ -113,7 +114,7 @@ cv::Scalar ObjectColorBgr(ObjectId id) {
 
 void DrawCuboids(cv::Mat& image_bgr, const CameraModel& camera, const SE3<World, Camera>& T_world_camera,
                  std::span<const ObjectUpdate> objects) {
-  // Labels come last, so that no box crosses them.
+  // Labels are drawn last, so that no wireframe crosses them.
   std::vector<std::pair<const ObjectUpdate*, cv::Point>> labels;
   for (const ObjectUpdate& object : objects) {
     if (object.state == ObjectState::kLost) continue;

@@ -14,9 +14,9 @@ namespace {
 
 const cv::Scalar kWhite(255, 255, 255);
 
-// A square of the image, in pixels; may reach beyond the image.
+// A square region in pixel coordinates; may extend beyond the image.
 struct Square {
-  double left_px = 0;  // outer edge of its leftmost pixels
+  double left_px = 0;  // outer edge of the leftmost pixels
   double top_px = 0;
   double side_px = 1;
 };
@@ -26,7 +26,7 @@ Square WholeImage(const CameraModel& camera) {
   return {0.5 * (camera.width_px - side_px) - 0.5, 0.5 * (camera.height_px - side_px) - 0.5, side_px};
 }
 
-// The square around all points in front of the camera, with a margin.
+// The bounding square, with a margin, of all points in front of the camera.
 Square SquareAround(const std::vector<Eigen::Vector3d>& points_world, const CameraModel& camera,
                     const SE3<World, Camera>& T_world_camera) {
   constexpr double kMargin = 1.2;
@@ -37,13 +37,13 @@ Square SquareAround(const std::vector<Eigen::Vector3d>& points_world, const Came
     if (p_camera.z() > 0) bounds.extend(camera.Project(p_camera));
   }
   if (bounds.isEmpty()) return WholeImage(camera);
-  // An object all around the camera would make a square without end.
-  const double most_px = 2.0 * std::max(camera.width_px, camera.height_px);
-  const double side_px = std::clamp(kMargin * bounds.sizes().maxCoeff(), 8.0, most_px);
+  // Limits the square for an object that surrounds the camera.
+  const double max_side_px = 2.0 * std::max(camera.width_px, camera.height_px);
+  const double side_px = std::clamp(kMargin * bounds.sizes().maxCoeff(), 8.0, max_side_px);
   return {bounds.center().x() - 0.5 * side_px, bounds.center().y() - 0.5 * side_px, side_px};
 }
 
-// The camera that sees just the square, enlarged or reduced to panel_side_px.
+// The camera whose image is the square, scaled to panel_side_px.
 CameraModel CameraOfSquare(const CameraModel& camera, const Square& square, int panel_side_px) {
   const double scale = panel_side_px / square.side_px;
   CameraModel crop = camera;
@@ -115,7 +115,7 @@ cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectU
       std::cos(kElevation_rad) * sideways.cross(up_world) - std::sin(kElevation_rad) * up_world;
   Eigen::Matrix3d rotation;
   rotation << forward.cross(up_world).normalized(), forward.cross(forward.cross(up_world)).normalized(), forward;
-  // Far enough for the sphere around everything to fit the smaller side.
+  // The bounding sphere fits the smaller side of the image.
   const double half_view_rad = std::atan(0.5 * std::min(size_px.width, size_px.height) / camera.fx_px);
   const double distance_mu = std::max(0.5 * bounds.diagonal().norm(), 1e-6) / std::sin(half_view_rad);
   const SE3<World, Camera> T_world_camera(rotation, bounds.center() - distance_mu * forward);

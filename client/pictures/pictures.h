@@ -11,27 +11,26 @@
 
 namespace romap::pictures {
 
-// Pictures of maps for people to look at. Cameras are free of distortion, images are CV_8UC3 in BGR, meshes are in the
-// World frame, lengths in map units.
+// Visualization of maps. Cameras have no distortion, images are CV_8UC3 in BGR, meshes are in the World frame, and
+// lengths are in map units.
 
-// The colour that stands for an object in all pictures: neighbours in id differ well. B, G, R of 0..255.
+// The color of an object in all images (B, G, R, 0..255). Objects with consecutive ids have clearly different colors.
 cv::Scalar ObjectColorBgr(ObjectId id);
 
-// Draws each object's cuboid as a wireframe with its label, such as "cup #3", in the object's colour. Edges end where
-// they come closer than one thousandth of the cuboid's size to the camera; what is behind the camera is not drawn.
-// Lost objects are left out.
+// Draws the cuboid of each object as a wireframe in the color of the object, with a label such as "cup #3". Parts
+// behind the camera or closer than one thousandth of the cuboid size are clipped. Lost objects are skipped.
 void DrawCuboids(cv::Mat& image_bgr, const CameraModel& camera, const SE3<World, Camera>& T_world_camera,
                  std::span<const ObjectUpdate> objects);
 
-// Three square panels side by side: what the camera saw of the object, its mesh shaded in grey, and its mesh in its own
-// colours, all from the same pose and cut to the same square around the object. `view_bgr` has the camera's size.
-// `cuboid` may be null; if given its outline is drawn over the first panel. When neither mesh nor cuboid is in front of
-// the camera, the panels show the whole view and nothing.
+// Draws three square panels side by side: the camera image of the object, its mesh shaded in gray, and its mesh with
+// vertex colors, all from the same pose and cropped to the same square around the object. `view_bgr` has the size of
+// the camera image. If `cuboid` is not null, its wireframe is drawn over the first panel. If neither mesh nor cuboid is
+// in front of the camera, the first panel shows the whole image and the others are empty.
 cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, const CameraModel& camera,
                            const SE3<World, Camera>& T_world_camera, const Cuboid* cuboid, int panel_side_px = 320);
 
-// All meshes in their colours and all cuboids, seen from above at an angle and fitted into the picture. `up_world` has
-// unit length. Without meshes and cuboids the picture is empty (white).
+// Draws all meshes with vertex colors and all cuboids, from an elevated viewpoint that fits everything into the image.
+// `up_world` has unit length. White if there are no meshes and no cuboids.
 cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectUpdate> objects,
                      const Eigen::Vector3d& up_world, const cv::Size& size_px = {960, 720});
 

@@ -13,11 +13,11 @@ namespace {
 
 constexpr int kSamplesAcross = 2;
 
-// All meshes in one set of arrays; attributes per vertex.
+// All meshes merged into one set of arrays, with attributes per vertex.
 struct MergedMeshes {
   std::vector<Eigen::Vector3f> positions_world;
-  std::vector<Eigen::Vector3f> normals;     // zero: use the triangle's
-  std::vector<Eigen::Vector3f> colors_bgr;  // 0..255; negative: none
+  std::vector<Eigen::Vector3f> normals;     // zero: use the triangle normal
+  std::vector<Eigen::Vector3f> colors_bgr;  // 0..255; negative: no color
   std::vector<std::array<uint32_t, 3>> triangles;
   std::vector<uint16_t> ids;  // per triangle
 };
@@ -44,8 +44,8 @@ MergedMeshes Merge(std::span<const MeshInstance> meshes) {
   return merged;
 }
 
-// Colour of triangle `triangle` where the ray meets it. The light sits a little above and left of the camera: a light
-// at the camera itself would hide the shape of what faces it.
+// The color of triangle `triangle` at its intersection with the ray. The light is above and left of the camera: a light
+// at the camera would make surfaces that face it look flat.
 Eigen::Vector3f ShadeBgr(const MergedMeshes& merged, int32_t triangle, const SE3<World, Camera>& T_world_camera,
                          const Eigen::Vector3d& ray_world, MeshPaint paint) {
   const auto& [a, b, c] = merged.triangles[triangle];

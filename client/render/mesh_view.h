@@ -10,25 +10,25 @@
 namespace romap::render {
 
 enum class MeshPaint {
-  kShaded,   // grey, lit from the camera: shows shape
-  kColored,  // the vertices' own colours, unlit; grey and lit where a mesh has no colours
+  kShaded,   // gray, lit from near the camera
+  kColored,  // unlit vertex colors; as kShaded for meshes without colors
 };
 
-// A mesh to draw. Normals are used when the mesh has them, else the triangles' own.
+// A mesh to draw. Shading uses the vertex normals if the mesh has them, otherwise the triangle normals.
 struct MeshInstance {
   const Mesh* mesh_world = nullptr;  // vertices in the World frame, map units; may be empty
-  uint16_t id = 0;                   // what RenderedView::ids shows, > 0
+  uint16_t id = 0;                   // value in RenderedView::ids, > 0
 };
 
-// Images of the size of the camera's.
+// A rendered view; all images have the size of the camera image.
 struct RenderedView {
-  cv::Mat color_bgr;  // CV_8UC3, averaged over 2x2 samples a pixel
-  cv::Mat depth_mu;   // CV_32FC1 z depth at the pixel's centre, 0 = nothing
-  cv::Mat ids;        // CV_16UC1 id of the mesh at the pixel's centre, 0 = nothing
+  cv::Mat color_bgr;  // CV_8UC3, mean of 2x2 samples per pixel
+  cv::Mat depth_mu;   // CV_32FC1 z depth at the pixel center, 0 = background
+  cv::Mat ids;        // CV_16UC1 id of the mesh at the pixel center, 0 = background
 };
 
-// Draws meshes, both sides of every triangle, over `background_bgr`. Triangles with an index out of range are left out.
-// `camera` must be free of distortion.
+// Draws both sides of all triangles over `background_bgr`. Triangles with an index out of range are skipped. `camera`
+// must have no distortion.
 RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraModel& camera,
                           const SE3<World, Camera>& T_world_camera, MeshPaint paint,
                           const cv::Scalar& background_bgr = cv::Scalar(255, 255, 255));

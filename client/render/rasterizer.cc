@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kTileSide_px = 64;
 
-// Pixels a triangle may cover, both ends included; empty when u_max < u_min.
+// Bounds of the pixels that a triangle may cover, inclusive; empty if u_max < u_min.
 struct PixelBox {
   int u_min = 0, v_min = 0, u_max = -1, v_max = -1;
   bool Empty() const { return u_max < u_min || v_max < v_min; }
@@ -24,7 +24,7 @@ struct PixelPlane {
   double At(double u_px, double v_px) const { return a * u_px + b * v_px + c; }
 };
 
-// The function ray -> normal . ray, as a function of the pixel the ray goes through.
+// The dot product of `normal` with the ray through a pixel, as a linear function of the pixel.
 PixelPlane PlaneOverPixels(const Eigen::Vector3d& normal, const CameraModel& camera) {
   const double a = normal.x() / camera.fx_px;
   const double b = normal.y() / camera.fy_px;
@@ -74,7 +74,7 @@ class TileRasterizer {
     const std::array<const Eigen::Vector3d*, 3> p = {&positions_camera_[triangle[0]], &positions_camera_[triangle[1]],
                                                      &positions_camera_[triangle[2]]};
     if (options_.cull_back_faces && p[0]->dot(p[1]->cross(*p[2])) >= 0) return {};
-    // Bounds of what lies beyond the near plane: its corners, and where edges pierce the plane.
+    // Bounds of the part beyond the near plane: its corners and the intersections of its edges with the plane.
     Eigen::AlignedBox2d bounds;
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d& from = *p[k];
@@ -85,14 +85,14 @@ class TileRasterizer {
         bounds.extend(camera_.Project(from + share * (to - from)));
       }
     }
-    // Also refuses what is empty or not finite.
+    // Written so that empty and non-finite bounds are rejected too.
     const double right_px = camera_.width_px - 1;
     const double bottom_px = camera_.height_px - 1;
     if (!(bounds.min().x() <= right_px && bounds.min().y() <= bottom_px && bounds.max().x() >= 0 &&
           bounds.max().y() >= 0)) {
       return {};
     }
-    // A rounding error must not cost a pixel that lies right on the border.
+    // Rounding errors must not exclude pixels on the border.
     constexpr double kSlack_px = 1e-6;
     return {static_cast<int>(std::ceil(std::max(bounds.min().x() - kSlack_px, 0.0))),
             static_cast<int>(std::ceil(std::max(bounds.min().y() - kSlack_px, 0.0))),
@@ -110,7 +110,7 @@ class TileRasterizer {
     }
   }
 
-  // Counting sort of triangle indices by tile; inside a tile they stay in order, which settles ties in depth.
+  // Counting sort of triangle indices by tile. Triangles of a tile stay in order, which resolves ties in depth.
   void BinTriangles() {
     tiles_across_ = (camera_.width_px + kTileSide_px - 1) / kTileSide_px;
     const int tiles_down = (camera_.height_px + kTileSide_px - 1) / kTileSide_px;
@@ -138,7 +138,7 @@ class TileRasterizer {
     const Eigen::Vector3d n2 = p0.cross(p1);
     const double volume = p0.dot(n0);
     if (volume == 0 || !std::isfinite(volume)) return;
-    // Seen from its front a triangle has a negative volume: its three e are then negative inside.
+    // Front faces have a negative volume, and their three e are negative inside.
     const double sign = volume < 0 ? -1 : 1;
     const PixelPlane e0 = PlaneOverPixels(sign * n0, camera_);
     const PixelPlane e1 = PlaneOverPixels(sign * n1, camera_);
@@ -169,7 +169,7 @@ class TileRasterizer {
   std::vector<Eigen::Vector3d> positions_camera_;
   std::vector<PixelBox> boxes_;  // per triangle
   int tiles_across_ = 0;
-  std::vector<size_t> tile_begin_;  // per tile, and one more: range of binned_
+  std::vector<size_t> tile_begin_;  // start in binned_ per tile, plus the end
   std::vector<uint32_t> binned_;    // triangle indices
 };
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kLeafTriangles = 4;
 constexpr int kBins = 12;
-// Below this depth sets are halved, whatever the heuristic says: no tree gets deeper than kStack.
+// Deeper nodes are split in half regardless of the heuristic, which bounds the depth of the tree by kStack.
 constexpr int kMaxHeuristicDepth = 48;
 constexpr size_t kStack = 96;
 
@@ -20,7 +20,7 @@ float HalfArea(const Eigen::AlignedBox3f& box) {
   return s.x() * s.y() + s.y() * s.z() + s.z() * s.x();
 }
 
-// Distance along the ray to the triangle, negative where it misses (Moeller and Trumbore, 1997).
+// Distance along the ray to the triangle; negative if it misses (Moeller and Trumbore, 1997).
 float HitDistance(const Eigen::Vector3f& corner, const Eigen::Vector3f& edge1, const Eigen::Vector3f& edge2,
                   const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) {
   const Eigen::Vector3f p = direction.cross(edge2);
@@ -71,7 +71,7 @@ void Bvh::Split(uint32_t node, std::span<Reference> references, uint32_t offset,
   Split(children + 1, references.subspan(middle), offset + static_cast<uint32_t>(middle), depth + 1);
 }
 
-// Sorts the references into two sets, the first of which has the returned size (neither is empty).
+// Reorders the references into two non-empty sets and returns the size of the first.
 size_t Bvh::Partition(std::span<Reference> references) {
   Eigen::AlignedBox3f centers;
   for (const Reference& reference : references) centers.extend(reference.center);
@@ -109,7 +109,7 @@ size_t Bvh::Partition(std::span<Reference> references) {
   return static_cast<size_t>(middle - references.begin());
 }
 
-// Calls visit(t) for each triangle hit at 0 < t < t_max, in no order, until it returns true.
+// Calls visit(t) for each triangle hit at 0 < t < t_max, in arbitrary order, until it returns true.
 template <class Visit>
 void Bvh::Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_max, Visit visit) const {
   if (triangles_.empty()) return;
@@ -137,7 +137,7 @@ void Bvh::Walk(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction
   }
 }
 
-// Where the ray enters the node's box, infinity where it misses it before t_max.
+// Distance at which the ray enters the box of the node; infinity if it misses the box or enters beyond t_max.
 float Bvh::Entry(const Node& node, const Eigen::Vector3f& origin_m, const Eigen::Vector3f& inverse, float t_max) {
   const Eigen::Vector3f to_low = (node.box.min() - origin_m).cwiseProduct(inverse);
   const Eigen::Vector3f to_high = (node.box.max() - origin_m).cwiseProduct(inverse);
@@ -151,7 +151,7 @@ std::optional<Bvh::Hit> Bvh::Nearest(const Eigen::Vector3f& origin_m, const Eige
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const Eigen::Vector3f inverse = direction.cwiseInverse();
   Hit best{0, kFar};
-  std::array<std::pair<uint32_t, float>, kStack> stack;  // nodes, and where the ray enters them
+  std::array<std::pair<uint32_t, float>, kStack> stack;  // nodes and their entry distances
   size_t depth = 0;
   if (Entry(nodes_[0], origin_m, inverse, kFar) < kFar) stack[depth++] = {0, 0.0F};
   while (depth > 0) {
@@ -170,9 +170,9 @@ std::optional<Bvh::Hit> Bvh::Nearest(const Eigen::Vector3f& origin_m, const Eige
     }
     for (uint32_t i = node.first; i < node.first + node.count; ++i) {
       const Triangle& triangle = triangles_[i];
-      if (direction.dot(triangle.edge1.cross(triangle.edge2)) >= 0) continue;  // from behind
+      if (direction.dot(triangle.edge1.cross(triangle.edge2)) >= 0) continue;  // back face
       const float t = HitDistance(triangle.corner, triangle.edge1, triangle.edge2, origin_m, direction);
-      // Of triangles that share an edge the first one takes it, in whatever order they come.
+      // A hit on a shared edge belongs to the triangle with the lowest index, independent of the visiting order.
       if (t > 0 && (t < best.t || (t == best.t && triangle.index < best.triangle))) best = {triangle.index, t};
     }
   }
@@ -188,7 +188,7 @@ bool Bvh::Occluded(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direc
 
 bool Bvh::Contains(const Eigen::Vector3f& point_m) const {
   if (!nodes_[0].box.contains(point_m)) return false;
-  // Along no axis and no diagonal, where rays would run through edges of regular meshes.
+  // Not parallel to axes or diagonals, so that the ray does not hit edges of regular meshes.
   const Eigen::Vector3f direction = Eigen::Vector3f(0.3217F, 0.2071F, 0.9239F).normalized();
   int hits = 0;
   Walk(point_m, direction, std::numeric_limits<float>::infinity(), [&](float) {

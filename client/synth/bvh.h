@@ -11,22 +11,22 @@
 namespace romap::synth {
 
 // Bounding volume hierarchy over triangles, split by the surface area heuristic in bins (Wald, "On fast construction of
-// SAH-based bounding volume hierarchies", 2007). Immutable after construction, safe to share between threads.
+// SAH-based bounding volume hierarchies", 2007). Immutable and thread-safe.
 class Bvh {
  public:
   Bvh(std::span<const Eigen::Vector3f> positions_m, std::span<const std::array<uint32_t, 3>> triangles);
 
   struct Hit {
-    uint32_t triangle = 0;  // index into the constructor's triangles
-    float t = 0;            // in lengths of the direction
+    uint32_t triangle = 0;  // index into the triangles of the constructor
+    float t = 0;            // distance in multiples of the direction
   };
 
-  // The first triangle that the ray meets from its front, where its corners run counter-clockwise. Nothing for a
-  // direction that is not finite.
+  // The nearest triangle whose front face (counter-clockwise corners) the ray hits. nullopt if there is none or the
+  // direction is not finite.
   std::optional<Hit> Nearest(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction) const;
-  // Whether any triangle meets origin + t * direction for some t in (t_min, t_max); t in lengths of `direction`.
+  // Whether any triangle intersects origin + t * direction for t in (t_min, t_max).
   bool Occluded(const Eigen::Vector3f& origin_m, const Eigen::Vector3f& direction, float t_min, float t_max) const;
-  // Whether the point is inside the closed surface the triangles form: an odd number of them lies on a ray from it.
+  // Whether the point is inside the closed surface that the triangles form (ray parity test).
   bool Contains(const Eigen::Vector3f& point_m) const;
 
  private:
@@ -40,7 +40,7 @@ class Bvh {
     uint32_t first = 0;
     uint32_t count = 0;
   };
-  struct Reference {  // a triangle while the tree is built
+  struct Reference {  // a triangle during construction
     Eigen::AlignedBox3f box;
     Eigen::Vector3f center;
     uint32_t triangle;

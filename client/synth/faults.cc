@@ -11,7 +11,7 @@
 namespace romap::synth {
 namespace {
 
-constexpr float kJitterWavelength_px = 14;  // along the border, as of a network's coarse mask
+constexpr float kJitterWavelength_px = 14;  // along the border, like the coarse masks of a network
 
 cv::Mat DisplaceBorders(const cv::Mat& labels, double jitter_px, uint32_t seed) {
   cv::Mat displaced(labels.size(), CV_8UC1);
@@ -29,8 +29,8 @@ cv::Mat DisplaceBorders(const cv::Mat& labels, double jitter_px, uint32_t seed) 
   return displaced;
 }
 
-// A line of `length_px` through the kernel's middle, its weights adding up to 1.
-cv::Mat SmearKernel(const cv::Vec2d& direction, double length_px) {
+// A normalized motion blur kernel: a line of `length_px` through the kernel center.
+cv::Mat MotionBlurKernel(const cv::Vec2d& direction, double length_px) {
   const int radius = static_cast<int>(std::ceil(0.5 * length_px));
   cv::Mat kernel = cv::Mat::zeros(2 * radius + 1, 2 * radius + 1, CV_32FC1);
   const double norm = std::hypot(direction[0], direction[1]);
@@ -52,14 +52,14 @@ void Expose(cv::Mat& color_bgr, double gain, double gamma) {
   cv::LUT(color_bgr, table, color_bgr);
 }
 
-// In a blurred stretch of frames: such that corners of a few pixels are gone.
-constexpr double kStretchSmear_share = 1.0 / 16;  // of the image's width
-constexpr double kStretchDefocus_share = 1.0 / 200;
+// Blur of the frames in SynthOptions::blurred, relative to the image width. Removes corners of a few pixels.
+constexpr double kStrongMotionBlur = 1.0 / 16;
+constexpr double kStrongDefocus = 1.0 / 200;
 
 }  // namespace
 
-FaultyMask SpoilMask(const cv::Mat& true_labels, int object_count, const SynthOptions& options, Random& random) {
-  // The same numbers are drawn whatever is asked for, so that switching one fault on does not change the others.
+FaultyMask DegradeMask(const cv::Mat& true_labels, int object_count, const SynthOptions& options, Random& random) {
+  // Draws the same random numbers for all options, so that enabling one fault does not change the others.
   const auto jitter_seed = static_cast<uint32_t>(random.Bits());
   std::vector<uint8_t> shuffled(static_cast<size_t>(object_count));
   for (int i = 0; i < object_count; ++i) shuffled[static_cast<size_t>(i)] = static_cast<uint8_t>(i + 1);
@@ -98,15 +98,15 @@ FaultyMask SpoilMask(const cv::Mat& true_labels, int object_count, const SynthOp
   return mask;
 }
 
-void SpoilImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random,
-                const FramePlan& plan) {
+void DegradeImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random,
+                  const FramePlan& plan) {
   if (plan.black) color_bgr.setTo(cv::Scalar::all(0));
   if (plan.gain != 1 || plan.gamma != 1) Expose(color_bgr, plan.gain, plan.gamma);
   const double width_px = plan.blurred ? color_bgr.cols : 0;
-  const double smear_px = std::max(options.motion_blur_px, kStretchSmear_share * width_px);
-  const double defocus_px = std::max(options.defocus_px, kStretchDefocus_share * width_px);
-  if (smear_px > 0) {
-    cv::filter2D(color_bgr, color_bgr, -1, SmearKernel(motion_px, smear_px), cv::Point(-1, -1), 0,
+  const double blur_px = std::max(options.motion_blur_px, kStrongMotionBlur * width_px);
+  const double defocus_px = std::max(options.defocus_px, kStrongDefocus * width_px);
+  if (blur_px > 0) {
+    cv::filter2D(color_bgr, color_bgr, -1, MotionBlurKernel(motion_px, blur_px), cv::Point(-1, -1), 0,
                  cv::BORDER_REPLICATE);
   }
   if (defocus_px > 0) {

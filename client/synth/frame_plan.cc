@@ -13,7 +13,7 @@ bool InAny(const std::vector<FrameRange>& ranges, size_t frame) {
                      [&](const FrameRange& range) { return range.Contains(static_cast<int>(frame) + 1); });
 }
 
-// A camera that sets its exposure anew every now and then.
+// Simulates automatic exposure that changes every second or two.
 void PlanExposure(const SynthOptions& options, std::vector<FramePlan>& plans) {
   Random random(options.seed, 8);
   double next_jump_s = 0;
@@ -44,10 +44,10 @@ std::vector<FramePlan> PlanFrames(const SynthOptions& options) {
     plan.blurred = InAny(options.blurred, i);
     plan.shown = i;
     const bool repeat = random.Chance(options.duplicate_share);
-    // Not across the borders of a stretch: a covered lens must not show an older picture, nor a new one a black one.
-    const bool like_before = i > 0 && !plan.missing && !plans[i - 1].missing && plan.black == plans[i - 1].black &&
+    // No repetition across the limits of a range: a covered lens must not show an earlier image, and vice versa.
+    const bool same_faults = i > 0 && !plan.missing && !plans[i - 1].missing && plan.black == plans[i - 1].black &&
                              plan.blurred == plans[i - 1].blurred;
-    if (repeat && like_before) plan = plans[i - 1];
+    if (repeat && same_faults) plan = plans[i - 1];
   }
   return plans;
 }

@@ -17,7 +17,7 @@ namespace {
 constexpr int kSamplesAcross = 2;
 constexpr int kSamples = kSamplesAcross * kSamplesAcross;
 
-// Linear light 0..1 to an 8-bit sRGB value (IEC 61966-2-1).
+// Converts linear intensity 0..1 to an 8-bit sRGB value (IEC 61966-2-1).
 uint8_t ToSrgb8(float linear) {
   static const std::array<uint8_t, 4096> kTable = [] {
     std::array<uint8_t, 4096> table;
@@ -35,7 +35,7 @@ bool ShareVertex(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>
   return std::any_of(a.begin(), a.end(), [&](uint32_t i) { return i == b[0] || i == b[1] || i == b[2]; });
 }
 
-// Whether the samples of a pixel see one smooth piece of surface, so that one colour will do for all of them.
+// Whether all samples of a pixel hit the same smooth surface, so that one color evaluation suffices.
 bool SameSurface(const Scene& scene, const std::array<int32_t, kSamples>& hits) {
   if (hits[0] == render::VisibilityImage::kNothing) return false;
   for (const int32_t hit : hits) {
@@ -44,7 +44,7 @@ bool SameSurface(const Scene& scene, const std::array<int32_t, kSamples>& hits) 
     const auto a = static_cast<size_t>(hits[0]);
     const auto b = static_cast<size_t>(hit);
     if (scene.surface_of_triangle[a] != scene.surface_of_triangle[b]) return false;
-    // Neighbours on a smooth surface share a vertex; a fold that hides a part of the same surface does not.
+    // Adjacent triangles of a smooth surface share a vertex; triangles at an occlusion within a surface do not.
     if (!ShareVertex(scene.triangles[a], scene.triangles[b])) return false;
   }
   return true;
@@ -67,8 +67,9 @@ FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera)
   fine_rays_ = LensRays(camera, kSamplesAcross);
 }
 
-render::VisibilityImage FrameRenderer::Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
-                                            const SE3<World, Camera>& T_world_camera) const {
+render::VisibilityImage FrameRenderer::Visibility(const CameraModel& camera,
+                                                  const std::vector<Eigen::Vector2d>& lens_rays,
+                                                  const SE3<World, Camera>& T_world_camera) const {
   if (!bvh_) return render::Rasterize(camera, T_world_camera, scene_.Soup(), {.cull_back_faces = true});
   render::VisibilityImage image;
   image.width_px = camera.width_px;
@@ -83,21 +84,20 @@ render::VisibilityImage FrameRenderer::Look(const CameraModel& camera, const std
       const std::optional<Bvh::Hit> hit = bvh_->Nearest(origin_m, direction.cast<float>());
       if (!hit) continue;
       image.triangle[i] = static_cast<int32_t>(hit->triangle);
-      image.inverse_depth_mu[i] = 1 / hit->t;  // the ray's z is 1 in the camera frame
+      image.inverse_depth_mu[i] = 1 / hit->t;  // the ray has z = 1 in the camera frame
     }
   });
   return image;
 }
 
-// Light that comes from where the ray meets the triangle; `pixel_share` is the side of the area that the colour stands
-// for, in pixels.
+// Radiance at the intersection of the ray with the triangle, filtered for an area with a side of `pixel_share` pixels.
 Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
                             const SE3<World, Camera>& T_world_camera, float inverse_depth, float pixel_share) const {
   const std::array<uint32_t, 3>& corner = scene_.triangles[static_cast<size_t>(triangle)];
   const std::array<Eigen::Vector3f, 3> world = {scene_.positions_world[corner[0]], scene_.positions_world[corner[1]],
                                                 scene_.positions_world[corner[2]]};
   const Eigen::Vector3d ray = T_world_camera.rotation() * ray_camera;
-  // A pixel's centre may lie just outside the triangle that one of its samples hit.
+  // The pixel center may be outside the triangle that a sample hit.
   Eigen::Vector3f weights = render::Barycentrics(world, T_world_camera.translation(), ray).cwiseMax(0.0F);
   weights /= weights.sum();
   const auto blend = [&](const auto& attribute) -> Eigen::Vector3f {
@@ -107,7 +107,7 @@ Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
   const auto& local = scene_.positions_local;
   const Eigen::Vector3f normal_local =
       (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
-  // A slanted surface shows more of itself in one direction of the pixel but not in the other: take the mean of both.
+  // On a slanted surface the footprint of a pixel is longer in one direction; use the geometric mean of both.
   const float cosine = std::abs(normal_world.dot(ray.cast<float>().normalized()));
   const float footprint_m =
       pixel_share / (inverse_depth * static_cast<float>(camera_.fx_px) * std::sqrt(std::max(cosine, 0.05F)));
@@ -115,7 +115,7 @@ Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
   return Albedo(material, blend(local), normal_local, footprint_m).cwiseProduct(blend(scene_.irradiance));
 }
 
-// Mean colour of pixel (u, v) from the samples of the finer image inside it.
+// Mean color of the samples of pixel (u, v).
 Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
                               int v_px) const {
   std::array<int32_t, kSamples> hits;
@@ -141,8 +141,8 @@ Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<Wor
 }
 
 TrueFrame FrameRenderer::Render(const SE3<World, Camera>& T_world_camera) const {
-  const render::VisibilityImage centers = Look(camera_, center_rays_, T_world_camera);
-  const render::VisibilityImage fine = Look(fine_camera_, fine_rays_, T_world_camera);
+  const render::VisibilityImage centers = Visibility(camera_, center_rays_, T_world_camera);
+  const render::VisibilityImage fine = Visibility(fine_camera_, fine_rays_, T_world_camera);
   TrueFrame frame;
   frame.color_bgr.create(camera_.height_px, camera_.width_px, CV_8UC3);
   frame.labels.create(camera_.height_px, camera_.width_px, CV_8UC1);

@@ -13,27 +13,27 @@
 
 namespace romap::synth {
 
-// A frame as it truly is, images of the camera's size.
+// A rendered frame without faults. The images have the size of the camera image.
 struct TrueFrame {
-  cv::Mat color_bgr;  // CV_8UC3 sRGB, averaged over 2x2 samples a pixel in linear light
-  cv::Mat labels;     // CV_8UC1 label of the object at the pixel's centre, 0 = room
-  cv::Mat depth_m;    // CV_32FC1 z depth at the pixel's centre, metres; 0 = nothing
+  cv::Mat color_bgr;  // CV_8UC3 sRGB, mean of 2x2 samples per pixel in linear space
+  cv::Mat labels;     // CV_8UC1 label of the object at the pixel center, 0 = room
+  cv::Mat depth_m;    // CV_32FC1 z depth at the pixel center [m]; 0 = nothing
 };
 
-// Draws a scene whose light is baked. A pinhole's view is drawn into a z-buffer; through a lens each sample's ray is
-// followed. Where a lens collects no light the image is black.
+// Renders a scene with baked light. Uses a z-buffer for a pinhole camera and ray tracing for a lens. Pixels of a lens
+// that receive no rays are black.
 class FrameRenderer {
  public:
-  // `scene` outlives the renderer and does not change.
+  // `scene` must outlive the renderer and not change.
   FrameRenderer(const Scene& scene, const CameraModel& camera);
 
-  // Safe to call from several threads.
+  // Thread-safe.
   TrueFrame Render(const SE3<World, Camera>& T_world_camera) const;
 
  private:
-  // The rays of one sampling of the image and what they meet.
-  render::VisibilityImage Look(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
-                               const SE3<World, Camera>& T_world_camera) const;
+  // The visible triangle of each sample of an image. `lens_rays` is empty for a pinhole camera.
+  render::VisibilityImage Visibility(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
+                                     const SE3<World, Camera>& T_world_camera) const;
   Rgb PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
                  int v_px) const;
   Rgb Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera, const SE3<World, Camera>& T_world_camera,
@@ -41,8 +41,8 @@ class FrameRenderer {
 
   const Scene& scene_;
   const CameraModel camera_;
-  const CameraModel fine_camera_;  // its pixels are the samples of camera_'s
-  // With a lens only:
+  const CameraModel fine_camera_;  // its pixels are the samples of camera_
+  // For a camera with a lens only:
   std::unique_ptr<Bvh> bvh_;
   std::vector<Eigen::Vector2d> center_rays_;
   std::vector<Eigen::Vector2d> fine_rays_;

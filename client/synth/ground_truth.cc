@@ -24,8 +24,8 @@ struct LocalPoint {
   Point normal;
 };
 
-// Points of every part's surface in the solid's frame, density in points per square metre. Triangles are smaller than
-// the distance of points: a running sum over the area decides how many each gets.
+// Samples the surfaces of all parts, in the frame of the solid; the density is in points per square meter. Triangles
+// are smaller than the distance of points, so their area is accumulated.
 std::vector<std::vector<LocalPoint>> SampleParts(const Solid& solid, double density, Random& random) {
   std::vector<std::vector<LocalPoint>> samples;
   for (const SolidPart& part : solid.parts) {
@@ -78,9 +78,9 @@ SurfacePoints::SurfacePoints(const SceneObject& object, uint64_t seed) : label_(
 
 void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera,
                              const SE3<World, Camera>& T_world_camera) {
-  constexpr double kMinCosine = 0.05;  // flatter than this a surface shows nothing that could be measured
+  constexpr double kMinCosine = 0.05;  // surfaces at more grazing angles are not considered visible
   constexpr double kTolerance_m = 3e-4;
-  constexpr double kMaxSlack_m = 3e-3;  // less than any wall is thick
+  constexpr double kMaxSlack_m = 3e-3;  // less than the thickness of any wall
   const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();
   for (size_t i = 0; i < positions_world_.size(); ++i) {
     if (seen(i)) continue;
@@ -98,7 +98,7 @@ void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera,
     const int u = static_cast<int>(std::lround(pixel.x()));
     const int v = static_cast<int>(std::lround(pixel.y()));
     if (frame.labels.at<uint8_t>(v, u) != label_) continue;
-    // The depth is that of the pixel's centre; half a pixel away a slanted surface is nearer or farther.
+    // The depth image is sampled at the pixel center; the depth of a slanted surface changes within half a pixel.
     const double slack_m = 0.71 * p.z() / camera.fx_px * std::sqrt(1 - cosine * cosine) / cosine;
     const double tolerance_m = kTolerance_m + std::min(slack_m, kMaxSlack_m);
     if (std::abs(frame.depth_m.at<float>(v, u) - p.z()) < tolerance_m) seen_[i].store(1, std::memory_order_relaxed);

@@ -11,14 +11,14 @@
 namespace romap::synth {
 namespace {
 
-// Newton's method on the lens's own formula, from a start within a fraction of a pixel. What is drawn must not share
-// the error of the inverse that the mapping under test uses.
-Eigen::Vector2d Polish(const CameraModel& camera, const Eigen::Vector2d& pixel_px, Eigen::Vector2d pinhole_px) {
+// Refines an undistorted pixel by Newton's method on the exact distortion formula, from an initial value within a
+// fraction of a pixel. Rendering must not share the approximation error of the undistortion that is tested with it.
+Eigen::Vector2d Refine(const CameraModel& camera, const Eigen::Vector2d& pixel_px, Eigen::Vector2d pinhole_px) {
   constexpr double kStep_px = 1e-3;
-  constexpr double kEnough_px = 1e-7;
+  constexpr double kTolerance_px = 1e-7;
   for (int iteration = 0; iteration < 8; ++iteration) {
     const Eigen::Vector2d error_px = DistortPixel(camera, pinhole_px) - pixel_px;
-    if (error_px.norm() < kEnough_px) break;
+    if (error_px.norm() < kTolerance_px) break;
     Eigen::Matrix2d slope;
     for (int k = 0; k < 2; ++k) {
       const Eigen::Vector2d step_px = kStep_px * Eigen::Vector2d::Unit(k);
@@ -42,7 +42,7 @@ std::vector<Eigen::Vector2d> LensRays(const CameraModel& camera, int samples_acr
     const std::vector<Eigen::Vector2f> starts_px = UndistortPixels(fine, pixels_px);
     for (int u = 0; u < fine.width_px; ++u) {
       const Eigen::Vector2d pixel_px(u, v);
-      const Eigen::Vector2d pinhole_px = Polish(fine, pixel_px, starts_px[static_cast<size_t>(u)].cast<double>());
+      const Eigen::Vector2d pinhole_px = Refine(fine, pixel_px, starts_px[static_cast<size_t>(u)].cast<double>());
       const bool found = (DistortPixel(fine, pinhole_px) - pixel_px).norm() < kTolerance_px;  // false for NaN
       rays[static_cast<size_t>(v) * static_cast<size_t>(fine.width_px) + static_cast<size_t>(u)] =
           found ? fine.Unproject(pinhole_px.x(), pinhole_px.y()).head<2>()

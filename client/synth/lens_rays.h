@@ -7,9 +7,9 @@
 
 namespace romap::synth {
 
-// The x and y of the direction with z = 1 from which light reaches each sample of an image: samples_across x
-// samples_across evenly spread inside each pixel, row-major over the finer image (see Supersampled()). Exact to 1e-6 px
-// by the lens's formula; NaN where no ray from the front meets the sample.
+// The ray of each sample of an image as x and y of its direction with z = 1. Each pixel has samples_across x
+// samples_across samples; row-major over the supersampled image (see Supersampled()). Accurate to 1e-6 px; NaN for
+// samples that no ray from the front reaches.
 std::vector<Eigen::Vector2d> LensRays(const CameraModel& camera, int samples_across);
 
 }  // namespace romap::synth

@@ -16,10 +16,10 @@ namespace {
 constexpr int kLightSamplesAcross = 6;
 constexpr int kAmbientRings = 4;
 constexpr int kAmbientSpokes = 10;
-constexpr float kAmbientReach_m = 0.5F;  // what is farther away counts as bright room
-constexpr float kOffset_m = 5e-4F;       // off the surface, so that it does not shade itself
+constexpr float kAmbientReach_m = 0.5F;  // farther surfaces do not occlude
+constexpr float kOffset_m = 5e-4F;       // offset of ray origins that avoids self-shadowing
 const Rgb kAmbient(0.30F, 0.31F, 0.34F);
-constexpr float kBounce = 0.25F;  // share of the ambient light that comes back from what is near
+constexpr float kBounce = 0.25F;  // share of the occluded ambient light that near surfaces reflect
 
 Rgb DirectLight(const AreaLight& light, const Bvh& bvh, const Point& p, const Point& normal) {
   const Point light_normal = light.half_u_m.cross(light.half_v_m).normalized();
@@ -38,7 +38,7 @@ Rgb DirectLight(const AreaLight& light, const Bvh& bvh, const Point& p, const Po
   return light.power * (sum / (kLightSamplesAcross * kLightSamplesAcross));
 }
 
-// Directions around +z, their density proportional to the cosine.
+// Cosine-weighted directions around +z.
 std::array<Point, kAmbientRings * kAmbientSpokes> HemisphereRays() {
   std::array<Point, kAmbientRings * kAmbientSpokes> rays;
   for (int ring = 0; ring < kAmbientRings; ++ring) {

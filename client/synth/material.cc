@@ -8,7 +8,7 @@
 namespace romap::synth {
 namespace {
 
-// A point to colour and how large a pixel is there.
+// A surface point to evaluate, and the side of a pixel there.
 struct Spot {
   Eigen::Vector3f p_m;
   Eigen::Vector3f normal;
@@ -22,8 +22,8 @@ float SmoothStep(float low, float high, float x) {
 
 Rgb Mix(const Rgb& a, const Rgb& b, float share_of_b) { return a + share_of_b * (b - a); }
 
-// 0 in the first half of each period of 1, 1 in the second, with borders as wide as `blur` periods; a half where no
-// band is resolved any more.
+// A square wave of period 1 with values 0 and 1, and transitions of width `blur`. Tends to 0.5 when the bands are not
+// resolved.
 float Bands(float x, float blur) {
   const float width = std::clamp(blur, 1e-4F, 1.0F);
   const float triangle = 2 * std::abs(x - std::floor(x) - 0.5F) - 0.5F;  // -0.5..0.5, sign flips between bands
@@ -43,14 +43,14 @@ Rgb Stripes(const Material& m, const Spot& s) {
   const float x = s.p_m.z() / m.scale_m + wave;
   const auto band = static_cast<int32_t>(std::floor(x));
   const float share = Bands(x, s.footprint_m / m.scale_m);
-  // Every band of the second colour may be of the third instead.
+  // Bands of the second color may have the third color instead.
   const Rgb& second = CellUniform(band, 0, 0, m.seed) < 0.4F ? m.colors[2] : m.colors[1];
   return Mix(m.colors[0], second, share);
 }
 
 Rgb Checks(const Material& m, const Spot& s) {
   const float blur = s.footprint_m / m.scale_m;
-  // The shift keeps flat faces at round coordinates off the border between two layers.
+  // The offset keeps faces at round coordinates away from the border of two layers.
   const Eigen::Vector3f q = s.p_m / (2 * m.scale_m) + Eigen::Vector3f(0.13F, 0.17F, 0.11F);
   float product = 1;
   for (int k = 0; k < 3; ++k) {
@@ -80,8 +80,8 @@ Rgb Wood(const Material& m, const Spot& s) {
   const float phase = radius_m / m.scale_m;
   const float ring = phase - std::floor(phase);
   const float dark = Resolved(m.scale_m, s.footprint_m) * (SmoothStep(0.2F, 0.85F, ring) - SmoothStep(0.9F, 1, ring));
-  const Eigen::Vector3f fibre(0.06F * s.p_m.x(), s.p_m.y(), s.p_m.z());
-  const float pores = FractalNoise(fibre, 0.18F * m.scale_m, 2, 0.7F, s.footprint_m, m.seed + 3);
+  const Eigen::Vector3f fiber(0.06F * s.p_m.x(), s.p_m.y(), s.p_m.z());
+  const float pores = FractalNoise(fiber, 0.18F * m.scale_m, 2, 0.7F, s.footprint_m, m.seed + 3);
   const Rgb base = Mix(m.colors[0], m.colors[1], 0.7F * dark);
   return Mix(base, m.colors[2], 0.5F * SmoothStep(0.15F, 0.6F, pores));
 }
@@ -106,7 +106,7 @@ Rgb Fabric(const Material& m, const Spot& s) {
   return Mix(base, m.colors[2], 0.5F * weave);
 }
 
-// Coordinates on the printed sheet, in metres, and which sheet it is.
+// Coordinates on a printed sheet [m], and the index of the sheet.
 struct SheetPoint {
   float s_m, t_m;
   int32_t sheet;
@@ -124,13 +124,13 @@ SheetPoint OnSheet(const Material& m, const Spot& s) {
   return {axis == 0 ? s.p_m.y() : s.p_m.x(), s.p_m.z(), sheet};
 }
 
-// 1 on the ink of a line of made-up words, 0 on paper. `t` runs from 0 to 1 through the line, `s_m` along it.
+// 1 on ink and 0 on paper, for a line of random glyphs. `t` in 0..1 is the position across the line, `s_m` along it.
 float WordInk(float s_m, float t, float line_m, int32_t line, float footprint_m, uint32_t seed) {
   const float letter_m = 0.55F * line_m;
   const auto letter = static_cast<int32_t>(std::floor(s_m / letter_m));
   const bool gap = CellUniform(letter, line, 1, seed) < 0.18F;
   if (gap || t < 0.25F || t > 0.85F) return 0;
-  // A letter is a little grid of strokes.
+  // A letter is a small grid of strokes.
   const auto stroke_s = static_cast<int32_t>(std::floor(3.0F * s_m / letter_m));
   const auto stroke_t = static_cast<int32_t>(std::floor((t - 0.25F) / 0.2F));
   const float stroke = CellUniform(stroke_s, stroke_t, line, seed + 5) < 0.62F ? 1.0F : 0.0F;
@@ -138,7 +138,7 @@ float WordInk(float s_m, float t, float line_m, int32_t line, float footprint_m,
   return sharp * stroke + (1 - sharp) * 0.55F;
 }
 
-// The sheet is laid out in blocks: paragraphs, headings, pictures, plain fields.
+// A sheet consists of blocks: paragraphs, headings, images and plain areas.
 Rgb Print(const Material& m, const Spot& s) {
   const SheetPoint q = OnSheet(m, s);
   const uint32_t seed = m.seed + 101U * static_cast<uint32_t>(q.sheet);
@@ -153,7 +153,7 @@ Rgb Print(const Material& m, const Spot& s) {
   const bool margin = s_in < 0.06F || s_in > 0.94F || t_in < 0.06F || t_in > 0.94F;
   const Rgb& paper = m.colors[0];
   if (margin) return paper;
-  if (kind < 0.3F) {  // picture
+  if (kind < 0.3F) {  // image
     const uint32_t picture = seed + CellHash(column, row, 6, seed);
     const float tone = FractalNoise(s.p_m, 0.6F * block_m, 5, 0.65F, s.footprint_m, picture);
     const Rgb tint = FromHsv(CellUniform(column, row, 7, seed), 0.45, 0.7);

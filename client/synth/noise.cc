@@ -8,10 +8,10 @@ namespace {
 
 float Fade(float t) { return t * t * t * (t * (t * 6 - 15) + 10); }
 
-// Without the care std::lerp takes at its ends: this is the innermost loop of all textures.
+// Faster than std::lerp, which guarantees exact end points; this is the innermost loop of all textures.
 float Lerp(float a, float b, float t) { return a + t * (b - a); }
 
-// Dot product with one of the twelve edge directions of a cube, picked by the low bits of `hash`.
+// Dot product with one of the twelve edge directions of a cube, selected by the low bits of `hash`.
 float GradientDot(uint32_t hash, float x, float y, float z) {
   const uint32_t h = hash & 15U;
   const float u = h < 8 ? x : y;
@@ -70,14 +70,14 @@ float FractalNoise(const Eigen::Vector3f& p_m, float wavelength_m, int octaves, 
     const float visible = Resolved(wavelength_m, footprint_m);
     amplitude_sum += amplitude;
     if (visible > 0) {
-      // The offset keeps the zeros of the octaves' lattices apart.
+      // The offset separates the lattice points of the octaves, where the noise is zero.
       const Eigen::Vector3f offset = Eigen::Vector3f::Constant(17.37F * static_cast<float>(octave));
       sum += amplitude * visible * GradientNoise(p_m / wavelength_m + offset, seed + static_cast<uint32_t>(octave));
     }
     wavelength_m *= 0.5F;
     amplitude *= persistence;
   }
-  // Gradient noise rarely passes 0.7.
+  // Gradient noise rarely exceeds 0.7.
   return 1.4F * sum / amplitude_sum;
 }
 

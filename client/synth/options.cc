@@ -9,19 +9,19 @@ namespace romap::synth {
 absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text) {
   FrameRange range;
   const char* const end = text.data() + text.size();
-  const auto [colon, fault] = std::from_chars(text.data(), end, range.first);
-  if (fault == std::errc() && colon != end && *colon == ':') {
-    const auto [rest, second_fault] = std::from_chars(colon + 1, end, range.last);
-    if (second_fault == std::errc() && rest == end) return range;
+  const auto [colon, error] = std::from_chars(text.data(), end, range.first);
+  if (error == std::errc() && colon != end && *colon == ':') {
+    const auto [rest, last_error] = std::from_chars(colon + 1, end, range.last);
+    if (last_error == std::errc() && rest == end) return range;
   }
-  return InvalidArgument("'{}' should be FIRST:LAST, two frame numbers counted from 1, like 100:130", text);
+  return InvalidArgument("'{}': expected FIRST:LAST, two frame numbers from 1, e.g. 100:130", text);
 }
 
 absl::Status ValidateSynthOptions(const SynthOptions& options) {
   std::string faults;
   const auto require = [&](const char* name, double value, double low, double high) {
     if (value >= low && value <= high) return;  // false for NaN
-    faults += fmt::format("{}{} = {} is not in {}..{}", faults.empty() ? "" : "; ", name, value, low, high);
+    faults += fmt::format("{}{} is {}; expected {}..{}", faults.empty() ? "" : "; ", name, value, low, high);
   };
   require("objects", options.objects, 1, 16);
   require("identical_pairs", options.identical_pairs, 0, options.objects / 2);
@@ -36,25 +36,25 @@ absl::Status ValidateSynthOptions(const SynthOptions& options) {
   require("noise_sigma", options.noise_sigma, 0, 100);
   require("motion_blur_px", options.motion_blur_px, 0, 100);
   require("defocus_px", options.defocus_px, 0, 20);
-  require("unrest", options.unrest, 0, 4);
+  require("hand_motion", options.hand_motion, 0, 4);
   require("exposure_stops", options.exposure_stops, 0, 4);
   require("duplicate_share", options.duplicate_share, 0, 1);
   const auto require_ranges = [&](const char* name, const std::vector<FrameRange>& ranges) {
     for (const FrameRange& range : ranges) {
       if (range.first >= 1 && range.first <= range.last && range.last <= options.frames) continue;
-      faults += fmt::format("{}{} = {}:{} should go forward within 1:{}", faults.empty() ? "" : "; ", name, range.first,
-                            range.last, options.frames);
+      faults += fmt::format("{}{} is {}:{}; expected an increasing range within 1:{}", faults.empty() ? "" : "; ", name,
+                            range.first, range.last, options.frames);
     }
   };
   require_ranges("cut", options.cuts);
   require_ranges("black", options.black);
   require_ranges("blurred", options.blurred);
-  bool any_left = false;
-  for (int number = 1; number <= options.frames && !any_left; ++number) {
-    any_left = std::none_of(options.cuts.begin(), options.cuts.end(),
-                            [&](const FrameRange& range) { return range.Contains(number); });
+  bool any_frame = false;
+  for (int number = 1; number <= options.frames && !any_frame; ++number) {
+    any_frame = std::none_of(options.cuts.begin(), options.cuts.end(),
+                             [&](const FrameRange& range) { return range.Contains(number); });
   }
-  if (options.frames > 0 && !any_left) faults += fmt::format("{}cut leaves no frame", faults.empty() ? "" : "; ");
+  if (options.frames > 0 && !any_frame) faults += fmt::format("{}cut removes all frames", faults.empty() ? "" : "; ");
   if (faults.empty()) return absl::OkStatus();
   return InvalidArgument("synthetic sequence: {}", faults);
 }

@@ -10,13 +10,14 @@ namespace romap::synth {
 
 enum class PathKind {
   kOrbit,     // a level circle around the table
-  kHandheld,  // an arc of 120 to 200 degrees with the unrest of a hand
-  // Twice around a larger room, back to the start: the table is seen at the start and end of each round, walls in
-  // between, and on a part of the way little else than a plain wall. About 600 frames a round are a brisk walk.
+  kHandheld,  // an arc of 120 to 200 degrees with the motion of a hand
+  // Two rounds through a larger room, ending at the start. The camera views the table at the start and end of each
+  // round and the walls in between, including an almost textureless wall. 600 frames per round correspond to a brisk
+  // walk.
   kTwoRounds,
 };
 
-// Frames by their numbers, counted from 1 as in the names of their files, both ends included.
+// An inclusive range of frame numbers, counted from 1 as in the file names.
 struct FrameRange {
   int first = 1;
   int last = 1;
@@ -25,44 +26,44 @@ struct FrameRange {
   bool operator==(const FrameRange&) const = default;
 };
 
-// Reads "FIRST:LAST". INVALID_ARGUMENT says what it should look like.
+// Parses "FIRST:LAST". INVALID_ARGUMENT if malformed.
 absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text);
 
 enum class ImageFormat { kPng, kJpeg };
 
-// What bends the rays: nothing, OpenCV's k1 k2 p1 p2 k3, or an equidistant fisheye that sees 127 degrees across.
+// Camera lens: no distortion, OpenCV's k1 k2 p1 p2 k3, or an equidistant fisheye with a field of view of 127 degrees.
 enum class SynthLens { kPinhole, kRadialTangential, kFisheye };
 
-// What sequence to make. Everything in it follows from these numbers.
+// The parameters of a synthetic sequence. They determine it completely.
 struct SynthOptions {
   uint64_t seed = 1;
   int objects = 6;          // 1..16
-  int identical_pairs = 0;  // so many pairs of objects are twins; 2 * pairs <= objects
+  int identical_pairs = 0;  // number of pairs of identical objects; 2 * identical_pairs <= objects
   int frames = 300;         // 1..100000
   double fps = 25;          // frames per second, 0.1..1000
   PathKind path = PathKind::kOrbit;
-  double rounds = 1;          // circles, passes along the arc (2 = there and back), or pairs of rounds; 0.01..100
-  double unrest = 1;          // of the hand: how far it wanders in height, distance, aim and roll; 0..4
-  double elevation_deg = 35;  // of the camera above the table, 5..80; the hand wanders about it
+  double rounds = 1;          // circles, passes along the arc (2 = back and forth), or pairs of rounds; 0.01..100
+  double hand_motion = 1;     // amplitude of the hand motion in height, distance, aim and roll; 0..4
+  double elevation_deg = 35;  // mean elevation of the camera above the table, 5..80
   int width_px = 640;         // 32..4096
   int height_px = 480;        // 32..4096
-  SynthLens lens = SynthLens::kPinhole;    // colours, masks and depth are all as the lens shows them
-  ImageFormat format = ImageFormat::kPng;  // of the colour images
-  // Faults, all off by default.
-  double mask_jitter_px = 0;          // the masks' borders are displaced by up to about so much, 0..50
-  double mask_drop_share = 0;         // share of the objects' masks that are missing, each by chance, 0..1
-  bool permute_labels = false;        // a mask's labels are shuffled in every frame; detections.csv says what they mean
-  double noise_sigma = 0;             // of Gaussian image noise, in 8-bit levels, 0..100
-  double motion_blur_px = 0;          // length of the smear along the camera's motion, 0..100
-  double defocus_px = 0;              // sigma of a Gaussian blur, 0..20
-  std::vector<FrameRange> cuts = {};  // frames that are missing, as if the camera had been carried off
-  std::vector<FrameRange> black = {};    // frames with a covered lens: no light, no masks, no depth
-  std::vector<FrameRange> blurred = {};  // frames in which hardly any corner survives the motion
-  double exposure_stops = 0;   // gain jumps every second or two by up to so much up or down, gamma with it; 0..4
-  double duplicate_share = 0;  // share of the frames that show the picture before them once more, by chance, 0..1
+  SynthLens lens = SynthLens::kPinhole;    // applies to images, masks and depth
+  ImageFormat format = ImageFormat::kPng;  // of the color images
+  // Faults, all disabled by default.
+  double mask_jitter_px = 0;             // approximate maximal displacement of mask borders, 0..50
+  double mask_drop_share = 0;            // probability that the mask of an object is missing in a frame, 0..1
+  bool permute_labels = false;           // permutes labels in each frame; detections.csv assigns classes to them
+  double noise_sigma = 0;                // standard deviation of Gaussian image noise [8-bit levels], 0..100
+  double motion_blur_px = 0;             // length of the motion blur, 0..100
+  double defocus_px = 0;                 // standard deviation of Gaussian blur, 0..20
+  std::vector<FrameRange> cuts = {};     // omitted frames: the camera jumps
+  std::vector<FrameRange> black = {};    // frames with a covered lens: black, without masks and depth
+  std::vector<FrameRange> blurred = {};  // frames blurred so strongly that almost no corners remain
+  double exposure_stops = 0;             // maximal jump of the gain every second or two, with a change of gamma; 0..4
+  double duplicate_share = 0;            // probability that a frame repeats the previous image, 0..1
 };
 
-// INVALID_ARGUMENT naming each option that is out of its range.
+// INVALID_ARGUMENT names every option that is out of range.
 absl::Status ValidateSynthOptions(const SynthOptions& options);
 
 }  // namespace romap::synth

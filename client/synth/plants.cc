@@ -20,7 +20,7 @@ Material Greenery(Random& random, float scale_m) {
   return leaf;
 }
 
-// A leaf of the given length along an arch that starts at `foot` towards `heading_rad` and droops.
+// A leaf along an arc that starts at `foot` in the direction `heading_rad` and bends down.
 Mesh LeafBlade(const Point& foot, float heading_rad, float length_m, float width_m, float rise) {
   const Point out(std::cos(heading_rad), std::sin(heading_rad), 0);
   const std::vector<Point> path = Smooth(std::vector<Point>{
@@ -107,7 +107,7 @@ Solid MakePottedPlant(Random& random) {
   const Material green = Greenery(random, 0.012F);
   const int leaves = 9 + random.Below(5);
   for (int i = 0; i < leaves; ++i) {
-    const float heading = 2.4F * static_cast<float>(i) + In(random, -0.2, 0.2);  // the golden angle, as plants do
+    const float heading = 2.4F * static_cast<float>(i) + In(random, -0.2, 0.2);  // the golden angle, as in plants
     const float t = static_cast<float>(i) / static_cast<float>(leaves);
     const Point foot(0.2F * radius_m * std::cos(heading), 0.2F * radius_m * std::sin(heading), 0.87F * height_m);
     solid.parts.push_back(

@@ -5,7 +5,7 @@
 
 namespace romap::synth {
 
-// Scrambles 64 bits (the finaliser of SplitMix64; Steele, Lea and Flood, "Fast splittable pseudorandom number
+// Hashes 64 bits with the finalizer of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number
 // generators", 2014).
 inline uint64_t Scramble(uint64_t x) {
   x += 0x9E3779B97F4A7C15ULL;
@@ -14,8 +14,8 @@ inline uint64_t Scramble(uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// A stream of random numbers fixed by (seed, stream) alone. The standard library's distributions may differ from one
-// implementation to the next; a sequence must be the same everywhere.
+// A stream of random numbers that is determined by (seed, stream). Does not use the distributions of the standard
+// library, which differ between implementations, so that sequences are identical everywhere.
 class Random {
  public:
   explicit Random(uint64_t seed, uint64_t stream = 0) : state_(Scramble(seed) ^ Scramble(~stream)) {}

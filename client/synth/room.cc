@@ -14,7 +14,7 @@ constexpr float kRoomHeight_m = 2.6F;
 
 float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
 
-// A rectangle from `corner` along `u` and `v`, seen from the side of u x v, in squares of about `cell_m`.
+// A rectangle from `corner` along `u` and `v` with front side u x v, in squares of about `cell_m`.
 Mesh Sheet(const Point& corner, const Point& u, const Point& v, float cell_m) {
   const auto columns = static_cast<uint32_t>(std::max(1.0F, std::ceil(u.norm() / cell_m)));
   const auto rows = static_cast<uint32_t>(std::max(1.0F, std::ceil(v.norm() / cell_m)));
@@ -39,7 +39,7 @@ void AddPart(Scene& scene, const Mesh& mesh, const Material& material) {
   AddSurface(scene, mesh, SE3<World, Object>(), material, 0);
 }
 
-// Paler and closer to each other than RandomMaterial's colours: a background, but one with corners to track.
+// Colors paler and more similar than those of RandomMaterial: a background that still has corners to track.
 Material Backdrop(Pattern pattern, float scale_m, Random& random) {
   Material material = RandomMaterial(pattern, scale_m, random);
   const double hue = random.Uniform();
@@ -57,7 +57,7 @@ Material WoodMaterial(Random& random, float scale_m) {
   return wood;
 }
 
-// One wall in the frame where it is at x = half, seen from smaller x: the turn about z brings it to its side.
+// A wall with posters and furniture. Modeled at x = half_m, facing -x, then rotated about z by `turn_rad`.
 void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   const Eigen::Quaternionf turn = Turn(turn_rad, Point::UnitZ());
   const auto add = [&](const Mesh& mesh, const Material& material) {
@@ -66,7 +66,7 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   constexpr Pattern kPatterns[] = {Pattern::kSpeckle, Pattern::kTiles, Pattern::kMarble, Pattern::kStripes};
   add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F),
       Backdrop(kPatterns[random.Below(4)], In(random, 0.12, 0.3), random));
-  // Posters above, chests and shelves of books below.
+  // Posters above, chests and bookshelves below.
   float y_m = -half_m + 0.2F;
   while (y_m < half_m - 0.7F) {
     const float half_width_m = In(random, 0.18, 0.34);
@@ -87,7 +87,7 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   }
 }
 
-// The same wall painted in one colour: a faint grain and a few notes pinned to it are all there is to see.
+// An almost textureless wall: one color with weak grain and a few small notes.
 void AddPlainWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   const Eigen::Quaternionf turn = Turn(turn_rad, Point::UnitZ());
   const auto add = [&](const Mesh& mesh, const Material& material) {
@@ -112,7 +112,7 @@ void AddTable(Scene& scene, Random& random) {
                                     : Backdrop(kCloths[random.Below(4)], In(random, 0.05, 0.1), random);
   top.grain = 0.25F;
   const Material frame = WoodMaterial(random, 0.02F);
-  // The cells are fine enough for the shadows at the objects' feet.
+  // Fine cells resolve the shadows around the objects.
   AddPart(scene, Sheet(Point(-half_x, -half_y, height_m), Point(2 * half_x, 0, 0), Point(0, 2 * half_y, 0), 0.007F),
           top);
   constexpr float kHalfSlab_m = 0.015F;
@@ -148,8 +148,8 @@ void AddRoom(Scene& scene, const SceneOptions& options, Random& random) {
   }
   AddTable(scene, random);
 
-  // A warm panel over the table and cool daylight from one side. Turned against the table's axes: the few samples of a
-  // panel that is parallel to an edge would line up and draw steps into its shadow.
+  // A warm panel above the table and cool daylight from one side. Both are rotated relative to the table: the samples
+  // of a light parallel to an edge would align and produce steps in its shadow.
   const float daylight_rad = In(random, 0, 2 * kPi);
   const Point to_window(std::cos(daylight_rad), std::sin(daylight_rad), 0);
   const Point along_window(-to_window.y(), to_window.x(), 0);

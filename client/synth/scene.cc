@@ -11,15 +11,15 @@ namespace romap::synth {
 namespace {
 
 constexpr float kCreaseCosine = 0.766F;  // 40 degrees
-constexpr double kGap_m = 0.03;          // between the footprints' circles
+constexpr double kGap_m = 0.03;          // minimal distance of the bounding circles of footprints
 
 struct Chosen {
   const SolidKind* kind;
   Solid solid;
-  bool twin = false;  // like the one before
+  bool twin = false;  // identical to the previous one
 };
 
-// Kinds in random order, each once before any comes again.
+// Chooses kinds in random order; a kind repeats only after all others were chosen.
 std::vector<Chosen> ChooseSolids(const SceneOptions& options, Random& random) {
   std::vector<const SolidKind*> deck;
   std::vector<Chosen> chosen;
@@ -41,8 +41,8 @@ std::vector<Chosen> ChooseSolids(const SceneOptions& options, Random& random) {
   return chosen;
 }
 
-// Centres for circles of the given radii such that none overlap, packed around the origin: the large ones first, each
-// at the first free spot of a few random ones in a disc that grows until there is one.
+// Centers of non-overlapping circles with the given radii, packed around the origin. Places circles in descending order
+// of radius at random positions in a disc that grows until a free position is found.
 std::vector<Eigen::Vector2d> PlaceCircles(const std::vector<double>& radii_m, Random& random) {
   std::vector<size_t> order(radii_m.size());
   for (size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -63,7 +63,7 @@ std::vector<Eigen::Vector2d> PlaceCircles(const std::vector<double>& radii_m, Ra
     }
     placed.push_back(i);
   }
-  // The middle of what was placed goes to the origin.
+  // Center the layout on the origin.
   Eigen::AlignedBox2d bounds;
   for (const size_t i : placed) {
     bounds.extend(centers_m[i] - Eigen::Vector2d::Constant(radii_m[i]));
@@ -73,12 +73,12 @@ std::vector<Eigen::Vector2d> PlaceCircles(const std::vector<double>& radii_m, Ra
   return centers_m;
 }
 
-SceneObject StandOnTable(Chosen chosen, const Eigen::Vector2d& spot_m, double yaw_rad, double table_height_m) {
+SceneObject PlaceOnTable(Chosen chosen, const Eigen::Vector2d& position_m, double yaw_rad, double table_height_m) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()));
   const Eigen::AlignedBox3d bounds = Bounds(chosen.solid).cast<double>();
   SceneObject object;
   object.solid = std::move(chosen.solid);
-  object.T_world_solid = {turn, Eigen::Vector3d(spot_m.x(), spot_m.y(), table_height_m)};
+  object.T_world_solid = {turn, Eigen::Vector3d(position_m.x(), position_m.y(), table_height_m)};
   object.T_world_object = {turn, object.T_world_solid * bounds.center()};
   object.half_extents_m = 0.5 * bounds.sizes();
   return object;
@@ -87,14 +87,14 @@ SceneObject StandOnTable(Chosen chosen, const Eigen::Vector2d& spot_m, double ya
 void AddObjects(Scene& scene, std::vector<Chosen> chosen, Random& random) {
   std::vector<double> radii_m;
   for (const Chosen& c : chosen) radii_m.push_back(FootprintRadius(c.solid));
-  const std::vector<Eigen::Vector2d> spots_m = PlaceCircles(radii_m, random);
+  const std::vector<Eigen::Vector2d> positions_m = PlaceCircles(radii_m, random);
   std::map<std::string, int> kind_counts;
   for (const Chosen& c : chosen) ++kind_counts[c.kind->name];
   std::map<std::string, int> used;
   for (size_t i = 0; i < chosen.size(); ++i) {
-    scene.layout_radius_m = std::max(scene.layout_radius_m, spots_m[i].norm() + radii_m[i]);
+    scene.layout_radius_m = std::max(scene.layout_radius_m, positions_m[i].norm() + radii_m[i]);
     const std::string kind = chosen[i].kind->name;
-    SceneObject object = StandOnTable(std::move(chosen[i]), spots_m[i],
+    SceneObject object = PlaceOnTable(std::move(chosen[i]), positions_m[i],
                                       random.Uniform(-std::numbers::pi, std::numbers::pi), scene.table_height_m);
     object.label = static_cast<uint8_t>(i + 1);
     object.name = kind_counts[kind] > 1 ? kind + "_" + std::to_string(++used[kind]) : kind;
@@ -109,7 +109,7 @@ void AddObjects(Scene& scene, std::vector<Chosen> chosen, Random& random) {
 
 void AddSurface(Scene& scene, const Mesh& mesh_local, const SE3<World, Object>& T_world_local, const Material& material,
                 uint8_t label) {
-  // The copies of one vertex, one for each smooth piece of surface that meets there.
+  // The copies of a vertex, one for each smooth surface that meets there.
   struct Copy {
     Eigen::Vector3f first_normal;
     uint32_t index;

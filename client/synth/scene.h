@@ -13,49 +13,49 @@
 
 namespace romap::synth {
 
-// World frame: metres, z up, the floor at z = 0, the table's middle above the origin.
+// World frame of the scene: meters, z up, floor at z = 0, center of the table above the origin.
 
 // One object on the table.
 struct SceneObject {
-  uint8_t label = 0;  // in masks and objects.yaml, 1..
+  uint8_t label = 0;  // in masks and objects.yaml, from 1
   std::string name;   // unique, e.g. "mug_2"
-  Solid solid;        // in its own frame
+  Solid solid;        // in the frame of the solid
   SE3<World, Object> T_world_solid;
-  // Tight cuboid; its yaw is the solid's.
+  // The tight cuboid, with the yaw of the solid.
   SE3<World, Object> T_world_object;
   Eigen::Vector3d half_extents_m = Eigen::Vector3d::Zero();
 };
 
-// A part of an object or of the room.
+// The surface of a part of an object or of the room.
 struct SceneSurface {
   Material material;
-  uint8_t label = 0;  // of its object, 0 = room
+  uint8_t label = 0;  // of the object, 0 = room
 };
 
-// Rectangle that shines to both sides.
+// A rectangular light that emits on both sides.
 struct AreaLight {
   Eigen::Vector3f center_m, half_u_m, half_v_m;
-  Rgb power = Rgb::Ones();  // irradiance it gives at 1 m in front of it, facing it
+  Rgb power = Rgb::Ones();  // irradiance on a surface that faces it at a distance of 1 m
 };
 
 struct SceneOptions {
   uint64_t seed = 1;
   int objects = 6;
   int identical_pairs = 0;
-  double min_room_half_m = 2;  // the room grows with what is on the table, and is no smaller than this
-  bool plain_wall = false;     // the wall at +y shows next to nothing a camera could hold on to
+  double min_room_half_m = 2;  // minimal half side of the room, which grows with the objects on the table
+  bool plain_wall = false;     // makes the wall at +y almost textureless
 };
 
 struct Scene {
   std::vector<SceneObject> objects;
   double table_height_m = 0;
-  double layout_radius_m = 0;  // circle around the origin that holds all objects
+  double layout_radius_m = 0;  // radius around the z axis that contains all objects
   double room_half_m = 0;      // the room spans -half..half in x and y
   std::vector<AreaLight> lights;
 
-  // Everything there is to draw. Per vertex:
-  std::vector<Eigen::Vector3f> positions_world;  // metres
-  std::vector<Eigen::Vector3f> positions_local;  // metres, in the frame of the part's material
+  // The triangles to render. Per vertex:
+  std::vector<Eigen::Vector3f> positions_world;  // meters
+  std::vector<Eigen::Vector3f> positions_local;  // meters, in the frame of the material
   std::vector<Eigen::Vector3f> normals_world;    // unit length
   std::vector<Rgb> irradiance;                   // see lighting.h
   // Per triangle:
@@ -66,16 +66,16 @@ struct Scene {
   render::TriangleSoup Soup() const { return {positions_world, triangles}; }
 };
 
-// Adds a mesh of one material to what is drawn. Vertices are shared by triangles that meet at less than 40 degrees and
-// doubled where the surface has an edge.
+// Adds a mesh of one material to the scene. Triangles share vertices, and thus normals, where they meet at less than 40
+// degrees; at sharper edges vertices are duplicated.
 void AddSurface(Scene& scene, const Mesh& mesh_local, const SE3<World, Object>& T_world_local, const Material& material,
                 uint8_t label);
 
-// A room with a table, and objects on it that keep a distance from each other. The first 2 * identical_pairs objects
-// are pairs of twins. Everything follows from the seed. Irradiance is left empty.
+// Makes a room with a table and objects on it that do not touch. The first 2 * identical_pairs objects are pairs of
+// identical objects. The seed determines everything. Leaves Scene::irradiance empty.
 Scene MakeScene(const SceneOptions& options);
 
-// room.cc: fills in room_half_m and lights and adds the surfaces of floor, walls, furniture and table.
+// Sets room_half_m and lights, and adds the surfaces of floor, walls, furniture and table. Defined in room.cc.
 void AddRoom(Scene& scene, const SceneOptions& options, Random& random);
 
 }  // namespace romap::synth

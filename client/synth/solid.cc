@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kTwoPi = 2 * std::numbers::pi_v<float>;
 
-std::vector<Ring> WithRingsBetween(const std::vector<Ring>& rings, float max_edge_m) {
+std::vector<Ring> InsertRings(const std::vector<Ring>& rings, float max_edge_m) {
   std::vector<Ring> dense = {rings.front()};
   for (size_t i = 1; i < rings.size(); ++i) {
     float longest_m = 0;
@@ -46,7 +46,7 @@ std::vector<Vector> CatmullRom(const std::vector<Vector>& control, int steps) {
   return curve;
 }
 
-// Points around a circle of the radius, a few millimetres apart.
+// Number of points on a circle, a few millimeters apart.
 int PointsAround(float radius_m) { return std::clamp(static_cast<int>(kTwoPi * radius_m / 0.004F), 12, 80); }
 
 // A rectangle with rounded corners at height z, counter-clockwise seen from above.
@@ -62,7 +62,7 @@ Ring RoundedRectangle(const Point& center, float half_x_m, float half_y_m, float
       ring.push_back(center +
                      Point(middle.x() + radius_m * std::cos(angle), middle.y() + radius_m * std::sin(angle), z_m));
     }
-    // The side to the next corner, in as many pieces for every ring of one box.
+    // The side to the next corner; all rings of a box have the same number of pieces.
     const float side_m = 2 * (c % 2 == 0 ? full_half_extents.x() : full_half_extents.y());
     const int pieces = std::max(1, static_cast<int>(std::ceil(side_m / max_edge_m)));
     const Eigen::Vector2f next(corners[(c + 1) % 4].x() * (half_x_m - radius_m),
@@ -81,7 +81,7 @@ Ring RoundedRectangle(const Point& center, float half_x_m, float half_y_m, float
 }  // namespace
 
 Mesh Loft(const std::vector<Ring>& rings, const Point& first_pole, const Point& last_pole, float max_edge_m) {
-  const std::vector<Ring> dense = WithRingsBetween(rings, max_edge_m);
+  const std::vector<Ring> dense = InsertRings(rings, max_edge_m);
   const auto around = static_cast<uint32_t>(dense.front().size());
   Mesh mesh;
   for (const Ring& ring : dense) mesh.vertices.insert(mesh.vertices.end(), ring.begin(), ring.end());
@@ -105,7 +105,7 @@ Mesh Revolve(const Profile& profile) {
   float widest_m = 0;
   for (const Eigen::Vector2f& p : profile) widest_m = std::max(widest_m, p.x());
   const int around = PointsAround(widest_m);
-  // The ends are drawn in to rings of small radius, so that flat bottoms have vertices of their own.
+  // Small rings at the poles give flat ends separate vertices.
   std::vector<Ring> rings;
   const auto add_ring = [&](float radius_m, float z_m) {
     Ring ring(static_cast<size_t>(around));
@@ -137,7 +137,7 @@ Mesh Sweep(const std::vector<Point>& path, std::span<const float> half_width_m, 
   Point height_axis = up;
   for (size_t i = 0; i < path.size(); ++i) {
     const Point tangent = (path[std::min(i + 1, path.size() - 1)] - path[i == 0 ? 0 : i - 1]).normalized();
-    // Carrying the axis along keeps the tube from twisting.
+    // Transporting the axis along the path avoids twist.
     height_axis -= height_axis.dot(tangent) * tangent;
     if (height_axis.norm() < 1e-3F) height_axis = tangent.unitOrthogonal();
     height_axis.normalize();

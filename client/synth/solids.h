@@ -7,13 +7,13 @@
 
 namespace romap::synth {
 
-// A kind of thing that can stand on the table. `make` varies proportions, colours and patterns with the random stream.
+// A kind of object. `make` draws proportions, colors and patterns from the random stream.
 struct SolidKind {
   const char* name;
   Solid (*make)(Random&);
 };
 
-// All kinds, in a fixed order.
+// All kinds, in fixed order.
 std::span<const SolidKind> SolidKinds();
 
 // tableware.cc
@@ -22,7 +22,7 @@ Solid MakeBottle(Random& random);
 Solid MakeBowl(Random& random);
 Solid MakeTeapot(Random& random);
 Solid MakeWineGlass(Random& random);
-// desk_things.cc
+// desk_objects.cc
 Solid MakeBook(Random& random);
 Solid MakeBox(Random& random);
 Solid MakeLaptop(Random& random);

@@ -21,6 +21,7 @@
 #include "client/synth/ground_truth.h"
 #include "client/synth/lighting.h"
 #include "client/synth/scene.h"
+#include "common/file_status.h"
 
 namespace romap::synth {
 namespace {
@@ -28,12 +29,13 @@ namespace {
 constexpr double kDepthUnit_m = 1e-4;
 
 absl::Status MakeFolders(const std::string& dir) {
+  // Not recursive: a missing parent of `dir` is probably a typing error.
   std::error_code error;
   std::filesystem::create_directory(dir, error);
+  if (error) return FileError(dir, "create", error);
   for (const char* name : {"rgb", "mask", "depth", "gt", "gt_mesh"}) {
-    if (!error) std::filesystem::create_directory(dir + "/" + name, error);
+    ROMAP_RETURN_IF_ERROR(files::MakeFolder(dir + "/" + name));
   }
-  if (error) return InvalidArgument("{}: cannot make the folder: {}", dir, error.message());
   return absl::OkStatus();
 }
 
@@ -53,14 +55,14 @@ cv::Mat DepthUnits(const cv::Mat& depth_m) {
   for (int v = 0; v < depth_m.rows; ++v) {
     for (int u = 0; u < depth_m.cols; ++u) {
       const long value = std::lround(depth_m.at<float>(v, u) / kDepthUnit_m);
-      // Too far for 16 bits counts as unknown.
+      // Depths beyond 16 bits are unknown.
       units.at<uint16_t>(v, u) = value > 65535 ? uint16_t{0} : static_cast<uint16_t>(value);
     }
   }
   return units;
 }
 
-// Makes and writes the frames, in any order, on several threads.
+// Renders and writes the frames in parallel.
 class SequenceMaker {
  public:
   SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
@@ -138,42 +140,42 @@ class SequenceMaker {
     if (plan.missing || plan.shown != static_cast<size_t>(i)) return absl::OkStatus();
     const SE3<World, Camera>& T_world_camera = path_[static_cast<size_t>(i)];
     TrueFrame frame = renderer_.Render(T_world_camera);
-    const cv::Vec2d motion_px = SceneMotion(static_cast<size_t>(i), CentreDepth_m(frame.depth_m));
+    const cv::Vec2d motion_px = SceneMotion(static_cast<size_t>(i), CenterDepth_m(frame.depth_m));
     if (plan.black) {
       frame.labels.setTo(0);
       frame.depth_m.setTo(0);
     }
     for (const auto& surface : surfaces_) surface->MarkSeen(frame, camera_, T_world_camera);
 
-    // One stream of random numbers per frame: frames are made in any order.
+    // One random stream per frame, because frames are rendered in any order.
     Random random(options_.seed, 100000U + static_cast<uint64_t>(i));
-    const FaultyMask mask = SpoilMask(frame.labels, static_cast<int>(scene_.objects.size()), options_, random);
-    SpoilImage(frame.color_bgr, motion_px, options_, random, plan);
+    const FaultyMask mask = DegradeMask(frame.labels, static_cast<int>(scene_.objects.size()), options_, random);
+    DegradeImage(frame.color_bgr, motion_px, options_, random, plan);
     detections_[static_cast<size_t>(i)] = mask.detections;
 
     const std::vector<int> fast_png = {cv::IMWRITE_PNG_COMPRESSION, 2};
-    const std::vector<int> fine_jpeg = {cv::IMWRITE_JPEG_QUALITY, 95};
+    const std::vector<int> high_quality_jpeg = {cv::IMWRITE_JPEG_QUALITY, 95};
     ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("rgb", i, ImageExtension()), frame.color_bgr,
-                                     options_.format == ImageFormat::kPng ? fast_png : fine_jpeg));
+                                     options_.format == ImageFormat::kPng ? fast_png : high_quality_jpeg));
     ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("mask", i, ".png"), mask.labels, fast_png));
     return WriteImage(dir_ + "/" + FrameFile("depth", i, ".png"), DepthUnits(frame.depth_m), fast_png);
   }
 
-  // Depth in the middle of the image, metres; 1 where there is nothing.
-  static double CentreDepth_m(const cv::Mat& depth_m) {
-    const float centre_m = depth_m.at<float>(depth_m.rows / 2, depth_m.cols / 2);
-    return centre_m > 0 ? centre_m : 1;
+  // Depth at the image center [m]; 1 for the background.
+  static double CenterDepth_m(const cv::Mat& depth_m) {
+    const float center_m = depth_m.at<float>(depth_m.rows / 2, depth_m.cols / 2);
+    return center_m > 0 ? center_m : 1;
   }
 
-  // How what lies straight ahead moves through the image around frame i, pixels per frame.
+  // Motion of the image content near the image center at frame i [px/frame].
   cv::Vec2d SceneMotion(size_t i, double depth_m) const {
     if (path_.size() < 2) return {0, 0};
     const size_t from = i + 1 < path_.size() ? i : i - 1;
-    const Eigen::Vector3d middle_world = path_[from] * Eigen::Vector3d(0, 0, depth_m);
-    const Eigen::Vector2d before = camera_.Project(path_[from].Inverse() * middle_world);
-    const Eigen::Vector2d after = camera_.Project(path_[from + 1].Inverse() * middle_world);
-    // An orbit keeps the middle in place and turns the table under it: what is near the camera moves most.
-    const Eigen::Vector3d near_world = middle_world + 0.3 * (path_[from].translation() - middle_world);
+    const Eigen::Vector3d center_world = path_[from] * Eigen::Vector3d(0, 0, depth_m);
+    const Eigen::Vector2d before = camera_.Project(path_[from].Inverse() * center_world);
+    const Eigen::Vector2d after = camera_.Project(path_[from + 1].Inverse() * center_world);
+    // On an orbit the center is stationary and closer points move, so average the motion at both depths.
+    const Eigen::Vector3d near_world = center_world + 0.3 * (path_[from].translation() - center_world);
     const Eigen::Vector2d near_before = camera_.Project(path_[from].Inverse() * near_world);
     const Eigen::Vector2d near_after = camera_.Project(path_[from + 1].Inverse() * near_world);
     const Eigen::Vector2d motion = 0.5 * (after - before + near_after - near_before);

@@ -10,7 +10,7 @@ namespace {
 
 float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
 
-// The side of a hollow vessel: the outside profile up to the rim, then back down inside at the wall's thickness to
+// The profile of a hollow vessel: the outside up to the rim, then the inside, offset by the wall thickness, down to
 // `floor_m` above the table.
 Profile Hollow(const Profile& outside, float wall_m, float floor_m) {
   Profile profile = outside;
@@ -25,7 +25,7 @@ Profile Hollow(const Profile& outside, float wall_m, float floor_m) {
   return profile;
 }
 
-// A handle in the x-z plane: leaves the wall at `top`, bulges out by `reach_m`, comes back at `bottom`.
+// A handle in the x-z plane from `top` to `bottom`, extending outward by `reach_m`.
 Mesh Handle(const Point& top, const Point& bottom, float reach_m, float thickness_m) {
   const float height_m = top.z() - bottom.z();
   const std::vector<Point> path = Smooth(std::vector<Point>{
@@ -140,7 +140,7 @@ Solid MakeTeapot(Random& random) {
 Solid MakeWineGlass(Random& random) {
   const float radius_m = In(random, 0.033, 0.042);
   const float height_m = In(random, 0.15, 0.19);
-  const float bowl_m = 0.52F * height_m;  // where the stem meets the bowl
+  const float bowl_m = 0.52F * height_m;  // height at which the stem meets the bowl
   Profile outside = {{0.95F * radius_m, 0}, {0.95F * radius_m, 0.002F}, {0.5F * radius_m, 0.005F}};
   const Profile stem_and_bowl = Smooth(Profile{{0.0052F, 0.014F},
                                                {0.0038F, 0.25F * height_m},

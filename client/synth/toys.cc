@@ -1,4 +1,4 @@
-// Chair, bear, duck, car: small enough to stand on a table.
+// Chair, bear, duck and car, in the size of toys.
 
 #include <array>
 #include <cmath>
@@ -107,9 +107,9 @@ Solid MakeCar(Random& random) {
   Material paint = RandomMaterial(random.Chance(0.5) ? Pattern::kPlain : Pattern::kStripes, 0.02F, random);
   paint.grain = 0.05F;
   Material glass = RandomMaterial(Pattern::kPrint, 0.02F, random);
-  Material tyre;
-  tyre.colors[0] = Rgb::Constant(0.03F);
-  tyre.grain = 0.4F;
+  Material tire;
+  tire.colors[0] = Rgb::Constant(0.03F);
+  tire.grain = 0.4F;
   const Material hub = RandomMaterial(Pattern::kDots, 0.006F, random);
   const float floor_m = 0.7F * wheel_m;
   Solid solid{"car", {}};
@@ -125,7 +125,7 @@ Solid MakeCar(Random& random) {
     const int around = 48;
     for (int j = 0; j < around; ++j) {
       const float angle = 2 * kPi * static_cast<float>(j) / around;
-      // A superellipse: a rectangle with soft corners.
+      // A superellipse: a rectangle with rounded corners.
       const float c = std::cos(angle), s = std::sin(angle);
       const float x = std::copysign(std::sqrt(std::abs(c)), c), y = std::copysign(std::sqrt(std::abs(s)), s);
       const float middle = 0.5F * (front + back), half = 0.5F * (front - back);
@@ -143,7 +143,7 @@ Solid MakeCar(Random& random) {
   for (const float x : {-0.6F, 0.58F}) {
     for (const float side : {-1.0F, 1.0F}) {
       const Point center(x * half_x, side * (half_y - 0.05F * wheel_m), wheel_m);
-      solid.parts.push_back({Moved(Revolve(wheel), Turn(0.5F * kPi, Point::UnitX()), center), tyre});
+      solid.parts.push_back({Moved(Revolve(wheel), Turn(0.5F * kPi, Point::UnitX()), center), tire});
       solid.parts.push_back({Moved(Revolve(cap), Turn(0.5F * kPi, Point::UnitX()), center), hub});
     }
   }

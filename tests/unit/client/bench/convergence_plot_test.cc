@@ -7,8 +7,8 @@
 namespace romap::bench {
 namespace {
 
-// Mean place of the pixels that have the colour of a line, in the left (accuracy) or the right (completion) panel; the
-// legend below is left out.
+// Mean position of the pixels with the color of a line, in the left (accuracy) or right (completion) panel, without the
+// legend.
 cv::Point2d PlaceOf(const cv::Mat& picture, const cv::Scalar& color, bool right) {
   const int half = picture.cols / 2;
   const cv::Mat panel = picture(cv::Rect(right ? half : 0, 0, half, 500));
@@ -24,7 +24,7 @@ cv::Point2d PlaceOf(const cv::Mat& picture, const cv::Scalar& color, bool right)
 
 const cv::Scalar kFirst(178, 114, 0), kSecond(0, 94, 213);
 
-TEST(ConvergencePlotTest, BetterIsLowerAndLaterIsFurtherRight) {
+TEST(ConvergencePlotTest, BetterIsLowerAndLaterIsRight) {
   PaperResults results;
   results.curves = {{"good", 0.1, 0.3, 0.5}, {"good", 0.2, 0.2, 0.4}, {"late", 2, 0.9, 0.1}, {"late", 8, 0.8, 0.05}};
   const cv::Mat picture = DrawConvergence(results);
@@ -44,7 +44,7 @@ TEST(ConvergencePlotTest, AxesAreLogarithmic) {
   EXPECT_NEAR(x_of(1) - x_of(0.1), x_of(10) - x_of(1), 2);
 }
 
-TEST(ConvergencePlotTest, ZeroTimesAndNoCurvesAreNoReasonToFail) {
+TEST(ConvergencePlotTest, AcceptsZeroTimesAndNoCurves) {
   EXPECT_FALSE(DrawConvergence(PaperResults()).empty());
   PaperResults results;
   results.curves = {{"fast", 0, 0, 0}};

@@ -47,7 +47,7 @@ TEST_F(HullFieldTest, IsFullInsideAndEmptyOutside) {
   }
 }
 
-TEST_F(HullFieldTest, ValuesRunEvenlyBetweenCells) {
+TEST_F(HullFieldTest, ValuesAreContinuousBetweenCells) {
   const float cell = 2 * snapshot.box_half_extents.x() / 64 / radius;
   const Eigen::Vector3f outwards = Eigen::Vector3f::Ones();
   float before = RawAt({0, 0, 0});
@@ -61,8 +61,8 @@ TEST_F(HullFieldTest, ValuesRunEvenlyBetweenCells) {
   EXPECT_GE(between, 5);
 }
 
-// Cells count as empty where a cell's centre is seen as background, so the hull is the ball give or take a pixel.
-TEST_F(HullFieldTest, ItsSurfaceHugsTheBall) {
+// Cells are empty if some view sees their center as background, so the hull is the ball within about a pixel.
+TEST_F(HullFieldTest, SurfaceIsCloseToTheBall) {
   const absl::StatusOr<Mesh> mesh = mesh::ExtractMesh(snapshot, mesh::MeshConfig());
   ASSERT_TRUE(mesh.ok()) << Message(mesh.status());
   ASSERT_GT(mesh->vertices.size(), 500u);

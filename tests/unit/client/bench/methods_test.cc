@@ -39,15 +39,15 @@ std::string Dump(EngineConfig config) {
   return fields.DumpYaml();
 }
 
-TEST(MethodsTest, EveryMethodFitsThisBuild) {
+TEST(MethodsTest, EveryMethodHasValidSettings) {
   std::set<std::string> ids;
   for (const BenchMethod& method : AllMethods()) {
-    EXPECT_TRUE(ids.insert(method.id).second) << method.id << " is there twice";
+    EXPECT_TRUE(ids.insert(method.id).second) << method.id << " exists twice";
     EXPECT_TRUE(Configure(method, {}).ok()) << method.id << ": " << Message(Configure(method, {}).status());
   }
 }
 
-// An ablation whose setting changes nothing measures nothing.
+// An ablation must differ from the default.
 TEST(MethodsTest, EveryAblationChangesSomething) {
   const std::string defaults = Dump(EngineConfig());
   for (const BenchMethod& method : AblationMethods()) {
@@ -56,8 +56,8 @@ TEST(MethodsTest, EveryAblationChangesSomething) {
   }
 }
 
-// [33] as the paper re-implements it: the same model without the paper's density loss.
-TEST(MethodsTest, TheOfflineMethodLacksTheDensityLossOnly) {
+// [33] as reimplemented in the paper: the same model without the density loss.
+TEST(MethodsTest, OfflineMethodOnlyLacksTheDensityLoss) {
   EngineConfig offline = ConfigOf("offline");
   EXPECT_EQ(offline.nerf.density_weight, 0);
   EXPECT_TRUE(offline.nerf.random_background);
@@ -66,7 +66,7 @@ TEST(MethodsTest, TheOfflineMethodLacksTheDensityLossOnly) {
   EXPECT_EQ(Dump(ConfigOf("offline-depth")), Dump(ConfigOf("offline")));
 }
 
-TEST(MethodsTest, DepthIsUsedByWhomItSays) {
+TEST(MethodsTest, DepthIsUsedByTheNamedMethods) {
   std::vector<std::string> with_depth, untrained;
   for (const BenchMethod& method : Table1Methods()) {
     if (method.with_depth) with_depth.push_back(method.id);
@@ -87,7 +87,7 @@ TEST(MethodsTest, PlainMlpsHaveTheirPublishedSizes) {
   }
 }
 
-TEST(MethodsTest, ModelSizesAreThoseOfThePapersTable) {
+TEST(MethodsTest, ModelSizesMatchTheTableOfThePaper) {
   const std::vector<BenchMethod> methods = ModelSizeMethods();
   ASSERT_EQ(methods.size(), std::size(kPublishedTable4));
   for (size_t i = 0; i < methods.size(); ++i) {
@@ -97,14 +97,14 @@ TEST(MethodsTest, ModelSizesAreThoseOfThePapersTable) {
   }
 }
 
-TEST(MethodsTest, OwnSettingsGoBeforeThoseForAll) {
+TEST(MethodsTest, MethodSettingsOverrideCommonSettings) {
   EXPECT_EQ(ConfigOf("fast", {"nerf.hidden_width=48"}).nerf.hidden_width, 48);
   EXPECT_EQ(ConfigOf("vmap", {"nerf.hidden_width=48"}).nerf.hidden_width, 32);
   EXPECT_EQ(ConfigOf("fast", {"mesh.resolution=40"}).mesh.resolution, 40);
   EXPECT_THAT(Message(Configure(BenchMethod(), {"nerf.hiden_width=48"}).status()), HasSubstr("nerf.hidden_width"));
 }
 
-TEST(MethodsTest, RowsAreReadFromText) {
+TEST(MethodsTest, ParsesRows) {
   const absl::StatusOr<BenchMethod> row = ParseMethod("big-one: nerf.levels=12  nerf.hidden_width=64");
   ASSERT_TRUE(row.ok());
   EXPECT_EQ(row->id, "big-one");

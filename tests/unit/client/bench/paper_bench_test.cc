@@ -38,7 +38,7 @@ absl::StatusOr<PaperResults> RunBench(const PaperBenchOptions& options) {
 
 nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
 
-TEST(PaperBenchTest, WritesReportPictureAndMeshes) {
+TEST(PaperBenchTest, WritesReportPlotAndMeshes) {
   const testing::TinySequence data;
   const PaperBenchOptions options = TinyBench(data);
   const absl::StatusOr<PaperResults> results = RunBench(options);
@@ -61,18 +61,18 @@ TEST(PaperBenchTest, WritesReportPictureAndMeshes) {
   EXPECT_EQ(ReadJson(options.out_dir + "/paper.json")["runs"]["done"], 1);
   EXPECT_GT(fs::file_size(options.out_dir + "/convergence.png"), 1000u);
   EXPECT_FALSE(fs::exists(options.out_dir + "/scratch"));
-  // A curve ends where its method ended.
+  // A curve ends with the training of its method.
   ASSERT_FALSE(results->curves.empty());
   EXPECT_EQ(results->curves.back().accuracy_cm, MeanOf(*results, "fast", kToTheEnd_s)->quality.accuracy_cm);
 }
 
-TEST(PaperBenchTest, EverySeedOnEverySubset) {
+TEST(PaperBenchTest, RunsEverySeedOnEverySubset) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.seeds = 2;
   options.subsets = 2;
   options.every = 6;
-  options.times_s = {100};  // beyond the cap: the end says as much
+  options.times_s = {100};  // beyond the cap, so only the end is measured
   const absl::StatusOr<PaperResults> results = RunBench(options);
   ASSERT_TRUE(results.ok()) << Message(results.status());
   EXPECT_EQ(results->frames_per_subset, 4);
@@ -85,11 +85,11 @@ TEST(PaperBenchTest, EverySeedOnEverySubset) {
     accuracies.insert(e.quality->accuracy_cm);
   }
   EXPECT_EQ(runs.size(), 4u);
-  EXPECT_EQ(accuracies.size(), 4u) << "seeds and subsets make a difference";
-  EXPECT_EQ(MeanOf(*results, "hull", kToTheEnd_s)->evaluations, 2) << "no seed in a hull";
+  EXPECT_EQ(accuracies.size(), 4u) << "seeds and subsets differ";
+  EXPECT_EQ(MeanOf(*results, "hull", kToTheEnd_s)->evaluations, 2) << "the hull does not depend on the seed";
 }
 
-TEST(PaperBenchTest, TheSameMethodUnderTwoNamesRunsOnce) {
+TEST(PaperBenchTest, EqualMethodsRunOnce) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.tables = {"1", "ablation"};
@@ -105,7 +105,7 @@ TEST(PaperBenchTest, TheSameMethodUnderTwoNamesRunsOnce) {
             MeanOf(*results, "fast", kToTheEnd_s)->quality.accuracy_cm);
 }
 
-TEST(PaperBenchTest, StoppedItKeepsWhatThereIs) {
+TEST(PaperBenchTest, InterruptKeepsPartialResults) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.seeds = 3;
@@ -118,11 +118,11 @@ TEST(PaperBenchTest, StoppedItKeepsWhatThereIs) {
   const nlohmann::json json = ReadJson(options.out_dir + "/paper.json");
   EXPECT_EQ(json["runs"]["done"], 1);
   EXPECT_EQ(json["runs"]["planned"], 3);
-  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("Stopped before the end"));
+  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("Interrupted: some rows lack runs"));
   EXPECT_FALSE(fs::exists(options.out_dir + "/scratch"));
 }
 
-TEST(PaperBenchTest, SignedDistancesStandBesideDensity) {
+TEST(PaperBenchTest, RunsSignedDistanceFields) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.methods = {"fast", "sdf"};
@@ -133,7 +133,7 @@ TEST(PaperBenchTest, SignedDistancesStandBesideDensity) {
   EXPECT_NE(fast->quality.accuracy_cm, sdf->quality.accuracy_cm);
 }
 
-TEST(PaperBenchTest, OnesOwnRowsAreRunAndMustBeRight) {
+TEST(PaperBenchTest, RunsAdditionalRowsAndRejectsInvalidOnes) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.more_methods = {{.id = "mine", .title = "mine", .settings = {"nerf.full_budget_steps=7"}}};
@@ -144,29 +144,30 @@ TEST(PaperBenchTest, OnesOwnRowsAreRunAndMustBeRight) {
   options.more_methods[0].settings = {"nerf.no_such_field=1"};
   EXPECT_THAT(Message(RunBench(options).status()), HasSubstr("nerf.no_such_field"));
   options.more_methods[0] = {.id = "fast", .title = "mine"};
-  EXPECT_THAT(Message(RunBench(options).status()), HasSubstr("'fast' is there already"));
+  EXPECT_THAT(Message(RunBench(options).status()), HasSubstr("'fast' already exists"));
 }
 
-TEST(PaperBenchTest, BadInputIsNamed) {
+TEST(PaperBenchTest, NamesInvalidInput) {
   const testing::TinySequence data;
   const auto fault = [&](const std::function<void(PaperBenchOptions&)>& spoil) {
     PaperBenchOptions options = TinyBench(data);
     spoil(options);
     return Message(RunBench(options).status());
   };
-  EXPECT_THAT(fault([](auto& o) { o.methods = {"fats"}; }), HasSubstr("method 'fats' is not one of all-parts, "));
-  EXPECT_THAT(fault([](auto& o) { o.subsets = 5; }), HasSubstr("5 subsets of every 4. frame"));
-  EXPECT_THAT(fault([](auto& o) { o.seeds = 0; }), HasSubstr("0 seeds"));
-  EXPECT_THAT(fault([](auto& o) { o.times_s = {5, 1}; }), HasSubstr("time 1 s"));
-  EXPECT_THAT(fault([](auto& o) { o.cap_s = 0; }), HasSubstr("cap 0 s"));
+  EXPECT_THAT(fault([](auto& o) { o.methods = {"fats"}; }),
+              HasSubstr("unknown method 'fats'; expected one of all-parts, "));
+  EXPECT_THAT(fault([](auto& o) { o.subsets = 5; }), HasSubstr("subsets is 5; expected 1 to 4"));
+  EXPECT_THAT(fault([](auto& o) { o.seeds = 0; }), HasSubstr("seeds is 0"));
+  EXPECT_THAT(fault([](auto& o) { o.times_s = {5, 1}; }), HasSubstr("times contain 1 s"));
+  EXPECT_THAT(fault([](auto& o) { o.cap_s = 0; }), HasSubstr("cap is 0 s"));
   EXPECT_THAT(fault([](auto& o) { o.settings = {"nerf.levles=3"}; }), HasSubstr("nerf.levels"));
-  EXPECT_THAT(fault([](auto& o) { o.methods = {"size-14-1"}; }), HasSubstr("no method is left")) << "of Table 1";
+  EXPECT_THAT(fault([](auto& o) { o.methods = {"size-14-1"}; }), HasSubstr("no method selected")) << "of Table 1";
   EXPECT_THAT(fault([](auto& o) { o.sequence_dir += "/nowhere"; }), HasSubstr("nowhere"));
   fs::remove_all(data.dir() + "/gt");
   EXPECT_THAT(fault([](auto&) {}), HasSubstr("gt"));
 }
 
-TEST(PaperBenchTest, QuickIsASmallRun) {
+TEST(PaperBenchTest, QuickReducesTheRun) {
   PaperBenchOptions options;
   options.more_methods = {{.id = "mine", .title = "mine"}};
   const PaperBenchOptions quick = Quick(options);

@@ -57,7 +57,7 @@ PaperResults TwoSeeds() {
   return r;
 }
 
-TEST(PaperResultsTest, MeansAreOverTheEvaluationsOfOneMethodAndLimit) {
+TEST(PaperResultsTest, MeansAreOverOneMethodAndLimit) {
   const auto mean = MeanOf(TwoSeeds(), "fast", 1);
   ASSERT_TRUE(mean.has_value());
   EXPECT_EQ(mean->evaluations, 2);
@@ -79,32 +79,32 @@ TEST(PaperResultsTest, CostsArePerObjectAndPerStep) {
   EXPECT_DOUBLE_EQ(mean.setup_s, 0.5);
   EXPECT_DOUBLE_EQ(mean.mesh_ms, 20);
   EXPECT_DOUBLE_EQ(mean.iteration_ms, 1);
-  EXPECT_DOUBLE_EQ(mean.sampling_ms, 0.1);  // of two threads: half their CPU time
+  EXPECT_DOUBLE_EQ(mean.sampling_ms, 0.1);  // CPU time of two threads / 2
   EXPECT_DOUBLE_EQ(mean.forward_ms, 0.3);
   EXPECT_DOUBLE_EQ(mean.backward_ms, 0.6);
   EXPECT_NEAR(mean.samples_per_s, 1e6, 1e-3);
   EXPECT_FALSE(mean.limited);
 }
 
-TEST(PaperResultsTest, LostObjectsAndCutPlansShow) {
+TEST(PaperResultsTest, ShowsMissingObjectsAndShortenedPlans) {
   PaperResults r = TwoSeeds();
   r.evaluations[0].matched = 1;
   r.evaluations[2].objects[1].limited = true;
   EXPECT_DOUBLE_EQ(MeanOf(r, "fast", 1)->found_share, 0.75);
   EXPECT_TRUE(MeanOf(r, "fast", 1)->limited);
-  r.evaluations[0].quality.reset();  // nothing could be measured: no figures, and all objects lost
+  r.evaluations[0].quality.reset();  // no figures: all objects are missing
   r.evaluations[0].matched = 0;
   EXPECT_DOUBLE_EQ(MeanOf(r, "fast", 1)->quality.accuracy_cm, 0.6);
   EXPECT_DOUBLE_EQ(MeanOf(r, "fast", 1)->found_share, 0.5);
-  EXPECT_THAT(ToMarkdown(r), AllOf(HasSubstr("| 50 % |"), HasSubstr("200 (cut)")));
+  EXPECT_THAT(ToMarkdown(r), AllOf(HasSubstr("| 50 % |"), HasSubstr("200 (shortened)")));
 }
 
-TEST(PaperResultsTest, ThePeakIsTheMedian) {
+TEST(PaperResultsTest, FmaPeakIsTheMedian) {
   EXPECT_EQ(FmaPeak(TwoSeeds()), 200);
   EXPECT_EQ(FmaPeak(PaperResults()), 0);
 }
 
-TEST(PaperResultsTest, MarkdownHasOursBesideThePapers) {
+TEST(PaperResultsTest, MarkdownComparesWithThePaper) {
   const std::string text = ToMarkdown(TwoSeeds());
   EXPECT_THAT(text, HasSubstr("means over 2 of 4 runs"));
   EXPECT_THAT(text, HasSubstr("### After at most 1 s of training per object"));
@@ -115,12 +115,12 @@ TEST(PaperResultsTest, MarkdownHasOursBesideThePapers) {
   EXPECT_THAT(text, HasSubstr("| ours, fast | 0.300 ± 0.000 | 0.150 ± 0.071 | 91.00 | 99.50 |"));
   EXPECT_THAT(text, HasSubstr("| COLMAP | - |"));
   EXPECT_THAT(text, HasSubstr("0.612 / 0.656 / 57.72 / 81.17"));
-  EXPECT_THAT(text, HasSubstr("| backward and optimisation | 0.600 | 0.600 | 0.455 |"));
+  EXPECT_THAT(text, HasSubstr("| backward and optimization | 0.600 | 0.600 | 0.455 |"));
   EXPECT_THAT(text, HasSubstr("| surface (in the paper 64^3 nodes) | 20.000 | 20.000 | 2.84 |"));
   EXPECT_THAT(text, HasSubstr("| 2^16 entries, 2 hidden layers | 0.700 ± 0.000 | 0.500 ± 0.000 | 1.000 | 200 | 0.409 / "
                               "0.241 / 0.862 |"));
   EXPECT_THAT(text, HasSubstr("| fast | 0.2 | 0.400 | 0.250 |"));
-  EXPECT_THAT(text, Not(HasSubstr("What each part is worth")));
+  EXPECT_THAT(text, Not(HasSubstr("## Ablation")));
 }
 
 TEST(PaperResultsTest, JsonHasTheSameFigures) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kForever_s = 1e6;
 
-// One object's views and a small field to learn them.
+// The views of one object and a small field.
 struct TimedTrainingTest : public ::testing::Test {
   TimedTrainingTest() {
     const files::Sequence sequence = data.Open();
@@ -46,7 +46,7 @@ struct TimedTrainingTest : public ::testing::Test {
   double seconds_per_step = 0;
 };
 
-TEST_F(TimedTrainingTest, TrainsToTheEndOfThePlanAsTheEngineDoes) {
+TEST_F(TimedTrainingTest, TrainsTheWholePlanLikeTheEngine) {
   const absl::StatusOr<TimedTraining> training = TrainWithin(request, seconds_per_step);
   ASSERT_TRUE(training.ok()) << Message(training.status());
   EXPECT_EQ(training->stats.steps, 30);
@@ -63,9 +63,9 @@ TEST_F(TimedTrainingTest, TrainsToTheEndOfThePlanAsTheEngineDoes) {
   EXPECT_EQ(RawOf(training->snapshot), RawOf(field.Snapshot()));
 }
 
-// What fits is planned from the start, so that the learning rate gets to its end.
-TEST_F(TimedTrainingTest, APlanThatDoesNotFitIsShortenedBeforeItBegins) {
-  seconds_per_step = 1;  // as if measured before
+// A shortened plan lets the learning rate schedule complete.
+TEST_F(TimedTrainingTest, ShortensAPlanThatDoesNotFit) {
+  seconds_per_step = 1;  // as if measured earlier
   request.limit_s = 12.5;
   const absl::StatusOr<TimedTraining> cut = TrainWithin(request, seconds_per_step);
   ASSERT_TRUE(cut.ok());
@@ -78,7 +78,7 @@ TEST_F(TimedTrainingTest, APlanThatDoesNotFitIsShortenedBeforeItBegins) {
   EXPECT_EQ(RawOf(cut->snapshot), RawOf(planned->snapshot));
 }
 
-TEST_F(TimedTrainingTest, TheLimitHoldsWhereStepsTakeLongerThanExpected) {
+TEST_F(TimedTrainingTest, RespectsTheLimitIfStepsAreSlowerThanExpected) {
   seconds_per_step = 1e-9;
   request.limit_s = 1e-7;
   const absl::StatusOr<TimedTraining> training = TrainWithin(request, seconds_per_step);
@@ -87,7 +87,7 @@ TEST_F(TimedTrainingTest, TheLimitHoldsWhereStepsTakeLongerThanExpected) {
   EXPECT_LT(training->stats.steps, 30);
 }
 
-TEST_F(TimedTrainingTest, SnapshotsAreTakenAtTheMarksThatAreReached) {
+TEST_F(TimedTrainingTest, TakesSnapshotsAtTheMarks) {
   request.marks_s = {1e-9, 1e-8, kForever_s};
   const absl::StatusOr<TimedTraining> training = TrainWithin(request, seconds_per_step);
   ASSERT_TRUE(training.ok());
@@ -96,7 +96,7 @@ TEST_F(TimedTrainingTest, SnapshotsAreTakenAtTheMarksThatAreReached) {
   EXPECT_NE(RawOf(training->at_marks[0]), RawOf(training->snapshot));
 }
 
-TEST_F(TimedTrainingTest, StopsWhenAsked) {
+TEST_F(TimedTrainingTest, StopsOnRequest) {
   int asked = 0;
   request.stop = [&] { return ++asked > 1; };
   seconds_per_step = 0.1;
@@ -104,7 +104,7 @@ TEST_F(TimedTrainingTest, StopsWhenAsked) {
   EXPECT_EQ(asked, 2);
 }
 
-TEST_F(TimedTrainingTest, WithoutViewsThereIsNothingToTrain) {
+TEST_F(TimedTrainingTest, RejectsAnObjectWithoutViews) {
   views.clear();
   EXPECT_EQ(TrainWithin(request, seconds_per_step).status().code(), absl::StatusCode::kFailedPrecondition);
 }

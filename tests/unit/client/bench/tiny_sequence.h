@@ -15,7 +15,7 @@ struct TinyBall {
   double radius_m;
 };
 
-// Two striped balls seen from all around in small frames, with all truth, drawn exactly and written anew by every test.
+// A sequence of small frames around two striped balls, with exact ground truth. Each test writes a new one.
 class TinySequence {
  public:
   static constexpr int kFrames = 24;

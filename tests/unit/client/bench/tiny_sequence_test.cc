@@ -92,7 +92,7 @@ void WriteFrames(const std::string& dir) {
   EXPECT_TRUE(files::WriteTum(dir + "/groundtruth.txt", poses).ok());
 }
 
-TEST(TinySequenceTest, ShowsSomethingOfBothBallsInEveryFrame) {
+TEST(TinySequenceTest, BothBallsAreVisibleInEveryFrame) {
   const TinySequence data;
   const files::Sequence sequence = data.Open();
   ASSERT_EQ(sequence.size(), static_cast<size_t>(TinySequence::kFrames));
@@ -101,7 +101,7 @@ TEST(TinySequenceTest, ShowsSomethingOfBothBallsInEveryFrame) {
     const cv::Mat labels = cv::imread(fmt::format("{}/mask/{}.png", data.dir(), i), cv::IMREAD_UNCHANGED);
     for (const TinyBall& ball : TinySequence::Balls()) {
       EXPECT_GT(cv::countNonZero(labels == static_cast<int>(ball.id)), 40)
-          << "frame " << i << "; one hides a part of the other";
+          << "frame " << i << "; one occludes a part of the other";
     }
   }
 }

@@ -20,15 +20,15 @@ std::vector<uint64_t> Ids(const TrueFrames& frames) {
   return ids;
 }
 
-TEST(TrueViewsTest, SubsetsShareNoFrame) {
+TEST(TrueViewsTest, SubsetsAreDisjoint) {
   const testing::TinySequence data;
   const files::Sequence sequence = data.Open();
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 0)), ElementsAre(1, 9, 17));
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 3)), ElementsAre(4, 12, 20));
-  EXPECT_EQ(LoadTrueFrames(sequence, 8, 24).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(LoadTrueFrames(sequence, 8, 24).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST(TrueViewsTest, AViewShowsItsObjectAndWhatIsAroundIt) {
+TEST(TrueViewsTest, ViewContainsTheObjectAndItsSurroundings) {
   const testing::TinySequence data;
   const files::Sequence sequence = data.Open();
   const TrueFrames frames = *LoadTrueFrames(sequence, 6, 0);
@@ -47,7 +47,7 @@ TEST(TrueViewsTest, AViewShowsItsObjectAndWhatIsAroundIt) {
       EXPECT_EQ(cv::norm(view.color_bgr, frame.image_bgr(view.roi_px), cv::NORM_INF), 0);
       EXPECT_EQ(cv::norm(view.depth_mu, frame.depth_mu(view.roi_px), cv::NORM_INF), 0);
       EXPECT_EQ(view.T_world_camera.translation(), frame.T_world_camera->translation());
-      // The cuboid's centre projects into the crop, with room around the mask.
+      // The center of the cuboid projects into the crop, which has a margin around the mask.
       const Eigen::Vector2d center =
           view.camera.Project(view.T_world_camera.Inverse() * object.T_world_object.translation());
       EXPECT_TRUE(view.roi_px.contains(cv::Point(cvRound(center.x()), cvRound(center.y()))));
@@ -57,7 +57,7 @@ TEST(TrueViewsTest, AViewShowsItsObjectAndWhatIsAroundIt) {
   }
 }
 
-TEST(TrueViewsTest, AnObjectThatIsHardlySeenGivesNoView) {
+TEST(TrueViewsTest, NoViewOfAnObjectWithFewPixels) {
   const testing::TinySequence data;
   const files::Sequence sequence = data.Open();
   Frame frame = *LoadTrueFrames(sequence, 24, 0)->front();
@@ -67,13 +67,13 @@ TEST(TrueViewsTest, AnObjectThatIsHardlySeenGivesNoView) {
   EXPECT_FALSE(MakeTrueView(frame, object, false).has_value());
 }
 
-TEST(TrueViewsTest, RenamedLabelsAreRefused) {
+TEST(TrueViewsTest, RejectsLabelsThatAreNotObjectIds) {
   const testing::TinySequence data;
-  std::ofstream(data.dir() + "/detections.csv") << "# timestamp,label,class,score\n0.0,1,nothing,1\n";
-  EXPECT_THAT(Message(LoadTrueFrames(data.Open(), 8, 0).status()), HasSubstr("label 1 of frame 1 is a nothing"));
+  std::ofstream(data.dir() + "/detections.csv") << "# timestamp,label,class,score\n0.0,1,bottle,1\n";
+  EXPECT_THAT(Message(LoadTrueFrames(data.Open(), 8, 0).status()), HasSubstr("label 1 of frame 1 has class bottle"));
 }
 
-TEST(TrueViewsTest, CuboidsMustBeThere) {
+TEST(TrueViewsTest, RequiresCuboids) {
   const testing::TinySequence data;
   std::filesystem::remove(data.dir() + "/objects.yaml");
   EXPECT_THAT(Message(LoadTrueFrames(data.Open(), 8, 0).status()), HasSubstr("objects.yaml"));

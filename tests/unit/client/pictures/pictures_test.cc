@@ -49,7 +49,7 @@ Mesh Cube(const Eigen::Vector3f& center, float half, const Rgb8& color) {
   return mesh;
 }
 
-TEST(DrawCuboids, PaintsItsEdgesWhereTheyProject) {
+TEST(DrawCuboidsTest, DrawsProjectedEdges) {
   cv::Mat image = Black();
   const std::array objects = {ObjectAt(3, {0, 0, 4}, {0.5, 0.4, 1})};
   DrawCuboids(image, SmallCamera(), {}, objects);
@@ -62,15 +62,15 @@ TEST(DrawCuboids, PaintsItsEdgesWhereTheyProject) {
   EXPECT_TRUE(HasColor(image, ObjectColorBgr(ObjectId{3})));
 }
 
-TEST(DrawCuboids, DrawsNothingBehindTheCamera) {
+TEST(DrawCuboidsTest, DrawsNothingBehindTheCamera) {
   cv::Mat image = Black();
   const std::array objects = {ObjectAt(1, {0, 0, -4}, {0.5, 0.4, 1})};
   DrawCuboids(image, SmallCamera(), {}, objects);
   EXPECT_EQ(cv::norm(image), 0);
 }
 
-TEST(DrawCuboids, ClipsWhatReachesBehindTheCamera) {
-  // The camera stands inside: only the far end shows, and edges run out of the picture, not through its middle.
+TEST(DrawCuboidsTest, ClipsEdgesThatExtendBehindTheCamera) {
+  // The camera is inside: only the far face is visible, and edges leave the image without crossing its center.
   cv::Mat image = Black();
   const std::array objects = {ObjectAt(1, {0, 0, 0}, {1, 0.8, 4})};
   DrawCuboids(image, SmallCamera(), {}, objects);
@@ -79,7 +79,7 @@ TEST(DrawCuboids, ClipsWhatReachesBehindTheCamera) {
   EXPECT_FALSE(Painted(image, 160, 120));
 }
 
-TEST(DrawCuboids, LeavesOutLostObjects) {
+TEST(DrawCuboidsTest, SkipsLostObjects) {
   cv::Mat image = Black();
   std::array objects = {ObjectAt(1, {0, 0, 4}, {0.5, 0.4, 1})};
   objects[0].state = ObjectState::kLost;
@@ -87,18 +87,18 @@ TEST(DrawCuboids, LeavesOutLostObjects) {
   EXPECT_EQ(cv::norm(image), 0);
 }
 
-TEST(DrawCuboids, KeepsLabelsInsideTheImage) {
+TEST(DrawCuboidsTest, KeepsLabelsInsideTheImage) {
   cv::Mat image = Black();
-  // The top of this one is far above the image.
+  // The top of this cuboid is far above the image.
   const std::array objects = {ObjectAt(2, {0, 0, 4}, {0.2, 5, 0.5})};
   DrawCuboids(image, SmallCamera(), {}, objects);
-  // A filled plate: a row of several pixels of the colour at the top.
+  // The filled label is at the top of the image.
   cv::Mat match;
   cv::inRange(image.rowRange(0, 16), ObjectColorBgr(ObjectId{2}), ObjectColorBgr(ObjectId{2}), match);
   EXPECT_GT(cv::countNonZero(match), 100);
 }
 
-TEST(ObjectColorBgr, DiffersBetweenNeighbours) {
+TEST(ObjectColorBgrTest, DiffersBetweenConsecutiveIds) {
   for (uint64_t a = 1; a <= 8; ++a) {
     for (uint64_t b = a + 1; b <= 8; ++b) {
       const cv::Scalar difference = ObjectColorBgr(ObjectId{a}) - ObjectColorBgr(ObjectId{b});
@@ -107,9 +107,9 @@ TEST(ObjectColorBgr, DiffersBetweenNeighbours) {
   }
 }
 
-TEST(DrawMeshBesideView, ShowsTheSameSquareThreeTimes) {
+TEST(DrawMeshBesideViewTest, ShowsTheSameSquareInThreePanels) {
   const Mesh mesh = Cube({0.4F, -0.2F, 4}, 0.3F, Rgb8{10, 20, 230});
-  // A photograph that is green where the cube projects (front face at z = 3.7) and black elsewhere.
+  // An image that is green at the projection of the cube (front face at z = 3.7) and black elsewhere.
   cv::Mat view = Black();
   const CameraModel camera = SmallCamera();
   const Eigen::Vector2d low = camera.Project({0.1, -0.5, 3.7});
@@ -123,7 +123,7 @@ TEST(DrawMeshBesideView, ShowsTheSameSquareThreeTimes) {
   EXPECT_EQ(shaded[0], shaded[2]);
   EXPECT_LT(shaded[0], 250);
   EXPECT_EQ(picture.at<cv::Vec3b>(60, 300), cv::Vec3b(230, 20, 10));
-  // The object's left and right borders are at the same place in all panels.
+  // The left border of the object is at the same column in all panels.
   const auto left_of = [&](int panel, auto is_object) {
     for (int u = 0; u < 120; ++u) {
       if (is_object(picture.at<cv::Vec3b>(60, 120 * panel + u))) return u;
@@ -136,7 +136,7 @@ TEST(DrawMeshBesideView, ShowsTheSameSquareThreeTimes) {
   EXPECT_GT(photo, 2);
 }
 
-TEST(DrawMeshBesideView, TakesEmptyMeshesAndObjectsBehindTheCamera) {
+TEST(DrawMeshBesideViewTest, AcceptsEmptyMeshesAndObjectsBehindTheCamera) {
   const cv::Mat view(240, 320, CV_8UC3, cv::Scalar(9, 8, 7));
   const Mesh behind = Cube({0, 0, -4}, 0.3F, Rgb8{1, 1, 1});
   for (const Mesh& mesh : {Mesh{}, behind}) {
@@ -150,19 +150,19 @@ TEST(DrawMeshBesideView, TakesEmptyMeshesAndObjectsBehindTheCamera) {
   EXPECT_GT(cv::norm(outlined.colRange(0, 64), cv::Mat(64, 64, CV_8UC3, cv::Scalar(9, 8, 7))), 1000);
 }
 
-TEST(DrawOverview, FitsEverythingIntoThePicture) {
+TEST(DrawOverviewTest, FitsEverythingIntoTheImage) {
   const std::array meshes = {Cube({10, 0, 0}, 0.5F, Rgb8{0, 0, 255}), Cube({-10, 3, 0}, 0.5F, Rgb8{255, 0, 0})};
   const cv::Mat picture = DrawOverview(meshes, {}, Eigen::Vector3d::UnitZ(), {300, 200});
   ASSERT_EQ(picture.size(), cv::Size(300, 200));
   EXPECT_TRUE(HasColor(picture, cv::Scalar(255, 0, 0)));
   EXPECT_TRUE(HasColor(picture, cv::Scalar(0, 0, 255)));
   const cv::Mat white(1, 300, CV_8UC3, cv::Scalar(255, 255, 255));
-  EXPECT_EQ(cv::norm(picture.row(0), white), 0) << "nothing is cut off at the top";
+  EXPECT_EQ(cv::norm(picture.row(0), white), 0) << "nothing is clipped at the top";
   EXPECT_EQ(cv::norm(picture.row(199), white), 0);
 }
 
-TEST(DrawOverview, LooksFromAbove) {
-  // A blue plate over a red one hides it, whichever way is up.
+TEST(DrawOverviewTest, ViewsFromAbove) {
+  // The blue cube above the red one appears higher in the image for any up direction.
   for (const Eigen::Vector3d& up : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, -1)}) {
     const std::array meshes = {Cube((1.2 * up).cast<float>(), 0.5F, Rgb8{0, 0, 255}),
                                Cube({0, 0, 0}, 0.1F, Rgb8{255, 0, 0})};
@@ -177,11 +177,11 @@ TEST(DrawOverview, LooksFromAbove) {
     }
     ASSERT_GT(blue, 0);
     ASSERT_GT(red, 0);
-    EXPECT_LT(blue_v / blue, red_v / red) << "what is higher is higher in the picture; up = " << up.transpose();
+    EXPECT_LT(blue_v / blue, red_v / red) << "up = " << up.transpose();
   }
 }
 
-TEST(DrawOverview, TakesAnEmptyMap) {
+TEST(DrawOverviewTest, AcceptsAnEmptyMap) {
   const cv::Mat picture = DrawOverview({}, {}, Eigen::Vector3d::UnitZ(), {64, 48});
   EXPECT_EQ(picture.at<cv::Vec3b>(24, 32), cv::Vec3b(255, 255, 255));
 }

@@ -14,7 +14,7 @@ CameraModel SmallCamera() {
   return {.width_px = 64, .height_px = 64, .fx_px = 64, .fy_px = 64, .cx_px = 31.5, .cy_px = 31.5};
 }
 
-// A square of the given half side across the optical axis.
+// A square centered on the optical axis and perpendicular to it.
 Mesh Square(float half, float z, std::optional<Rgb8> color) {
   Mesh mesh;
   mesh.vertices = {{-half, -half, z}, {-half, half, z}, {half, half, z}, {half, -half, z}};
@@ -23,7 +23,7 @@ Mesh Square(float half, float z, std::optional<Rgb8> color) {
   return mesh;
 }
 
-TEST(RenderMeshes, GivesColorDepthAndIdOfTheNearestMesh) {
+TEST(RenderMeshesTest, RendersColorDepthAndIdOfTheNearestMesh) {
   const Mesh near = Square(0.25F, 2, Rgb8{200, 10, 30});
   const Mesh far = Square(0.5F, 3, Rgb8{0, 0, 250});
   const std::array<MeshInstance, 2> instances = {{{&near, 7}, {&far, 9}}};
@@ -31,7 +31,7 @@ TEST(RenderMeshes, GivesColorDepthAndIdOfTheNearestMesh) {
   EXPECT_EQ(view.color_bgr.at<cv::Vec3b>(32, 32), cv::Vec3b(30, 10, 200));
   EXPECT_FLOAT_EQ(view.depth_mu.at<float>(32, 32), 2);
   EXPECT_EQ(view.ids.at<uint16_t>(32, 32), 7);
-  // The near square reaches 8 pixels from the axis, the far one 10.7.
+  // The near square extends 8 pixels from the axis, the far one 10.7.
   EXPECT_EQ(view.color_bgr.at<cv::Vec3b>(32, 41), cv::Vec3b(250, 0, 0));
   EXPECT_EQ(view.ids.at<uint16_t>(32, 41), 9);
   EXPECT_EQ(view.color_bgr.at<cv::Vec3b>(2, 2), cv::Vec3b(1, 2, 3));
@@ -39,8 +39,8 @@ TEST(RenderMeshes, GivesColorDepthAndIdOfTheNearestMesh) {
   EXPECT_EQ(view.ids.at<uint16_t>(2, 2), 0);
 }
 
-TEST(RenderMeshes, ShadesByNormalAndIgnoresColors) {
-  // Two halves of a roof whose ridge runs away from the camera: the light comes from the upper left.
+TEST(RenderMeshesTest, ShadesByNormalAndIgnoresColors) {
+  // A roof whose ridge points toward the camera; the light comes from the upper left.
   Mesh roof;
   roof.vertices = {{0, -1, 2}, {0, 1, 2}, {-1, 1, 3}, {-1, -1, 3}, {1, -1, 3}, {1, 1, 3}};
   roof.triangles = {{0, 3, 2}, {0, 2, 1}, {0, 1, 5}, {0, 5, 4}};
@@ -49,11 +49,11 @@ TEST(RenderMeshes, ShadesByNormalAndIgnoresColors) {
   const RenderedView view = RenderMeshes(instances, SmallCamera(), {}, MeshPaint::kShaded);
   const auto left = view.color_bgr.at<cv::Vec3b>(32, 24);
   const auto right = view.color_bgr.at<cv::Vec3b>(32, 40);
-  EXPECT_EQ(left[0], left[2]) << "grey";
+  EXPECT_EQ(left[0], left[2]) << "gray";
   EXPECT_GT(left[0], right[0] + 20);
 }
 
-TEST(RenderMeshes, FallsBackToShadingWithoutColors) {
+TEST(RenderMeshesTest, FallsBackToShadingWithoutColors) {
   const Mesh plain = Square(0.25F, 2, std::nullopt);
   const std::array<MeshInstance, 1> instances = {{{&plain, 1}}};
   const RenderedView view = RenderMeshes(instances, SmallCamera(), {}, MeshPaint::kColored);
@@ -63,7 +63,7 @@ TEST(RenderMeshes, FallsBackToShadingWithoutColors) {
   EXPECT_GT(pixel[0], 60);
 }
 
-TEST(RenderMeshes, TakesEmptyMeshesAndLeavesOutBrokenTriangles) {
+TEST(RenderMeshesTest, AcceptsEmptyMeshesAndSkipsInvalidTriangles) {
   const Mesh empty;
   Mesh broken = Square(0.25F, 2, Rgb8{9, 9, 9});
   broken.triangles.push_back({0, 1, 1000});

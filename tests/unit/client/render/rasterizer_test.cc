@@ -16,12 +16,11 @@ CameraModel SmallCamera() {
 using Positions = std::vector<Eigen::Vector3f>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
-// With the camera at the world's origin, world and camera axes are the same. Counter-clockwise seen from the camera
-// (whose y points down).
+// World and camera axes coincide. Counter-clockwise seen from the camera, whose y points down.
 const Triangles kOne = {{0, 1, 2}};
 Positions Facing(float z) { return {{-1, -1, z}, {-1, 3, z}, {3, -1, z}}; }
 
-TEST(Rasterize, PutsAPlaneAtItsDepthEverywhere) {
+TEST(RasterizeTest, PlaneHasItsDepthEverywhere) {
   const Positions positions = {{-9, -9, 2}, {-9, 9, 2}, {9, 9, 2}, {9, -9, 2}};
   const Triangles triangles = {{0, 1, 2}, {0, 2, 3}};
   const VisibilityImage image = Rasterize(SmallCamera(), {}, {positions, triangles}, {.cull_back_faces = true});
@@ -30,8 +29,8 @@ TEST(Rasterize, PutsAPlaneAtItsDepthEverywhere) {
   }
 }
 
-TEST(Rasterize, CoversExactlyThePixelsWhoseCentresAreInside) {
-  // Projects to the corners (9.5, 9.5), (9.5, 59.5), (59.5, 9.5): no pixel centre lies on an edge that is not slanted.
+TEST(RasterizeTest, CoversExactlyThePixelCentersInside) {
+  // Projects to the corners (9.5, 9.5), (9.5, 59.5), (59.5, 9.5): no pixel center is on a horizontal or vertical edge.
   const float z = 90;
   const Positions positions = {{-40, -30, z}, {-40, 20, z}, {10, -30, z}};
   const VisibilityImage image = Rasterize(SmallCamera(), {}, {positions, kOne});
@@ -44,8 +43,8 @@ TEST(Rasterize, CoversExactlyThePixelsWhoseCentresAreInside) {
   }
 }
 
-TEST(Rasterize, NeighboursLeaveNoGapAndTheNearerTriangleWins) {
-  // A fan around a point that projects right onto a pixel centre, in front of a far plane.
+TEST(RasterizeTest, AdjacentTrianglesLeaveNoGapAndTheNearestWins) {
+  // A fan around a point that projects exactly to a pixel center, in front of a far plane.
   Positions positions = {{0.5F, 0.5F, 90}};
   Triangles triangles;
   for (int i = 0; i < 12; ++i) {
@@ -70,7 +69,7 @@ TEST(Rasterize, NeighboursLeaveNoGapAndTheNearerTriangleWins) {
   }
 }
 
-TEST(Rasterize, CullsBackFacesOnlyWhenAsked) {
+TEST(RasterizeTest, CullsBackFacesOnlyIfEnabled) {
   const Positions positions = Facing(2);
   const Triangles reversed = {{0, 2, 1}};
   const VisibilityImage both = Rasterize(SmallCamera(), {}, {positions, reversed});
@@ -81,7 +80,7 @@ TEST(Rasterize, CullsBackFacesOnlyWhenAsked) {
   EXPECT_EQ(facing.triangle[facing.Index(30, 30)], 0);
 }
 
-TEST(Rasterize, DrawsFloorThatReachesBehindTheCamera) {
+TEST(RasterizeTest, DrawsAFloorThatExtendsBehindTheCamera) {
   // The plane y = 1 from far behind to far in front: every pixel below the horizon sees it at z = fy / (v - cy).
   const Positions positions = {{-500, 1, -500}, {500, 1, -500}, {500, 1, 5000}, {-500, 1, 5000}};
   const Triangles triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -98,7 +97,7 @@ TEST(Rasterize, DrawsFloorThatReachesBehindTheCamera) {
   }
 }
 
-TEST(Rasterize, ShowsNothingOfWhatIsBehindOrTooNear) {
+TEST(RasterizeTest, IgnoresTrianglesBehindOrTooNear) {
   const Positions behind = Facing(-2);
   const Positions near = Facing(0.05F);
   for (const Positions& positions : {behind, near}) {
@@ -107,14 +106,14 @@ TEST(Rasterize, ShowsNothingOfWhatIsBehindOrTooNear) {
   }
 }
 
-TEST(Rasterize, SurvivesDegenerateAndUnreasonableTriangles) {
+TEST(RasterizeTest, SurvivesDegenerateAndNonFiniteTriangles) {
   const Positions positions = {{0, 0, 2}, {1, 0, 2}, {2, 0, 2}, {NAN, 0, 2}, {1e30F, 1e30F, 2}};
   const Triangles triangles = {{0, 1, 2}, {0, 0, 0}, {0, 1, 3}, {0, 1, 4}};
   const VisibilityImage image = Rasterize(SmallCamera(), {}, {positions, triangles});
   EXPECT_EQ(image.triangle.size(), 8000U);
 }
 
-TEST(Supersampled, PutsSamplesInsideTheirPixel) {
+TEST(SupersampledTest, SamplesAreInsideTheirPixel) {
   const CameraModel camera = SmallCamera();
   const CameraModel fine = Supersampled(camera, 2);
   const Eigen::Vector3d p(0.31, -0.17, 1.3);
@@ -125,7 +124,7 @@ TEST(Supersampled, PutsSamplesInsideTheirPixel) {
   EXPECT_EQ(fine.width_px, 200);
 }
 
-TEST(Barycentrics, ArePerspectiveCorrect) {
+TEST(BarycentricsTest, ArePerspectiveCorrect) {
   const std::array<Eigen::Vector3f, 3> corners = {{{0, 0, 1}, {1, 0, 4}, {0, 1, 2}}};
   const Eigen::Vector3f wanted(0.2F, 0.5F, 0.3F);
   const Eigen::Vector3f point = wanted.x() * corners[0] + wanted.y() * corners[1] + wanted.z() * corners[2];

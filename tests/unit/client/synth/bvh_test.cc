@@ -11,7 +11,7 @@
 namespace romap::synth {
 namespace {
 
-TEST(Bvh, ContainsWhatTheBallContains) {
+TEST(BvhTest, ContainsAgreesWithTheBall) {
   const Mesh ball = Ellipsoid(Point(0.1F, -0.2F, 0.3F), Point::Constant(0.08F));
   const Bvh bvh(ball.vertices, ball.triangles);
   Random random(5);
@@ -24,8 +24,8 @@ TEST(Bvh, ContainsWhatTheBallContains) {
   }
 }
 
-TEST(Bvh, FindsOcclusionAsTestingEveryTriangleDoes) {
-  // Random triangles; the reference solves for the crossing of each one.
+TEST(BvhTest, OccludedAgreesWithExhaustiveSearch) {
+  // Random triangles; the reference computes the intersection with each one.
   Random random(9);
   const auto coordinate = [&](double reach) { return static_cast<float>(random.Uniform(-reach, reach)); };
   std::vector<Point> positions;
@@ -56,7 +56,7 @@ TEST(Bvh, FindsOcclusionAsTestingEveryTriangleDoes) {
   EXPECT_LT(occluded, 900);
 }
 
-TEST(Bvh, FindsTheNearestFrontAsTestingEveryTriangleDoes) {
+TEST(BvhTest, NearestAgreesWithExhaustiveSearch) {
   Random random(11);
   const auto coordinate = [&](double reach) { return static_cast<float>(random.Uniform(-reach, reach)); };
   std::vector<Point> positions;
@@ -95,7 +95,7 @@ TEST(Bvh, FindsTheNearestFrontAsTestingEveryTriangleDoes) {
   EXPECT_FALSE(bvh.Nearest(Point::Zero(), Point::Constant(std::numeric_limits<float>::quiet_NaN())).has_value());
 }
 
-TEST(Bvh, TakesNothing) {
+TEST(BvhTest, AcceptsNoTriangles) {
   const Bvh bvh({}, {});
   EXPECT_FALSE(bvh.Occluded(Point::Zero(), Point::UnitZ(), 0, 1));
   EXPECT_FALSE(bvh.Contains(Point::Zero()));

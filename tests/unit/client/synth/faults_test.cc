@@ -10,7 +10,7 @@
 namespace romap::synth {
 namespace {
 
-// Four squares of 40 px with labels 1..4 on a ground of 200 x 200.
+// Four squares of 40 px with labels 1..4 in an image of 200 x 200 px.
 cv::Mat FourSquares() {
   cv::Mat labels = cv::Mat::zeros(200, 200, CV_8UC1);
   for (int i = 0; i < 4; ++i) {
@@ -19,9 +19,9 @@ cv::Mat FourSquares() {
   return labels;
 }
 
-TEST(SpoilMask, ChangesNothingUnasked) {
+TEST(DegradeMaskTest, ChangesNothingByDefault) {
   Random random(1);
-  const FaultyMask mask = SpoilMask(FourSquares(), 4, {}, random);
+  const FaultyMask mask = DegradeMask(FourSquares(), 4, {}, random);
   EXPECT_EQ(cv::countNonZero(mask.labels != FourSquares()), 0);
   ASSERT_EQ(mask.detections.size(), 4U);
   for (const SynthDetection& detection : mask.detections) {
@@ -31,32 +31,32 @@ TEST(SpoilMask, ChangesNothingUnasked) {
   }
 }
 
-TEST(SpoilMask, ListsOnlyWhatIsVisible) {
+TEST(DegradeMaskTest, ListsOnlyVisibleLabels) {
   cv::Mat labels = FourSquares();
   labels.setTo(0, labels == 2);
   Random random(1);
-  const FaultyMask mask = SpoilMask(labels, 4, {}, random);
+  const FaultyMask mask = DegradeMask(labels, 4, {}, random);
   ASSERT_EQ(mask.detections.size(), 3U);
   EXPECT_EQ(mask.detections[1].object, 3);
 }
 
-TEST(SpoilMask, DropsTheShareAskedFor) {
+TEST(DegradeMaskTest, DropsTheGivenShare) {
   Random random(2);
   size_t kept = 0;
   for (int i = 0; i < 250; ++i) {
-    const FaultyMask mask = SpoilMask(FourSquares(), 4, {.mask_drop_share = 0.3}, random);
+    const FaultyMask mask = DegradeMask(FourSquares(), 4, {.mask_drop_share = 0.3}, random);
     kept += mask.detections.size();
     ASSERT_EQ(cv::countNonZero(mask.labels), 1600 * static_cast<int>(mask.detections.size()));
   }
   EXPECT_NEAR(static_cast<double>(kept) / 1000, 0.7, 0.05);
 }
 
-TEST(SpoilMask, ShufflesLabelsAndSaysWhatTheyMean) {
+TEST(DegradeMaskTest, PermutesLabelsConsistentlyWithTheDetections) {
   Random random(3);
   const cv::Mat truth = FourSquares();
   std::set<uint8_t> labels_of_first;
   for (int i = 0; i < 50; ++i) {
-    const FaultyMask mask = SpoilMask(truth, 4, {.permute_labels = true}, random);
+    const FaultyMask mask = DegradeMask(truth, 4, {.permute_labels = true}, random);
     std::set<uint8_t> labels;
     for (const SynthDetection& detection : mask.detections) {
       labels.insert(detection.label);
@@ -68,72 +68,72 @@ TEST(SpoilMask, ShufflesLabelsAndSaysWhatTheyMean) {
   EXPECT_EQ(labels_of_first.size(), 4U);
 }
 
-TEST(SpoilMask, MovesBordersByAboutTheJitter) {
+TEST(DegradeMaskTest, DisplacesBordersByAboutTheJitter) {
   Random random(4);
   const cv::Mat truth = FourSquares();
-  const FaultyMask mask = SpoilMask(truth, 4, {.mask_jitter_px = 4}, random);
+  const FaultyMask mask = DegradeMask(truth, 4, {.mask_jitter_px = 4}, random);
   const cv::Mat changed = mask.labels != truth;
   EXPECT_GT(cv::countNonZero(changed), 100);
-  // Nothing changes farther from a border than the displacement reaches.
+  // Nothing changes beyond the maximal displacement.
   cv::Mat far_inside;
   cv::erode(truth == 1, far_inside, cv::getStructuringElement(cv::MORPH_RECT, {15, 15}));
   EXPECT_GT(cv::countNonZero(far_inside), 400);
   EXPECT_EQ(cv::countNonZero(changed & far_inside), 0);
 }
 
-TEST(SpoilImage, ChangesNothingUnasked) {
+TEST(DegradeImageTest, ChangesNothingByDefault) {
   Random random(1);
   cv::Mat image(20, 20, CV_8UC3, cv::Scalar(50, 100, 150));
-  SpoilImage(image, {1, 0}, {}, random);
+  DegradeImage(image, {1, 0}, {}, random);
   EXPECT_EQ(cv::norm(image, cv::Mat(20, 20, CV_8UC3, cv::Scalar(50, 100, 150))), 0);
 }
 
-TEST(SpoilImage, AddsNoiseOfTheSigmaAskedFor) {
+TEST(DegradeImageTest, AddsNoiseOfTheGivenSigma) {
   Random random(1);
   cv::Mat image(100, 100, CV_8UC3, cv::Scalar(120, 120, 120));
-  SpoilImage(image, {1, 0}, {.noise_sigma = 8}, random);
+  DegradeImage(image, {1, 0}, {.noise_sigma = 8}, random);
   cv::Scalar mean, deviation;
   cv::meanStdDev(image, mean, deviation);
   EXPECT_NEAR(mean[1], 120, 0.5);
   EXPECT_NEAR(deviation[1], 8, 0.3);
 }
 
-TEST(SpoilImage, SmearsAlongTheMotionOnly) {
-  // A white dot becomes a line of the blur's length.
+TEST(DegradeImageTest, BlursOnlyAlongTheMotion) {
+  // A white dot becomes a line with the length of the blur.
   for (const cv::Vec2d& motion : {cv::Vec2d(3, 0), cv::Vec2d(0, -2)}) {
     Random random(1);
     cv::Mat image = cv::Mat::zeros(41, 41, CV_8UC3);
     image.at<cv::Vec3b>(20, 20) = {255, 255, 255};
-    SpoilImage(image, motion, {.motion_blur_px = 10}, random);
-    cv::Mat grey;
-    cv::extractChannel(image, grey, 0);
-    const cv::Rect line = cv::boundingRect(grey);
+    DegradeImage(image, motion, {.motion_blur_px = 10}, random);
+    cv::Mat gray;
+    cv::extractChannel(image, gray, 0);
+    const cv::Rect line = cv::boundingRect(gray);
     const bool horizontal = motion[0] != 0;
     EXPECT_NEAR(horizontal ? line.width : line.height, 11, 1);
     EXPECT_EQ(horizontal ? line.height : line.width, 1);
-    EXPECT_NEAR(cv::sum(grey)[0], 255, 15) << "no light is lost";
+    EXPECT_NEAR(cv::sum(gray)[0], 255, 15) << "the total intensity is preserved";
   }
 }
 
-TEST(SpoilImage, ExposesByGainAndGamma) {
+TEST(DegradeImageTest, AppliesGainAndGamma) {
   Random random(1);
   cv::Mat image(4, 4, CV_8UC3, cv::Scalar(0, 64, 200));
-  SpoilImage(image, {1, 0}, {}, random, {.gain = 2});
+  DegradeImage(image, {1, 0}, {}, random, {.gain = 2});
   EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 128, 255)) << "bright values clip";
   cv::Mat darker(4, 4, CV_8UC3, cv::Scalar(0, 64, 255));
-  SpoilImage(darker, {1, 0}, {}, random, {.gamma = 2});
+  DegradeImage(darker, {1, 0}, {}, random, {.gamma = 2});
   EXPECT_EQ(darker.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 16, 255)) << "gamma keeps black and white";
 }
 
-TEST(SpoilImage, ACoveredLensShowsNothing) {
+TEST(DegradeImageTest, BlackFrameIsBlack) {
   Random random(1);
   cv::Mat image(20, 20, CV_8UC3, cv::Scalar(50, 100, 150));
-  SpoilImage(image, {1, 0}, {}, random, {.black = true});
+  DegradeImage(image, {1, 0}, {}, random, {.black = true});
   EXPECT_EQ(cv::norm(image), 0);
 }
 
-TEST(SpoilImage, ABlurredStretchKeepsNoCorners) {
-  // Squares of 8 px become a grey that hardly varies along the motion.
+TEST(DegradeImageTest, BlurredFrameHasNoCorners) {
+  // A checkerboard with squares of 8 px becomes almost uniform gray along the motion.
   Random random(1);
   cv::Mat image(120, 320, CV_8UC3);
   for (int v = 0; v < image.rows; ++v) {
@@ -141,18 +141,18 @@ TEST(SpoilImage, ABlurredStretchKeepsNoCorners) {
       image.at<cv::Vec3b>(v, u) = cv::Vec3b::all((u / 8 + v / 8) % 2 == 0 ? 40 : 220);
     }
   }
-  SpoilImage(image, {5, 0}, {}, random, {.blurred = true});
+  DegradeImage(image, {5, 0}, {}, random, {.blurred = true});
   cv::Scalar mean, deviation;
   cv::meanStdDev(image(cv::Rect(40, 20, 240, 80)), mean, deviation);
-  EXPECT_LT(deviation[0], 30) << "of 90 before";
+  EXPECT_LT(deviation[0], 30) << "90 without blur";
 }
 
-TEST(SpoilImage, DefocusSpreadsADot) {
+TEST(DegradeImageTest, DefocusSpreadsADot) {
   Random random(1);
   cv::Mat image = cv::Mat::zeros(41, 41, CV_8UC3);
   cv::circle(image, {20, 20}, 3, {255, 255, 255}, cv::FILLED);
   const int before = cv::countNonZero(image.reshape(1) > 20);
-  SpoilImage(image, {0, 0}, {.defocus_px = 2}, random);
+  DegradeImage(image, {0, 0}, {.defocus_px = 2}, random);
   EXPECT_GT(cv::countNonZero(image.reshape(1) > 20), 3 * before / 2);
 }
 

@@ -8,7 +8,7 @@
 namespace romap::synth {
 namespace {
 
-TEST(ParseFrameRange, ReadsTwoNumbers) {
+TEST(ParseFrameRangeTest, ParsesTwoNumbers) {
   const auto range = ParseFrameRange("100:130");
   ASSERT_TRUE(range.ok()) << range.status();
   EXPECT_EQ(*range, (FrameRange{100, 130}));
@@ -17,7 +17,7 @@ TEST(ParseFrameRange, ReadsTwoNumbers) {
   EXPECT_FALSE(range->Contains(131));
 }
 
-TEST(ParseFrameRange, SaysWhatItShouldLookLike) {
+TEST(ParseFrameRangeTest, RejectsMalformedRanges) {
   for (const char* text : {"", "100", "100:", ":5", "1:2:3", "a:b", "1-2", "1:2 ", "99999999999:1"}) {
     const auto range = ParseFrameRange(text);
     EXPECT_EQ(range.status().code(), absl::StatusCode::kInvalidArgument) << text;
@@ -25,7 +25,7 @@ TEST(ParseFrameRange, SaysWhatItShouldLookLike) {
   }
 }
 
-TEST(PlanFrames, ChangesNothingUnasked) {
+TEST(PlanFramesTest, ChangesNothingByDefault) {
   const auto plans = PlanFrames({.frames = 20});
   ASSERT_EQ(plans.size(), 20U);
   for (size_t i = 0; i < plans.size(); ++i) {
@@ -36,7 +36,7 @@ TEST(PlanFrames, ChangesNothingUnasked) {
   }
 }
 
-TEST(PlanFrames, CountsStretchesFromOne) {
+TEST(PlanFramesTest, RangesCountFromOne) {
   const auto plans = PlanFrames({.frames = 10, .cuts = {{1, 2}, {9, 10}}, .black = {{4, 4}}, .blurred = {{5, 6}}});
   for (size_t i = 0; i < plans.size(); ++i) {
     const size_t number = i + 1;
@@ -46,7 +46,7 @@ TEST(PlanFrames, CountsStretchesFromOne) {
   }
 }
 
-TEST(PlanFrames, RepeatsTheShareAskedForAndNeverAcrossAStretch) {
+TEST(PlanFramesTest, RepeatsTheGivenShareButNotAcrossRanges) {
   const SynthOptions options{.frames = 1000, .cuts = {{200, 300}}, .black = {{400, 420}}, .duplicate_share = 0.3};
   const auto plans = PlanFrames(options);
   int repeated = 0;
@@ -55,14 +55,14 @@ TEST(PlanFrames, RepeatsTheShareAskedForAndNeverAcrossAStretch) {
     ASSERT_LE(plans[i].shown, i);
     if (plans[i].shown == i) continue;
     ++repeated;
-    EXPECT_EQ(plans[i].shown, plans[i - 1].shown) << "the picture before it";
+    EXPECT_EQ(plans[i].shown, plans[i - 1].shown) << "the previous image";
     EXPECT_FALSE(plans[plans[i].shown].missing);
     EXPECT_EQ(plans[plans[i].shown].black, plans[i].black);
   }
   EXPECT_NEAR(repeated / 899.0, 0.3, 0.05);
 }
 
-TEST(PlanFrames, ExposureHoldsForAWhileAndJumpsWithinItsBounds) {
+TEST(PlanFramesTest, ExposureJumpsWithinItsBounds) {
   const auto plans = PlanFrames({.frames = 500, .fps = 25, .exposure_stops = 1});
   std::set<double> gains;
   for (size_t i = 0; i < plans.size(); ++i) {
@@ -70,7 +70,7 @@ TEST(PlanFrames, ExposureHoldsForAWhileAndJumpsWithinItsBounds) {
     EXPECT_LE(std::abs(std::log2(plans[i].gain)), 1);
     EXPECT_LE(std::abs(std::log2(plans[i].gamma)), 0.31);
   }
-  // 20 seconds, one jump every 0.8 to 2.2 of them.
+  // 20 seconds with a jump every 0.8 to 2.2 s.
   EXPECT_GE(gains.size(), 9U);
   EXPECT_LE(gains.size(), 26U);
 }

@@ -13,7 +13,7 @@
 namespace romap::synth {
 namespace {
 
-// The pixel that OpenCV's documentation says the lens sends a ray (x, y, 1) to.
+// The pixel of a ray (x, y, 1) by the distortion formulas in OpenCV's documentation.
 Eigen::Vector2d PixelByTheBook(const CameraModel& camera, double x, double y) {
   const auto& k = camera.distortion;
   const double r2 = x * x + y * y;
@@ -32,7 +32,7 @@ Eigen::Vector2d PixelByTheBook(const CameraModel& camera, double x, double y) {
   return {camera.fx_px * bent.x() + camera.cx_px, camera.fy_px * bent.y() + camera.cy_px};
 }
 
-TEST(LensRays, ObeyTheLensExactly) {
+TEST(LensRaysTest, InvertTheLensExactly) {
   for (const SynthLens lens : {SynthLens::kRadialTangential, SynthLens::kFisheye}) {
     const CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120, .lens = lens});
     for (const int across : {1, 2}) {
@@ -41,7 +41,7 @@ TEST(LensRays, ObeyTheLensExactly) {
       for (int v = 0; v < 120 * across; ++v) {
         for (int u = 0; u < 160 * across; ++u) {
           const Eigen::Vector2d& ray = rays[static_cast<size_t>(v * 160 * across + u)];
-          // Sample (u, v) of the finer image as a place in the coarse one.
+          // Sample (u, v) in pixel coordinates of the original image.
           const Eigen::Vector2d pixel_px((u + 0.5) / across - 0.5, (v + 0.5) / across - 0.5);
           ASSERT_LT((PixelByTheBook(camera, ray.x(), ray.y()) - pixel_px).norm(), 1e-4) << u << ' ' << v;
         }
@@ -50,7 +50,7 @@ TEST(LensRays, ObeyTheLensExactly) {
   }
 }
 
-// A chequered ball before a chequered wall.
+// A checkered ball in front of a checkered wall.
 Scene BallScene() {
   Scene scene;
   Random random(5);
@@ -63,31 +63,31 @@ Scene BallScene() {
   return scene;
 }
 
-// From above, looking down.
+// A camera above the scene, pointing down.
 SE3<World, Camera> Above() {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitX())), Eigen::Vector3d(0.1, 0, 1.2)};
 }
 
-TEST(FrameRenderer, ALensThatHardlyBendsShowsWhatThePinholeShows) {
+TEST(FrameRendererTest, WeakDistortionRendersLikeAPinhole) {
   const Scene scene = BallScene();
   CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120});
   const TrueFrame pinhole = FrameRenderer(scene, camera).Render(Above());
-  camera.distortion[0] = 1e-9;  // rays are followed now, instead of triangles drawn
+  camera.distortion[0] = 1e-9;  // enables ray tracing
   const TrueFrame lens = FrameRenderer(scene, camera).Render(Above());
   EXPECT_GT(cv::countNonZero(pinhole.labels), 1000);
-  EXPECT_LE(cv::countNonZero(pinhole.labels != lens.labels), 4) << "but for a tie at an edge";
+  EXPECT_LE(cv::countNonZero(pinhole.labels != lens.labels), 4) << "ties at edges";
   EXPECT_LE(cv::countNonZero(cv::abs(pinhole.depth_m - lens.depth_m) > 1e-3), 4);
   cv::Mat difference;
   cv::absdiff(pinhole.color_bgr, lens.color_bgr, difference);
   EXPECT_LE(cv::countNonZero(difference.reshape(1) > 8), 60);
 }
 
-TEST(FrameRenderer, ALensBendsColourMaskAndDepthAlike) {
+TEST(FrameRendererTest, LensDistortsColorMaskAndDepthAlike) {
   const Scene scene = BallScene();
   for (const SynthLens lens : {SynthLens::kRadialTangential, SynthLens::kFisheye}) {
     const CameraModel camera = SynthCamera({.width_px = 320, .height_px = 240, .lens = lens});
     const TrueFrame frame = FrameRenderer(scene, camera).Render(Above());
-    // The wall's top is at z = -0.45: 1.65 m before the camera, wherever the pixel.
+    // The top of the wall is at z = -0.45, at a depth of 1.65 m for every pixel.
     int wall_pixels = 0;
     for (int v = 0; v < 240; v += 7) {
       for (int u = 0; u < 320; u += 7) {
@@ -97,7 +97,7 @@ TEST(FrameRenderer, ALensBendsColourMaskAndDepthAlike) {
       }
     }
     EXPECT_GT(wall_pixels, 300);
-    // The ball's nearest point is at (0.05, 0.02, 0.4), 0.8 m before the camera.
+    // The nearest point of the ball is at (0.05, 0.02, 0.4), at a depth of 0.8 m.
     const Eigen::Vector3d top = Above().Inverse() * Eigen::Vector3d(0.05, 0.02, 0.4);
     const Eigen::Vector2d pixel_px = PixelByTheBook(camera, top.x() / top.z(), top.y() / top.z());
     const int u = static_cast<int>(std::lround(pixel_px.x()));

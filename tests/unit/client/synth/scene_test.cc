@@ -13,7 +13,7 @@
 namespace romap::synth {
 namespace {
 
-TEST(MakeScene, KeepsObjectsApartAndOnTheTable) {
+TEST(MakeSceneTest, ObjectsStandOnTheTableWithoutContact) {
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     const Scene scene = MakeScene({.seed = seed, .objects = 16});
     ASSERT_EQ(scene.objects.size(), 16U);
@@ -34,7 +34,7 @@ TEST(MakeScene, KeepsObjectsApartAndOnTheTable) {
   }
 }
 
-TEST(MakeScene, CuboidsAreTight) {
+TEST(MakeSceneTest, CuboidsAreTight) {
   const Scene scene = MakeScene({.seed = 5, .objects = 8});
   for (const SceneObject& object : scene.objects) {
     const SE3<Object, World> T_object_world = object.T_world_object.Inverse();
@@ -49,7 +49,7 @@ TEST(MakeScene, CuboidsAreTight) {
   }
 }
 
-TEST(MakeScene, MakesTwinsAndOtherwiseDifferentKinds) {
+TEST(MakeSceneTest, MakesIdenticalPairsAndOtherwiseDifferentKinds) {
   const Scene scene = MakeScene({.seed = 6, .objects = 7, .identical_pairs = 2});
   const auto vertices = [&](size_t i) { return scene.objects[i].solid.parts[0].mesh.vertices; };
   EXPECT_EQ(vertices(0), vertices(1));
@@ -59,7 +59,7 @@ TEST(MakeScene, MakesTwinsAndOtherwiseDifferentKinds) {
   EXPECT_EQ(scene.objects[0].solid.parts[0].material.seed, scene.objects[1].solid.parts[0].material.seed);
 }
 
-TEST(AddSurface, SharesSmoothVerticesAndSplitsEdges) {
+TEST(AddSurfaceTest, SharesSmoothVerticesAndSplitsEdges) {
   Scene scene;
   AddSurface(scene, RoundedBox(Point::Zero(), Point::Constant(0.1F), 0.002F, 1.0F), {}, {}, 1);
   for (const auto& triangle : scene.triangles) {
@@ -70,13 +70,13 @@ TEST(AddSurface, SharesSmoothVerticesAndSplitsEdges) {
   }
 }
 
-TEST(BakeLight, CastsShadowsUnderAndBesideObjects) {
+TEST(BakeLightTest, CastsShadowsBelowAndBesideObjects) {
   Scene scene;
   const Mesh plate = RoundedBox(Point(0, 0, -0.01F), Point(0.5F, 0.5F, 0.01F), 0.001F, 0.02F);
   AddSurface(scene, plate, {}, {}, 0);
   const auto plate_vertices = static_cast<uint32_t>(scene.positions_world.size());
   AddSurface(scene, RoundedBox(Point(0, 0, 0.1F), Point(0.05F, 0.05F, 0.1F), 0.002F), {}, {}, 1);
-  // The light stands to the left (-x): the shadow falls to the right.
+  // The light is on the left (-x), so the shadow is on the right.
   scene.lights = {{Point(-1, 0, 1), Point(0, 0.1F, 0), Point(0.07F, 0, 0.07F), Rgb::Ones()}};
   BakeLight(scene);
   const auto irradiance_at = [&](float x, float y) {
@@ -88,11 +88,11 @@ TEST(BakeLight, CastsShadowsUnderAndBesideObjects) {
     return scene.irradiance[best].sum();
   };
   EXPECT_GT(irradiance_at(-0.2F, 0), 2 * irradiance_at(0.12F, 0)) << "shadow";
-  EXPECT_GT(irradiance_at(0.12F, 0), irradiance_at(0, 0)) << "under the object it is darker still";
-  EXPECT_GT(irradiance_at(0, 0.3F), 2 * irradiance_at(0.12F, 0)) << "beside the shadow";
+  EXPECT_GT(irradiance_at(0.12F, 0), irradiance_at(0, 0)) << "darkest below the object";
+  EXPECT_GT(irradiance_at(0, 0.3F), 2 * irradiance_at(0.12F, 0)) << "outside the shadow";
 }
 
-TEST(MakeCameraPath, OrbitsAtTheElevationAskedForAndLooksAtTheTable) {
+TEST(MakeCameraPathTest, OrbitHasTheGivenElevationAndFacesTheTable) {
   const Scene scene = MakeScene({.seed = 2, .objects = 3});
   SynthOptions options{.seed = 2, .objects = 3, .frames = 36, .elevation_deg = 30};
   const CameraModel camera = SynthCamera(options);
@@ -114,7 +114,7 @@ TEST(MakeCameraPath, OrbitsAtTheElevationAskedForAndLooksAtTheTable) {
   }
 }
 
-TEST(MakeCameraPath, TheHandMovesSmoothlyInsideTheRoom) {
+TEST(MakeCameraPathTest, HandheldPathIsSmoothAndInsideTheRoom) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const Scene scene = MakeScene({.seed = seed, .objects = 6});
     SynthOptions options{.seed = seed, .frames = 300, .path = PathKind::kHandheld};
@@ -135,10 +135,10 @@ TEST(MakeCameraPath, TheHandMovesSmoothlyInsideTheRoom) {
   }
 }
 
-TEST(MakeCameraPath, ALivelyHandWandersFarther) {
+TEST(MakeCameraPathTest, HandMotionScalesTheVariation) {
   const Scene scene = MakeScene({.seed = 1, .objects = 3});
-  const auto spread_m = [&](double unrest) {
-    const SynthOptions options{.seed = 1, .frames = 300, .path = PathKind::kHandheld, .unrest = unrest};
+  const auto spread_m = [&](double hand_motion) {
+    const SynthOptions options{.seed = 1, .frames = 300, .path = PathKind::kHandheld, .hand_motion = hand_motion};
     double nearest_m = 1e9, farthest_m = 0;
     for (const auto& pose : MakeCameraPath(options, scene, SynthCamera(options))) {
       const double distance_m = (pose.translation() - Eigen::Vector3d(0, 0, scene.table_height_m)).norm();
@@ -150,7 +150,7 @@ TEST(MakeCameraPath, ALivelyHandWandersFarther) {
   EXPECT_GT(spread_m(2.5), 1.5 * spread_m(1));
 }
 
-TEST(MakeCameraPath, TwoRoundsComeBackByWayOfThePlainWall) {
+TEST(MakeCameraPathTest, TwoRoundsPassThePlainWallAndReturn) {
   const Scene scene = MakeScene({.seed = 4, .objects = 4, .min_room_half_m = kTwoRoundsRoomHalf_m, .plain_wall = true});
   ASSERT_GE(scene.room_half_m, kTwoRoundsRoomHalf_m);
   const SynthOptions options{.seed = 4, .frames = 1200, .path = PathKind::kTwoRounds};
@@ -161,7 +161,7 @@ TEST(MakeCameraPath, TwoRoundsComeBackByWayOfThePlainWall) {
     const Eigen::Vector3d& p = path[i].translation();
     ASSERT_LT(p.head<2>().cwiseAbs().maxCoeff(), scene.room_half_m - 0.4) << "furniture";
     const Eigen::Vector3d forward = path[i].rotation() * Eigen::Vector3d::UnitZ();
-    // Where the view's middle meets the plane of the wall at y = half.
+    // Intersection of the optical axis with the plane of the wall at y = half.
     const double s = (scene.room_half_m - p.y()) / forward.y();
     if (s > 0 && std::abs(p.x() + s * forward.x()) < 0.7 * scene.room_half_m) ++at_plain_wall;
     if (forward.head<2>().normalized().dot(-p.head<2>().normalized()) > 0.95) ++at_table;

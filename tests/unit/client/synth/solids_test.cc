@@ -12,7 +12,7 @@
 namespace romap::synth {
 namespace {
 
-class EverySolid : public ::testing::TestWithParam<SolidKind> {
+class EverySolidTest : public ::testing::TestWithParam<SolidKind> {
  protected:
   static Solid Make(uint64_t seed) {
     Random random(seed);
@@ -22,7 +22,7 @@ class EverySolid : public ::testing::TestWithParam<SolidKind> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Kinds, EverySolid, ::testing::ValuesIn(SolidKinds().begin(), SolidKinds().end()),
+INSTANTIATE_TEST_SUITE_P(Kinds, EverySolidTest, ::testing::ValuesIn(SolidKinds().begin(), SolidKinds().end()),
                          [](const auto& info) { return std::string(info.param.name); });
 
 double SignedVolume(const Mesh& mesh) {
@@ -34,10 +34,10 @@ double SignedVolume(const Mesh& mesh) {
   return volume;
 }
 
-TEST_P(EverySolid, HasClosedPartsThatFaceOutwards) {
+TEST_P(EverySolidTest, HasClosedPartsThatFaceOutward) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     for (const SolidPart& part : Make(seed).parts) {
-      // Every directed edge once, and its reverse once: closed, two triangles an edge, all turned the same way.
+      // Each directed edge and its reverse occur once: closed, two triangles per edge, consistent orientation.
       std::set<std::pair<uint32_t, uint32_t>> edges;
       for (const auto& triangle : part.mesh.triangles) {
         for (int k = 0; k < 3; ++k) {
@@ -50,7 +50,7 @@ TEST_P(EverySolid, HasClosedPartsThatFaceOutwards) {
   }
 }
 
-TEST_P(EverySolid, StandsOnTheTableAndIsFiveToThirtyCentimetres) {
+TEST_P(EverySolidTest, StandsAtZeroAndMeasuresFiveToThirtyCentimeters) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     const Solid solid = Make(seed);
     const Eigen::AlignedBox3f bounds = Bounds(solid);
@@ -64,8 +64,8 @@ TEST_P(EverySolid, StandsOnTheTableAndIsFiveToThirtyCentimetres) {
   }
 }
 
-TEST_P(EverySolid, HangsTogether) {
-  // Every part reaches into or touches the box of another one.
+TEST_P(EverySolidTest, IsConnected) {
+  // Every part overlaps or touches the bounding box of another one.
   const Solid solid = Make(4);
   std::vector<Eigen::AlignedBox3f> boxes;
   for (const SolidPart& part : solid.parts) {
@@ -89,7 +89,7 @@ TEST_P(EverySolid, HangsTogether) {
   EXPECT_EQ(reached.size(), boxes.size());
 }
 
-TEST_P(EverySolid, FollowsFromTheSeed) {
+TEST_P(EverySolidTest, IsDeterminedByTheSeed) {
   const Solid a = Make(7);
   const Solid b = Make(7);
   const Solid other = Make(8);
@@ -98,20 +98,20 @@ TEST_P(EverySolid, FollowsFromTheSeed) {
   EXPECT_NE(a.parts[0].mesh.vertices, other.parts[0].mesh.vertices);
 }
 
-TEST(SolidKinds, HaveNamesOfTheirOwn) {
+TEST(SolidKindsTest, HaveUniqueNames) {
   std::set<std::string> names;
   for (const SolidKind& kind : SolidKinds()) EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
-  EXPECT_GE(names.size(), 16U) << "as many as objects in a sequence";
+  EXPECT_GE(names.size(), 16U) << "at least the maximal number of objects";
 }
 
-TEST(Bowl, IsHollow) {
+TEST(BowlTest, IsHollow) {
   Random random(3);
   Solid bowl = MakeBowl(random);
   Settle(bowl);
   const Bvh inside(bowl.parts[0].mesh.vertices, bowl.parts[0].mesh.triangles);
   const Eigen::AlignedBox3f bounds = Bounds(bowl);
   EXPECT_FALSE(inside.Contains(Point(0, 0, 0.6F * bounds.max().z())));
-  EXPECT_TRUE(inside.Contains(Point(0.001F, 0.002F, 0.004F))) << "the foot is massive";
+  EXPECT_TRUE(inside.Contains(Point(0.001F, 0.002F, 0.004F))) << "the foot is solid";
   EXPECT_FALSE(inside.Contains(Point(0, 0, 2 * bounds.max().z())));
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder of the running test's own, removed with it.
+// Each test has a temporary folder.
 class MakeSequenceTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -33,7 +33,7 @@ class MakeSequenceTest : public ::testing::Test {
 
   std::string Dir(const std::string& name = "sequence") const { return dir_ / name; }
 
-  // Small: the scene costs most of the time.
+  // Few small frames; most of the time is for the scene.
   static SynthOptions Small() { return {.seed = 3, .objects = 2, .frames = 4, .width_px = 160, .height_px = 120}; }
 
   static cv::Mat Read(const std::string& path) { return cv::imread(path, cv::IMREAD_UNCHANGED); }
@@ -52,7 +52,7 @@ Files AllFiles(const std::string& dir) {
   return files;
 }
 
-TEST_F(MakeSequenceTest, ReadsBackAsASequence) {
+TEST_F(MakeSequenceTest, IsReadableAsASequence) {
   int last_done = 0;
   ASSERT_TRUE(MakeSequence(Small(), Dir(), [&](int done, int total) {
                 EXPECT_EQ(done, last_done + 1);
@@ -75,7 +75,7 @@ TEST_F(MakeSequenceTest, ReadsBackAsASequence) {
   EXPECT_EQ(Read(Dir() + "/rgb/000001.png").size(), cv::Size(160, 120));
 }
 
-// Where each point of the true surfaces falls into the frames.
+// Projects the points of the true surfaces to the frames.
 TEST_F(MakeSequenceTest, TruthAgreesWithMasksAndDepth) {
   ASSERT_TRUE(MakeSequence(Small(), Dir()).ok());
   const auto sequence = files::Sequence::Open(Dir(), {.use_depth = true});
@@ -108,7 +108,7 @@ TEST_F(MakeSequenceTest, TruthAgreesWithMasksAndDepth) {
             nearest_m = std::min(nearest_m, depth.at<uint16_t>(near_v, near_u) * sequence->depth_scale());
           }
         }
-        // Something true in front of all that the camera sees would hang in the air.
+        // No true point may be in front of the rendered depth.
         in_free_space += nearest_m - p.z() > 0.005 ? 1 : 0;
       }
     }
@@ -116,19 +116,19 @@ TEST_F(MakeSequenceTest, TruthAgreesWithMasksAndDepth) {
     for (size_t k = 0; k < seen.size(); ++k) {
       if (seen[k] > 0) {
         ++seen_count;
-        ASSERT_TRUE(matched[k]) << object.name << " point " << k << " is said to be seen, but no frame shows it";
+        ASSERT_TRUE(matched[k]) << object.name << " point " << k << " is marked as seen, but not visible in any frame";
         ASSERT_EQ(source[k], 0) << "the underside cannot be seen";
       }
     }
     EXPECT_GT(seen_count, seen.size() / 10) << object.name;
-    EXPECT_LT(seen_count, seen.size()) << object.name << ": four near views cannot show all";
-    // At this coarse resolution thin parts fall between the pixels.
+    EXPECT_LT(seen_count, seen.size()) << object.name << ": four similar views cannot show everything";
+    // Thin parts are below this coarse resolution.
     EXPECT_LT(in_free_space, static_cast<int>(seen.size() / 20)) << object.name;
-    EXPECT_GT(std::count(source.begin(), source.end(), 2), 0) << object.name << " stands on something";
+    EXPECT_GT(std::count(source.begin(), source.end(), 2), 0) << object.name << " has an underside";
   }
 }
 
-TEST_F(MakeSequenceTest, CloudsLieOnTheMeshesAndFillTheCuboids) {
+TEST_F(MakeSequenceTest, CloudsAreOnTheMeshesAndFillTheCuboids) {
   ASSERT_TRUE(MakeSequence(Small(), Dir()).ok());
   const auto objects = files::ReadObjects(Dir() + "/objects.yaml");
   ASSERT_TRUE(objects.ok()) << objects.status();
@@ -154,7 +154,7 @@ TEST_F(MakeSequenceTest, CloudsLieOnTheMeshesAndFillTheCuboids) {
   }
 }
 
-TEST_F(MakeSequenceTest, IsTheSameOnOneThreadAndOnFour) {
+TEST_F(MakeSequenceTest, IsIdenticalForOneAndFourThreads) {
   SynthOptions options = Small();
   options.frames = 2;
   options.path = PathKind::kHandheld;
@@ -171,7 +171,7 @@ TEST_F(MakeSequenceTest, IsTheSameOnOneThreadAndOnFour) {
   for (const auto& [name, bytes] : one) EXPECT_TRUE(four.at(name) == bytes) << name << " differs";
 }
 
-TEST_F(MakeSequenceTest, FaultsShowInMasksAndTables) {
+TEST_F(MakeSequenceTest, FaultsAppearInMasksAndTables) {
   SynthOptions options = Small();
   options.frames = 8;
   options.width_px = 64;
@@ -200,10 +200,10 @@ TEST_F(MakeSequenceTest, FaultsShowInMasksAndTables) {
   }
   EXPECT_LT(instances, 16U) << "some were dropped";
   EXPECT_GT(instances, 3U);
-  EXPECT_EQ(classes_of_label[1].size(), 2U) << "label 1 means one thing here and another there";
+  EXPECT_EQ(classes_of_label[1].size(), 2U) << "label 1 has different classes in different frames";
 }
 
-TEST_F(MakeSequenceTest, CutFramesAreGoneAndRepeatedOnesListTheSamePicture) {
+TEST_F(MakeSequenceTest, OmitsCutFramesAndListsRepeatedImagesAgain) {
   SynthOptions options = Small();
   options.frames = 8;
   options.width_px = 64;
@@ -216,9 +216,9 @@ TEST_F(MakeSequenceTest, CutFramesAreGoneAndRepeatedOnesListTheSamePicture) {
   ASSERT_TRUE(sequence.ok()) << sequence.status();
   ASSERT_EQ(sequence->size(), 6U);
   EXPECT_EQ(sequence->timestamp_ns(1), 40000000);
-  EXPECT_EQ(sequence->timestamp_ns(2), 160000000) << "time goes on during a cut";
+  EXPECT_EQ(sequence->timestamp_ns(2), 160000000) << "timestamps include the cut";
   EXPECT_FALSE(fs::exists(Dir() + "/rgb/000003.png"));
-  // 1 1 - - 5 5 5 8: each picture stays until the next stretch.
+  // 1 1 - - 5 5 5 8: each image repeats until the next range.
   const auto first = sequence->Load(0);
   const auto repeated = sequence->Load(1);
   const auto after_cut = sequence->Load(2);
@@ -234,29 +234,29 @@ TEST_F(MakeSequenceTest, CutFramesAreGoneAndRepeatedOnesListTheSamePicture) {
   EXPECT_EQ(cv::countNonZero(Read(Dir() + "/depth/000008.png")), 0);
 }
 
-TEST_F(MakeSequenceTest, RefusesBadOptionsByName) {
+TEST_F(MakeSequenceTest, NamesInvalidOptions) {
   SynthOptions options;
   options.objects = 17;
   options.fps = NAN;
   options.mask_drop_share = 1.5;
   const absl::Status status = MakeSequence(options, Dir());
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  for (const char* name : {"objects = 17", "fps", "mask_drop_share"}) {
+  for (const char* name : {"objects is 17", "fps", "mask_drop_share"}) {
     EXPECT_NE(Message(status).find(name), std::string::npos) << status;
   }
   EXPECT_EQ(Message(status).find("frames"), std::string::npos) << status;
-  EXPECT_FALSE(fs::exists(Dir())) << "nothing is written";
+  EXPECT_FALSE(fs::exists(Dir())) << "no files are written";
 
   SynthOptions ranges;
   ranges.cuts = {{5, 2}};
   ranges.black = {{0, 3}};
   ranges.blurred = {{290, 301}};
-  for (const char* name : {"cut = 5:2", "black = 0:3", "blurred = 290:301", "1:300"}) {
+  for (const char* name : {"cut is 5:2", "black is 0:3", "blurred is 290:301", "1:300"}) {
     EXPECT_NE(Message(ValidateSynthOptions(ranges)).find(name), std::string::npos) << name;
   }
   SynthOptions nothing;
   nothing.cuts = {{1, 200}, {150, 300}};
-  EXPECT_EQ(Message(ValidateSynthOptions(nothing)), "synthetic sequence: cut leaves no frame");
+  EXPECT_EQ(Message(ValidateSynthOptions(nothing)), "synthetic sequence: cut removes all frames");
 
   SynthOptions twins;
   twins.objects = 3;
@@ -264,10 +264,10 @@ TEST_F(MakeSequenceTest, RefusesBadOptionsByName) {
   EXPECT_NE(Message(ValidateSynthOptions(twins)).find("identical_pairs"), std::string::npos);
 }
 
-TEST_F(MakeSequenceTest, SaysWhichFolderItCannotMake) {
+TEST_F(MakeSequenceTest, ReportsAMissingParentFolder) {
   const absl::Status status = MakeSequence(Small(), Dir("missing") + "/sequence");
-  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_NE(Message(status).find("missing/sequence"), std::string::npos) << status;
+  EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+  EXPECT_NE(Message(status).find("missing/sequence: cannot create"), std::string::npos) << status;
 }
 
 }  // namespace

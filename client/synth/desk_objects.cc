@@ -13,7 +13,7 @@ constexpr float kPi = std::numbers::pi_v<float>;
 
 float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
 
-// One closed book lying flat with its lower cover at `bottom_m`: two covers, a spine, and pages set back on three
+// Adds a closed book lying flat with its bottom at `bottom_m`: two covers, a spine, and pages that are inset on three
 // sides.
 void AddBook(Solid& solid, Random& random, float half_x_m, float half_y_m, float thickness_m, float bottom_m,
              float turn_rad) {
@@ -39,7 +39,7 @@ void AddBook(Solid& solid, Random& random, float half_x_m, float half_y_m, float
       pages);
 }
 
-// The stem of a lamp or the like: a tube through the corners of a bent path.
+// A curved tube through the given points, e.g. the stem of a lamp.
 Mesh Arm(const std::vector<Point>& corners, float radius_m) { return Tube(Smooth(corners, 8), radius_m); }
 
 }  // namespace
@@ -73,7 +73,7 @@ Solid MakeLaptop(Random& random) {
   Material keys = RandomMaterial(Pattern::kTiles, 0.014F, random);
   keys.colors = {FromHsv(0.6, 0.05, 0.2), FromHsv(0.6, 0.05, 0.28), FromHsv(0.6, 0.03, 0.55)};
   const Material screen = RandomMaterial(Pattern::kPrint, 0.035F, random);
-  // The lid stands up from the back edge, leaning backwards (to +y).
+  // The lid rises from the back edge and leans backward (+y).
   const Eigen::Quaternionf lean = Turn(0.5F * kPi - tilt_rad, Point::UnitX());
   const Point hinge(0, half.y() - 0.004F, 2 * half.z());
   return {
@@ -93,7 +93,7 @@ Solid MakeLamp(Random& random) {
   const float shade_m = In(random, 0.045, 0.058);
   const Profile base =
       Smooth(Profile{{0.055F, 0}, {0.056F, 0.006F}, {0.045F, 0.013F}, {0.012F, 0.018F}, {0.006F, 0.026F}});
-  // A cone open downwards: outside up to the socket, inside back down.
+  // A cone that is open at the bottom, with an inner and an outer side.
   const float top_m = 0.055F;
   const Profile shade = {{0.003F, top_m - 0.006F},
                          {0.013F, top_m - 0.006F},
@@ -127,7 +127,7 @@ Solid MakeClock(Random& random) {
                         {0.9F * radius_m, half_depth_m},  {0.88F * radius_m, 0.7F * half_depth_m}};
   const Eigen::Quaternionf upright = Turn(0.5F * kPi, Point::UnitX());
   const Point center(0, 0, radius_m + 0.012F);
-  const float face_m = -0.7F * half_depth_m;  // after turning, the face looks to -y
+  const float face_m = -0.7F * half_depth_m;  // the face points to -y after the rotation
   Solid solid{"clock", {{Moved(Revolve(drum), upright, center), RandomMaterial(Pattern::kSpeckle, 0.02F, random)}}};
   const Material marks = RandomMaterial(Pattern::kPlain, 0.01F, random);
   for (int hour = 0; hour < 12; ++hour) {
