@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
-# Measures many objects at once: streams a synthetic sequence of twelve objects at 25 Hz, tracking and training on the
-# same machine, and prints a Markdown table of each object against the paper's Table 1 (accuracy .431 cm, completion
-# .248 cm, 80.85 % under 0.4 cm, 98.93 % under 1 cm), of the surface that the cameras saw.
+# Measures a map with many objects: maps a synthetic sequence of twelve objects at 25 Hz, with tracking and training on
+# the same machine, and prints a Markdown table that compares each object with Table 1 of the paper (accuracy 0.431 cm,
+# completion 0.248 cm, 80.85 % below 0.4 cm, 98.93 % below 1 cm), for the surface that some camera saw.
 #
 #   tests/bench/crowd_quality.sh BUILD_DIR OUT_DIR [SEQUENCE]
 #
-# FRAMES, OBJECTS and SEED in the environment change the sequence (300, 12, 1), POSES=none tracks the camera from the
-# images. All objects are done at the latest when training after the last frame is. Other work on the machine makes the
-# figures worse: the table ends with the load it began and ended with.
+# The environment variables FRAMES, OBJECTS and SEED change the sequence (300, 12, 1); POSES=none tracks the camera from
+# the images. Other load on the machine degrades the figures, so the load average before and after the run is printed.
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,12s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
 frames=${FRAMES:-300} objects=${OBJECTS:-12} seed=${SEED:-1}
 romap=$build/client/cli/romap
@@ -23,7 +22,7 @@ load=$(cut -d' ' -f1 /proc/loadavg)
   --out "$out/crowd.map" --no-pictures >"$out/crowd.txt"
 awk -v load="$load to $(cut -d' ' -f1 /proc/loadavg)" '
   / rejected, .* dropped\)/ { run = $0 }
-  / acc +acc.seen / { meshes = 1; print "| object | accuracy | completion | < 0.4 cm | < 1 cm | at the paper'"'"'s row |"
+  / acc +acc.seen / { meshes = 1; print "| object | accuracy | completion | < 0.4 cm | < 1 cm | reaches the paper |"
                       print "| --- | --- | --- | --- | --- | --- |"; next }
   /^cuboids/ { meshes = 0 }
   meshes && NF >= 10 {

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Measures whole runs: streams sequences through a romap-server on loopback at the recorded rate, with the labels of every
-# frame renamed at random, and prints a Markdown table of what came out against ground truth.
+# Measures complete runs: streams sequences through a romap-server on loopback at the recorded rate, with labels permuted
+# in each frame, and prints a Markdown table of the results against the ground truth.
 #
 #   tests/bench/map_quality.sh BUILD_DIR OUT_DIR [SEQUENCE...]
 #
-# POSES=none in the environment tracks the camera from the images. Without SEQUENCE it makes three synthetic ones (150 frames, five objects, seeds 1 to 3) in OUT_DIR. Figures are means
-# over the objects, of the surface that the cameras saw; distances in cm.
+# The environment variable POSES=none tracks the camera from the images. Without SEQUENCE, renders three synthetic
+# sequences (150 frames, five objects, seeds 1 to 3) in OUT_DIR. The figures are means over the objects, for the surface
+# that some camera saw; distances are in cm.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
@@ -31,15 +32,15 @@ for _ in $(seq 100); do
 done
 [ -n "$address" ] || { cat "$out/server.out" "$out/server.err" >&2; exit 1; }
 
-echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | server, client memory |'
+echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | peak memory of server, client |'
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
 for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
   "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 \
     --poses "${POSES:-given}" --out "$out/$name.map" --no-pictures >"$out/$name.txt"
   awk -v name="$name" '
-    / rejected, .* dropped\)/ { dropped = $7; for (i = 1; i < NF; ++i) if ($i == "for") training = $(i + 1) }
-    /^memory:/ { memory = $3 " MB, " $6 " MB" }
+    / rejected, .* dropped\)/ { dropped = $7; for (i = 1; i < NF; ++i) if ($i == "took") training = $(i + 1) }
+    /^peak memory:/ { memory = $4 " MiB, " $7 " MiB" }
     /^[0-9]+_/ && / s +[0-9]+ +[0-9.]+ s +[0-9.]+ s$/ { if ($(NF-3) > cuboid) cuboid = $(NF-3); if ($(NF-1) > mesh) mesh = $(NF-1) }
     /^mean/ && !found { found = $2 " of " $4; acc = $6; comp = $8; r04 = $10; r1 = $12; next }
     /^mean / && NF <= 8 { iou = $5 }

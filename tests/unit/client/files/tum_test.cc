@@ -1,61 +1,18 @@
+#include "client/files/tum.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 
-#include "client/files/associate.h"
-#include "client/files/text_file.h"
-#include "client/files/tum.h"
-
 namespace romap::files {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::Pair;
 
 std::string TempPath(const std::string& name) {
   return testing::TempDir() + "romap_" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name;
-}
-
-TEST(ParseSecondsTest, KeepsAllDigitsOfAUnixTime) {
-  EXPECT_EQ(ParseSeconds("1700000000.123456789"), 1700000000123456789);
-  EXPECT_EQ(ParseSeconds("0.0333333333"), 33333333);
-  EXPECT_EQ(ParseSeconds("0.9999999996"), 1000000000);
-  EXPECT_EQ(ParseSeconds("-0.5"), -500000000);
-  EXPECT_EQ(ParseSeconds("+7"), 7000000000);
-  EXPECT_EQ(ParseSeconds("1.5e-3"), 1500000);
-  EXPECT_EQ(ParseSeconds("1.2.3"), std::nullopt);
-  EXPECT_EQ(ParseSeconds("inf"), std::nullopt);
-  EXPECT_EQ(ParseSeconds("1e12"), std::nullopt);
-  for (const int64_t t_ns : {int64_t{0}, int64_t{-1}, int64_t{-1500000000}, int64_t{1700000000123456789}}) {
-    EXPECT_EQ(ParseSeconds(FormatSeconds(t_ns)), t_ns);
-  }
-}
-
-TEST(ReadTableTest, SplitsAtBlanksOrCommas) {
-  const std::string path = TempPath("table");
-  std::ofstream(path) << "# head\n\n 1 \t two  3 # tail\r\na b";
-  const auto words = ReadTable(path, ' ');
-  ASSERT_TRUE(words.ok());
-  EXPECT_EQ((*words)[0].number, 3);
-  EXPECT_THAT((*words)[0].fields, ElementsAre("1", "two", "3"));
-  EXPECT_THAT((*words)[1].fields, ElementsAre("a", "b"));
-  std::ofstream(path) << "1, potted plant ,,\n";
-  EXPECT_THAT((*ReadTable(path, ','))[0].fields, ElementsAre("1", "potted plant", "", ""));
-  std::filesystem::remove(path);
-  EXPECT_EQ(ReadTable(path, ',').status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(ReadTable(testing::TempDir(), ',').status().code(), absl::StatusCode::kPermissionDenied) << "a folder";
-}
-
-TEST(AssociateTimestampsTest, PairsOneToOneAndClosestFirst) {
-  const std::vector<int64_t> a{0, 100, 200, 300};
-  const std::vector<int64_t> b{95, 104, 190, 1000};
-  EXPECT_THAT(AssociateTimestamps(a, b, 10), ElementsAre(Pair(1, 1), Pair(2, 2)));
-  EXPECT_THAT(AssociateTimestamps(a, b, 9), ElementsAre(Pair(1, 1)));
-  EXPECT_THAT(AssociateTimestamps(a, b, 100), ElementsAre(Pair(0, 0), Pair(1, 1), Pair(2, 2)));
-  EXPECT_TRUE(AssociateTimestamps(a, {}, 10).empty());
 }
 
 TEST(TumTest, RoundTripSortsByTime) {

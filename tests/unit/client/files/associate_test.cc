@@ -1,0 +1,22 @@
+#include "client/files/associate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace romap::files {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::Pair;
+
+TEST(AssociateTimestampsTest, PairsOneToOneAndClosestFirst) {
+  const std::vector<int64_t> a{0, 100, 200, 300};
+  const std::vector<int64_t> b{95, 104, 190, 1000};
+  EXPECT_THAT(AssociateTimestamps(a, b, 10), ElementsAre(Pair(1, 1), Pair(2, 2)));
+  EXPECT_THAT(AssociateTimestamps(a, b, 9), ElementsAre(Pair(1, 1)));
+  EXPECT_THAT(AssociateTimestamps(a, b, 100), ElementsAre(Pair(0, 0), Pair(1, 1), Pair(2, 2)));
+  EXPECT_TRUE(AssociateTimestamps(a, {}, 10).empty());
+}
+
+}  // namespace
+}  // namespace romap::files
