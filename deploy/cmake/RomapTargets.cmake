@@ -65,6 +65,21 @@ target_precompile_headers(romap_precompiled PRIVATE
   <algorithm> <chrono> <cmath> <cstdint> <functional> <map> <memory> <mutex> <optional> <string> <thread> <vector>
   <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>)
 
+# Tests also share GoogleTest. Their own code needs no speed, so they are compiled with little optimization.
+set(ROMAP_TEST_OPTIMIZATION -O1)
+if(ROMAP_BUILD_TESTS)
+  find_package(GTest CONFIG REQUIRED)
+  file(WRITE ${CMAKE_BINARY_DIR}/precompiled_tests.cc "")
+  add_library(romap_precompiled_tests OBJECT ${CMAKE_BINARY_DIR}/precompiled_tests.cc)
+  target_link_libraries(romap_precompiled_tests PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor
+                                                        fmt::fmt GTest::gmock)
+  target_compile_options(romap_precompiled_tests PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
+  target_precompile_headers(romap_precompiled_tests PRIVATE
+    <algorithm> <chrono> <cmath> <cstdint> <filesystem> <fstream> <functional> <map> <memory> <mutex> <optional> <random>
+    <string> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>
+    <gmock/gmock.h> <gtest/gtest.h>)
+endif()
+
 function(romap_precompile target)
   target_precompile_headers(${target} REUSE_FROM romap_precompiled)
   target_link_libraries(${target} PRIVATE fmt::fmt)
@@ -100,7 +115,8 @@ function(romap_tests name)
     return()
   endif()
   add_executable(${name}_test ${sources})
-  target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main)
-  romap_precompile(${name}_test)
+  target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main fmt::fmt)
+  target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
+  target_compile_options(${name}_test PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
   gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
 endfunction()
