@@ -1,0 +1,126 @@
+#include "server/session/frame_ledger.h"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/status.h"
+
+namespace romap::session {
+namespace {
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+void FrameLedger::CountReceived(bool is_frame) {
+  ++inputs_received_;
+  if (is_frame) ++frames_received_;
+}
+
+void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& tracked) {
+  const FrameInput& input = std::get<FrameInput>(arrival.input);
+  const bool has_pose = tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalized;
+  FrameAck ack;
+  ack.frame_id = input.frame_id;
+  ack.state = tracked.state;
+  if (has_pose) ack.T_world_camera = tracked.T_world_camera;
+  ack.is_keyframe = tracked.is_keyframe;
+  ack.latency_s = SecondsSince(arrival.time);
+  ack.state_reason = tracked.reason;
+  map_->Acknowledge(std::move(ack), input.timestamp_ns, tracked.reference, tracked.T_reference_camera);
+}
+
+void FrameLedger::AcknowledgeMasks(const FrameMasks& masks) {
+  map_->Acknowledge(MasksAck{.frame_id = masks.frame_id, .accepted = true, .error = ""});
+}
+
+void FrameLedger::Reject(const Arrival& arrival, const absl::Status& why) {
+  if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
+    ++frames_rejected_;
+    spdlog::info("session {}: frame {} rejected: {}", session_id_, frame->frame_id, Message(why));
+  } else {
+    const uint64_t frame_id = std::get<MasksInput>(arrival.input).frame_id;
+    spdlog::info("session {}: masks of frame {} rejected: {}", session_id_, frame_id, Message(why));
+  }
+  Refuse(arrival, Message(why), TrackingState::kLost);
+}
+
+void FrameLedger::Drop(const Arrival& arrival) {
+  if (std::holds_alternative<FrameInput>(arrival.input)) ++frames_dropped_;
+  Refuse(arrival, "dropped: the server cannot keep up with the live stream", TrackingState::kTracking);
+}
+
+void FrameLedger::Refuse(const Arrival& arrival, std::string why, TrackingState state) {
+  if (const auto* masks = std::get_if<MasksInput>(&arrival.input)) {
+    map_->Acknowledge(MasksAck{.frame_id = masks->frame_id, .accepted = false, .error = std::move(why)});
+  } else {
+    const FrameInput& frame = std::get<FrameInput>(arrival.input);
+    FrameAck ack;
+    ack.frame_id = frame.frame_id;
+    ack.accepted = false;
+    ack.error = std::move(why);
+    ack.state = state;
+    ack.latency_s = SecondsSince(arrival.time);
+    map_->Acknowledge(std::move(ack), frame.timestamp_ns);
+  }
+  Settle();
+}
+
+void FrameLedger::CountMappedFrame(bool is_keyframe, size_t map_points) {
+  if (is_keyframe) ++keyframes_;
+  map_points_ = map_points;
+  ++frames_processed_;
+  Settle();
+}
+
+void FrameLedger::Settle() {
+  std::vector<std::function<void()>> due;
+  {
+    std::lock_guard lock(mutex_);
+    ++inputs_settled_;
+    const auto end = waiters_.upper_bound(inputs_settled_);
+    for (auto it = waiters_.begin(); it != end; ++it) due.push_back(std::move(it->second));
+    waiters_.erase(waiters_.begin(), end);
+  }
+  for (const auto& done : due) done();
+}
+
+void FrameLedger::SettleAll() {
+  std::multimap<uint64_t, std::function<void()>> due;
+  {
+    std::lock_guard lock(mutex_);
+    all_settled_ = true;
+    due.swap(waiters_);
+  }
+  for (const auto& [target, done] : due) done();
+}
+
+void FrameLedger::WhenSettled(std::function<void()> done) {
+  {
+    std::lock_guard lock(mutex_);
+    const uint64_t target = inputs_received_;
+    if (!all_settled_ && inputs_settled_ < target) {
+      waiters_.emplace(target, std::move(done));
+      return;
+    }
+  }
+  done();
+}
+
+void FrameLedger::FillIn(Statistics* statistics) const {
+  statistics->frames_received = frames_received_;
+  statistics->frames_processed = frames_processed_;
+  statistics->frames_dropped = frames_dropped_;
+  statistics->frames_rejected = frames_rejected_;
+  statistics->keyframes = keyframes_;
+  statistics->map_points = map_points_;
+}
+
+}  // namespace romap::session

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <absl/status/status.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "common/map_events.h"
+#include "common/stage_messages.h"
+#include "server/session/arrival.h"
+#include "server/session/map_state.h"
+
+namespace romap::session {
+
+// Keeps account of the inputs (frames and late masks) of one session: counts them, acknowledges them to the client, and
+// reports when all inputs received so far are settled. An input is settled once it is mapped, rejected, dropped or
+// skipped. Thread-safe.
+class FrameLedger {
+ public:
+  // `map` sends the acknowledgements and outlives the ledger.
+  FrameLedger(std::string session_id, MapState* map) : session_id_(std::move(session_id)), map_(map) {}
+
+  void CountReceived(bool is_frame);
+
+  // The acknowledgement of an accepted input.
+  void AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& tracked);
+  void AcknowledgeMasks(const FrameMasks& masks);
+
+  // Each of these settles one input. Reject: malformed. Drop: the live queue was full. SkipMapping: acknowledged, but
+  // not mapped, because mapping is behind a live stream.
+  void Reject(const Arrival& arrival, const absl::Status& why);
+  void Drop(const Arrival& arrival);
+  void SkipMapping() { Settle(); }
+  void CountMappedFrame(bool is_keyframe, size_t map_points);
+  void CountMappedMasks() { Settle(); }
+
+  // No further input will be settled.
+  void SettleAll();
+  // Calls `done` once all inputs received before this call are settled: at once, or later on the thread that settles
+  // the last of them.
+  void WhenSettled(std::function<void()> done);
+
+  // Sets the counters of frames, keyframes and map points.
+  void FillIn(Statistics* statistics) const;
+
+ private:
+  void Refuse(const Arrival& arrival, std::string why, TrackingState state);
+  void Settle();
+
+  const std::string session_id_;
+  MapState* const map_;
+
+  std::atomic<uint64_t> inputs_received_ = 0;  // frames and late masks
+  std::atomic<uint64_t> frames_received_ = 0, frames_processed_ = 0, frames_dropped_ = 0, frames_rejected_ = 0;
+  std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
+
+  std::mutex mutex_;
+  uint64_t inputs_settled_ = 0;
+  bool all_settled_ = false;
+  std::multimap<uint64_t, std::function<void()>> waiters_;  // by the number of inputs that must be settled
+};
+
+}  // namespace romap::session

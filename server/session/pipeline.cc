@@ -1,0 +1,143 @@
+#include "server/session/pipeline.h"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+#include <variant>
+
+#include "common/status.h"
+
+namespace romap::session {
+
+// ---------------------------------------------------------------------------------------------------- the data path
+
+void Pipeline::Process(const Arrival& arrival, const MappingExecutor& execute) {
+  if (std::holds_alternative<FrameInput>(arrival.input)) {
+    ProcessFrame(arrival, execute);
+  } else {
+    ProcessLateMasks(arrival, execute);
+  }
+}
+
+void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execute) {
+  // Ingest.
+  const auto frame = ingest_.Accept(std::get<FrameInput>(arrival.input));
+  if (!frame.ok()) return ledger_->Reject(arrival, frame.status());
+  Record(arrival.input);
+
+  // Track.
+  slam::TrackedImage image = tracker_.Track(*frame);
+  ledger_->AcknowledgeFrame(arrival, image.tracked);
+  const bool is_lost = image.tracked.state == TrackingState::kLost;
+  MappingStep step;
+  step.is_keyframe = image.tracked.is_keyframe;
+  step.may_be_skipped = !image.tracked.is_keyframe && !image.start;
+  step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.start || is_lost);
+
+  step.run = [this, image = std::move(image)] {
+    // Map.
+    const slam::MappedFrame mapped = sparse_mapper_.Process(image);
+    if (mapped.begun_anew) Publish(object_mapper_.Reset());
+    if (mapped.correction) Correct(*mapped.correction);
+    // Objects. Publish() sends them to the clients, and their new views to the fields.
+    Publish(object_mapper_.ObserveFrame(mapped.tracked));
+    if (mapped.view) Publish(object_mapper_.ObserveKeyframe(*mapped.view));
+    ledger_->CountMappedFrame(mapped.view.has_value(), sparse_mapper_.points());
+  };
+  execute(std::move(step));
+}
+
+// Late masks take the same path, so that every stage has processed the frame before its masks.
+void Pipeline::ProcessLateMasks(const Arrival& arrival, const MappingExecutor& execute) {
+  auto masks = ingest_.AcceptMasks(std::get<MasksInput>(arrival.input));
+  if (!masks.ok()) return ledger_->Reject(arrival, masks.status());
+  Record(arrival.input);
+  ledger_->AcknowledgeMasks(*masks);
+
+  MappingStep step;
+  step.run = [this, masks = *std::move(masks)] {
+    sparse_mapper_.ObserveMasks(masks);
+    Publish(object_mapper_.ObserveLateMasks(masks));
+    ledger_->CountMappedMasks();
+  };
+  execute(std::move(step));
+}
+
+void Pipeline::Correct(const MapCorrection& correction) {
+  map_->Correct(correction);
+  Publish(object_mapper_.Correct(correction));
+}
+
+// Objects -> clients and fields.
+void Pipeline::Publish(objects::ObjectOutput output) {
+  // First, because the object updates below publish the corrected mesh poses, and because a field must not make meshes
+  // in the corrected world before the map is corrected.
+  for (const ObjectViews& views : output.views) {
+    if (views.S_new_old) map_->MoveObject(views.object, *views.S_new_old);
+  }
+  for (MapEvent& event : output.events) PublishEvent(std::move(event));
+  for (ObjectViews& views : output.views) pool_->Offer(pool_client_, std::move(views));
+}
+
+void Pipeline::PublishEvent(MapEvent event) {
+  ObjectId ended;
+  if (const auto* removed = std::get_if<ObjectRemoved>(&event)) ended = removed->id;
+  if (const auto* merged = std::get_if<ObjectMerged>(&event)) ended = merged->from;
+  if (ended) {
+    pool_->Remove(pool_client_, ended);
+    mesher_->Remove(mesher_session_, ended);
+  }
+  map_->Apply(std::move(event));
+}
+
+// Fields -> meshes. Called by the training pool.
+void Pipeline::MeshField(FieldSnapshot snapshot) { mesher_->Offer(mesher_session_, std::move(snapshot)); }
+
+// Meshes -> clients. Called by the mesher.
+void Pipeline::PublishMesh(MeshUpdate mesh, const MeshPose& pose) { map_->PublishMesh(std::move(mesh), pose); }
+
+void Pipeline::FinishMapping() {
+  Correct(sparse_mapper_.Finish());
+  Publish(object_mapper_.Finish());
+  pool_->Finish(pool_client_);
+}
+
+// -------------------------------------------------------------------------------------------------------------------
+
+Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config,
+                   nerf::TrainingPool* pool, Mesher* mesher, MapState* map, FrameLedger* ledger,
+                   std::unique_ptr<wire::RecordingWriter> recorder)
+    : session_id_(std::move(session_id)),
+      pool_(pool),
+      mesher_(mesher),
+      map_(map),
+      ledger_(ledger),
+      ingest_(options.camera, config.objects.max_mask_delay_s),
+      recorder_(std::move(recorder)),
+      tracker_(config.slam, options.pose_use, &local_map_),
+      sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
+      object_mapper_(config.objects) {
+  mesher_session_ =
+      mesher_->Register([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
+  pool_client_ = pool_->Register([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
+}
+
+Pipeline::~Pipeline() {
+  pool_->Unregister(pool_client_);
+  mesher_->Unregister(mesher_session_);
+}
+
+// A disk that fails ends the recording, but not the session.
+void Pipeline::Record(const SessionInput& input) {
+  if (!recorder_) return;
+  const absl::Status status = recorder_->Append(input);
+  if (status.ok()) return;
+  spdlog::error("session {}: recording stopped: {}", session_id_, Message(status));
+  recorder_ = nullptr;
+}
+
+bool Pipeline::IsTrainingDone() const { return pool_->Idle(pool_client_) && mesher_->Idle(mesher_session_); }
+
+void Pipeline::TrainSlices(int count) { pool_->TrainSlices(pool_client_, count); }
+
+}  // namespace romap::session

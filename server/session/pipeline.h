@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/field_snapshot.h"
+#include "common/mapping_service.h"
+#include "common/stage_messages.h"
+#include "common/wire/recording.h"
+#include "server/nerf/training_pool.h"
+#include "server/objects/object_mapper.h"
+#include "server/session/arrival.h"
+#include "server/session/frame_ledger.h"
+#include "server/session/ingest.h"
+#include "server/session/map_state.h"
+#include "server/session/mesh_pose.h"
+#include "server/session/mesher.h"
+#include "server/session/server_config.h"
+#include "server/slam/sparse_mapper.h"
+#include "server/slam/tracker.h"
+
+namespace romap::session {
+
+// The second half of an input's processing, as a task for the thread that maps.
+struct MappingStep {
+  std::function<void()> run;
+  bool is_keyframe = false;
+  bool may_be_skipped = false;     // under load; the map only lacks the object masks of this frame
+  bool changes_local_map = false;  // later frames are tracked against the result
+};
+
+// The stages of one session and the data path through them:
+//
+//   Ingest -> Tracker -> SparseMapper -> ObjectMapper -> TrainingPool -> Mesher -> MapState -> clients
+//
+// Process() reads in that order. The pipeline has no thread: the caller runs Process() on one thread and the
+// MappingSteps, in their order, on the same or on a second one. The sparse map goes back to the tracker as a value
+// (LocalMapSlot). The training pool and the mesher belong to the server; they call MeshField() and PublishMesh().
+class Pipeline {
+ public:
+  // Runs the step, or queues it for the thread that maps.
+  using MappingExecutor = std::function<void(MappingStep)>;
+
+  // `pool`, `mesher`, `map` and `ledger` outlive the pipeline. `recorder` gets every accepted input; may be null.
+  Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
+           Mesher* mesher, MapState* map, FrameLedger* ledger, std::unique_ptr<wire::RecordingWriter> recorder);
+  ~Pipeline();  // neither the pool nor the mesher calls back afterwards
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  // Processes a frame or late masks. `execute` is called at most once, before Process() returns: not at all for an
+  // input that is rejected.
+  void Process(const Arrival& arrival, const MappingExecutor& execute);
+
+  // On the thread that maps, after the last step: the last corrections and cuboids. Fields then train to the end of
+  // their plans.
+  void FinishMapping();
+  bool IsTrainingDone() const;  // and all meshes are published; meaningful after FinishMapping()
+  // For a training pool without threads: trains for at most `count` slices.
+  void TrainSlices(int count);
+
+  // From any thread: asks bundle adjustment to end early while keyframes wait.
+  void CutAdjustmentShort(bool keyframes_wait) { sparse_mapper_.Hurry(keyframes_wait); }
+
+  nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_client_); }
+
+ private:
+  void ProcessFrame(const Arrival& arrival, const MappingExecutor& execute);
+  void ProcessLateMasks(const Arrival& arrival, const MappingExecutor& execute);
+  void Record(const SessionInput& input);
+  void Correct(const MapCorrection& correction);
+  void Publish(objects::ObjectOutput output);
+  void PublishEvent(MapEvent event);
+  void MeshField(FieldSnapshot snapshot);
+  void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
+
+  const std::string session_id_;
+  nerf::TrainingPool* const pool_;
+  Mesher* const mesher_;
+  MapState* const map_;
+  FrameLedger* const ledger_;
+
+  slam::LocalMapSlot local_map_;  // from the mapper to the tracker
+  // Used by Process().
+  Ingest ingest_;
+  std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
+  slam::Tracker tracker_;
+  // Used by the mapping steps.
+  slam::SparseMapper sparse_mapper_;
+  objects::ObjectMapper object_mapper_;
+
+  uint64_t mesher_session_ = 0;
+  uint64_t pool_client_ = 0;
+};
+
+}  // namespace romap::session

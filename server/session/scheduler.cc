@@ -1,0 +1,165 @@
+#include "server/session/scheduler.h"
+
+#include <exception>
+#include <optional>
+#include <utility>
+#include <variant>
+
+namespace romap::session {
+namespace {
+
+// Single thread: slices of training after each keyframe, about what two cores train between two keyframes.
+constexpr int kSlicesPerKeyframe = 4;
+
+constexpr std::chrono::milliseconds kTrainingPollPeriod{20};
+
+}  // namespace
+
+Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger,
+                     Callbacks callbacks)
+    : config_(config),
+      mode_(mode),
+      pipeline_(pipeline),
+      ledger_(ledger),
+      callbacks_(std::move(callbacks)),
+      inputs_(config.frame_queue),
+      steps_(config.mapping_queue) {
+  if (config_.single_thread) {
+    tracking_thread_ = std::thread([this] { RunSingleThread(); });
+  } else {
+    tracking_thread_ = std::thread([this] { RunTracking(); });
+    mapping_thread_ = std::thread([this] { RunMapping(); });
+  }
+}
+
+bool Scheduler::Offer(SessionInput input) {
+  const bool is_frame = std::holds_alternative<FrameInput>(input);
+  Arrival arrival{std::move(input), std::chrono::steady_clock::now()};
+  bool accepted = false;
+  std::optional<Arrival> dropped;
+  if (mode_ == FrameMode::kReplay) {
+    accepted = inputs_.Push(std::move(arrival));
+  } else {
+    dropped = inputs_.PushDroppingOldest(std::move(arrival), &accepted);
+  }
+  if (accepted) ledger_->CountReceived(is_frame);
+  if (dropped) ledger_->Drop(*dropped);
+  return accepted;
+}
+
+void Scheduler::Stop() {
+  stopping_ = true;
+  inputs_.Close();
+  steps_.Close();
+  if (tracking_thread_.joinable()) tracking_thread_.join();
+  if (mapping_thread_.joinable()) mapping_thread_.join();
+}
+
+void Scheduler::RunTracking() {
+  const Pipeline::MappingExecutor execute = [this](MappingStep step) {
+    mode_ == FrameMode::kLive ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
+  };
+  try {
+    while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (!stopping_) pipeline_->Process(*arrival, execute);
+    }
+  } catch (const std::exception& e) {
+    Fail("tracking", e.what());
+  }
+  steps_.Close();
+}
+
+void Scheduler::RunMapping() {
+  const auto period = std::chrono::milliseconds(static_cast<int64_t>(1000 * config_.statistics_period_s));
+  try {
+    while (!steps_.Drained()) {
+      if (const std::optional<MappingStep> step = steps_.PopFor(period)) RunStep(*step);
+      callbacks_.tick();
+    }
+    EndMapping();
+    TrainToTheEnd();
+  } catch (const std::exception& e) {
+    Fail("mapping", e.what());
+    EndMapping();
+  }
+}
+
+void Scheduler::RunSingleThread() {
+  const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteAtOnce(step); };
+  try {
+    while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (!stopping_) pipeline_->Process(*arrival, execute);
+      callbacks_.tick();
+    }
+    EndMapping();
+    TrainToTheEnd();
+  } catch (const std::exception& e) {
+    Fail("mapping", e.what());
+    EndMapping();
+  }
+}
+
+void Scheduler::ExecuteAtOnce(const MappingStep& step) {
+  step.run();
+  if (step.is_keyframe) pipeline_->TrainSlices(kSlicesPerKeyframe);
+}
+
+void Scheduler::ExecuteReplay(MappingStep step) {
+  const bool changes_local_map = step.changes_local_map;
+  if (changes_local_map) {
+    std::lock_guard lock(mutex_);
+    ++map_changes_waiting_;
+  }
+  if (!steps_.Push(std::move(step)) || !changes_local_map) return;
+  std::unique_lock lock(mutex_);
+  local_map_changed_.wait(lock, [&] { return map_changes_waiting_ == 0 || mapping_ended_; });
+}
+
+void Scheduler::ExecuteLive(MappingStep step) {
+  if (step.is_keyframe) pipeline_->CutAdjustmentShort(++keyframes_waiting_ > 0);
+  if (steps_.TryPush(step)) return;
+  if (step.may_be_skipped) return ledger_->SkipMapping();
+  steps_.Push(std::move(step));
+}
+
+void Scheduler::RunStep(const MappingStep& step) {
+  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->CutAdjustmentShort(--keyframes_waiting_ > 0);
+  if (!stopping_) step.run();
+  if (mode_ == FrameMode::kReplay && step.changes_local_map) {
+    std::lock_guard lock(mutex_);
+    --map_changes_waiting_;
+    local_map_changed_.notify_all();
+  }
+}
+
+void Scheduler::EndMapping() {
+  {
+    std::lock_guard lock(mutex_);
+    mapping_ended_ = true;
+    local_map_changed_.notify_all();
+  }
+  ledger_->SettleAll();
+}
+
+void Scheduler::TrainToTheEnd() {
+  if (failed_ || stopping_) return;
+  pipeline_->FinishMapping();
+  while (!stopping_ && !pipeline_->IsTrainingDone()) {
+    if (config_.single_thread) {
+      pipeline_->TrainSlices(1);
+    } else {
+      std::this_thread::sleep_for(kTrainingPollPeriod);
+    }
+    callbacks_.tick();
+  }
+  if (!stopping_) callbacks_.finished();
+}
+
+void Scheduler::Fail(const char* stage, const std::string& what) {
+  failed_ = true;
+  inputs_.Close();
+  steps_.Close();
+  callbacks_.failed(stage, what);
+}
+
+}  // namespace romap::session

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "common/bounded_queue.h"
+#include "common/mapping_service.h"
+#include "server/session/arrival.h"
+#include "server/session/frame_ledger.h"
+#include "server/session/pipeline.h"
+#include "server/session/session_config.h"
+
+namespace romap::session {
+
+// Runs a session's pipeline: queues and threads only.
+//
+//   client threads -> inputs -> [tracking thread: Pipeline::Process()] -> steps -> [mapping thread: MappingStep::run()]
+//
+// Replay: a full queue blocks, and what changes the local map is mapped before the next frame is tracked.
+// Live: a full input queue drops its oldest input; tracking never waits for the mapping of an ordinary frame.
+// Single thread (session.single_thread): the tracking thread maps and trains too, in a fixed order, so that equal input
+// gives an identical map. The training pool and the mesher must have no threads then.
+class Scheduler {
+ public:
+  // Called on the scheduler's threads.
+  struct Callbacks {
+    std::function<void()> tick;      // between steps, and while there are none; at least every statistics period
+    std::function<void()> finished;  // everything is mapped, trained and published
+    std::function<void(const char* stage, const std::string& what)> failed;  // a stage threw; processing stops
+  };
+
+  // Starts the threads. `pipeline` and `ledger` outlive the scheduler.
+  Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger, Callbacks callbacks);
+  ~Scheduler() { Stop(); }
+
+  // Queues an input. False after CloseInputs() or a failure.
+  bool Offer(SessionInput input);
+  // No more inputs. Returns at once; `finished` is called when everything is done.
+  void CloseInputs() { inputs_.Close(); }
+  // Ends the threads without processing or training the rest, and joins them. Not from one of the callbacks.
+  void Stop();
+
+ private:
+  void RunTracking();      // the tracking thread
+  void RunMapping();       // the mapping thread
+  void RunSingleThread();  // both
+
+  // How a mapping step is executed in each mode; called by the pipeline on the tracking thread.
+  void ExecuteAtOnce(const MappingStep& step);
+  void ExecuteReplay(MappingStep step);
+  void ExecuteLive(MappingStep step);
+  void RunStep(const MappingStep& step);
+
+  void TrainToTheEnd();
+  void Fail(const char* stage, const std::string& what);
+  void EndMapping();
+
+  const SessionConfig config_;
+  const FrameMode mode_;
+  Pipeline* const pipeline_;
+  FrameLedger* const ledger_;
+  const Callbacks callbacks_;
+
+  BoundedQueue<Arrival> inputs_;
+  BoundedQueue<MappingStep> steps_;
+  std::atomic<bool> stopping_ = false;
+  std::atomic<bool> failed_ = false;
+
+  std::atomic<int> keyframes_waiting_ = 0;  // live: in `steps_`
+  std::mutex mutex_;
+  std::condition_variable local_map_changed_;
+  int map_changes_waiting_ = 0;  // replay: steps in `steps_` that change the local map
+  bool mapping_ended_ = false;
+
+  std::thread tracking_thread_;
+  std::thread mapping_thread_;
+};
+
+}  // namespace romap::session
