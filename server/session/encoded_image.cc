@@ -50,42 +50,42 @@ std::optional<Size> JpegSize(const std::string& bytes) {
   return std::nullopt;
 }
 
-// libjpeg and libpng fill what is missing of a truncated file with grey; the end markers tell.
+// libjpeg and libpng fill the missing part of a truncated file with gray, so the end markers are checked instead.
 bool HasPngEnd(const std::string& bytes) {
   return bytes.find("IEND", bytes.size() - std::min<size_t>(bytes.size(), 64)) != std::string::npos;
 }
-// A thumbnail in the metadata ends with the same marker, so it must come after the last scan has begun.
+// A thumbnail in the metadata ends with the same marker, so only a marker after the start of the last scan counts.
 bool HasJpegEnd(const std::string& bytes) {
   const size_t end = bytes.rfind("\xFF\xD9");
   const size_t scan = bytes.rfind("\xFF\xDA");
   return end != std::string::npos && scan != std::string::npos && end > scan;
 }
 
-absl::Status CheckSize(const char* what, const Size& size, const CameraModel& camera) {
+absl::Status CheckSize(const char* field, const Size& size, const CameraModel& camera) {
   if (size.width_px == camera.width_px && size.height_px == camera.height_px) return absl::OkStatus();
-  return InvalidArgument("{} is {}x{} px, the session's camera says {}x{} px", what, size.width_px, size.height_px,
-                         camera.width_px, camera.height_px);
+  return InvalidArgument("{}: must be {}x{} px like the session's camera, is {}x{} px", field, camera.width_px,
+                         camera.height_px, size.width_px, size.height_px);
 }
 
-absl::StatusOr<cv::Mat> DecodeFile(const char* what, const char* format, const std::string& bytes,
+absl::StatusOr<cv::Mat> DecodeFile(const char* field, const char* format, const std::string& bytes,
                                    const std::optional<Size>& size, bool has_end, int flags,
                                    const CameraModel& camera) {
-  if (!size) return InvalidArgument("{} is not a {} file ({} bytes)", what, format, bytes.size());
-  ROMAP_RETURN_IF_ERROR(CheckSize(what, *size, camera));
-  if (!has_end) return InvalidArgument("{}: {} file is truncated ({} bytes)", what, format, bytes.size());
+  if (!size) return InvalidArgument("{}: {} bytes are not a {} file", field, bytes.size(), format);
+  ROMAP_RETURN_IF_ERROR(CheckSize(field, *size, camera));
+  if (!has_end) return InvalidArgument("{}: {} file is truncated ({} bytes)", field, format, bytes.size());
   cv::Mat decoded;
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
     decoded = cv::imdecode(buffer, flags);
   } catch (const cv::Exception& e) {
-    return InvalidArgument("{}: {} file cannot be decoded: {}", what, format, e.err);
+    return InvalidArgument("{}: {} file cannot be decoded: {}", field, format, e.err);
   }
-  if (decoded.empty()) return InvalidArgument("{}: {} file is damaged", what, format);
+  if (decoded.empty()) return InvalidArgument("{}: {} file is damaged", field, format);
   return decoded;
 }
 
-absl::StatusOr<cv::Mat> DecodePng(const char* what, const std::string& bytes, int flags, const CameraModel& camera) {
-  return DecodeFile(what, "PNG", bytes, PngSize(bytes), HasPngEnd(bytes), flags, camera);
+absl::StatusOr<cv::Mat> DecodePng(const char* field, const std::string& bytes, int flags, const CameraModel& camera) {
+  return DecodeFile(field, "PNG", bytes, PngSize(bytes), HasPngEnd(bytes), flags, camera);
 }
 
 absl::StatusOr<cv::Mat> DecodeRawColor(const FrameInput& input, const CameraModel& camera) {
@@ -93,8 +93,8 @@ absl::StatusOr<cv::Mat> DecodeRawColor(const FrameInput& input, const CameraMode
   ROMAP_RETURN_IF_ERROR(CheckSize("image", {input.raw_width_px, input.raw_height_px}, camera));
   const size_t expected = static_cast<size_t>(camera.width_px) * camera.height_px * channels;
   if (input.image.size() != expected) {
-    return InvalidArgument("image: {} bytes of raw pixels, {}x{}x{} needs {}", input.image.size(), camera.width_px,
-                           camera.height_px, channels, expected);
+    return InvalidArgument("image: raw pixels must have {}x{}x{} = {} bytes, have {}", camera.width_px,
+                           camera.height_px, channels, expected, input.image.size());
   }
   const cv::Mat view(camera.height_px, camera.width_px, CV_8UC(channels), const_cast<char*>(input.image.data()));
   cv::Mat bgr;
@@ -114,18 +114,18 @@ absl::StatusOr<cv::Mat> DecodeRawColor(const FrameInput& input, const CameraMode
 absl::StatusOr<cv::Mat> ExpandRuns(const std::vector<uint32_t>& runs, const CameraModel& camera) {
   const size_t total = static_cast<size_t>(camera.width_px) * camera.height_px;
   if (runs.size() % 2 != 0)
-    return InvalidArgument("mask: {} run-length numbers, expected (label, length) pairs", runs.size());
+    return InvalidArgument("masks: label_runs must be (label, length) pairs, has {} numbers", runs.size());
   cv::Mat labels(camera.height_px, camera.width_px, CV_16UC1);
   auto* out = labels.ptr<uint16_t>();
   size_t filled = 0;
   for (size_t i = 0; i < runs.size(); i += 2) {
-    if (runs[i] > 65535) return InvalidArgument("mask: label {} of run {} is above 65535", runs[i], i / 2);
+    if (runs[i] > 65535) return InvalidArgument("masks: label of run {} must be in 0..65535, is {}", i / 2, runs[i]);
     if (runs[i + 1] > total - filled) break;
     std::fill_n(out + filled, runs[i + 1], static_cast<uint16_t>(runs[i]));
     filled += runs[i + 1];
     if (i + 2 == runs.size() && filled == total) return labels;
   }
-  return InvalidArgument("mask: run lengths do not add up to {}x{} = {} pixels", camera.width_px, camera.height_px,
+  return InvalidArgument("masks: run lengths must add up to {}x{} = {} pixels", camera.width_px, camera.height_px,
                          total);
 }
 
@@ -146,9 +146,9 @@ absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraMo
 absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera) {
   if (masks.mask_encoding == MaskEncoding::kNone) return cv::Mat();
   if (masks.mask_encoding == MaskEncoding::kRunLength) return ExpandRuns(masks.label_runs, camera);
-  ROMAP_ASSIGN_OR_RETURN(cv::Mat decoded, DecodePng("mask", masks.label_png, cv::IMREAD_UNCHANGED, camera));
+  ROMAP_ASSIGN_OR_RETURN(cv::Mat decoded, DecodePng("masks", masks.label_png, cv::IMREAD_UNCHANGED, camera));
   if (decoded.channels() != 1 || (decoded.depth() != CV_8U && decoded.depth() != CV_16U)) {
-    return InvalidArgument("mask: PNG has {} channels, labels need one channel of 8 or 16 bits", decoded.channels());
+    return InvalidArgument("masks: PNG must have one channel of 8 or 16 bits, has {} channels", decoded.channels());
   }
   cv::Mat labels;
   decoded.convertTo(labels, CV_16U);
@@ -158,17 +158,17 @@ absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraMode
 absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera) {
   if (input.depth_encoding == DepthEncoding::kNone) return cv::Mat();
   if (!std::isfinite(input.depth_scale_mu) || input.depth_scale_mu <= 0) {
-    return InvalidArgument("depth: scale {} map units per unit must be a positive number", input.depth_scale_mu);
+    return InvalidArgument("depth: scale_mu must be a positive number, is {}", input.depth_scale_mu);
   }
   cv::Mat raw;
   if (input.depth_encoding == DepthEncoding::kPng16) {
     ROMAP_ASSIGN_OR_RETURN(raw, DecodePng("depth", input.depth, cv::IMREAD_UNCHANGED, camera));
-    if (raw.type() != CV_16UC1) return InvalidArgument("depth: PNG is not one channel of 16 bits");
+    if (raw.type() != CV_16UC1) return InvalidArgument("depth: PNG must have one channel of 16 bits");
   } else {
     const size_t expected = static_cast<size_t>(camera.width_px) * camera.height_px * 2;
     if (input.depth.size() != expected) {
-      return InvalidArgument("depth: {} bytes, {}x{} values of 16 bits need {}", input.depth.size(), camera.width_px,
-                             camera.height_px, expected);
+      return InvalidArgument("depth: {}x{} values of 16 bits must have {} bytes, have {}", camera.width_px,
+                             camera.height_px, expected, input.depth.size());
     }
     raw = cv::Mat(camera.height_px, camera.width_px, CV_16UC1);
     std::memcpy(raw.data, input.depth.data(), expected);

@@ -12,15 +12,17 @@
 
 namespace romap::session {
 
-// Decodes a frame's colour image to CV_8UC3, BGR. The size is read from the header before anything is decoded, so a
-// small file cannot claim a huge image. INVALID_ARGUMENT: truncated, not of the stated encoding, not the camera's size.
+// Decodes the color image of a frame to CV_8UC3, BGR. The size in the file header is checked before decoding, so that a
+// small file cannot allocate a huge image. INVALID_ARGUMENT: truncated, not in the stated encoding, or not of the
+// camera's size; the message names the field.
 absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera);
 
-// Decodes instance masks to CV_16UC1 labels; empty Mat when there are none (kNone). INVALID_ARGUMENT: as above,
-// or runs that do not add up to the image.
+// Decodes instance masks to CV_16UC1 labels; empty for MaskEncoding::kNone. INVALID_ARGUMENT: as above, or the runs do
+// not add up to the size of the image.
 absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera);
 
-// Decodes a frame's depth to CV_32FC1 in map units, 0 = unknown; empty Mat when the frame has none.
+// Decodes the z depth of a frame to CV_32FC1 in map units, 0 = unknown; empty if the frame has no depth.
+// INVALID_ARGUMENT: as above, or an invalid scale.
 absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera);
 
 }  // namespace romap::session

@@ -13,20 +13,22 @@ namespace romap::session {
 namespace {
 
 constexpr size_t kMaxClassNameBytes = 100;
-// Farther from the origin single-precision geometry falls apart.
-constexpr double kFarthest_mu = 1e6;
+// Single-precision geometry is too coarse beyond this distance from the origin.
+constexpr double kMaxDistance_mu = 1e6;
 
 absl::Status CheckPose(const FrameInput& input) {
   if (input.T_world_camera && !input.T_world_camera->IsFinite()) {
-    return InvalidArgument("T_world_camera has a number that is not finite");
+    return InvalidArgument("t_world_camera: all numbers must be finite");
   }
-  if (input.T_world_camera && input.T_world_camera->translation().norm() > kFarthest_mu) {
-    return InvalidArgument("T_world_camera lies {:.3g} map units from the origin, at most {:.0e} are allowed",
-                           input.T_world_camera->translation().norm(), kFarthest_mu);
+  if (input.T_world_camera && input.T_world_camera->translation().norm() > kMaxDistance_mu) {
+    return InvalidArgument("t_world_camera: must be within {:.0e} map units of the origin, is {:.3g} away",
+                           kMaxDistance_mu, input.T_world_camera->translation().norm());
   }
   if (input.gravity_camera) {
     const double norm = input.gravity_camera->norm();
-    if (!std::isfinite(norm) || norm < 1e-9) return InvalidArgument("gravity must be a finite vector longer than 0");
+    if (!std::isfinite(norm) || norm < 1e-9) {
+      return InvalidArgument("gravity_camera: must be a finite vector that is not zero");
+    }
   }
   return absl::OkStatus();
 }
@@ -35,22 +37,23 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
   std::set<uint32_t> seen;
   for (const Instance& instance : instances) {
     if (instance.label == 0 || instance.label > 65535) {
-      return InvalidArgument("instance label {} must lie in 1..65535", instance.label);
+      return InvalidArgument("masks: instance label must be in 1..65535, is {}", instance.label);
     }
-    if (!seen.insert(instance.label).second)
-      return InvalidArgument("instance label {} is listed twice", instance.label);
+    if (!seen.insert(instance.label).second) {
+      return InvalidArgument("masks: instance label {} is listed twice", instance.label);
+    }
     if (instance.class_name.size() > kMaxClassNameBytes || !IsUtf8(instance.class_name)) {
-      return InvalidArgument("class name of label {} must be UTF-8 of at most {} bytes", instance.label,
+      return InvalidArgument("masks: class_name of label {} must be UTF-8 of at most {} bytes", instance.label,
                              kMaxClassNameBytes);
     }
     if (!(instance.score >= 0 && instance.score <= 1)) {
-      return InvalidArgument("score {} of label {} must lie in 0..1", instance.score, instance.label);
+      return InvalidArgument("masks: score of label {} must be in 0..1, is {}", instance.label, instance.score);
     }
   }
   return absl::OkStatus();
 }
 
-// Every label in the mask gets an entry, so that later stages need not ask whether one is listed.
+// Adds an entry for every label of the mask that has none, so that later stages find one for each label.
 void ListAllLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
   std::vector<bool> listed(65536, false);
   listed[0] = true;
@@ -76,10 +79,10 @@ absl::Status Ingest::CheckOrder(const FrameInput& input) const {
   if (accepted_.empty()) return absl::OkStatus();
   const AcceptedFrame& last = accepted_.back();
   if (input.frame_id <= last.frame_id) {
-    return InvalidArgument("frame id does not grow: {} after {}", input.frame_id, last.frame_id);
+    return InvalidArgument("frame_id must increase: got {} after {}", input.frame_id, last.frame_id);
   }
   if (input.timestamp_ns <= last.timestamp_ns) {
-    return InvalidArgument("timestamp goes back: {} ns after {} ns", input.timestamp_ns, last.timestamp_ns);
+    return InvalidArgument("timestamp_ns must increase: got {} after {}", input.timestamp_ns, last.timestamp_ns);
   }
   return absl::OkStatus();
 }
@@ -109,19 +112,19 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
 void Ingest::Remember(const Frame& frame) {
   accepted_.push_back({frame.frame_id, frame.timestamp_ns, frame.has_masks});
   const auto is_too_old = [&](const AcceptedFrame& old) {
-    // The clock's epoch is the client's: only the unsigned difference of two far times cannot overflow.
+    // Unsigned, because timestamps have an arbitrary epoch and the signed difference could overflow.
     const uint64_t behind_ns = static_cast<uint64_t>(frame.timestamp_ns) - static_cast<uint64_t>(old.timestamp_ns);
     return static_cast<double>(behind_ns) > 1e9 * max_mask_delay_s_;
   };
   while (is_too_old(accepted_.front())) {
     accepted_.pop_front();
-    any_forgotten_ = true;
+    any_expired_ = true;
   }
 }
 
 absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
-  ROMAP_ASSIGN_OR_RETURN(AcceptedFrame* const frame, FindMaskless(input.frame_id));
-  if (input.mask_encoding == MaskEncoding::kNone) return InvalidArgument("mask: missing");
+  ROMAP_ASSIGN_OR_RETURN(AcceptedFrame* const frame, FindFrameWithoutMasks(input.frame_id));
+  if (input.mask_encoding == MaskEncoding::kNone) return InvalidArgument("masks: missing");
   ROMAP_RETURN_IF_ERROR(CheckInstances(input.instances));
   FrameMasks masks{.frame_id = input.frame_id, .labels = {}, .instances = input.instances};
   ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_));
@@ -131,15 +134,18 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   return masks;
 }
 
-absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindMaskless(uint64_t frame_id) {
+absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindFrameWithoutMasks(uint64_t frame_id) {
   const auto found = std::lower_bound(accepted_.begin(), accepted_.end(), frame_id,
                                       [](const AcceptedFrame& frame, uint64_t id) { return frame.frame_id < id; });
-  if (found == accepted_.begin() && any_forgotten_ && found->frame_id != frame_id) {
-    return InvalidArgument("too late: the frame lies more than {} s (objects.max_mask_delay_s) behind the newest",
-                           max_mask_delay_s_);
+  if (found == accepted_.begin() && any_expired_ && found->frame_id != frame_id) {
+    return InvalidArgument(
+        "too late: the frame is more than {} s (objects.max_mask_delay_s) older than the newest frame",
+        max_mask_delay_s_);
   }
-  if (found == accepted_.end() || found->frame_id != frame_id) return InvalidArgument("no such frame was accepted");
-  if (found->has_masks) return InvalidArgument("the frame has masks already");
+  if (found == accepted_.end() || found->frame_id != frame_id) {
+    return InvalidArgument("frame_id: no accepted frame has id {}", frame_id);
+  }
+  if (found->has_masks) return InvalidArgument("frame {} already has masks", frame_id);
   return &*found;
 }
 
@@ -153,7 +159,7 @@ void Ingest::Undistort(Frame& frame) const {
   UndistortNearest(frame.depth_mu);
 }
 
-// Labels and depth must not be blended; what comes from outside the image is black, unlabelled and without depth.
+// Nearest neighbor, because labels and depths must not be interpolated. Pixels from outside the image get 0.
 void Ingest::UndistortNearest(cv::Mat& image) const {
   if (image.empty()) return;
   cv::Mat undistorted;

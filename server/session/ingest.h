@@ -12,19 +12,19 @@
 
 namespace romap::session {
 
-// First step of a frame's life: decodes, validates and undistorts. Remembers the last accepted id and time, so that
-// frames cannot go back, and which of the newest frames may still get masks. One per session, used by its tracking
-// thread only.
+// The first stage: decodes, validates and undistorts the inputs of one session. Checks that frame ids and timestamps
+// increase, and keeps a list of the frames that may still get late masks. Not thread-safe.
 class Ingest {
  public:
-  // Masks may come so long after newer frames than their own, by the frames' timestamps.
+  // Late masks are accepted for frames whose timestamp is at most `max_mask_delay_s` older than the newest one.
   Ingest(const CameraModel& camera, double max_mask_delay_s);
 
-  // INVALID_ARGUMENT naming what is wrong with the frame; then the frame counts as never sent.
+  // INVALID_ARGUMENT: the frame is malformed or out of order; the message names the field. A rejected frame has no
+  // effect on later ones.
   absl::StatusOr<std::shared_ptr<const Frame>> Accept(const FrameInput& input);
 
-  // The masks of a frame that was accepted without any. INVALID_ARGUMENT naming what is wrong with them: in themselves,
-  // or that there is no such frame, that it has masks, that they come too late. Then they count as never sent.
+  // The masks of an accepted frame that has none. INVALID_ARGUMENT: the masks are malformed, the frame is unknown or
+  // too old, or it already has masks. Rejected masks have no effect.
   absl::StatusOr<FrameMasks> AcceptMasks(const MasksInput& input);
 
  private:
@@ -35,16 +35,16 @@ class Ingest {
   };
 
   absl::Status CheckOrder(const FrameInput& input) const;
-  absl::StatusOr<AcceptedFrame*> FindMaskless(uint64_t frame_id);
+  absl::StatusOr<AcceptedFrame*> FindFrameWithoutMasks(uint64_t frame_id);
   void Remember(const Frame& frame);
   void Undistort(Frame& frame) const;
   void UndistortNearest(cv::Mat& image) const;
 
-  CameraModel camera_;     // as the client gave it
+  CameraModel camera_;     // of the client's images, with distortion
   UndistortionMaps maps_;  // empty for a pinhole
   double max_mask_delay_s_;
-  bool any_forgotten_ = false;
-  std::deque<AcceptedFrame> accepted_;  // by id and time; the newest, and those at most the patience behind it
+  bool any_expired_ = false;
+  std::deque<AcceptedFrame> accepted_;  // by id and time: the newest and those that may still get masks
 };
 
 }  // namespace romap::session

@@ -33,18 +33,19 @@ class LocalEventStream : public MapStream {
   absl::Status status() const override { return outbox_->status(); }
 
   absl::Status Send(FrameInput frame) override {
-    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
     return session_->Offer(std::move(frame));
   }
 
   absl::Status SendMasks(MasksInput masks) override {
-    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
     return session_->Offer(std::move(masks));
   }
 
   absl::Status CloseSend() override {
-    if (!StopSending()) return FailedPrecondition("this stream was closed for sending");
-    session_->WhenDrained([outbox = outbox_] { outbox->Close(); });
+    if (!StopSending())
+      return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+    session_->WhenSettled([outbox = outbox_] { outbox->Close(); });
     return absl::OkStatus();
   }
 
@@ -74,7 +75,7 @@ LocalMappingService::LocalMappingService(const ServerConfig& config)
       mesher_(config.mesh, config.session.single_thread ? Mesher::Threading::kCaller : Mesher::Threading::kOwnThread) {}
 
 LocalMappingService::~LocalMappingService() {
-  // Sessions use the pool and the mesher, so they end first.
+  // Sessions use the pool and the mesher, so they must end first.
   std::lock_guard lock(mutex_);
   for (const auto& [id, session] : sessions_) session->Stop(absl::UnavailableError("the server is shutting down"));
   sessions_.clear();
@@ -91,12 +92,13 @@ std::string LocalMappingService::NewId() {
 absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
   if (options.name.size() > kMaxNameLength) {
-    return InvalidArgument("session name has {} bytes, at most {} are allowed", options.name.size(), kMaxNameLength);
+    return InvalidArgument("name: must have at most {} bytes, has {}", kMaxNameLength, options.name.size());
   }
   std::lock_guard lock(mutex_);
   if (sessions_.size() >= static_cast<size_t>(config_.session.max_sessions)) {
     return absl::ResourceExhaustedError(
-        fmt::format("the server keeps {} sessions and takes no more; delete one first", sessions_.size()));
+        fmt::format("the limit of {} sessions (session.max_sessions) is reached; delete a session first",
+                    config_.session.max_sessions));
   }
   const std::string id = NewId();
   std::unique_ptr<wire::RecordingWriter> recorder;
@@ -113,7 +115,7 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
 absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::Find(const std::string& session_id) const {
   std::lock_guard lock(mutex_);
   const auto it = sessions_.find(session_id);
-  if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+  if (it == sessions_.end()) return NotFound("session '{}' does not exist", session_id);
   return it->second;
 }
 
@@ -146,7 +148,7 @@ absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
   {
     std::lock_guard lock(mutex_);
     const auto it = sessions_.find(session_id);
-    if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+    if (it == sessions_.end()) return NotFound("session '{}' does not exist", session_id);
     session = std::move(it->second);
     sessions_.erase(it);
   }
@@ -157,18 +159,17 @@ absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
 
 absl::StatusOr<std::unique_ptr<MapStream>> LocalMappingService::OpenMap(const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
-  if (session->Info().state != SessionState::kOpen) {
-    return FailedPrecondition("session '{}' takes no more frames: it is finished", session_id);
+  ROMAP_RETURN_IF_ERROR(session->CheckOpen());
+  if (!session->AttachSender()) {
+    return FailedPrecondition("session '{}' already has a Map stream; close it first", session_id);
   }
-  if (!session->AttachSender()) return FailedPrecondition("session '{}' has a Map stream already", session_id);
-  auto outbox =
-      session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue, /*with_snapshot=*/true);
+  auto outbox = session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue);
   return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/true);
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> LocalMappingService::Watch(const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
-  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, 1, /*with_snapshot=*/true);
+  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1);
   return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/false);
 }
 

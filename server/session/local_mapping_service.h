@@ -15,8 +15,8 @@
 
 namespace romap::session {
 
-// The mapping service in this process: owns the sessions, the training pool and the mesh thread. Thread-safe. Streams
-// must be gone before the service is destroyed.
+// The mapping service in this process: owns the sessions, the training pool and the mesh thread. Thread-safe. All
+// streams must be destroyed before the service.
 class LocalMappingService : public MappingService {
  public:
   explicit LocalMappingService(const ServerConfig& config);

@@ -21,7 +21,7 @@ void MapState::Apply(MapEvent event) {
 }
 
 void MapState::ApplyUpdate(ObjectUpdate update) {
-  if (gone_.contains(update.id)) return;
+  if (removed_.contains(update.id)) return;
   Object& entry = objects_[update.id];
   update.revision = entry.object.revision + 1;
   update.T_world_mesh = entry.object.T_world_mesh;
@@ -34,7 +34,7 @@ void MapState::ApplyRemoval(ObjectRemoved removed) {
   const auto it = objects_.find(removed.id);
   if (it == objects_.end()) return;
   removed.revision = it->second.object.revision + 1;
-  gone_.insert(removed.id);
+  removed_.insert(removed.id);
   objects_.erase(it);
   Send(removed);
 }
@@ -46,11 +46,11 @@ void MapState::ApplyMerge(ObjectMerged merged) {
     return ApplyRemoval({.id = merged.from, .revision = 0, .reason = "merged into " + merged.into.ToString()});
   }
   if (objects_.erase(merged.from) == 0) return;
-  gone_.insert(merged.from);
+  removed_.insert(merged.from);
   ObjectUpdate& object = into->second.object;
   merged.revision = ++object.revision;
   Send(merged);
-  // Who is slow may never hear of the merge, but must learn of the revision.
+  // A slow reader may not get the merge, but must get the revision.
   ++object.revision;
   Send(object);
 }
@@ -66,7 +66,7 @@ void MapState::MoveObject(ObjectId object, const Sim3<World, World>& S_new_old) 
   entry.object.mesh_scale *= S_new_old.scale();
 }
 
-void MapState::PublishMesh(MeshUpdate mesh, const MeshPlace& place) {
+void MapState::PublishMesh(MeshUpdate mesh, const MeshPose& pose) {
   std::lock_guard lock(mutex_);
   const auto it = objects_.find(mesh.id);
   if (it == objects_.end()) return;
@@ -74,9 +74,9 @@ void MapState::PublishMesh(MeshUpdate mesh, const MeshPlace& place) {
   mesh.revision = ++entry.object.revision;
   entry.mesh = std::move(mesh);
   Send(*entry.mesh);
-  // Where the mesh stands travels with the object. The snapshot may lack the newest corrections.
-  const Sim3<World, World> S_new_snapshot = entry.S_new_first * place.S_new_first.Inverse();
-  entry.object.T_world_mesh = S_new_snapshot.Moved(place.T_world_mesh);
+  // The pose of the mesh is part of the object update. The snapshot may lack the newest corrections.
+  const Sim3<World, World> S_new_snapshot = entry.S_new_first * pose.S_new_first.Inverse();
+  entry.object.T_world_mesh = S_new_snapshot.Moved(pose.T_world_mesh);
   entry.object.mesh_scale = S_new_snapshot.scale();
   ++entry.object.revision;
   Send(entry.object);
@@ -116,14 +116,12 @@ void MapState::Publish(const Statistics& statistics) {
   Send(statistics);
 }
 
-std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks, bool with_snapshot) {
+std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks) {
   auto outbox = std::make_shared<Outbox>(acks, max_acks);
   std::lock_guard lock(mutex_);
-  if (with_snapshot) {
-    for (const auto& [id, entry] : objects_) {
-      outbox->Put(entry.object);
-      if (entry.mesh) outbox->Put(*entry.mesh);
-    }
+  for (const auto& [id, entry] : objects_) {
+    outbox->Put(entry.object);
+    if (entry.mesh) outbox->Put(*entry.mesh);
   }
   if (closed_) {
     outbox->Close(*closed_);

@@ -13,41 +13,42 @@
 #include "common/mapping_service.h"
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
-#include "server/session/mesh_place.h"
+#include "server/session/mesh_pose.h"
 #include "server/session/outbox.h"
 
 namespace romap::session {
 
-// The map as clients see it: the newest cuboid and mesh of every object, the trajectory, and who listens. Every change
-// gets its revision here and goes to all outboxes. Corrections move meshes and frames that are there already; the mesh
-// itself is never sent again for it. What is gone stays gone: its id is never used again. Thread-safe.
+// The map that clients see: the newest cuboid and mesh of every object, the trajectory, and the subscribers. Every
+// change of an object gets its revision here, and here only, and is sent to all outboxes. A correction moves existing
+// meshes by their pose; their vertices are not sent again. The id of a removed object is never used again. Thread-safe.
 class MapState {
  public:
-  // What the objects stage says: updates, removals, merges. Passed over when it is about objects that are gone, or that
-  // were never told of; an object that is merged into such a one is removed.
+  // Applies an ObjectUpdate, ObjectRemoved or ObjectMerged; its revision is overwritten. Ignored if the object was
+  // removed or, for removals and merges, never announced. A merge into an unknown object becomes a removal.
   void Apply(MapEvent event);
-  // The space of an object underwent `S_new_old`: its mesh goes along, and so will meshes that are being made of older
-  // snapshots. Clients learn of it by the object's next update, so call it before Apply() of what the same correction
-  // changed, and before the field is told, which must never be ahead of the map.
+  // Moves the mesh of an object with the space around it: p_new = S_new_old * p_old. Meshes still to come from older
+  // snapshots are moved too. Clients get the new pose with the object's next update, so call this before Apply() of the
+  // updates of the same correction. Also call it before the correction is passed to the field: snapshots must not
+  // include corrections that are unknown here.
   void MoveObject(ObjectId object, const Sim3<World, World>& S_new_old);
-  // A new mesh, and where it stood when its snapshot was taken. Ignored when its object is gone.
-  void PublishMesh(MeshUpdate mesh, const MeshPlace& place);
-  // Answer to one frame; kept in the trajectory when it has a pose. See TrackedFrame for `reference`.
+  // Ignored if the object was removed.
+  void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
+  // Sends the acknowledgement, and adds an accepted frame with a pose to the trajectory. See TrackedFrame for
+  // `reference`.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
                    const SE3<Camera, Camera>& T_reference_camera = {});
-  // Keyframes were corrected: the frames of the trajectory that hang on them go along.
+  // Moves the frames of the trajectory with their corrected reference keyframes.
   void Correct(const MapCorrection& correction);
-  // Answer to late masks.
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
 
-  // Starts with the objects there are, if `with_snapshot`. Already closed when the map is.
-  std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks, bool with_snapshot);
+  // The outbox starts with the current objects. It is closed if the map is closed.
+  std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks);
   void Unsubscribe(const std::shared_ptr<Outbox>& outbox);
   // Ends all present and future subscriptions.
   void Close(const absl::Status& status);
 
-  // Objects, trajectory and timestamps; the rest is the session's to fill in.
+  // Objects, trajectory and timestamps. The caller sets the other fields.
   MapSnapshot Snapshot() const;
   uint64_t ConfirmedObjects() const;
 
@@ -55,7 +56,7 @@ class MapState {
   struct Object {
     ObjectUpdate object;
     std::optional<MeshUpdate> mesh;
-    Sim3<World, World> S_new_first;  // all that corrections did to its space
+    Sim3<World, World> S_new_first;  // product of all corrections of its space
   };
   struct TrajectoryEntry {
     FrameAck ack;
@@ -72,7 +73,7 @@ class MapState {
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
-  std::set<ObjectId> gone_;
+  std::set<ObjectId> removed_;
   std::vector<TrajectoryEntry> trajectory_;
   std::map<KeyframeId, ScaledPose> references_;
   std::vector<std::shared_ptr<Outbox>> outboxes_;

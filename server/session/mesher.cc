@@ -12,7 +12,7 @@
 namespace romap::session {
 namespace {
 
-absl::StatusOr<MeshUpdate> MakeMesh(const FieldSnapshot& snapshot, const mesh::MeshConfig& config) {
+absl::StatusOr<MeshUpdate> ExtractAndEncode(const FieldSnapshot& snapshot, const mesh::MeshConfig& config) {
   ROMAP_ASSIGN_OR_RETURN(const Mesh mesh, mesh::ExtractMesh(snapshot, config));
   MeshUpdate update;
   update.id = snapshot.object;
@@ -40,56 +40,56 @@ Mesher::~Mesher() {
   if (thread_.joinable()) thread_.join();
 }
 
-uint64_t Mesher::Register(Sink sink) {
+Mesher::SessionId Mesher::AddSession(Sink sink) {
   std::lock_guard lock(mutex_);
-  const uint64_t client = next_client_++;
-  sinks_[client] = std::move(sink);
-  return client;
+  const SessionId session = next_session_++;
+  sinks_[session] = std::move(sink);
+  return session;
 }
 
-void Mesher::Unregister(uint64_t client) {
+void Mesher::RemoveSession(SessionId session) {
   std::unique_lock lock(mutex_);
-  sinks_.erase(client);
-  std::erase_if(waiting_, [&](const auto& entry) { return entry.first.first == client; });
-  changed_.wait(lock, [&] { return busy_client_ != client; });
+  sinks_.erase(session);
+  std::erase_if(waiting_, [&](const auto& entry) { return entry.first.first == session; });
+  changed_.wait(lock, [&] { return busy_session_ != session; });
 }
 
-void Mesher::Offer(uint64_t client, FieldSnapshot snapshot) {
+void Mesher::Offer(SessionId session, FieldSnapshot snapshot) {
   std::unique_lock lock(mutex_);
-  if (!sinks_.contains(client)) return;
+  if (!sinks_.contains(session)) return;
   if (threading_ == Threading::kCaller) {
-    const Sink sink = sinks_.at(client);
+    const Sink sink = sinks_.at(session);
     lock.unlock();
-    Serve(sink, snapshot);
+    MakeMesh(sink, snapshot);
     return;
   }
-  auto& slot = waiting_[{client, snapshot.object}];
-  if (slot.first == 0) slot.first = next_ticket_++;
-  slot.second = std::move(snapshot);
+  WaitingSnapshot& slot = waiting_[{session, snapshot.object}];
+  if (slot.ticket == 0) slot.ticket = next_ticket_++;
+  slot.snapshot = std::move(snapshot);
   changed_.notify_all();
 }
 
-void Mesher::Remove(uint64_t client, ObjectId object) {
+void Mesher::RemoveObject(SessionId session, ObjectId object) {
   std::lock_guard lock(mutex_);
-  waiting_.erase({client, object});
+  waiting_.erase({session, object});
 }
 
-bool Mesher::Idle(uint64_t client) const {
+bool Mesher::IsIdle(SessionId session) const {
   std::lock_guard lock(mutex_);
-  return busy_client_ != client &&
-         std::none_of(waiting_.begin(), waiting_.end(), [&](const auto& entry) { return entry.first.first == client; });
+  return busy_session_ != session && std::none_of(waiting_.begin(), waiting_.end(),
+                                                  [&](const auto& entry) { return entry.first.first == session; });
 }
 
-void Mesher::Serve(const Sink& sink, const FieldSnapshot& snapshot) const {
+void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
   try {
-    if (auto mesh = MakeMesh(snapshot, config_); mesh.ok()) {
+    if (auto mesh = ExtractAndEncode(snapshot, config_); mesh.ok()) {
       sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
     } else {
-      // Early in training there may be no surface yet; the next snapshot brings it.
+      // Normal early in training, when the field has no surface yet. A later snapshot will have one.
       spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
                     Message(mesh.status()));
     }
-  } catch (const std::exception& e) {  // a library, or memory: this mesh is lost, the next may come
+  } catch (const std::exception& e) {  // from a library, or out of memory: only this mesh is lost
     spdlog::error("{}: meshing failed: {}", snapshot.object.ToString(), e.what());
   }
 }
@@ -100,16 +100,17 @@ void Mesher::Run() {
   while (true) {
     changed_.wait(lock, [&] { return stopping_ || !waiting_.empty(); });
     if (stopping_) return;
-    const auto oldest = std::min_element(waiting_.begin(), waiting_.end(),
-                                         [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
-    busy_client_ = oldest->first.first;
-    const Sink sink = sinks_.at(busy_client_);
-    const FieldSnapshot snapshot = std::move(oldest->second.second);
+    const auto oldest = std::min_element(waiting_.begin(), waiting_.end(), [](const auto& a, const auto& b) {
+      return a.second.ticket < b.second.ticket;
+    });
+    busy_session_ = oldest->first.first;
+    const Sink sink = sinks_.at(busy_session_);
+    const FieldSnapshot snapshot = std::move(oldest->second.snapshot);
     waiting_.erase(oldest);
     lock.unlock();
-    Serve(sink, snapshot);
+    MakeMesh(sink, snapshot);
     lock.lock();
-    busy_client_ = 0;
+    busy_session_ = 0;
     changed_.notify_all();
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -10,44 +11,54 @@
 #include "common/field_snapshot.h"
 #include "common/map_events.h"
 #include "server/mesh/mesh_config.h"
-#include "server/session/mesh_place.h"
+#include "server/session/mesh_pose.h"
 
 namespace romap::session {
 
-// The server's mesh thread: field snapshots in, Draco meshes out. Per object only the newest snapshot waits. Without a
-// thread of its own it makes each mesh in Offer().
+// The server's mesh thread: converts the field snapshots of all sessions to Draco meshes, oldest first. Per object only
+// the newest snapshot waits. Thread-safe.
 class Mesher {
  public:
-  using Sink = std::function<void(MeshUpdate, const MeshPlace&)>;
+  using SessionId = uint64_t;
+  using Sink = std::function<void(MeshUpdate, const MeshPose&)>;
 
-  enum class Threading { kOwnThread, kCaller };
+  enum class Threading {
+    kOwnThread,
+    kCaller,  // every mesh is made within Offer()
+  };
 
   explicit Mesher(const mesh::MeshConfig& config, Threading threading = Threading::kOwnThread);
   ~Mesher();
 
-  uint64_t Register(Sink sink);
-  // Returns when no call of this client's sink is under way; none comes afterwards.
-  void Unregister(uint64_t client);
-  void Offer(uint64_t client, FieldSnapshot snapshot);
-  // Drops what waits of an object that is gone.
-  void Remove(uint64_t client, ObjectId object);
-  bool Idle(uint64_t client) const;
+  SessionId AddSession(Sink sink);
+  // Waits for a running call of this session's sink; none follows.
+  void RemoveSession(SessionId session);
+  // Calls with the id of a removed session have no effect.
+  void Offer(SessionId session, FieldSnapshot snapshot);
+  // Discards the waiting snapshot of an object that was removed.
+  void RemoveObject(SessionId session, ObjectId object);
+  // No snapshot of the session waits or is being meshed.
+  bool IsIdle(SessionId session) const;
 
  private:
-  using Key = std::pair<uint64_t, ObjectId>;
+  using Key = std::pair<SessionId, ObjectId>;
+  struct WaitingSnapshot {
+    uint64_t ticket = 0;  // order of arrival of the object's first waiting snapshot
+    FieldSnapshot snapshot;
+  };
 
   void Run();
-  void Serve(const Sink& sink, const FieldSnapshot& snapshot) const;
+  void MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const;
 
   const mesh::MeshConfig config_;
   const Threading threading_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::map<uint64_t, Sink> sinks_;
-  std::map<Key, std::pair<uint64_t, FieldSnapshot>> waiting_;  // with a ticket: the oldest is served first
-  uint64_t next_client_ = 1;
+  std::map<SessionId, Sink> sinks_;
+  std::map<Key, WaitingSnapshot> waiting_;
+  SessionId next_session_ = 1;
   uint64_t next_ticket_ = 1;
-  uint64_t busy_client_ = 0;
+  SessionId busy_session_ = 0;  // whose snapshot the thread is meshing; 0 = none
   bool stopping_ = false;
   std::thread thread_;  // kOwnThread only
 };

@@ -33,7 +33,6 @@ void Outbox::Put(MapEvent event) {
 
 void Outbox::PutAck(MapEvent event) {
   if (acks_ == Acks::kNewest) {
-    // A viewer follows the camera; what a client's masks came to is nothing to it.
     if (std::holds_alternative<FrameAck>(event)) Replace(newest_ack_, std::move(event));
     return;
   }
@@ -43,8 +42,8 @@ void Outbox::PutAck(MapEvent event) {
 }
 
 void Outbox::PutUpdate(ObjectUpdate update) {
-  const auto [it, is_new] = known_.try_emplace(update.id);
-  Known& object = it->second;
+  const auto [it, is_new] = objects_.try_emplace(update.id);
+  AnnouncedObject& object = it->second;
   object.revision = update.revision;
   if (is_new) {
     object.announcement = Append(std::move(update));
@@ -54,20 +53,20 @@ void Outbox::PutUpdate(ObjectUpdate update) {
 }
 
 void Outbox::PutMesh(MeshUpdate mesh) {
-  const auto it = known_.find(mesh.id);
-  if (it == known_.end()) return;
+  const auto it = objects_.find(mesh.id);
+  if (it == objects_.end()) return;
   it->second.revision = mesh.revision;
   Replace(it->second.mesh, std::move(mesh));
 }
 
 void Outbox::PutRemoved(ObjectRemoved removed) {
   uint64_t last_revision = 0;
-  if (ForgetObject(removed.id, &last_revision)) {
+  if (DropObject(removed.id, &last_revision)) {
     Append(std::move(removed));
     return;
   }
   for (auto it = merges_.begin(); it != merges_.end();) {
-    MapEvent& event = *it->second.place;
+    MapEvent& event = *it->second.event;
     if (std::get<ObjectMerged>(event).into != removed.id) {
       ++it;
       continue;
@@ -79,45 +78,45 @@ void Outbox::PutRemoved(ObjectRemoved removed) {
 
 void Outbox::PutMerged(ObjectMerged merged) {
   uint64_t last_revision = 0;
-  if (ForgetObject(merged.from, &last_revision)) {
+  if (DropObject(merged.from, &last_revision)) {
     merges_[merged.from] = {Append(merged), last_revision + 1};
     return;
   }
   for (auto& [from, merge] : merges_) {
-    ObjectMerged& waiting = std::get<ObjectMerged>(*merge.place);
+    ObjectMerged& waiting = std::get<ObjectMerged>(*merge.event);
     if (waiting.into != merged.from) continue;
     waiting = {.from = from, .into = merged.into, .revision = merged.revision};
-    events_.splice(events_.end(), events_, merge.place);  // behind the announcement of `into`
+    events_.splice(events_.end(), events_, merge.event);  // behind the announcement of the new `into`
   }
 }
 
-bool Outbox::ForgetObject(ObjectId id, uint64_t* last_revision) {
-  const auto it = known_.find(id);
-  if (it == known_.end()) return false;
-  Known& object = it->second;
+bool Outbox::DropObject(ObjectId id, uint64_t* last_revision) {
+  const auto it = objects_.find(id);
+  if (it == objects_.end()) return false;
+  AnnouncedObject& object = it->second;
   *last_revision = object.revision;
-  const bool has_been_told = !object.announcement;
+  const bool was_announced = !object.announcement;
   Drop(object.announcement);
   Drop(object.update);
   Drop(object.mesh);
-  known_.erase(it);
-  return has_been_told;
+  objects_.erase(it);
+  return was_announced;
 }
 
-Outbox::Place Outbox::Append(MapEvent event) {
+Outbox::EventIterator Outbox::Append(MapEvent event) {
   events_.push_back(std::move(event));
   return std::prev(events_.end());
 }
 
-// The newer event goes to the end, not to the place of the older one, so that revisions arrive in their order.
-void Outbox::Replace(std::optional<Place>& place, MapEvent event) {
-  Drop(place);
-  place = Append(std::move(event));
+// The new event goes to the end instead of the position of the old one, so that revisions are read in order.
+void Outbox::Replace(std::optional<EventIterator>& old_event, MapEvent event) {
+  Drop(old_event);
+  old_event = Append(std::move(event));
 }
 
-void Outbox::Drop(std::optional<Place>& place) {
-  if (place) events_.erase(*place);
-  place.reset();
+void Outbox::Drop(std::optional<EventIterator>& event) {
+  if (event) events_.erase(*event);
+  event.reset();
 }
 
 void Outbox::TrimAcks() {
@@ -136,18 +135,18 @@ std::optional<MapEvent> Outbox::Next(std::chrono::milliseconds timeout) {
   return event;
 }
 
-// The first event is about to be taken: no newer one can replace it any more.
+// The first event is about to be returned: a newer one can no longer replace it.
 void Outbox::ForgetFront() {
-  const Place front = events_.begin();
-  const auto forget = [&](std::optional<Place>& place) {
-    if (place == front) place.reset();
+  const EventIterator front = events_.begin();
+  const auto forget = [&](std::optional<EventIterator>& event) {
+    if (event == front) event.reset();
   };
   if (const auto* update = std::get_if<ObjectUpdate>(&*front)) {
-    Known& object = known_.at(update->id);
+    AnnouncedObject& object = objects_.at(update->id);
     forget(object.announcement);
     forget(object.update);
   } else if (const auto* mesh = std::get_if<MeshUpdate>(&*front)) {
-    forget(known_.at(mesh->id).mesh);
+    forget(objects_.at(mesh->id).mesh);
   } else if (const auto* merged = std::get_if<ObjectMerged>(&*front)) {
     merges_.erase(merged->from);
   } else if (IsAck(*front)) {

@@ -15,40 +15,47 @@
 
 namespace romap::session {
 
-// Events on their way to one subscriber. Never blocks the sender: what a slow reader has not taken yet is coalesced, so
-// that per object only the newest cuboid and the newest mesh wait. Order is kept otherwise, and
-//   - the first update of an object, which announces it, stays where it is: nothing is said of an object before it;
-//   - after the removal or merge of an object nothing is said of it;
-//   - an object that came and went before the reader heard of it is passed over in silence. What was merged into it
-//   then
-//     has gone where it went.
-// So whoever applies what is read has, when all is read, what the sender has; and what waits is bounded by the objects
-// that are there and those the reader has heard of. An object must be put first by an ObjectUpdate, its id is not used
-// again, and after a merge an update of `into` must follow: it brings the revision where the merge is passed over.
+// The event queue of one subscriber. Never blocks the sender: events that a slow reader has not read yet are coalesced,
+// so that only the newest cuboid and the newest mesh of each object wait. The order is kept, with these rules:
+//   - The first update of an object, which announces it, keeps its position: no other event of the object precedes it.
+//   - No event of an object follows its removal or merge.
+//   - An object that is created and removed before its announcement is read produces no event at all. Objects whose
+//     waiting merge names it are redirected to the object it was merged into, or removed if it was removed.
+// A reader that applies all events has the same map as the sender. The number of waiting events is bounded by the
+// number of current objects and of objects whose announcement was read.
+//
+// Required of the sender: the first event of an object is an ObjectUpdate; object ids are never reused; a merge is
+// followed by an update of `into`, which carries the revision to readers for which the merge was left out.
+// Thread-safe.
 class Outbox {
  public:
-  enum class Acks { kAll /* the client that sends the frames */, kNewest /* a viewer that follows the camera */ };
+  enum class Acks {
+    kAll,     // for the client that sends the frames
+    kNewest,  // for viewers, which follow the camera: only the newest FrameAck waits, and no MasksAck
+  };
 
+  // `max_acks`: with kAll, at most this many acknowledgements wait; then the oldest is dropped.
   Outbox(Acks acks, size_t max_acks) : acks_(acks), max_acks_(max_acks) {}
 
   void Put(MapEvent event);
+  // Waits for the next event; nullopt after `timeout`, or if the outbox is closed and empty.
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout);
 
-  // No more events; what waits can still be taken. The first call decides the status.
+  // Ends Put(); waiting events can still be read. Only the first call sets the status.
   void Close(absl::Status status = absl::OkStatus());
   bool Done() const;  // closed and empty
   absl::Status status() const;
 
  private:
-  using Place = std::list<MapEvent>::iterator;
-  // An object that is there, as far as the reader knows or will know. Places are those of events that wait.
-  struct Known {
-    uint64_t revision = 0;  // the last that was put
-    std::optional<Place> announcement, update, mesh;
+  using EventIterator = std::list<MapEvent>::iterator;
+  // A current object that was announced, or whose announcement waits. Iterators of events that wait.
+  struct AnnouncedObject {
+    uint64_t revision = 0;  // of the last event
+    std::optional<EventIterator> announcement, update, mesh;
   };
   struct WaitingMerge {
-    Place place;
-    uint64_t removal_revision = 0;  // of the object that was merged away, were it removed instead
+    EventIterator event;
+    uint64_t removal_revision = 0;  // of `from`, should the merge become a removal
   };
   struct Putter;
 
@@ -57,11 +64,12 @@ class Outbox {
   void PutMesh(MeshUpdate mesh);
   void PutRemoved(ObjectRemoved removed);
   void PutMerged(ObjectMerged merged);
-  // Forgets the object and what waits of it. False when the reader has not heard of it, and so need not of its end.
-  bool ForgetObject(ObjectId id, uint64_t* last_revision);
-  Place Append(MapEvent event);
-  void Replace(std::optional<Place>& place, MapEvent event);
-  void Drop(std::optional<Place>& place);
+  // Drops the object and its waiting events. False if its announcement was not read: then the reader must not get its
+  // removal either.
+  bool DropObject(ObjectId id, uint64_t* last_revision);
+  EventIterator Append(MapEvent event);
+  void Replace(std::optional<EventIterator>& old_event, MapEvent event);
+  void Drop(std::optional<EventIterator>& event);
   void ForgetFront();
   void TrimAcks();
 
@@ -70,9 +78,9 @@ class Outbox {
   mutable std::mutex mutex_;
   std::condition_variable ready_;
   std::list<MapEvent> events_;
-  std::map<ObjectId, Known> known_;
-  std::map<ObjectId, WaitingMerge> merges_;  // that wait, by the object that was merged away
-  std::optional<Place> statistics_, newest_ack_;
+  std::map<ObjectId, AnnouncedObject> objects_;
+  std::map<ObjectId, WaitingMerge> merges_;  // by `from`
+  std::optional<EventIterator> statistics_, newest_ack_;
   size_t waiting_acks_ = 0;
   bool closed_ = false;
   absl::Status status_;

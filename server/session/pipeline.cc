@@ -85,7 +85,7 @@ void Pipeline::PublishEvent(MapEvent event) {
   if (const auto* merged = std::get_if<ObjectMerged>(&event)) ended = merged->from;
   if (ended) {
     pool_->Remove(pool_client_, ended);
-    mesher_->Remove(mesher_session_, ended);
+    mesher_->RemoveObject(mesher_session_, ended);
   }
   map_->Apply(std::move(event));
 }
@@ -118,13 +118,13 @@ Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const 
       sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
       object_mapper_(config.objects) {
   mesher_session_ =
-      mesher_->Register([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
+      mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
   pool_client_ = pool_->Register([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
 }
 
 Pipeline::~Pipeline() {
   pool_->Unregister(pool_client_);
-  mesher_->Unregister(mesher_session_);
+  mesher_->RemoveSession(mesher_session_);
 }
 
 // A disk that fails ends the recording, but not the session.
@@ -136,7 +136,7 @@ void Pipeline::Record(const SessionInput& input) {
   recorder_ = nullptr;
 }
 
-bool Pipeline::IsTrainingDone() const { return pool_->Idle(pool_client_) && mesher_->Idle(mesher_session_); }
+bool Pipeline::IsTrainingDone() const { return pool_->Idle(pool_client_) && mesher_->IsIdle(mesher_session_); }
 
 void Pipeline::TrainSlices(int count) { pool_->TrainSlices(pool_client_, count); }
 

@@ -91,7 +91,7 @@ class Pipeline {
   slam::SparseMapper sparse_mapper_;
   objects::ObjectMapper object_mapper_;
 
-  uint64_t mesher_session_ = 0;
+  Mesher::SessionId mesher_session_ = 0;
   uint64_t pool_client_ = 0;
 };
 

@@ -44,10 +44,17 @@ Scheduler::Callbacks Session::SchedulerCallbacks() {
           .failed = [this](const char* stage, const std::string& what) { OnFailed(stage, what); }};
 }
 
+absl::Status Session::CheckOpen() const {
+  const SessionState state = state_;
+  if (state == SessionState::kOpen) return absl::OkStatus();
+  return FailedPrecondition("session '{}' {} and accepts no more frames", id_,
+                            state == SessionState::kFailed ? "has failed" : "was finished");
+}
+
 absl::Status Session::Offer(SessionInput input) {
   if (scheduler_.Offer(std::move(input))) return absl::OkStatus();
-  return FailedPrecondition("session '{}' accepts no more frames: it is {}", id_,
-                            state_ == SessionState::kFailed ? "failed" : "finished");
+  ROMAP_RETURN_IF_ERROR(CheckOpen());
+  return FailedPrecondition("session '{}' was stopped and accepts no more frames", id_);
 }
 
 void Session::Finish() {

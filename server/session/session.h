@@ -35,9 +35,11 @@ class Session {
   SessionInfo Info() const;
   MapSnapshot Export() const;
 
+  // FAILED_PRECONDITION if the session accepts no more inputs.
+  absl::Status CheckOpen() const;
   // Queues a frame, or the masks of an earlier frame; the FrameAck or MasksAck follows as an event. If the queue is
-  // full, kReplay waits and kLive drops the oldest input. FAILED_PRECONDITION: the session is finishing, finished or
-  // failed.
+  // full, kReplay waits and kLive drops the oldest input. Fails as
+  // CheckOpen() does.
   absl::Status Offer(SessionInput input);
   // No more inputs. Returns at once; the state becomes kFinished when everything is mapped and trained.
   void Finish();

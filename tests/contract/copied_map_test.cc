@@ -35,7 +35,7 @@ class OutboxStream : public EventStream {
 class OneMapService : public testing::FakeMappingService {
  public:
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& /*session_id*/) override {
-    return std::make_unique<OutboxStream>(map.Subscribe(session::Outbox::Acks::kNewest, 1, /*with_snapshot=*/true));
+    return std::make_unique<OutboxStream>(map.Subscribe(session::Outbox::Acks::kNewest, 1));
   }
   session::MapState map;
 };
@@ -62,7 +62,7 @@ TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
   const auto late_stream = remote->Watch("any").value();
   std::thread late_reader([&] { ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
   for (int step = 0; step < 2000; ++step) random.Step();
-  const auto all = service.map.Subscribe(session::Outbox::Acks::kAll, 16, /*with_snapshot=*/true);
+  const auto all = service.map.Subscribe(session::Outbox::Acks::kAll, 16);
   service.map.Close(absl::OkStatus());
   for (std::thread* reader : {&fast_reader, &slow_reader, &late_reader}) reader->join();
   OutboxStream truth_stream(all);

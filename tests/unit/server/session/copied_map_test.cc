@@ -19,7 +19,7 @@ constexpr int kSteps = 400;
 // A subscriber that takes `share` of 10 chances to read a few events.
 class Reader {
  public:
-  Reader(MapState& map, Outbox::Acks acks, int share) : outbox_(map.Subscribe(acks, 50, true)), share_(share) {}
+  Reader(MapState& map, Outbox::Acks acks, int share) : outbox_(map.Subscribe(acks, 50)), share_(share) {}
 
   void MaybeRead(testing::RandomMap& random) {
     if (random.Pick(0, 9) >= share_) return;

@@ -48,14 +48,14 @@ class Stages {
  public:
   Stages() {
     mesher_client_ =
-        mesher_.Register([this](MeshUpdate mesh, const MeshPlace& place) { map.PublishMesh(std::move(mesh), place); });
+        mesher_.AddSession([this](MeshUpdate mesh, const MeshPose& pose) { map.PublishMesh(std::move(mesh), pose); });
     pool_client_ =
         pool_.Register([this](FieldSnapshot snapshot) { mesher_.Offer(mesher_client_, std::move(snapshot)); });
-    outbox = map.Subscribe(Outbox::Acks::kAll, 100, true);
+    outbox = map.Subscribe(Outbox::Acks::kAll, 100);
   }
   ~Stages() {
     pool_.Unregister(pool_client_);
-    mesher_.Unregister(mesher_client_);
+    mesher_.RemoveSession(mesher_client_);
   }
 
   void Publish(objects::ObjectOutput output) {

@@ -20,9 +20,9 @@ MeshUpdate MeshOf(uint64_t id) {
   return mesh;
 }
 
-MeshPlace PlaceAt(double x) { return {{Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}, {}}; }
+MeshPose PlaceAt(double x) { return {{Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}, {}}; }
 
-std::shared_ptr<Outbox> Listen(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100, true); }
+std::shared_ptr<Outbox> Listen(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100); }
 
 TEST(MapStateTest, RevisionsGrowOverCuboidsAndMeshes) {
   MapState map;
@@ -52,7 +52,7 @@ TEST(MapStateTest, WhatIsGoneStaysGone) {
   for (uint64_t id : {1, 2, 3}) map.Apply(Update(id));
   map.Apply(ObjectRemoved{ObjectId{1}, 0, "ghost"});
   map.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 0});
-  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100, false);
+  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100);
   for (uint64_t id : {1, 2}) {
     map.Apply(Update(id));
     map.Apply(ObjectRemoved{ObjectId{id}, 0, "once more"});
@@ -111,7 +111,7 @@ TEST(MapStateTest, ACorrectionMovesTheMeshAndDoesNotSendItAgain) {
   MapState map;
   map.Apply(Update(1));
   map.PublishMesh(MeshOf(1), PlaceAt(5));
-  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100, false);
+  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100);
   const Eigen::Vector3d before = Placed(map.Snapshot().objects[0].object, vertex);
   const Sim3<World, World> first = Correction(1.3, 0.35, 2), second = Correction(0.9, -0.1, -1);
   for (const Sim3<World, World>& S : {first, second}) {
@@ -135,7 +135,7 @@ TEST(MapStateTest, AMeshOfAnOlderSnapshotIsPutWhereItsObjectIsNow) {
   MapState map;
   map.Apply(Update(1));
   map.MoveObject(ObjectId{1}, first);
-  MeshPlace place = PlaceAt(5);
+  MeshPose place = PlaceAt(5);
   place.S_new_first = first;
   map.MoveObject(ObjectId{1}, second);
   map.PublishMesh(MeshOf(1), place);
