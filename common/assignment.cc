@@ -5,14 +5,14 @@
 namespace romap {
 namespace {
 
-// For at most as many rows as columns. Index 0 of the arrays stands for "none"; rows and columns count from 1.
+// Requires rows <= columns. Rows and columns are numbered from 1; index 0 of the arrays means "none".
 std::vector<int> AssignWide(const Eigen::MatrixXd& cost) {
   const int rows = static_cast<int>(cost.rows());
   const int columns = static_cast<int>(cost.cols());
   std::vector<double> row_potential(rows + 1), column_potential(columns + 1);
-  std::vector<int> row_of(columns + 1);  // the row a column is given to
+  std::vector<int> row_of(columns + 1);  // the row assigned to a column
   for (int row = 1; row <= rows; ++row) {
-    // Grows a tree of shortest alternating paths from `row` until it meets a free column.
+    // Grows a tree of shortest alternating paths from `row` until it reaches a free column.
     std::vector<double> slack(columns + 1, std::numeric_limits<double>::infinity());
     std::vector<int> previous(columns + 1);
     std::vector<bool> visited(columns + 1);

@@ -10,32 +10,33 @@
 
 namespace romap {
 
-// A closable FIFO of limited length between threads. After Close() nothing more goes in; what is in still comes out.
+// A closable FIFO of limited length between threads. After Close(), Push() fails; waiting items can still be popped.
 template <class T>
 class BoundedQueue {
  public:
   explicit BoundedQueue(size_t capacity) : capacity_(capacity) {}
 
-  // Waits for room. False when the queue was closed (the item is not taken).
+  // Waits while the queue is full. False if the queue was closed; then the item is discarded.
   bool Push(T item) {
     std::unique_lock lock(mutex_);
-    room_.wait(lock, [&] { return closed_ || items_.size() < capacity_; });
+    not_full_.wait(lock, [&] { return closed_ || items_.size() < capacity_; });
     if (closed_) return false;
     items_.push_back(std::move(item));
-    ready_.notify_one();
+    not_empty_.notify_one();
     return true;
   }
 
-  // Never waits: false when there is no room or the queue was closed; then the item is left as it was.
+  // Does not wait. False if the queue is full or closed; then the item is unchanged.
   bool TryPush(T& item) {
     std::lock_guard lock(mutex_);
     if (closed_ || items_.size() >= capacity_) return false;
     items_.push_back(std::move(item));
-    ready_.notify_one();
+    not_empty_.notify_one();
     return true;
   }
 
-  // Never waits: makes room by dropping the oldest item, which is returned. False in `accepted` when closed.
+  // Does not wait: if the queue is full, removes and returns the oldest item. `accepted` is false if the queue is
+  // closed.
   std::optional<T> PushDroppingOldest(T item, bool* accepted) {
     std::lock_guard lock(mutex_);
     *accepted = !closed_;
@@ -46,29 +47,29 @@ class BoundedQueue {
       items_.pop_front();
     }
     items_.push_back(std::move(item));
-    ready_.notify_one();
+    not_empty_.notify_one();
     return dropped;
   }
 
-  // Waits for an item. nullopt when the queue is closed and empty.
+  // Waits for an item. nullopt if the queue is closed and empty.
   std::optional<T> Pop() {
     std::unique_lock lock(mutex_);
-    ready_.wait(lock, [&] { return closed_ || !items_.empty(); });
+    not_empty_.wait(lock, [&] { return closed_ || !items_.empty(); });
     return TakeFront();
   }
 
-  // As Pop, but gives up after `timeout`.
+  // As Pop(); also nullopt after `timeout`.
   std::optional<T> PopFor(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
-    ready_.wait_for(lock, timeout, [&] { return closed_ || !items_.empty(); });
+    not_empty_.wait_for(lock, timeout, [&] { return closed_ || !items_.empty(); });
     return TakeFront();
   }
 
   void Close() {
     std::lock_guard lock(mutex_);
     closed_ = true;
-    ready_.notify_all();
-    room_.notify_all();
+    not_empty_.notify_all();
+    not_full_.notify_all();
   }
 
   bool Drained() const {
@@ -86,14 +87,14 @@ class BoundedQueue {
     if (items_.empty()) return std::nullopt;
     std::optional<T> item(std::move(items_.front()));
     items_.pop_front();
-    room_.notify_one();
+    not_full_.notify_one();
     return item;
   }
 
   const size_t capacity_;
   mutable std::mutex mutex_;
-  std::condition_variable ready_;
-  std::condition_variable room_;
+  std::condition_variable not_empty_;
+  std::condition_variable not_full_;
   std::deque<T> items_;
   bool closed_ = false;
 };

@@ -9,24 +9,25 @@ namespace romap {
 absl::Status ValidateCameraModel(const CameraModel& camera) {
   const auto bad_size = [](int n) { return n < 16 || n > 8192; };
   if (bad_size(camera.width_px) || bad_size(camera.height_px)) {
-    return InvalidArgument("camera: size {}x{} px must lie in 16..8192", camera.width_px, camera.height_px);
+    return InvalidArgument("camera: size must be in 16..8192 px, is {}x{} px", camera.width_px, camera.height_px);
   }
   const auto bad_focal = [](double f) { return !std::isfinite(f) || f <= 0; };
   if (bad_focal(camera.fx_px) || bad_focal(camera.fy_px)) {
-    return InvalidArgument("camera: focal lengths fx={} fy={} px must be positive", camera.fx_px, camera.fy_px);
+    return InvalidArgument("camera: focal lengths must be positive, are fx={} fy={} px", camera.fx_px, camera.fy_px);
   }
   const auto bad_center = [](double c, int size) { return !std::isfinite(c) || c < -size || c > 2.0 * size; };
   if (bad_center(camera.cx_px, camera.width_px) || bad_center(camera.cy_px, camera.height_px)) {
-    return InvalidArgument("camera: principal point cx={} cy={} px is far outside the {}x{} image", camera.cx_px,
-                           camera.cy_px, camera.width_px, camera.height_px);
+    return InvalidArgument(
+        "camera: principal point must be at most one image size outside the {}x{} px image, is cx={} cy={} px",
+        camera.width_px, camera.height_px, camera.cx_px, camera.cy_px);
   }
   const bool fisheye = camera.lens == LensModel::kFisheye;
   const char* names = fisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3";
   for (double k : camera.distortion) {
-    if (!std::isfinite(k)) return InvalidArgument("camera: distortion ({}) must be finite numbers", names);
+    if (!std::isfinite(k)) return InvalidArgument("camera: distortion ({}) must be finite", names);
   }
   if (fisheye && camera.distortion[4] != 0) {
-    return InvalidArgument("camera: a fisheye lens has four distortion coefficients ({}), not a fifth", names);
+    return InvalidArgument("camera: a fisheye lens must have 4 distortion coefficients ({}), has 5", names);
   }
   return absl::OkStatus();
 }

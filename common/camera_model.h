@@ -7,13 +7,13 @@
 
 namespace romap {
 
-// How a lens bends rays.
+// Distortion model of a lens.
 enum class LensModel {
-  kRadialTangential,  // OpenCV's k1 k2 p1 p2 k3; with all of them 0 a pinhole
+  kRadialTangential,  // OpenCV's k1 k2 p1 p2 k3; a pinhole if all are 0
   kFisheye,           // equidistant with OpenCV's fisheye coefficients k1 k2 k3 k4 (Kannala and Brandt, PAMI 2006)
 };
 
-// Pinhole camera behind a lens. Pixel centres lie at integer coordinates. See common/lens.h for what the lens does.
+// Pinhole camera with lens distortion (common/lens.h). Pixel centers are at integer coordinates.
 struct CameraModel {
   int width_px = 0;
   int height_px = 0;
@@ -21,18 +21,18 @@ struct CameraModel {
   double fy_px = 0;
   double cx_px = 0;
   double cy_px = 0;
-  std::array<double, 5> distortion{};  // coefficients of `lens`, the fifth of a fisheye is 0
+  std::array<double, 5> distortion{};  // coefficients of `lens`; the fifth of a fisheye is 0
   LensModel lens = LensModel::kRadialTangential;
 
   // Pinhole projection of a point in the camera frame (z > 0) to pixels, without distortion.
   Eigen::Vector2d Project(const Eigen::Vector3d& p_camera) const {
     return {fx_px * p_camera.x() / p_camera.z() + cx_px, fy_px * p_camera.y() / p_camera.z() + cy_px};
   }
-  // Direction with z = 1 through a pixel, without distortion; not normalised.
+  // Direction with z = 1 through a pixel, without distortion; not normalized.
   Eigen::Vector3d Unproject(double u_px, double v_px) const {
     return {(u_px - cx_px) / fx_px, (v_px - cy_px) / fy_px, 1.0};
   }
-  // False for a pinhole. A fisheye bends rays even when its coefficients are all 0.
+  // False for a pinhole. A fisheye has distortion even if its coefficients are all 0.
   bool HasDistortion() const {
     if (lens == LensModel::kFisheye) return true;
     for (double k : distortion) {
@@ -40,7 +40,7 @@ struct CameraModel {
     }
     return false;
   }
-  // The same camera with its lens taken off.
+  // The same camera without distortion.
   CameraModel Pinhole() const {
     CameraModel pinhole = *this;
     pinhole.lens = LensModel::kRadialTangential;
@@ -50,12 +50,12 @@ struct CameraModel {
   bool operator==(const CameraModel&) const = default;
 };
 
-// How many distortion coefficients a lens has.
+// Number of distortion coefficients of a lens.
 inline int CoefficientCount(LensModel lens) { return lens == LensModel::kFisheye ? 4 : 5; }
 
-// INVALID_ARGUMENT naming the first field that cannot be (size outside 16..8192 px, focal length not positive or not
-// finite, principal point outside the image by more than its size, distortion not finite, or more coefficients than the
-// lens has).
+// INVALID_ARGUMENT, with the first invalid field in the message: size outside 16..8192 px, focal length not positive or
+// not finite, principal point more than one image size outside the image, distortion not finite, or more coefficients
+// than the lens has.
 absl::Status ValidateCameraModel(const CameraModel& camera);
 
 }  // namespace romap

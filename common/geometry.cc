@@ -2,7 +2,7 @@
 
 namespace romap {
 
-// Here and not in the header: it instantiates Eigen's SVD, four seconds in every file that includes it.
+// Not in the header, because it instantiates Eigen's SVD, which takes four seconds to compile.
 Eigen::Quaterniond ShortestRotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return Eigen::Quaterniond::FromTwoVectors(from, to);
 }

@@ -6,8 +6,8 @@
 
 namespace romap {
 
-// Tags of the frames. World: right-handed, map units, z up unless a session's `up_world` says otherwise.
-// Camera: x right, y down, z forward (OpenCV). Object: cuboid centre, axes along the cuboid's edges, z along up.
+// Tags of the frames. World: right-handed, map units, z up unless the session's `up_world` differs. Camera: x right,
+// y down, z forward (OpenCV). Object: origin at the center of the cuboid, axes along its edges, z along up.
 struct World {};
 struct Camera {};
 struct Object {};
@@ -53,8 +53,8 @@ class SE3 {
   Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
 };
 
-// Similarity: p_to = scale * rotation * p_from + translation. What a monocular map undergoes when it is corrected: its
-// scale is as uncertain as its pose. Composes like SE3.
+// Similarity: p_to = scale * rotation * p_from + translation. Composes like SE3. Corrections of a monocular map are
+// similarities, because its scale is as uncertain as its pose.
 template <class To, class From>
 class Sim3 {
  public:
@@ -66,7 +66,7 @@ class Sim3 {
   double scale() const { return scale_; }  // > 0
   const Eigen::Quaterniond& rotation() const { return rotation_; }
   const Eigen::Vector3d& translation() const { return translation_; }
-  // The same without the scale: turns and shifts alike.
+  // The rigid transform with the same rotation and translation.
   SE3<To, From> Rigid() const { return {rotation_, translation_}; }
 
   Sim3<From, To> Inverse() const {
@@ -84,8 +84,8 @@ class Sim3 {
             scale_ * (rotation_ * other.translation()) + translation_};
   }
 
-  // Where a rigid frame (a camera, an object) gets to when its space undergoes this similarity: its origin goes along,
-  // its axes turn, and its own unit of length stays what it was.
+  // The pose of a rigid frame (camera, object) after its space was moved by this similarity: origin and axes move with
+  // the space; the frame's own unit of length stays the same.
   template <class Other>
   SE3<To, Other> Moved(const SE3<From, Other>& frame) const {
     return {rotation_ * frame.rotation(), *this * frame.translation()};
@@ -101,10 +101,10 @@ class Sim3 {
   Eigen::Vector3d translation_ = Eigen::Vector3d::Zero();
 };
 
-// Shortest rotation that takes the direction `from` to the direction `to`; lengths do not matter.
+// Shortest rotation from the direction `from` to the direction `to`, which may have any length > 0.
 Eigen::Quaterniond ShortestRotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-// Shortest rotation that takes world +z to `up_world` (unit length): the orientation of a cuboid whose yaw is 0.
+// Shortest rotation from world +z to `up_world` (unit length): the orientation of a cuboid with yaw 0.
 Eigen::Quaterniond RotationFromZTo(const Eigen::Vector3d& up_world);
 
 }  // namespace romap

@@ -8,7 +8,7 @@
 
 namespace romap {
 
-// A 64-bit id that cannot be mixed up with another kind. 0 means "none". Prints as e.g. `object/12`.
+// A 64-bit id; ids of different kinds do not convert to each other. 0 means "none". Prints as e.g. `object/12`.
 template <class Tag>
 struct Id {
   uint64_t value = 0;

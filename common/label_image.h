@@ -6,8 +6,8 @@
 
 namespace romap {
 
-// The label under a pixel of a label image (CV_16UC1), if all pixels within `erosion_px` have it too: masks err at
-// their rims. Else 0, as outside the image and without an image.
+// The label at a pixel of a label image (CV_16UC1), if all pixels within `erosion_px` have the same label, because
+// masks are inaccurate near their borders. Otherwise 0; also 0 outside the image or if the image is empty.
 uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int erosion_px);
 
 }  // namespace romap

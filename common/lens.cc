@@ -8,7 +8,7 @@ namespace romap {
 namespace {
 
 constexpr double kAccuracy_px = 0.05;
-// The radial-tangential formula is inverted by fixed-point iteration, which is slow for strong lenses.
+// OpenCV inverts the radial-tangential formula by fixed-point iteration, which converges slowly for strong distortion.
 constexpr int kIterations = 100;
 constexpr double kConverged_px = 0.001;
 
@@ -20,15 +20,15 @@ cv::Mat Coefficients(const CameraModel& camera) {
   return cv::Mat(1, CoefficientCount(camera.lens), CV_64F, const_cast<double*>(camera.distortion.data())).clone();
 }
 
-// Image-plane coordinates (z = 1) after the lens of those before it.
-Eigen::Vector2d BendRadialTangential(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
+// Image-plane coordinates (z = 1) with distortion, from those without.
+Eigen::Vector2d DistortRadialTangential(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
   const double x = ray.x(), y = ray.y(), r2 = ray.squaredNorm();
   const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
   return {x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x),
           y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y};
 }
 
-Eigen::Vector2d BendFisheye(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
+Eigen::Vector2d DistortFisheye(const std::array<double, 5>& k, const Eigen::Vector2d& ray) {
   const double r = ray.norm();
   if (r == 0) return ray;
   const double theta = std::atan(r), t2 = theta * theta;
@@ -40,20 +40,20 @@ Eigen::Vector2d BendFisheye(const std::array<double, 5>& k, const Eigen::Vector2
 std::vector<Eigen::Vector2f> UndistortPixels(const CameraModel& camera, std::span<const Eigen::Vector2f> pixels_px) {
   std::vector<Eigen::Vector2f> undistorted(pixels_px.begin(), pixels_px.end());
   if (pixels_px.empty() || !camera.HasDistortion()) return undistorted;
-  std::vector<cv::Point2d> bent, straight;
-  for (const Eigen::Vector2f& pixel_px : pixels_px) bent.emplace_back(pixel_px.x(), pixel_px.y());
+  std::vector<cv::Point2d> distorted, undistorted_points;
+  for (const Eigen::Vector2f& pixel_px : pixels_px) distorted.emplace_back(pixel_px.x(), pixel_px.y());
   const cv::Matx33d K = IntrinsicMatrix(camera);
   const cv::TermCriteria until(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kIterations,
                                camera.lens == LensModel::kFisheye ? 1e-9 : kConverged_px);
   if (camera.lens == LensModel::kFisheye) {
-    cv::fisheye::undistortPoints(bent, straight, K, Coefficients(camera), cv::noArray(), K, until);
+    cv::fisheye::undistortPoints(distorted, undistorted_points, K, Coefficients(camera), cv::noArray(), K, until);
   } else {
-    cv::undistortPoints(bent, straight, K, Coefficients(camera), cv::noArray(), K, until);
+    cv::undistortPoints(distorted, undistorted_points, K, Coefficients(camera), cv::noArray(), K, until);
   }
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  for (size_t i = 0; i < straight.size(); ++i) {
-    // Neither iteration says whether it found anything.
-    const Eigen::Vector2d pinhole_px(straight[i].x, straight[i].y);
+  for (size_t i = 0; i < undistorted_points.size(); ++i) {
+    // OpenCV does not report whether the iteration converged.
+    const Eigen::Vector2d pinhole_px(undistorted_points[i].x, undistorted_points[i].y);
     const double error_px = (DistortPixel(camera, pinhole_px) - pixels_px[i].cast<double>()).norm();
     undistorted[i] = error_px < kAccuracy_px ? pinhole_px.cast<float>().eval() : Eigen::Vector2f(kNone, kNone);
   }
@@ -62,9 +62,10 @@ std::vector<Eigen::Vector2f> UndistortPixels(const CameraModel& camera, std::spa
 
 Eigen::Vector2d DistortPixel(const CameraModel& camera, const Eigen::Vector2d& pinhole_px) {
   const Eigen::Vector2d ray = camera.Unproject(pinhole_px.x(), pinhole_px.y()).head<2>();
-  const Eigen::Vector2d bent = camera.lens == LensModel::kFisheye ? BendFisheye(camera.distortion, ray)
-                                                                  : BendRadialTangential(camera.distortion, ray);
-  return camera.Project({bent.x(), bent.y(), 1});
+  const Eigen::Vector2d distorted = camera.lens == LensModel::kFisheye
+                                        ? DistortFisheye(camera.distortion, ray)
+                                        : DistortRadialTangential(camera.distortion, ray);
+  return camera.Project({distorted.x(), distorted.y(), 1});
 }
 
 UndistortionMaps MakeUndistortionMaps(const CameraModel& camera) {

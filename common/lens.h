@@ -9,15 +9,15 @@
 
 namespace romap {
 
-// Where the pinhole camera.Pinhole() would see what `camera` sees at each of `pixels_px`, to better than 0.05 px.
-// (NaN, NaN) where it would not see it at all: the ray leaves the lens sideways or backwards, or no ray meets the pixel
-// by the lens's formula.
+// Converts pixels of `camera` to pixels of the pinhole camera.Pinhole(), with an error below 0.05 px. (NaN, NaN) for
+// pixels without an equivalent: the ray is 90 degrees or more from the optical axis, or the distortion formula maps no
+// ray to the pixel.
 std::vector<Eigen::Vector2f> UndistortPixels(const CameraModel& camera, std::span<const Eigen::Vector2f> pixels_px);
 
-// The other way round, for one pixel of the pinhole image: where `camera` sees it.
+// The inverse for one pixel: from the pinhole image to the image of `camera`.
 Eigen::Vector2d DistortPixel(const CameraModel& camera, const Eigen::Vector2d& pinhole_px);
 
-// Maps for cv::remap, which turn an image of `camera` into that of camera.Pinhole(), of the same size.
+// Maps for cv::remap that convert an image of `camera` to an image of camera.Pinhole() of the same size.
 struct UndistortionMaps {
   cv::Mat xy;        // CV_16SC2
   cv::Mat fraction;  // CV_16UC1

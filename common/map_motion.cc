@@ -13,7 +13,7 @@ ObjectView Moved(const Sim3<World, World>& S_new_old, ObjectView view) {
   if (S_new_old.scale() == 1) return view;
   for (Eigen::Vector3f& point : view.sparse_depth) point.z() *= static_cast<float>(S_new_old.scale());
   if (!view.depth_mu.empty()) {
-    cv::Mat scaled;  // the old one is shared with whoever else holds the view
+    cv::Mat scaled;  // the old image may be shared with other holders of the view
     view.depth_mu.convertTo(scaled, -1, S_new_old.scale());
     view.depth_mu = scaled;
   }

@@ -6,13 +6,13 @@
 
 namespace romap {
 
-// How what was handed on follows a correction of the map: the space it stands in underwent `S_new_old`.
+// Motion of values with the space around them, p_new = S_new_old * p_old, after a correction of the map.
 
-// The box goes along and grows with the space. It leans when the space was turned against up.
+// Moves and scales the cuboid. It is no longer upright if the correction changed the up direction.
 Cuboid Moved(const Sim3<World, World>& S_new_old, Cuboid cuboid);
 
-// The camera goes along and its depths grow with the space, so that nothing changes between the view and an object that
-// moves in the same way. The pixels stay shared; depth images are shared unless the scale changes.
+// Moves the camera and scales its depths, so that the view stays consistent with an object that moves in the same way.
+// The pixels stay shared; the depth image is shared unless the scale changes.
 ObjectView Moved(const Sim3<World, World>& S_new_old, ObjectView view);
 
 }  // namespace romap

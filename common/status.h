@@ -6,7 +6,7 @@
 
 #include <utility>
 
-// Debian's Abseil has its own string_view; messages are made with fmt and handed over as std::string.
+// absl::string_view is not std::string_view in Debian's Abseil, so messages are formatted with fmt to std::string.
 
 namespace romap {
 
@@ -27,7 +27,7 @@ absl::Status Internal(fmt::format_string<Args...> format, Args&&... args) {
   return absl::InternalError(fmt::format(format, std::forward<Args>(args)...));
 }
 
-// The message of a status as std::string (fmt cannot print absl's string_view).
+// The message of a status as std::string, because fmt cannot format absl::string_view.
 inline std::string Message(const absl::Status& status) { return std::string(status.message()); }
 
 }  // namespace romap
@@ -42,5 +42,5 @@ inline std::string Message(const absl::Status& status) { return std::string(stat
   auto tmp = (expr);                                \
   if (!tmp.ok()) return tmp.status();               \
   lhs = std::move(tmp).value()
-// ROMAP_ASSIGN_OR_RETURN(auto x, F()): x = value of F(), or return its status.
+// ROMAP_ASSIGN_OR_RETURN(auto x, F()): declares x with the value of F(), or returns the status of F().
 #define ROMAP_ASSIGN_OR_RETURN(lhs, expr) ROMAP_ASSIGN_OR_RETURN_IMPL(ROMAP_CONCAT(romap_tmp_, __LINE__), lhs, expr)

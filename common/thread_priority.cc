@@ -6,10 +6,10 @@
 namespace romap {
 
 void LowerThreadPriority() {
-  constexpr int kNicer = 10;
-  // On Linux the nice value belongs to the thread, and lowering one's priority is always allowed.
+  constexpr int kNiceIncrement = 10;
+  // On Linux the nice value is per thread, and increasing it is always allowed.
   const auto thread = static_cast<id_t>(gettid());
-  setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + kNicer);
+  setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + kNiceIncrement);
 }
 
 }  // namespace romap

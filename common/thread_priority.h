@@ -2,8 +2,8 @@
 
 namespace romap {
 
-// Lets the calling thread yield to the others of the process: what answers a client comes first, training and meshing
-// take what is left. Does nothing where the system has no priorities per thread.
+// Lowers the priority of the calling thread, for training and meshing, so that threads that serve clients run first. No
+// effect on systems without priorities per thread.
 void LowerThreadPriority();
 
 }  // namespace romap

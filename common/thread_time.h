@@ -4,7 +4,7 @@
 
 namespace romap {
 
-// CPU time that the calling thread has used [s]. A call of the kernel: some hundred nanoseconds.
+// CPU time used by the calling thread [s]. A system call of a few hundred nanoseconds.
 inline double ThreadCpuSeconds() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -1,5 +1,5 @@
 // romap-server: serves the mapping service of this process over gRPC until SIGINT or SIGTERM.
-// Exit status: 0 stopped as asked, 1 could not run, 2 wrong flags or configuration.
+// Exit status: 0 after SIGINT or SIGTERM, 1 server could not start, 2 invalid flags or configuration.
 
 #include <fmt/format.h>
 #include <pthread.h>
@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "common/config.h"
+#include "common/file_status.h"
 #include "common/status.h"
 #include "common/version.h"
 #include "server/session/local_mapping_service.h"
@@ -51,20 +53,20 @@ struct Config {
   }
 };
 
-void SayError(const std::string& message) { fmt::print(stderr, "romap-server: {}\n", message); }
+void PrintError(const std::string& message) { fmt::print(stderr, "romap-server: {}\n", message); }
 
-// The flags, or the exit status when there is nothing more to do (help, version, wrong flags).
+// The flags, or the exit status if the program must end (--help, --version, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
   std::string listen_address;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
-  app.add_option("--listen", listen_address, "HOST:PORT to serve on (default 127.0.0.1:50051; port 0: any free one)");
+  app.add_option("--listen", listen_address, "HOST:PORT to serve on (default 127.0.0.1:50051; port 0 = any free port)");
   app.add_option("--config", flags.config_file, "YAML file with the configuration");
-  app.add_option("--set", flags.assignments, "section.field=value, overrides the file; may be repeated")
+  app.add_option("--set", flags.assignments, "section.field=value; overrides the file; may be repeated")
       ->allow_extra_args(false);
-  app.add_flag("--dump-config", flags.dump_config, "Print the configuration in effect and exit");
-  app.add_option("--log-level", flags.log_level, "Least severity that is logged")
+  app.add_flag("--dump-config", flags.dump_config, "Print the effective configuration and exit");
+  app.add_option("--log-level", flags.log_level, "Minimum severity of log messages")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "critical", "off"}))
       ->capture_default_str();
   app.add_option("--threads", threads, "Training threads (default: one per core)");
@@ -74,7 +76,7 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    SayError(fmt::format("{} (romap-server --help lists the flags)", e.what()));
+    PrintError(fmt::format("{} (see romap-server --help)", e.what()));
     return kExitUsage;
   }
   if (!listen_address.empty()) flags.assignments.push_back("transport.listen_address=" + listen_address);
@@ -84,10 +86,12 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
 
 absl::Status Load(const Flags& flags, ConfigFields fields) {
   if (!flags.config_file.empty()) {
+    errno = 0;
     std::ifstream file(flags.config_file);
-    // Opening a folder succeeds, and reading from it then throws.
-    if (!file || std::filesystem::is_directory(flags.config_file)) {
-      return InvalidArgument("cannot read the configuration file '{}'", flags.config_file);
+    if (!file) return FileError(flags.config_file, "read the configuration");
+    // A folder can be opened like a file, but reading from it throws.
+    if (std::filesystem::is_directory(flags.config_file)) {
+      return FileError(flags.config_file, "read the configuration", EISDIR);
     }
     const std::string text{std::istreambuf_iterator<char>(file), {}};
     ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text, flags.config_file));
@@ -96,13 +100,13 @@ absl::Status Load(const Flags& flags, ConfigFields fields) {
 }
 
 void SetUpLogging(const std::string& level) {
-  // Standard output is for what scripts wait for, so the log goes to standard error.
+  // To standard error: scripts read the address of the server from standard output.
   spdlog::set_default_logger(spdlog::stderr_color_mt("romap-server"));
   spdlog::set_level(spdlog::level::from_str(level));
   transport::RouteGrpcLogToSpdlog();
 }
 
-// Signals are taken by WaitForStop() instead of by a handler. Threads inherit this, so it must come before any is made.
+// WaitForStop() receives the signals instead of a handler. Threads inherit the mask, so call this before starting any.
 sigset_t BlockStopSignals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -116,7 +120,7 @@ void WaitForStop(const sigset_t& signals) {
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
-  // A second one ends a stop that takes too long.
+  // A second signal terminates the process if the shutdown takes too long.
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
 }
 
@@ -127,7 +131,7 @@ int Main(int argc, char** argv) {
 
   Config config;
   if (const absl::Status status = Load(flags, config.Fields()); !status.ok()) {
-    SayError(Message(status));
+    PrintError(Message(status));
     return kExitUsage;
   }
   if (flags.dump_config) {
@@ -140,7 +144,7 @@ int Main(int argc, char** argv) {
   session::LocalMappingService service(config.server);
   auto server = transport::GrpcServer::Start(&service, config.transport);
   if (!server.ok()) {
-    SayError(Message(server.status()));
+    PrintError(Message(server.status()));
     return absl::IsInvalidArgument(server.status()) ? kExitUsage : kExitFailure;
   }
   fmt::print("romap-server listening on {}\n", (*server)->address());

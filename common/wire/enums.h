@@ -14,7 +14,7 @@
 
 namespace romap::wire {
 
-// One table per enum serves both directions, so that they cannot disagree.
+// One table per enum is used for both directions, which keeps them consistent.
 template <class Plain, class Wire>
 struct EnumPair {
   Plain plain;
@@ -34,21 +34,21 @@ inline constexpr std::array<EnumPair<DepthEncoding, v1::DepthEncoding>, 2> kDept
     {DepthEncoding::kRawUint16, v1::DEPTH_ENCODING_RAW_UINT16},
 }};
 
-// LENS_MODEL_UNSPECIFIED may come in and means radial-tangential, as before there was a choice.
+// LENS_MODEL_UNSPECIFIED is accepted as radial-tangential, the only lens of older clients.
 inline constexpr std::array<EnumPair<LensModel, v1::LensModel>, 3> kLensModels{{
     {LensModel::kRadialTangential, v1::LENS_MODEL_RADIAL_TANGENTIAL},
     {LensModel::kRadialTangential, v1::LENS_MODEL_UNSPECIFIED},
     {LensModel::kFisheye, v1::LENS_MODEL_FISHEYE},
 }};
 
-// FRAME_MODE_UNSPECIFIED may come in and means replay.
+// FRAME_MODE_UNSPECIFIED is accepted as replay.
 inline constexpr std::array<EnumPair<FrameMode, v1::FrameMode>, 3> kFrameModes{{
     {FrameMode::kReplay, v1::FRAME_MODE_REPLAY},
     {FrameMode::kReplay, v1::FRAME_MODE_UNSPECIFIED},
     {FrameMode::kLive, v1::FRAME_MODE_LIVE},
 }};
 
-// POSE_USE_UNSPECIFIED may come in and means given, as before there was a choice.
+// POSE_USE_UNSPECIFIED is accepted as given, the only use in older clients.
 inline constexpr std::array<EnumPair<PoseUse, v1::PoseUse>, 4> kPoseUses{{
     {PoseUse::kGiven, v1::POSE_USE_GIVEN},
     {PoseUse::kGiven, v1::POSE_USE_UNSPECIFIED},
@@ -76,7 +76,7 @@ inline constexpr std::array<EnumPair<ObjectState, v1::ObjectState>, 3> kObjectSt
     {ObjectState::kLost, v1::OBJECT_STATE_LOST},
 }};
 
-// The wire's value, or its value 0 (unspecified) for one that is not in the table.
+// The wire value; 0 (unspecified) for a value that is not in the table.
 template <class Plain, class Wire, size_t N>
 Wire EnumToProto(const std::array<EnumPair<Plain, Wire>, N>& table, Plain plain) {
   for (const auto& pair : table) {
@@ -85,7 +85,7 @@ Wire EnumToProto(const std::array<EnumPair<Plain, Wire>, N>& table, Plain plain)
   return Wire{};
 }
 
-// INVALID_ARGUMENT naming `where` and the values that are known.
+// INVALID_ARGUMENT, with `where` and the known values in the message.
 template <class Plain, class Wire, size_t N>
 absl::StatusOr<Plain> EnumFromProto(const std::array<EnumPair<Plain, Wire>, N>& table, Wire wire,
                                     const std::string& where) {
@@ -95,7 +95,7 @@ absl::StatusOr<Plain> EnumFromProto(const std::array<EnumPair<Plain, Wire>, N>& 
     const auto* value = google::protobuf::GetEnumDescriptor<Wire>()->FindValueByNumber(static_cast<int>(pair.wire));
     known += (known.empty() ? "" : ", ") + value->name();
   }
-  return InvalidArgument("{}: value {} is not known here, known are {}", where, static_cast<int>(wire), known);
+  return InvalidArgument("{}: must be one of {}; is {}", where, known, static_cast<int>(wire));
 }
 
 }  // namespace romap::wire

@@ -10,12 +10,12 @@
 namespace romap::wire {
 namespace {
 
-// These overloads would hide the public ones otherwise.
+// Without these, the overloads below would hide the public ones.
 using wire::FromProto;
 using wire::ToProto;
 
 absl::StatusOr<ObjectId> ObjectIdFromProto(uint64_t value, const std::string& where) {
-  if (value == 0) return InvalidArgument("{}: missing (ids start at 1)", where);
+  if (value == 0) return InvalidArgument("{}: missing; ids start at 1", where);
   return ObjectId{value};
 }
 
@@ -84,7 +84,7 @@ MasksAck FromProto(v1::MasksAck proto) {
   return {.frame_id = proto.frame_id(), .accepted = proto.accepted(), .error = std::move(*proto.mutable_error())};
 }
 
-// Puts each kind of event into its member of the oneof.
+// Sets the member of the oneof for each kind of event.
 struct EventWriter {
   v1::MapEvent& proto;
   void operator()(FrameAck&& ack) const { *proto.mutable_frame_ack() = ToProto(std::move(ack)); }
@@ -121,7 +121,7 @@ absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where)
     case v1::MapEvent::kMasksAck:
       return FromProto(std::move(*proto.mutable_masks_ack()));
     default:
-      return InvalidArgument("{}: of a kind that is not known here", where);
+      return InvalidArgument("{}: unknown kind of event", where);
   }
 }
 
@@ -185,7 +185,7 @@ absl::StatusOr<ObjectUpdate> FromProto(v1::ObjectUpdate proto, const std::string
                            (TransformFromProto<World, Object>(proto.t_world_mesh(), where + ".t_world_mesh")));
   }
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.mesh_scale(), where + ".mesh_scale"));
-  if (proto.mesh_scale() < 0) return InvalidArgument("{}.mesh_scale: must be positive", where);
+  if (proto.mesh_scale() < 0) return InvalidArgument("{}.mesh_scale: must not be negative", where);
   if (proto.mesh_scale() > 0) update.mesh_scale = proto.mesh_scale();
   return update;
 }

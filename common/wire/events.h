@@ -9,11 +9,11 @@
 
 namespace romap::wire {
 
-// FromProto answers INVALID_ARGUMENT "<where>.<field>: ..." to a missing message, an unknown enum value, an id of 0, or
-// a number that is not finite. `where` is the path of the message, e.g. "event".
+// FromProto returns INVALID_ARGUMENT "<where>.<field>: ..." for a missing message, an unknown enum value, an id of 0,
+// or a number that is not finite. `where` is the path of the message, e.g. "event".
 
 v1::MapEvent ToProto(MapEvent event);
-// Of an event kind this release does not know (compatibility rule 3), too: INVALID_ARGUMENT.
+// Also INVALID_ARGUMENT: an event kind that this release does not know (compatibility rule 3).
 absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where);
 
 v1::FrameAck ToProto(FrameAck ack);

@@ -26,7 +26,7 @@ v1::Instance ToProto(Instance instance) {
   return proto;
 }
 
-// Leaves `masks` empty.
+// Moves the contents of `masks`.
 v1::Masks MasksToProto(EncodedMasks& masks) {
   v1::Masks proto;
   if (masks.mask_encoding == MaskEncoding::kLabelPng) {
@@ -41,13 +41,13 @@ v1::Masks MasksToProto(EncodedMasks& masks) {
 absl::Status ReadImage(v1::Image& proto, FrameInput& frame) {
   ROMAP_ASSIGN_OR_RETURN(frame.image_encoding,
                          EnumFromProto(kImageEncodings, proto.encoding(), "frame.image.encoding"));
-  if (proto.data().empty()) return InvalidArgument("frame.image.data: empty");
+  if (proto.data().empty()) return InvalidArgument("frame.image.data: missing");
   frame.image = std::move(*proto.mutable_data());
   if (!IsRaw(frame.image_encoding)) return absl::OkStatus();
   const auto bad_side = [](uint32_t side_px) { return side_px < 1 || side_px > kMaxSide_px; };
   if (bad_side(proto.width_px()) || bad_side(proto.height_px())) {
-    return InvalidArgument("frame.image: size {}x{} px of a raw image must lie in 1..{}", proto.width_px(),
-                           proto.height_px(), kMaxSide_px);
+    return InvalidArgument("frame.image: raw size must be in 1..{} px, is {}x{} px", kMaxSide_px, proto.width_px(),
+                           proto.height_px());
   }
   frame.raw_width_px = static_cast<int>(proto.width_px());
   frame.raw_height_px = static_cast<int>(proto.height_px());
@@ -56,7 +56,7 @@ absl::Status ReadImage(v1::Image& proto, FrameInput& frame) {
 
 absl::StatusOr<Instance> InstanceFromProto(v1::Instance& proto, const std::string& where) {
   if (proto.label() < 1 || proto.label() > kMaxLabel) {
-    return InvalidArgument("{}.label: {} must lie in 1..{}", where, proto.label(), kMaxLabel);
+    return InvalidArgument("{}.label: must be in 1..{}, is {}", where, kMaxLabel, proto.label());
   }
   Instance instance;
   instance.label = proto.label();
@@ -73,27 +73,28 @@ absl::Status ReadMasks(v1::Masks& proto, const std::string& where, EncodedMasks&
   switch (proto.labels_case()) {
     case v1::Masks::kLabelPng:
       masks.mask_encoding = MaskEncoding::kLabelPng;
-      if (proto.label_png().empty()) return InvalidArgument("{}.label_png: empty", where);
+      if (proto.label_png().empty()) return InvalidArgument("{}.label_png: missing", where);
       masks.label_png = std::move(*proto.mutable_label_png());
       break;
     case v1::Masks::kLabelRuns: {
       const auto& pairs = proto.label_runs().label_length_pairs();
       if (pairs.empty() || pairs.size() % 2 != 0) {
-        return InvalidArgument("{}.label_runs: {} numbers, must be pairs of label and length", where, pairs.size());
+        return InvalidArgument("{}.label_runs: must be (label, length) pairs, has {} numbers", where, pairs.size());
       }
       masks.mask_encoding = MaskEncoding::kRunLength;
       masks.label_runs.assign(pairs.begin(), pairs.end());
       break;
     }
     default:
-      return InvalidArgument("{}: needs label_png or label_runs", where);
+      return InvalidArgument("{}: must have label_png or label_runs", where);
   }
   std::unordered_set<uint32_t> labels;
   for (int i = 0; i < proto.instances_size(); ++i) {
     const std::string which = fmt::format("{}.instances[{}]", where, i);
     ROMAP_ASSIGN_OR_RETURN(Instance instance, InstanceFromProto(*proto.mutable_instances(i), which));
-    if (!labels.insert(instance.label).second)
-      return InvalidArgument("{}.label: {} occurs twice", which, instance.label);
+    if (!labels.insert(instance.label).second) {
+      return InvalidArgument("{}.label: {} is listed twice", which, instance.label);
+    }
     masks.instances.push_back(std::move(instance));
   }
   return absl::OkStatus();
@@ -102,9 +103,9 @@ absl::Status ReadMasks(v1::Masks& proto, const std::string& where, EncodedMasks&
 absl::Status ReadDepth(v1::Depth& proto, FrameInput& frame) {
   ROMAP_ASSIGN_OR_RETURN(frame.depth_encoding,
                          EnumFromProto(kDepthEncodings, proto.encoding(), "frame.depth.encoding"));
-  if (proto.data().empty()) return InvalidArgument("frame.depth.data: empty");
+  if (proto.data().empty()) return InvalidArgument("frame.depth.data: missing");
   if (!std::isfinite(proto.scale_mu()) || proto.scale_mu() <= 0) {
-    return InvalidArgument("frame.depth.scale_mu: {} must be finite and positive", proto.scale_mu());
+    return InvalidArgument("frame.depth.scale_mu: must be finite and positive, is {}", proto.scale_mu());
   }
   frame.depth = std::move(*proto.mutable_data());
   frame.depth_scale_mu = proto.scale_mu();

@@ -7,15 +7,15 @@
 
 namespace romap::wire {
 
-// Both directions take their argument by value and move the image, mask and depth bytes instead of copying them.
+// Both directions take their argument by value and move the image, mask and depth bytes.
 
-// Nothing is checked here: the receiver answers a bad frame.
+// Without checks: the receiver rejects invalid frames.
 v1::Frame ToProto(FrameInput frame);
 v1::LateMasks ToProto(MasksInput masks);
 
-// INVALID_ARGUMENT "frame.<field>: ..." for what the wire can break: a part that is missing or empty, an unknown enum
-// value, a number that is not finite or out of its range, a rotation that is none, an instance's label given twice.
-// Whether the bytes decode to images of the right size is not looked at.
+// INVALID_ARGUMENT "frame.<field>: ...": a required part is missing or empty, an enum value is unknown, a number is not
+// finite or out of range, a quaternion is not a rotation, or an instance label is listed twice. Does not decode the
+// image, masks and depth.
 absl::StatusOr<FrameInput> FromProto(v1::Frame proto);
 // As above, "late_masks.<field>: ...".
 absl::StatusOr<MasksInput> FromProto(v1::LateMasks proto);

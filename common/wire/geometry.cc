@@ -9,7 +9,7 @@
 namespace romap::wire {
 namespace {
 
-// Wide enough for a quaternion that went through 32-bit floats or a text file, far from one that is not a rotation.
+// Allows for rounding to 32-bit floats or to the digits of a text file.
 constexpr double kMaxNormError = 1e-3;
 
 }  // namespace
@@ -50,7 +50,7 @@ v1::Camera ToProto(const CameraModel& camera) {
 absl::StatusOr<Eigen::Vector3d> VectorFromProto(const v1::Vector3& proto, const std::string& where) {
   const Eigen::Vector3d vector(proto.x(), proto.y(), proto.z());
   if (!vector.allFinite()) {
-    return InvalidArgument("{}: ({}, {}, {}) must be finite", where, proto.x(), proto.y(), proto.z());
+    return InvalidArgument("{}: must be finite, is ({}, {}, {})", where, proto.x(), proto.y(), proto.z());
   }
   return vector;
 }
@@ -59,8 +59,8 @@ absl::StatusOr<Eigen::Quaterniond> QuaternionFromProto(const v1::Quaternion& pro
   const Eigen::Quaterniond quaternion(proto.w(), proto.x(), proto.y(), proto.z());
   const double norm = quaternion.norm();
   if (!(std::abs(norm - 1) <= kMaxNormError)) {  // NaN fails the comparison
-    return InvalidArgument("{}: quaternion xyzw ({}, {}, {}, {}) must have norm 1, has {}", where, proto.x(), proto.y(),
-                           proto.z(), proto.w(), norm);
+    return InvalidArgument("{}: must be a unit quaternion, is ({}, {}, {}, {}) with norm {}", where, proto.x(),
+                           proto.y(), proto.z(), proto.w(), norm);
   }
   return quaternion.normalized();
 }
@@ -68,7 +68,7 @@ absl::StatusOr<Eigen::Quaterniond> QuaternionFromProto(const v1::Quaternion& pro
 absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::string& where) {
   constexpr uint32_t kMaxInt = std::numeric_limits<int>::max();
   if (proto.width_px() > kMaxInt || proto.height_px() > kMaxInt) {
-    return InvalidArgument("{}: size {}x{} px is impossible", where, proto.width_px(), proto.height_px());
+    return InvalidArgument("{}: size must be in 16..8192 px, is {}x{} px", where, proto.width_px(), proto.height_px());
   }
   CameraModel camera;
   camera.width_px = static_cast<int>(proto.width_px());
@@ -79,9 +79,9 @@ absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::
   camera.cy_px = proto.cy_px();
   ROMAP_ASSIGN_OR_RETURN(camera.lens, EnumFromProto(kLensModels, proto.lens(), where + ".lens"));
   if (proto.distortion_size() != 0 && proto.distortion_size() != CoefficientCount(camera.lens)) {
-    return InvalidArgument(
-        "{}.distortion: has {} coefficients, must have none or {}", where, proto.distortion_size(),
-        camera.lens == LensModel::kFisheye ? "four (k1 k2 k3 k4 of a fisheye)" : "five (k1 k2 p1 p2 k3)");
+    return InvalidArgument("{}.distortion: must have no coefficients or {}, has {}", where,
+                           camera.lens == LensModel::kFisheye ? "4 (k1 k2 k3 k4)" : "5 (k1 k2 p1 p2 k3)",
+                           proto.distortion_size());
   }
   std::copy(proto.distortion().begin(), proto.distortion().end(), camera.distortion.begin());
   return camera;
@@ -89,12 +89,12 @@ absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::
 
 absl::Status CheckFinite(double value, const std::string& where) {
   if (std::isfinite(value)) return absl::OkStatus();
-  return InvalidArgument("{}: {} must be finite", where, value);
+  return InvalidArgument("{}: must be finite, is {}", where, value);
 }
 
 absl::Status CheckRange(double value, double min, double max, const std::string& where) {
   if (value >= min && value <= max) return absl::OkStatus();  // NaN fails the comparisons
-  return InvalidArgument("{}: {} must lie in {}..{}", where, value, min, max);
+  return InvalidArgument("{}: must be in {}..{}, is {}", where, min, max, value);
 }
 
 }  // namespace romap::wire

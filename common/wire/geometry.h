@@ -13,8 +13,8 @@
 
 namespace romap::wire {
 
-// Conversions between romap's values and the wire's. `where` is the path of the field, for error messages; every
-// FromProto answers INVALID_ARGUMENT "<where>...: <what is wrong>" to what the wire can break.
+// Conversions between plain values and wire messages. `where` is the path of the field, for error messages: every
+// FromProto returns INVALID_ARGUMENT "<where>...: <what would be right>" for an invalid message.
 
 v1::Vector3 ToProto(const Eigen::Vector3d& vector);
 v1::Quaternion ToProto(const Eigen::Quaterniond& quaternion);
@@ -28,15 +28,15 @@ v1::RigidTransform ToProto(const SE3<To, From>& transform) {
   return proto;
 }
 
-// Every number finite.
+// All numbers must be finite.
 absl::StatusOr<Eigen::Vector3d> VectorFromProto(const v1::Vector3& proto, const std::string& where);
-// Finite, norm within 0.001 of 1; the result is normalised.
+// Must be finite, with a norm within 0.001 of 1; the result is normalized.
 absl::StatusOr<Eigen::Quaterniond> QuaternionFromProto(const v1::Quaternion& proto, const std::string& where);
-// Sizes that fit, a lens that is known, and none or all of its distortion coefficients; whether such a camera can be is
-// ValidateCameraModel's question.
+// Must have a size that fits into int, a known lens, and none or all of its distortion coefficients. Everything else is
+// checked by ValidateCameraModel.
 absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::string& where);
 
-// The caller names the frames: TransformFromProto<World, Camera>(frame.t_world_camera(), "frame.t_world_camera").
+// The caller specifies the frames: TransformFromProto<World, Camera>(frame.t_world_camera(), "frame.t_world_camera").
 template <class To, class From>
 absl::StatusOr<SE3<To, From>> TransformFromProto(const v1::RigidTransform& proto, const std::string& where) {
   if (!proto.has_rotation()) return InvalidArgument("{}.rotation: missing", where);
@@ -47,7 +47,7 @@ absl::StatusOr<SE3<To, From>> TransformFromProto(const v1::RigidTransform& proto
 }
 
 absl::Status CheckFinite(double value, const std::string& where);
-// OK when `value` lies in [min, max].
+// OK if `value` is in [min, max].
 absl::Status CheckRange(double value, double min, double max, const std::string& where);
 
 }  // namespace romap::wire

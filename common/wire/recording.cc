@@ -1,10 +1,12 @@
 #include "common/wire/recording.h"
 
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <optional>
 #include <utility>
 
+#include "common/file_status.h"
 #include "common/status.h"
 #include "common/wire/frame.h"
 #include "common/wire/sessions.h"
@@ -55,7 +57,7 @@ v1::MapRequest ToRequest(SessionInput input) {
   return request;
 }
 
-// nullopt: the bytes are no record of that version.
+// nullopt: the bytes are not a record of that version.
 std::optional<v1::MapRequest> ParseRequest(const std::string& bytes, uint32_t version) {
   v1::MapRequest request;
   const bool parsed =
@@ -71,13 +73,12 @@ absl::StatusOr<SessionInput> FromRequest(v1::MapRequest request) {
 
 }  // namespace
 
-RecordingWriter::RecordingWriter(const std::string& path)
-    : path_(path), file_(path, std::ios::binary | std::ios::trunc) {}
-
 absl::StatusOr<std::unique_ptr<RecordingWriter>> RecordingWriter::Create(const std::string& path,
                                                                          const SessionOptions& options) {
-  std::unique_ptr<RecordingWriter> writer(new RecordingWriter(path));
-  if (!writer->file_) return FailedPrecondition("{}: the recording cannot be made there", path);
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  if (!file) return FileError(path, "create the recording");
+  std::unique_ptr<RecordingWriter> writer(new RecordingWriter(path, std::move(file)));
   ROMAP_RETURN_IF_ERROR(writer->Write(kMagic + NumberBytes(kVersion) + Record(ToProto(options))));
   return writer;
 }
@@ -85,18 +86,20 @@ absl::StatusOr<std::unique_ptr<RecordingWriter>> RecordingWriter::Create(const s
 absl::Status RecordingWriter::Append(SessionInput input) { return Write(Record(ToRequest(std::move(input)))); }
 
 absl::Status RecordingWriter::Write(const std::string& bytes) {
+  errno = 0;
   file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file_.flush();
   if (file_) return absl::OkStatus();
-  return absl::ResourceExhaustedError(fmt::format("{}: the recording cannot be written on, is the disk full?", path_));
+  return FileError(path_, "write to the recording");
 }
 
 absl::StatusOr<Recording> Recording::Open(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) return NotFound("{}: no such file", path);
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
-  const uint64_t file_bytes = std::filesystem::file_size(path, error);
-  if (!file || error) return InvalidArgument("{}: not a file that can be read", path);
+  if (!file) return FileError(path, "open the recording");
+  std::error_code error;
+  const uint64_t file_bytes = std::filesystem::file_size(path, error);  // fails for a folder, which can be opened
+  if (error) return FileError(path, "read the recording", error);
   Recording recording;
   recording.path_ = path;
   ROMAP_RETURN_IF_ERROR(recording.ReadHead(file));
@@ -106,20 +109,19 @@ absl::StatusOr<Recording> Recording::Open(const std::string& path) {
 
 absl::Status Recording::ReadHead(std::ifstream& file) {
   if (ReadBytes(file, kMagicBytes) != kMagic) {
-    return InvalidArgument("{}: not a recording, it should begin with {}", path_, kMagic);
+    return InvalidArgument("{}: not a recording: must begin with {}", path_, kMagic);
   }
   const std::optional<uint32_t> version = ReadNumber(file);
-  if (!version) return InvalidArgument("{}: cut off within its first bytes, nothing can be replayed", path_);
+  if (!version) return InvalidArgument("{}: recording is truncated within its header", path_);
   if (*version < kFramesOnly || *version > kVersion) {
-    return InvalidArgument("{}: a recording of version {}, this program reads versions {} to {}", path_, *version,
-                           kFramesOnly, kVersion);
+    return InvalidArgument("{}: recording version must be {} to {}, is {}", path_, kFramesOnly, kVersion, *version);
   }
   version_ = *version;
   const std::optional<uint32_t> length = ReadNumber(file);
   const std::optional<std::string> bytes = length && *length < (1U << 20) ? ReadBytes(file, *length) : std::nullopt;
   v1::CreateSessionRequest request;
   if (!bytes || !request.ParseFromString(*bytes)) {
-    return InvalidArgument("{}: its first record should be a CreateSessionRequest, but is damaged or cut off", path_);
+    return InvalidArgument("{}: first record must be a CreateSessionRequest; it is damaged or truncated", path_);
   }
   auto options = FromProto(request);
   if (!options.ok()) return InvalidArgument("{}: session options: {}", path_, Message(options.status()));
@@ -139,25 +141,27 @@ absl::Status Recording::FindRecords(std::ifstream& file, uint64_t file_bytes) {
     const std::optional<std::string> bytes = ReadBytes(file, *length);
     const std::optional<v1::MapRequest> request = bytes ? ParseRequest(*bytes, version_) : std::nullopt;
     if (!request) {
-      return InvalidArgument("{}: record {} (at byte {}) should be a frame or masks, but is damaged", path_,
-                             places_.size() + 1, begin);
+      return InvalidArgument("{}: record {} at byte {} must be a frame or masks; it is damaged", path_,
+                             positions_.size() + 1, begin);
     }
     if (request->has_frame()) ++frames_;
-    places_.push_back({begin, *length});
+    positions_.push_back({begin, *length});
     offset = begin + *length;
   }
   return absl::OkStatus();
 }
 
 absl::StatusOr<SessionInput> Recording::Load(size_t index) const {
-  if (index >= size()) return InvalidArgument("{}: no record {}, there are {}", path_, index, size());
-  const Place& place = places_[index];
+  if (index >= size()) return InvalidArgument("{}: record index must be below {}, is {}", path_, size(), index);
+  const Position& position = positions_[index];
+  errno = 0;
   std::ifstream file(path_, std::ios::binary);
-  file.seekg(static_cast<std::streamoff>(place.offset));
-  const std::optional<std::string> bytes = file ? ReadBytes(file, place.length) : std::nullopt;
+  if (!file) return FileError(path_, "open the recording");
+  file.seekg(static_cast<std::streamoff>(position.offset));
+  const std::optional<std::string> bytes = ReadBytes(file, position.length);
   std::optional<v1::MapRequest> request = bytes ? ParseRequest(*bytes, version_) : std::nullopt;
   if (!request) {
-    return InvalidArgument("{}: record {} can no longer be read, was the file changed?", path_, index + 1);
+    return InvalidArgument("{}: record {} is damaged; the file was changed after it was opened", path_, index + 1);
   }
   auto input = FromRequest(*std::move(request));
   if (!input.ok()) return InvalidArgument("{}: record {}: {}", path_, index + 1, Message(input.status()));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/client_input.h"
@@ -14,52 +15,51 @@
 
 namespace romap::wire {
 
-// What a session was fed, in a file, to be fed to another one later. Layout, numbers little-endian:
+// A file with all inputs of a session, to be replayed to another session. Layout, numbers little-endian:
 //
 //   8 bytes "ROMAPREC", uint32 version = 2
-//   records, each: uint32 length, then so many bytes of a message of romap.v1:
-//     first CreateSessionRequest, then one MapRequest each (`frame` or `late_masks`), in order
+//   records, each: uint32 length in bytes, then a message of romap.v1: first a CreateSessionRequest, then the
+//     MapRequests (`frame` or `late_masks`) in order
 //
-// Version 1, which had no late masks, is read too: its records are Frames instead of MapRequests.
-// Whatever stops the writer leaves whole records and at most one that is cut off at the end.
+// Version 1, without late masks, is also readable: its records are Frames instead of MapRequests.
+// If the writer stops at any time, all records but the last are complete.
 class RecordingWriter {
  public:
-  // Makes the file, replacing one of that name. FAILED_PRECONDITION naming the path when that cannot be done.
+  // Creates the file; replaces an existing one. Errors as FileError() (common/file_status.h).
   static absl::StatusOr<std::unique_ptr<RecordingWriter>> Create(const std::string& path,
                                                                  const SessionOptions& options);
 
-  // Writes one record and hands it to the operating system: it survives the end of this process. RESOURCE_EXHAUSTED
-  // naming the path when the disk refuses; the file is then of no further use to the writer.
+  // Writes one record and flushes it to the operating system, so that it survives a crash of this process. Errors as
+  // FileError(); do not append after an error.
   absl::Status Append(SessionInput input);
 
  private:
-  explicit RecordingWriter(const std::string& path);
+  RecordingWriter(std::string path, std::ofstream file) : path_(std::move(path)), file_(std::move(file)) {}
   absl::Status Write(const std::string& bytes);
 
   std::string path_;
   std::ofstream file_;
 };
 
-// Reads such a file. Only the places of the records are kept in memory. Several threads may Load() at a time.
+// Reads such a file. Only the positions of the records are kept in memory. Load() is thread-safe.
 class Recording {
  public:
-  // Looks at every record once. NOT_FOUND: no such file. INVALID_ARGUMENT, naming the file and what was expected: not a
-  // recording, another version, a first or other record that is no such message. A last record that is cut off is
-  // left out and counted in lost_bytes().
+  // Checks every record. Errors as FileError() if the file cannot be read. INVALID_ARGUMENT: not a recording, an
+  // unknown version, or a damaged record. An incomplete last record is ignored and counted in lost_bytes().
   static absl::StatusOr<Recording> Open(const std::string& path);
 
   const std::string& path() const { return path_; }
   const SessionOptions& options() const { return options_; }
-  size_t size() const { return places_.size(); }       // frames and late masks
-  size_t frames() const { return frames_; }            // of them
+  size_t size() const { return positions_.size(); }    // frames and late masks
+  size_t frames() const { return frames_; }            // without late masks
   uint64_t lost_bytes() const { return lost_bytes_; }  // at the end of the file
 
-  // What came as number `index` (< size()). INVALID_ARGUMENT naming file and record when it is nothing that may be
-  // sent.
+  // The input number `index`, < size(). INVALID_ARGUMENT: the record is damaged or not a valid input. Errors as
+  // FileError() if the file can no longer be read.
   absl::StatusOr<SessionInput> Load(size_t index) const;
 
  private:
-  struct Place {
+  struct Position {
     uint64_t offset = 0;  // of the message, bytes
     uint32_t length = 0;  // bytes
   };
@@ -70,7 +70,7 @@ class Recording {
   std::string path_;
   SessionOptions options_;
   uint32_t version_ = 0;
-  std::vector<Place> places_;
+  std::vector<Position> positions_;
   size_t frames_ = 0;
   uint64_t lost_bytes_ = 0;
 };

@@ -11,10 +11,10 @@
 namespace romap::wire {
 namespace {
 
-// These overloads would hide the public ones otherwise.
+// Without this, the overload below would hide the public ones.
 using wire::FromProto;
 
-// About 200 bytes a point.
+// About 200 bytes per point, so that a part stays far below the message limit.
 constexpr size_t kTrajectoryPointsPerPart = 4096;
 
 absl::StatusOr<ObjectSnapshot> FromProto(v1::ObjectSnapshot proto, const std::string& where) {
@@ -62,7 +62,7 @@ v1::SessionInfo ToProto(const SessionInfo& info) {
 }
 
 absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::string& where) {
-  if (proto.id().empty()) return InvalidArgument("{}.id: empty", where);
+  if (proto.id().empty()) return InvalidArgument("{}.id: missing", where);
   if (!proto.has_camera()) return InvalidArgument("{}.camera: missing", where);
   SessionInfo info;
   info.id = proto.id();
@@ -87,7 +87,7 @@ std::vector<v1::ExportMapResponse> ToProto(MapSnapshot snapshot) {
     *proto.mutable_object() = ToProto(std::move(object.object));
     if (object.mesh) *proto.mutable_mesh() = ToProto(std::move(*object.mesh));
   }
-  // A snapshot whose two arrays disagree is cut to the shorter one rather than read out of bounds.
+  // If the two arrays differ in length, the longer one is truncated.
   const size_t points = std::min(snapshot.trajectory.size(), snapshot.timestamps_ns.size());
   for (size_t i = 0; i < points; ++i) {
     if (i % kTrajectoryPointsPerPart == 0) parts.emplace_back().mutable_trajectory();
@@ -99,7 +99,8 @@ std::vector<v1::ExportMapResponse> ToProto(MapSnapshot snapshot) {
 }
 
 absl::Status SnapshotAssembler::Add(v1::ExportMapResponse part) {
-  if (part.has_header() == has_header_) return InvalidArgument("export: must have one header, as its first part");
+  if (part.has_header() == has_header_)
+    return InvalidArgument("export: must have exactly one header, as its first part");
   switch (part.part_case()) {
     case v1::ExportMapResponse::kHeader: {
       const v1::ExportHeader& header = part.header();
@@ -131,7 +132,7 @@ absl::Status SnapshotAssembler::Add(v1::ExportMapResponse part) {
 }
 
 absl::StatusOr<MapSnapshot> SnapshotAssembler::Take() {
-  if (!has_header_) return InvalidArgument("export: ended without its header");
+  if (!has_header_) return InvalidArgument("export: header missing");
   return std::move(snapshot_);
 }
 

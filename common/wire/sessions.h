@@ -11,7 +11,7 @@
 
 namespace romap::wire {
 
-// FromProto answers INVALID_ARGUMENT "<field>: ..." to a missing camera, an unknown enum value or an impossible number.
+// FromProto returns INVALID_ARGUMENT "<field>: ..." for a missing camera, an unknown enum value or an invalid number.
 
 v1::CreateSessionRequest ToProto(const SessionOptions& options);
 absl::StatusOr<SessionOptions> FromProto(const v1::CreateSessionRequest& proto);
@@ -19,16 +19,16 @@ absl::StatusOr<SessionOptions> FromProto(const v1::CreateSessionRequest& proto);
 v1::SessionInfo ToProto(const SessionInfo& info);
 absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::string& where);
 
-// The parts of an export in the order they are sent: header, objects, pieces of the trajectory. Each is far below the
-// message limit; only a single mesh could outgrow it.
+// The messages of an export in sending order: header, objects, pieces of the trajectory. Only a part with a very large
+// mesh can exceed the message limit.
 std::vector<v1::ExportMapResponse> ToProto(MapSnapshot snapshot);
 
-// Puts the parts of an export together again.
+// Assembles a snapshot from the messages of an export.
 class SnapshotAssembler {
  public:
-  // INVALID_ARGUMENT when the part is malformed or out of order. A kind of part that is not known here is skipped.
+  // INVALID_ARGUMENT: the part is malformed or out of order. Parts of an unknown kind are skipped.
   absl::Status Add(v1::ExportMapResponse part);
-  // INVALID_ARGUMENT when the header never came. Call once, after the last part.
+  // Call once, after the last part. INVALID_ARGUMENT: there was no header.
   absl::StatusOr<MapSnapshot> Take();
 
  private:

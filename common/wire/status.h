@@ -7,7 +7,7 @@
 
 namespace romap::wire {
 
-// The codes of the two libraries are the same numbers; the message is kept.
+// Both libraries use the same code numbers.
 
 inline grpc::Status ToGrpc(const absl::Status& status) {
   return status.ok() ? grpc::Status::OK : grpc::Status(static_cast<grpc::StatusCode>(status.code()), Message(status));

@@ -17,7 +17,8 @@ absl::Status CallHost::Launch(StoppableCall* call, std::function<void()> body) {
     if (!stopped_.ok()) return stopped_;
     ended = TakeEnded();
     if (threads_.size() >= max_calls_) {
-      return absl::ResourceExhaustedError(fmt::format("the server is serving {} calls and takes no more", max_calls_));
+      return absl::ResourceExhaustedError(
+          fmt::format("the limit of {} concurrent calls (transport.max_calls) is reached", max_calls_));
     }
     const auto self = threads_.emplace(threads_.end());
     try {
@@ -28,7 +29,7 @@ absl::Status CallHost::Launch(StoppableCall* call, std::function<void()> body) {
       });
     } catch (const std::system_error& e) {
       threads_.erase(self);
-      return absl::ResourceExhaustedError(fmt::format("the server has no thread for this call: {}", e.what()));
+      return absl::ResourceExhaustedError(fmt::format("cannot start a thread for this call: {}", e.what()));
     }
     if (call != nullptr) calls_.insert(call);
   }
@@ -50,7 +51,7 @@ void CallHost::StopAll(const absl::Status& why) {
 void CallHost::JoinAll() {
   Threads threads;
   {
-    // Moving list nodes keeps the iterators in ended_ valid, but nobody will look at them again.
+    // The iterators in ended_ stay valid and are not used again.
     std::lock_guard lock(mutex_);
     threads = std::move(threads_);
   }
@@ -70,8 +71,8 @@ absl::Status Guarded(const std::function<absl::Status()>& body) {
   try {
     return body();
   } catch (const std::exception& e) {
-    spdlog::error("a call failed: {}", e.what());
-    return Internal("the call failed: {}", e.what());
+    spdlog::error("call failed: {}", e.what());
+    return Internal("call failed: {}", e.what());
   }
 }
 

@@ -13,16 +13,16 @@
 
 namespace romap::transport {
 
-// A call that lives until it is told to stop.
+// A call that can be ended by the server.
 class StoppableCall {
  public:
   virtual ~StoppableCall() = default;
-  // Makes the call end soon, with `why` (which may be OK) as its status. Does not wait. The first reason counts.
+  // Ends the call soon, with `why` (which may be OK) as its status. Does not wait. Only the first call has an effect.
   virtual void RequestStop(const absl::Status& why) = 0;
 };
 
-// What all calls of one server share. Each call has a thread of its own, because whatever MappingService does may wait
-// and gRPC's threads must not. Thread-safe.
+// Runs the calls of one server. Every call has its own thread, because the methods of MappingService may block and
+// gRPC's threads must not. Thread-safe.
 class CallHost {
  public:
   CallHost(MappingService* service, int max_calls) : service_(service), max_calls_(max_calls) {}
@@ -30,12 +30,12 @@ class CallHost {
 
   MappingService& service() const { return *service_; }
 
-  // Runs `body` on a thread of its own and lets StopAll() reach `call` (may be null) until Forget(call).
-  // RESOURCE_EXHAUSTED: too many calls. After StopAll(): its status.
+  // Runs `body` on a new thread. StopAll() stops `call`, which may be null, until Forget(call). RESOURCE_EXHAUSTED: too
+  // many calls. After StopAll(): the status given there.
   absl::Status Launch(StoppableCall* call, std::function<void()> body);
   void Forget(StoppableCall* call);
 
-  // Stops every registered call and refuses new ones.
+  // Stops all registered calls and rejects new ones.
   void StopAll(const absl::Status& why);
   // Waits for every body to return.
   void JoinAll();
@@ -49,14 +49,13 @@ class CallHost {
   const size_t max_calls_;
 
   std::mutex mutex_;
-  absl::Status stopped_;  // OK while calls are taken
+  absl::Status stopped_;  // OK before StopAll()
   std::set<StoppableCall*> calls_;
   Threads threads_;
-  std::vector<Threads::iterator> ended_;  // their bodies have returned
+  std::vector<Threads::iterator> ended_;  // those whose body has returned
 };
 
-// Runs `body`, which returns an absl::Status, and turns an exception into INTERNAL: a bug in one call must not take the
-// server down.
+// Runs `body` and converts an exception to INTERNAL, so that a fault in one call does not terminate the server.
 absl::Status Guarded(const std::function<absl::Status()>& body);
 
 }  // namespace romap::transport

@@ -44,12 +44,12 @@ int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
 void Configure(grpc::ServerBuilder& builder, const TransportConfig& config) {
   builder.SetMaxReceiveMessageSize(config.max_message_bytes);
   builder.SetMaxSendMessageSize(config.max_message_bytes);
-  // Two servers on one port would share the clients between them at random.
+  // Otherwise two servers could listen on one port, and clients would reach either of them at random.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(config.keepalive_s));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(config.keepalive_s));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  // Clients ping as often; without this the server would take that for an attack.
+  // Clients send keepalive pings too. By default gRPC disconnects clients that ping more often than every 5 minutes.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 1000);
 }
 
@@ -63,9 +63,10 @@ class GrpcServer::Impl {
   absl::Status Start() {
     const std::optional<HostPort> host_port = SplitHostPort(config_.listen_address);
     if (!host_port) {
-      return InvalidArgument("listen_address '{}': must be HOST:PORT, e.g. 127.0.0.1:50051", config_.listen_address);
+      return InvalidArgument("transport.listen_address: must be HOST:PORT, e.g. 127.0.0.1:50051, is '{}'",
+                             config_.listen_address);
     }
-    // Both are switches of the process that must be set before the first server is built.
+    // Both are process-wide settings that must be set before the first server is built.
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
 
@@ -75,7 +76,8 @@ class GrpcServer::Impl {
     builder.RegisterService(&rpcs_);
     server_ = builder.BuildAndStart();
     if (!server_ || port_ == 0) {
-      return absl::UnavailableError(fmt::format("cannot listen on {}: address in use?", config_.listen_address));
+      return absl::UnavailableError(
+          fmt::format("cannot listen on {}: the address is in use or not available", config_.listen_address));
     }
     address_ = fmt::format("{}:{}", host_port->host, port_);
     SetServing(true);

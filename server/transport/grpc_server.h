@@ -10,21 +10,21 @@
 
 namespace romap::transport {
 
-// Serves a MappingService over gRPC (proto/romap/v1/mapping.proto), with the standard health service (overall and as
-// "romap.v1.Mapping") and server reflection. Calls of the service come from many threads at once.
+// Serves a MappingService over gRPC (proto/romap/v1/mapping.proto), with the standard health service (overall and for
+// "romap.v1.Mapping") and server reflection. Calls the service from many threads.
 class GrpcServer {
  public:
-  // `service` outlives the server. INVALID_ARGUMENT: listen_address is not HOST:PORT. UNAVAILABLE: it cannot be
-  // listened on, e.g. because another server does.
+  // `service` outlives the server. INVALID_ARGUMENT: listen_address is not HOST:PORT. UNAVAILABLE: cannot listen there,
+  // e.g. because another process does.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(MappingService* service, const TransportConfig& config);
 
   ~GrpcServer();  // Shutdown()
 
-  int port() const;                    // the actual one
-  const std::string& address() const;  // HOST:PORT with the actual port
+  int port() const;                    // the chosen port if the configuration has port 0
+  const std::string& address() const;  // HOST:PORT with port()
 
-  // Takes no more calls, ends the streams with UNAVAILABLE (what they accepted stays with the service) and waits until
-  // all calls are over. May be called again, then does nothing. Not from a thread of a call.
+  // Rejects new calls, ends the streams with UNAVAILABLE (accepted inputs stay in the service) and waits for all calls.
+  // A second call has no effect. Must not be called on the thread of a call.
   void Shutdown();
 
  private:
@@ -34,7 +34,7 @@ class GrpcServer {
   std::unique_ptr<Impl> impl_;
 };
 
-// Sends gRPC's own log, which goes to stderr unasked, to spdlog at debug level. For main(): it holds for the process.
+// Redirects gRPC's log from stderr to spdlog at debug level, for the whole process.
 void RouteGrpcLogToSpdlog();
 
 }  // namespace romap::transport

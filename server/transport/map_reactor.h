@@ -8,8 +8,9 @@
 
 namespace romap::transport {
 
-// One Map call: frames and late masks from the client to the MapStream, events from MapStream::Next to the client. The
-// next request is read only when the stream has taken the last one; that is what slows the client down.
+// One Map call: passes frames and late masks from the client to the MapStream, and events from MapStream::Next() to the
+// client. A request is read only after the stream has accepted the previous one; this is the back pressure on the
+// client.
 class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
  public:
   using StreamReactor::StreamReactor;
@@ -20,15 +21,16 @@ class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, 
   absl::Status Run() override;
   void OnStop() override { read_.Abandon(); }
 
-  // Waits for the next request, into request_; false when the client has closed its side, nullopt when the call stops.
+  // Waits for the next request and stores it in request_. False: the client has closed its side. nullopt: the call is
+  // being stopped.
   std::optional<bool> Read();
-  // Body of the thread that reads requests.
+  // Reads requests; runs on its own thread.
   void PumpRequests(MapStream& stream);
-  // Hands what is in request_ on, or refuses it; otherwise why the call must end.
-  absl::Status TakeRequest(MapStream& stream);
-  absl::Status TakeFrame(MapStream& stream);
-  absl::Status TakeMasks(MapStream& stream);
-  void Answer(MapEvent refusal);
+  // Processes request_. An invalid frame or masks are rejected by an event; an error status ends the call.
+  absl::Status HandleRequest(MapStream& stream);
+  absl::Status HandleFrame(MapStream& stream);
+  absl::Status HandleMasks(MapStream& stream);
+  void WriteEvent(MapEvent event);
 
   Completion read_;
   v1::MapRequest request_;

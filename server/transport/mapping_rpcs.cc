@@ -34,7 +34,7 @@ class ExportReactor : public StreamReactor<grpc::ServerWriteReactor<v1::ExportMa
   absl::Status Run() override {
     ROMAP_ASSIGN_OR_RETURN(MapSnapshot snapshot, service().ExportMap(session_id_));
     for (const v1::ExportMapResponse& part : wire::ToProto(std::move(snapshot))) {
-      if (stopping() || !Write(part)) return absl::CancelledError("the client is gone");
+      if (stopping() || !Write(part)) return absl::CancelledError("the client disconnected");
     }
     return absl::OkStatus();
   }
@@ -50,8 +50,7 @@ StreamReactor* Started(StreamReactor* reactor) {
 
 }  // namespace
 
-grpc::ServerUnaryReactor* MappingRpcs::Answer(grpc::CallbackServerContext* context,
-                                              std::function<absl::Status()> body) {
+grpc::ServerUnaryReactor* MappingRpcs::Run(grpc::CallbackServerContext* context, std::function<absl::Status()> body) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const absl::Status launched =
       host_->Launch(nullptr, [reactor, body = std::move(body)] { reactor->Finish(wire::ToGrpc(Guarded(body))); });
@@ -62,7 +61,7 @@ grpc::ServerUnaryReactor* MappingRpcs::Answer(grpc::CallbackServerContext* conte
 grpc::ServerUnaryReactor* MappingRpcs::CreateSession(grpc::CallbackServerContext* context,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::CreateSessionResponse* response) {
-  return Answer(context, [=, this]() -> absl::Status {
+  return Run(context, [=, this]() -> absl::Status {
     ROMAP_ASSIGN_OR_RETURN(const SessionOptions options, wire::FromProto(*request));
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().CreateSession(options));
     *response->mutable_session() = wire::ToProto(info);
@@ -73,7 +72,7 @@ grpc::ServerUnaryReactor* MappingRpcs::CreateSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* MappingRpcs::ListSessions(grpc::CallbackServerContext* context,
                                                     const v1::ListSessionsRequest* /*request*/,
                                                     v1::ListSessionsResponse* response) {
-  return Answer(context, [=, this]() -> absl::Status {
+  return Run(context, [=, this]() -> absl::Status {
     ROMAP_ASSIGN_OR_RETURN(const std::vector<SessionInfo> infos, host_->service().ListSessions());
     for (const SessionInfo& info : infos) *response->add_sessions() = wire::ToProto(info);
     return absl::OkStatus();
@@ -83,7 +82,7 @@ grpc::ServerUnaryReactor* MappingRpcs::ListSessions(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* MappingRpcs::GetSession(grpc::CallbackServerContext* context,
                                                   const v1::GetSessionRequest* request,
                                                   v1::GetSessionResponse* response) {
-  return Answer(context, [=, this]() -> absl::Status {
+  return Run(context, [=, this]() -> absl::Status {
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().GetSession(request->session_id()));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
@@ -93,7 +92,7 @@ grpc::ServerUnaryReactor* MappingRpcs::GetSession(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* MappingRpcs::FinishSession(grpc::CallbackServerContext* context,
                                                      const v1::FinishSessionRequest* request,
                                                      v1::FinishSessionResponse* response) {
-  return Answer(context, [=, this]() -> absl::Status {
+  return Run(context, [=, this]() -> absl::Status {
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().FinishSession(request->session_id()));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
@@ -103,7 +102,7 @@ grpc::ServerUnaryReactor* MappingRpcs::FinishSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* MappingRpcs::DeleteSession(grpc::CallbackServerContext* context,
                                                      const v1::DeleteSessionRequest* request,
                                                      v1::DeleteSessionResponse* /*response*/) {
-  return Answer(context, [=, this] { return host_->service().DeleteSession(request->session_id()); });
+  return Run(context, [=, this] { return host_->service().DeleteSession(request->session_id()); });
 }
 
 grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>* MappingRpcs::Map(grpc::CallbackServerContext* /*context*/) {

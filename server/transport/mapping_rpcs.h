@@ -9,7 +9,7 @@
 
 namespace romap::transport {
 
-// The gRPC service: one handler per method, each translates, asks the MappingService, and translates back.
+// The gRPC service. Every handler converts the request, calls the MappingService, and converts the result.
 class MappingRpcs : public v1::Mapping::CallbackService {
  public:
   explicit MappingRpcs(CallHost* host) : host_(host) {}
@@ -31,8 +31,9 @@ class MappingRpcs : public v1::Mapping::CallbackService {
                                                              const v1::ExportMapRequest* request) override;
 
  private:
-  // Answers with the status that `body` returns on a thread of its own. Request and response live until then.
-  grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, std::function<absl::Status()> body);
+  // Runs `body` on its own thread and finishes the call with the status that it returns. gRPC keeps request and
+  // response until then.
+  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::function<absl::Status()> body);
 
   CallHost* const host_;
 };

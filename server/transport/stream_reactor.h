@@ -15,22 +15,22 @@
 
 namespace romap::transport {
 
-// Lets a thread wait for a gRPC operation that it has started. One operation at a time.
+// Waits for a gRPC operation that was started. One operation at a time.
 class Completion {
  public:
-  // From gRPC's thread: the operation is over.
+  // Called by gRPC's thread when the operation ends.
   void Complete(bool ok) {
     std::lock_guard lock(mutex_);
     result_ = ok;
     changed_.notify_all();
   }
-  // Waits for the operation and says whether it succeeded; nullopt after Abandon().
+  // Waits for the operation and returns whether it succeeded; nullopt after Abandon().
   std::optional<bool> Wait() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return abandoned_ || result_.has_value(); });
     return abandoned_ ? std::nullopt : std::exchange(result_, std::nullopt);
   }
-  // Ends the present Wait() and all later ones.
+  // Ends the current Wait() and all later ones.
   void Abandon() {
     std::lock_guard lock(mutex_);
     abandoned_ = true;
@@ -44,26 +44,26 @@ class Completion {
   bool abandoned_ = false;
 };
 
-// A streaming call whose work is done by Run() on a thread of its own: gRPC's threads only say what has completed. Made
-// with new, deletes itself when gRPC is done with it.
+// A streaming call whose work is done by Run() on its own thread; gRPC's threads only report completed operations. Must
+// be created with new; deletes itself when gRPC no longer needs it.
 // Reactor: grpc::ServerWriteReactor<Response>, or a ServerBidiReactor that writes Response.
 template <class Reactor, class Response>
 class StreamReactor : public Reactor, public StoppableCall {
  public:
   explicit StreamReactor(CallHost* host) : host_(host) {}
 
-  // Call once, when the object is complete.
+  // Call once, after construction.
   void Start() {
     const absl::Status launched = host_->Launch(this, [this] {
       absl::Status status = Guarded([this] { return Run(); });
-      // Finish() lets gRPC delete this object, so that nothing may follow it.
+      // gRPC may delete this object after Finish().
       this->Finish(wire::ToGrpc(StopReasonOr(std::move(status))));
     });
     if (!launched.ok()) this->Finish(wire::ToGrpc(launched));
   }
 
   void OnWriteDone(bool ok) final { write_.Complete(ok); }
-  void OnCancel() final { RequestStop(absl::CancelledError("the client is gone")); }
+  void OnCancel() final { RequestStop(absl::CancelledError("the client disconnected")); }
   void OnDone() final {
     host_->Forget(this);
     delete this;
@@ -78,10 +78,10 @@ class StreamReactor : public Reactor, public StoppableCall {
   }
 
  protected:
-  // The whole call, from the first request to the last response; returns its status. May wait, but must return soon
+  // The whole call, from the first request to the last response; returns its status. May block, but must return soon
   // after RequestStop().
   virtual absl::Status Run() = 0;
-  // Ends waits that Cancel() of the event stream does not end. Must not wait.
+  // Ends waits that EventStream::Cancel() does not end. Must not block.
   virtual void OnStop() {}
 
   MappingService& service() const { return host_->service(); }
@@ -91,19 +91,18 @@ class StreamReactor : public Reactor, public StoppableCall {
     return stop_reason_.has_value();
   }
 
-  // Waits until gRPC has taken the message; false when the client is gone. Any thread of this call may write.
+  // Waits until gRPC has accepted the message; false if the client disconnected. Any thread of this call may write.
   bool Write(const Response& response) {
     std::lock_guard lock(write_mutex_);
     this->StartWrite(&response);
     return write_.Wait().value_or(false);
   }
 
-  // Says that the stream is open, then writes events until either side ends. While it runs, RequestStop() cancels
-  // `events`.
+  // Writes `opened`, then events until either side ends the stream. Meanwhile, RequestStop() cancels `events`.
   absl::Status ForwardEvents(const std::string& session_id, EventStream& events) {
-    // RequestStop() wakes Next(), so this only bounds how long a mistake there could go unnoticed.
+    // RequestStop() wakes Next() earlier.
     constexpr std::chrono::milliseconds kLongWait{1000};
-    if (!Attach(&events)) return absl::CancelledError("stopped before it was open");
+    if (!Attach(&events)) return absl::CancelledError("stopped before the stream was open");
     Response opened;
     opened.mutable_opened()->set_session_id(session_id);
     bool writable = Write(opened);
@@ -118,7 +117,7 @@ class StreamReactor : public Reactor, public StoppableCall {
       }
     }
     Detach();
-    return writable ? events.status() : absl::CancelledError("the client is gone");
+    return writable ? events.status() : absl::CancelledError("the client disconnected");
   }
 
  private:
@@ -142,7 +141,7 @@ class StreamReactor : public Reactor, public StoppableCall {
   Completion write_;
 
   std::mutex mutex_;
-  std::optional<absl::Status> stop_reason_;  // none while the call may go on
+  std::optional<absl::Status> stop_reason_;  // nullopt until RequestStop()
   EventStream* events_ = nullptr;
 };
 
