@@ -52,7 +52,7 @@ class LocalEventStream : public MapStream {
   void Cancel() override {
     StopSending();
     session_->map().Unsubscribe(outbox_);
-    outbox_->Close(absl::CancelledError("the stream was cancelled"));
+    outbox_->Close(absl::CancelledError("the stream was canceled"));
   }
 
  private:

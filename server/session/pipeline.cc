@@ -37,7 +37,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execu
   step.run = [this, image = std::move(image)] {
     // Map.
     const slam::MappedFrame mapped = sparse_mapper_.Process(image);
-    if (mapped.begun_anew) Publish(object_mapper_.Reset());
+    if (mapped.was_reset) Publish(object_mapper_.Reset());
     if (mapped.correction) Correct(*mapped.correction);
     // Objects. Publish() sends them to the clients, and their new views to the fields.
     Publish(object_mapper_.ObserveFrame(mapped.tracked));

@@ -62,7 +62,7 @@ class Pipeline {
   void TrainSlices(int count);
 
   // From any thread: asks bundle adjustment to end early while keyframes wait.
-  void CutAdjustmentShort(bool keyframes_wait) { sparse_mapper_.Hurry(keyframes_wait); }
+  void RequestEarlyStop(bool keyframes_wait) { sparse_mapper_.RequestEarlyStop(keyframes_wait); }
 
   nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_client_); }
 

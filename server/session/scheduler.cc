@@ -116,14 +116,14 @@ void Scheduler::ExecuteReplay(MappingStep step) {
 }
 
 void Scheduler::ExecuteLive(MappingStep step) {
-  if (step.is_keyframe) pipeline_->CutAdjustmentShort(++keyframes_waiting_ > 0);
+  if (step.is_keyframe) pipeline_->RequestEarlyStop(++keyframes_waiting_ > 0);
   if (steps_.TryPush(step)) return;
   if (step.may_be_skipped) return ledger_->SkipMapping();
   steps_.Push(std::move(step));
 }
 
 void Scheduler::RunStep(const MappingStep& step) {
-  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->CutAdjustmentShort(--keyframes_waiting_ > 0);
+  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->RequestEarlyStop(--keyframes_waiting_ > 0);
   if (!stopping_) step.run();
   if (mode_ == FrameMode::kReplay && step.changes_local_map) {
     std::lock_guard lock(mutex_);

@@ -11,22 +11,22 @@
 
 namespace romap::contract {
 
-// A mapping service that keeps the contract, and how it is reached.
+// An implementation of MappingService to test, in process or over gRPC.
 struct Backend {
   std::string name;
   std::function<std::unique_ptr<MappingService>()> make;
-  // Whether one frame that shows an instance is enough for an object of its class. A service that really maps needs a
-  // real scene for that, which is the business of the integration tests.
+  // One frame with an instance suffices for an object of its class. False for a real service, which needs frames of a
+  // real scene (see the integration tests).
   bool objects_from_one_frame = false;
   bool over_grpc = false;
 
   friend void PrintTo(const Backend& backend, std::ostream* os) { *os << backend.name; }
 };
 
-// Every service, each once in process and once over gRPC. A new service is one line in backends.cc.
+// Every service, in process and over gRPC.
 std::vector<Backend> AllBackends();
 
-// A running backend. Over gRPC it has a server of its own on a free port.
+// A running backend; over gRPC with its own server on a free port.
 class RunningBackend {
  public:
   explicit RunningBackend(const Backend& backend);
@@ -34,7 +34,7 @@ class RunningBackend {
   MappingService& service() { return remote_ ? *remote_ : *local_; }
 
  private:
-  // In the order in which they need each other.
+  // Each needs the one before.
   std::unique_ptr<MappingService> local_;
   std::unique_ptr<transport::GrpcServer> server_;
   std::unique_ptr<MappingService> remote_;

@@ -40,7 +40,7 @@ class MappingServiceContract : public ::testing::TestWithParam<Backend> {
     return stream.ok() ? *std::move(stream) : nullptr;
   }
 
-  // A stream on a session whose last stream may not have been given back yet.
+  // Opens a stream while the previous stream of the session may still be closing.
   std::unique_ptr<MapStream> Reopen(const std::string& session_id) {
     std::unique_ptr<MapStream> reopened;
     EXPECT_TRUE(testing::Eventually([&] {

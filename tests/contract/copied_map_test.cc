@@ -1,4 +1,4 @@
-// A client's copy of a map that changes all the time, over a real connection.
+// Compares copies of a changing map over gRPC with the map itself.
 
 #include <gmock/gmock.h>
 
@@ -25,14 +25,14 @@ class OutboxStream : public EventStream {
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
   bool Done() const override { return outbox_->Done(); }
   absl::Status status() const override { return outbox_->status(); }
-  void Cancel() override { outbox_->Close(absl::CancelledError("the stream was cancelled")); }
+  void Cancel() override { outbox_->Close(absl::CancelledError("the stream was canceled")); }
 
  private:
   const std::shared_ptr<session::Outbox> outbox_;
 };
 
-// Whoever watches any session watches one map.
-class OneMapService : public testing::FakeMappingService {
+// Every Watch() subscribes to the same map, whatever the session id.
+class SharedMapService : public testing::FakeMappingService {
  public:
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& /*session_id*/) override {
     return std::make_unique<OutboxStream>(map.Subscribe(session::Outbox::Acks::kNewest, 1));
@@ -41,26 +41,31 @@ class OneMapService : public testing::FakeMappingService {
 };
 
 void ReadToEnd(EventStream& stream, testing::CheckedCopy& copy, std::chrono::microseconds pause) {
+  const auto deadline = std::chrono::steady_clock::now() + testing::kTimeout;
   while (!stream.Done()) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      ADD_FAILURE() << "the stream did not end within " << testing::kTimeout.count() << " s";
+      return;
+    }
     if (const auto event = stream.Next(std::chrono::milliseconds(100))) copy.Apply(*event);
     std::this_thread::sleep_for(pause);
   }
 }
 
-TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
-  OneMapService service;
+TEST(CopiedMapOverGrpc, EqualsTheMapForFastAndSlowReaders) {
+  SharedMapService service;
   transport::TransportConfig config;
   config.listen_address = "127.0.0.1:0";
   const auto server = transport::GrpcServer::Start(&service, config).value();
   const auto remote = client::RemoteMappingService::Connect(server->address()).value();
-  testing::CheckedCopy fast, slow, latecomer, truth;
+  testing::CheckedCopy fast, slow, late, truth;
   const auto fast_stream = remote->Watch("any").value(), slow_stream = remote->Watch("any").value();
   std::thread fast_reader([&] { ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
   std::thread slow_reader([&] { ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
   testing::RandomMap random(7, &service.map);
   for (int step = 0; step < 6000; ++step) random.Step();
   const auto late_stream = remote->Watch("any").value();
-  std::thread late_reader([&] { ReadToEnd(*late_stream, latecomer, std::chrono::microseconds(0)); });
+  std::thread late_reader([&] { ReadToEnd(*late_stream, late, std::chrono::microseconds(0)); });
   for (int step = 0; step < 2000; ++step) random.Step();
   const auto all = service.map.Subscribe(session::Outbox::Acks::kAll, 16);
   service.map.Close(absl::OkStatus());
@@ -70,7 +75,7 @@ TEST(CopiedMapOverGrpc, IsTheMapForFastAndSlowReaders) {
   EXPECT_FALSE(truth.Bytes().empty());
   EXPECT_EQ(fast.Bytes(), truth.Bytes());
   EXPECT_EQ(slow.Bytes(), truth.Bytes());
-  EXPECT_EQ(latecomer.Bytes(), truth.Bytes());
+  EXPECT_EQ(late.Bytes(), truth.Bytes());
   EXPECT_OK(slow_stream->status());
 }
 

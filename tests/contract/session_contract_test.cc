@@ -1,4 +1,4 @@
-// What every MappingService promises about sessions.
+// The contract of MappingService for sessions.
 
 #include "tests/contract/contract_fixture.h"
 
@@ -12,7 +12,7 @@ class SessionContract : public MappingServiceContract {};
 INSTANTIATE_TEST_SUITE_P(All, SessionContract, ::testing::ValuesIn(AllBackends()),
                          [](const auto& info) { return info.param.name; });
 
-TEST_P(SessionContract, SessionsAreMadeListedAndDeleted) {
+TEST_P(SessionContract, SessionsAreCreatedListedAndDeleted) {
   const std::string first = NewSession(), second = NewSession();
   EXPECT_NE(first, second);
   EXPECT_THAT(service().ListSessions().value(), SizeIs(2));
@@ -22,15 +22,15 @@ TEST_P(SessionContract, SessionsAreMadeListedAndDeleted) {
   EXPECT_EQ(left->front().id, second);
 }
 
-TEST_P(SessionContract, ASessionRemembersHowItWasMade) {
+TEST_P(SessionContract, InfoReturnsTheOptions) {
   SessionOptions options;
   options.name = "Küche, zweiter Versuch";
   options.camera = testing::SmallCamera();
   options.camera.distortion = {0.1, -0.2, 0.001, 0.002, 0.05};
   options.mode = FrameMode::kLive;
-  const auto made = service().CreateSession(options);
-  ASSERT_TRUE(made.ok());
-  const auto info = service().GetSession(made->id);
+  const auto created = service().CreateSession(options);
+  ASSERT_TRUE(created.ok());
+  const auto info = service().GetSession(created->id);
   ASSERT_TRUE(info.ok());
   EXPECT_EQ(info->name, options.name);
   EXPECT_EQ(info->camera, options.camera);
@@ -40,20 +40,20 @@ TEST_P(SessionContract, ASessionRemembersHowItWasMade) {
   EXPECT_GT(info->created_unix_ns, 0);
 }
 
-TEST_P(SessionContract, AnUnknownSessionIsNotFound) {
-  EXPECT_CODE(service().GetSession("nobody").status(), StatusCode::kNotFound);
-  EXPECT_CODE(service().FinishSession("nobody").status(), StatusCode::kNotFound);
-  EXPECT_CODE(service().DeleteSession("nobody"), StatusCode::kNotFound);
-  EXPECT_CODE(service().OpenMap("nobody").status(), StatusCode::kNotFound);
-  EXPECT_CODE(service().Watch("nobody").status(), StatusCode::kNotFound);
-  EXPECT_CODE(service().ExportMap("nobody").status(), StatusCode::kNotFound);
+TEST_P(SessionContract, UnknownSessionIsNotFound) {
+  EXPECT_CODE(service().GetSession("unknown").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().FinishSession("unknown").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().DeleteSession("unknown"), StatusCode::kNotFound);
+  EXPECT_CODE(service().OpenMap("unknown").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().Watch("unknown").status(), StatusCode::kNotFound);
+  EXPECT_CODE(service().ExportMap("unknown").status(), StatusCode::kNotFound);
 }
 
-TEST_P(SessionContract, AnErrorSaysWhichSessionItIsAbout) {
-  EXPECT_THAT(Message(service().GetSession("nobody").status()), ::testing::HasSubstr("nobody"));
+TEST_P(SessionContract, ErrorContainsTheSessionId) {
+  EXPECT_THAT(Message(service().GetSession("unknown").status()), ::testing::HasSubstr("unknown"));
 }
 
-TEST_P(SessionContract, AnImpossibleCameraIsRefused) {
+TEST_P(SessionContract, InvalidCameraIsRejected) {
   SessionOptions options;
   options.camera = testing::SmallCamera();
   options.camera.fx_px = -1;
@@ -67,7 +67,7 @@ TEST_P(SessionContract, AnImpossibleCameraIsRefused) {
   EXPECT_THAT(service().ListSessions().value(), SizeIs(0));
 }
 
-TEST_P(SessionContract, AFinishedSessionStaysUntilItIsDeleted) {
+TEST_P(SessionContract, FinishedSessionExistsUntilItIsDeleted) {
   const std::string session = NewSession();
   const auto finishing = service().FinishSession(session);
   ASSERT_TRUE(finishing.ok());
@@ -79,7 +79,7 @@ TEST_P(SessionContract, AFinishedSessionStaysUntilItIsDeleted) {
   EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
 }
 
-TEST_P(SessionContract, AnExportHoldsTheTrajectory) {
+TEST_P(SessionContract, ExportContainsTheTrajectory) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
@@ -99,8 +99,8 @@ TEST_P(SessionContract, AnExportHoldsTheTrajectory) {
   EXPECT_EQ(map->statistics.frames_received, 5u);
 }
 
-TEST_P(SessionContract, AnExportHoldsTheObjects) {
-  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+TEST_P(SessionContract, ExportContainsTheObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "objects need frames of a real scene";
   const std::string session = NewSession();
   const auto stream = Open(session);
   EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));

@@ -1,4 +1,4 @@
-// What every MappingService promises about its streams.
+// The contract of MappingService for streams.
 
 #include <map>
 #include <thread>
@@ -15,7 +15,7 @@ class StreamContract : public MappingServiceContract {};
 INSTANTIATE_TEST_SUITE_P(All, StreamContract, ::testing::ValuesIn(AllBackends()),
                          [](const auto& info) { return info.param.name; });
 
-TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsCleanly) {
+TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsWithOk) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 40;
   for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id)).ok());
@@ -30,7 +30,7 @@ TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsCleanly) {
   EXPECT_OK(stream->status());
 }
 
-TEST_P(StreamContract, ABadFrameIsRefusedAndTheStreamLivesOn) {
+TEST_P(StreamContract, InvalidFrameIsRejectedAndTheStreamContinues) {
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   FrameInput bad = testing::MakeFrame(2);
@@ -55,7 +55,7 @@ MasksInput MasksOf(uint64_t frame_id, const std::string& class_name) {
   return masks;
 }
 
-TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
+TEST_P(StreamContract, LateMasksAreAcknowledgedInOrder) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 20, kDelay = 5;
   for (uint64_t id = 1; id <= kFrames + kDelay; ++id) {
@@ -66,7 +66,7 @@ TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
   const auto events = testing::ReadToEnd(*stream);
   EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(kFrames));
   const auto acks = testing::Only<MasksAck>(events);
-  ASSERT_THAT(acks, SizeIs(kFrames)) << "the stream ends when the last masks are mapped, too";
+  ASSERT_THAT(acks, SizeIs(kFrames)) << "the stream must not end before the last masks are mapped";
   for (uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(acks[i].frame_id, i + 1);
     EXPECT_TRUE(acks[i].accepted) << acks[i].error;
@@ -75,14 +75,14 @@ TEST_P(StreamContract, MasksMayComeAfterTheirFramesAndAreAcknowledgedInOrder) {
   EXPECT_OK(stream->status());
 }
 
-TEST_P(StreamContract, MasksThatFitNoFrameAreRefusedAndTheStreamLivesOn) {
+TEST_P(StreamContract, LateMasksWithoutAMatchingFrameAreRejectedAndTheStreamContinues) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
   EXPECT_OK(stream->Send(testing::MakeFrame(2)));
-  EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));  // it brought its own
+  EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));  // frame 1 has masks
   EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));
-  EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));  // twice
+  EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));  // frame 2 now has masks
   EXPECT_OK(stream->SendMasks(MasksOf(9, "mug")));  // not sent yet
   EXPECT_OK(stream->Send(testing::MakeFrame(3)));
   EXPECT_OK(stream->CloseSend());
@@ -95,11 +95,11 @@ TEST_P(StreamContract, MasksThatFitNoFrameAreRefusedAndTheStreamLivesOn) {
   }
   EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(3));
   EXPECT_OK(stream->status());
-  EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 3u) << "masks are no frames";
+  EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 3u) << "late masks do not count as frames";
 }
 
-TEST_P(StreamContract, LateMasksMakeObjects) {
-  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+TEST_P(StreamContract, LateMasksCreateObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "objects need frames of a real scene";
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->Send(testing::MakeFrame(1)));
   EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));
@@ -108,7 +108,7 @@ TEST_P(StreamContract, LateMasksMakeObjects) {
   EXPECT_EQ(object->class_name, "mug");
 }
 
-TEST_P(StreamContract, ALiveSessionAnswersAllFramesAndMasks) {
+TEST_P(StreamContract, LiveSessionAcknowledgesAllFramesAndMasks) {
   SessionOptions options;
   options.camera = testing::SmallCamera();
   options.mode = FrameMode::kLive;
@@ -124,7 +124,7 @@ TEST_P(StreamContract, ALiveSessionAnswersAllFramesAndMasks) {
   EXPECT_THAT(testing::Only<MasksAck>(events), SizeIs(kFrames));
 }
 
-TEST_P(StreamContract, AFrameWithAPoseThatIsNoneIsRefused) {
+TEST_P(StreamContract, FrameWithANonFinitePoseIsRejected) {
   const auto stream = Open(NewSession());
   FrameInput frame = testing::MakeFrame(1);
   frame.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(std::nan(""), 0, 0));
@@ -132,12 +132,12 @@ TEST_P(StreamContract, AFrameWithAPoseThatIsNoneIsRefused) {
   EXPECT_OK(stream->CloseSend());
   const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
   if (acks.empty() || acks[0].accepted) {
-    // The fake does not look at poses; over the wire such a frame does not get as far as the fake.
+    // The fake does not check poses. Over gRPC the transport rejects the frame.
     EXPECT_EQ(GetParam().name, "Fake");
   }
 }
 
-TEST_P(StreamContract, ASecondMapStreamIsRefused) {
+TEST_P(StreamContract, SecondMapStreamIsRejected) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   EXPECT_TRUE(service().GetSession(session)->stream_open);
@@ -146,7 +146,7 @@ TEST_P(StreamContract, ASecondMapStreamIsRefused) {
   EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
 }
 
-TEST_P(StreamContract, AStreamMayFollowAnother) {
+TEST_P(StreamContract, StreamsMayFollowEachOther) {
   const std::string session = NewSession();
   for (uint64_t id = 1; id <= 3; ++id) {
     const auto stream = Reopen(session);
@@ -159,13 +159,13 @@ TEST_P(StreamContract, AStreamMayFollowAnother) {
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(3));
 }
 
-TEST_P(StreamContract, AFinishedSessionTakesNoStream) {
+TEST_P(StreamContract, FinishedSessionRejectsMapStreams) {
   const std::string session = NewSession();
   EXPECT_OK(service().FinishSession(session).status());
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kFailedPrecondition);
 }
 
-TEST_P(StreamContract, NothingIsSentAfterCloseSend) {
+TEST_P(StreamContract, SendFailsAfterCloseSend) {
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->CloseSend());
   EXPECT_CODE(stream->Send(testing::MakeFrame(1)), StatusCode::kFailedPrecondition);
@@ -175,7 +175,7 @@ TEST_P(StreamContract, NothingIsSentAfterCloseSend) {
   EXPECT_OK(stream->status());
 }
 
-TEST_P(StreamContract, DisconnectingKeepsTheSession) {
+TEST_P(StreamContract, DisconnectKeepsTheSession) {
   const std::string session = NewSession();
   {
     const auto stream = Open(session);
@@ -191,7 +191,7 @@ TEST_P(StreamContract, DisconnectingKeepsTheSession) {
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(4));
 }
 
-TEST_P(StreamContract, FinishingEndsTheOpenStreams) {
+TEST_P(StreamContract, FinishEndsOpenStreams) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
@@ -206,7 +206,7 @@ TEST_P(StreamContract, FinishingEndsTheOpenStreams) {
   EXPECT_CODE(stream->Send(testing::MakeFrame(2)), StatusCode::kFailedPrecondition);
 }
 
-TEST_P(StreamContract, DeletingEndsTheOpenStreams) {
+TEST_P(StreamContract, DeleteEndsOpenStreams) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
@@ -221,7 +221,7 @@ TEST_P(StreamContract, DeletingEndsTheOpenStreams) {
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kNotFound);
 }
 
-TEST_P(StreamContract, DeletingWhileFramesAreSentHangsNobody) {
+TEST_P(StreamContract, DeleteDuringSendEndsSenderAndReader) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   std::thread sender([&] {
@@ -235,7 +235,7 @@ TEST_P(StreamContract, DeletingWhileFramesAreSentHangsNobody) {
   EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
 }
 
-TEST_P(StreamContract, CancelWakesTheReader) {
+TEST_P(StreamContract, CancelEndsAWaitingReader) {
   const auto stream = Open(NewSession());
   std::thread reader([&] { testing::ReadToEnd(*stream); });
   stream->Cancel();
@@ -245,7 +245,7 @@ TEST_P(StreamContract, CancelWakesTheReader) {
   EXPECT_FALSE(stream->Send(testing::MakeFrame(1)).ok());
 }
 
-TEST_P(StreamContract, AWatcherFollowsTheClient) {
+TEST_P(StreamContract, WatchReceivesFrameAcks) {
   const std::string session = NewSession();
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
@@ -257,7 +257,7 @@ TEST_P(StreamContract, AWatcherFollowsTheClient) {
   EXPECT_TRUE(ack->T_world_camera.has_value());
 }
 
-TEST_P(StreamContract, AWatchOfAFinishedSessionEndsByItself) {
+TEST_P(StreamContract, WatchOfAFinishedSessionEnds) {
   const std::string session = NewSession();
   EXPECT_OK(service().FinishSession(session).status());
   const auto watch = service().Watch(session);
@@ -266,8 +266,8 @@ TEST_P(StreamContract, AWatchOfAFinishedSessionEndsByItself) {
   EXPECT_OK((*watch)->status());
 }
 
-TEST_P(StreamContract, AWatchBeginsWithTheObjectsThereAre) {
-  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "needs a real scene to make objects";
+TEST_P(StreamContract, WatchStartsWithTheCurrentObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "objects need frames of a real scene";
   const std::string session = NewSession();
   const auto stream = Open(session);
   EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
@@ -288,7 +288,7 @@ TEST_P(StreamContract, AWatchBeginsWithTheObjectsThereAre) {
   EXPECT_GT(newer->revision, object->revision);
 }
 
-TEST_P(StreamContract, TwoSessionsDoNotMix) {
+TEST_P(StreamContract, SessionsAreIndependent) {
   constexpr uint64_t kFrames = 20;
   const auto run = [&](uint64_t first_id, std::vector<FrameAck>* acks) {
     const std::string session = NewSession();

@@ -11,7 +11,7 @@
 namespace romap::testing {
 namespace {
 
-// Events waiting for one subscriber.
+// The event queue of one subscriber.
 class Mailbox {
  public:
   void Put(MapEvent event) {
@@ -74,7 +74,7 @@ class FakeSession {
     return info_;
   }
 
-  // A subscriber that has been told of all objects there are.
+  // The mailbox starts with all current objects.
   std::shared_ptr<Mailbox> Subscribe() {
     std::lock_guard lock(mutex_);
     return SubscribeLocked();
@@ -82,8 +82,9 @@ class FakeSession {
 
   absl::StatusOr<std::shared_ptr<Mailbox>> AttachSender() {
     std::lock_guard lock(mutex_);
-    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
-    if (info_.stream_open) return FailedPrecondition("session '{}' has a Map stream already", info_.id);
+    if (info_.state != SessionState::kOpen)
+      return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
+    if (info_.stream_open) return FailedPrecondition("session '{}' already has a Map stream; close it first", info_.id);
     info_.stream_open = true;
     return SubscribeLocked();
   }
@@ -96,14 +97,15 @@ class FakeSession {
     subscribers_.erase(mailbox);
   }
 
-  absl::Status Take(const FrameInput& frame) {
+  absl::Status Process(const FrameInput& frame) {
     std::lock_guard lock(mutex_);
-    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
+    if (info_.state != SessionState::kOpen)
+      return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
     Statistics& statistics = info_.statistics;
     ++statistics.frames_received;
     FrameAck ack{.frame_id = frame.frame_id,
                  .accepted = !frame.image.empty(),
-                 .error = frame.image.empty() ? "frame.image: empty" : "",
+                 .error = frame.image.empty() ? "frame.image.data: missing" : "",
                  .state = TrackingState::kTracking,
                  .T_world_camera = frame.T_world_camera,
                  .is_keyframe = false,
@@ -114,19 +116,20 @@ class FakeSession {
     if (frame.mask_encoding == MaskEncoding::kNone) awaiting_masks_.insert(frame.frame_id);
     trajectory_.push_back(ack);
     timestamps_ns_.push_back(frame.timestamp_ns);
-    for (const Instance& instance : frame.instances) See(instance);
+    for (const Instance& instance : frame.instances) AddObservation(instance);
     return absl::OkStatus();
   }
 
-  absl::Status TakeMasks(const MasksInput& masks) {
+  absl::Status ProcessMasks(const MasksInput& masks) {
     std::lock_guard lock(mutex_);
-    if (info_.state != SessionState::kOpen) return FailedPrecondition("session '{}' is finished", info_.id);
+    if (info_.state != SessionState::kOpen)
+      return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
     const bool awaited = awaiting_masks_.erase(masks.frame_id) > 0;
     Publish(MasksAck{.frame_id = masks.frame_id,
                      .accepted = awaited,
-                     .error = awaited ? "" : "no such frame was accepted, or it has masks already"});
+                     .error = awaited ? "" : "frame_id: no accepted frame without masks has this id"});
     if (!awaited) return absl::OkStatus();
-    for (const Instance& instance : masks.instances) See(instance);
+    for (const Instance& instance : masks.instances) AddObservation(instance);
     return absl::OkStatus();
   }
 
@@ -170,7 +173,7 @@ class FakeSession {
     for (const auto& subscriber : subscribers_) subscriber->Put(event);
   }
 
-  void See(const Instance& instance) {
+  void AddObservation(const Instance& instance) {
     const auto [it, is_new] = objects_.try_emplace(instance.class_name);
     ObjectUpdate& object = it->second;
     if (is_new) {
@@ -198,7 +201,7 @@ class FakeSession {
   SessionInfo info_;
   std::set<std::shared_ptr<Mailbox>> subscribers_;
   std::map<std::string, ObjectUpdate> objects_;  // by class name
-  std::set<uint64_t> awaiting_masks_;            // frames that were accepted without
+  std::set<uint64_t> awaiting_masks_;            // accepted frames without masks
   std::vector<FrameAck> trajectory_;
   std::vector<int64_t> timestamps_ns_;
 };
@@ -218,23 +221,24 @@ class FakeStream : public MapStream {
   absl::Status status() const override { return mailbox_->status(); }
 
   absl::Status Send(FrameInput frame) override {
-    if (!sending_) return FailedPrecondition("this stream was closed for sending");
+    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
     hook_(frame);
-    return session_->Take(frame);
+    return session_->Process(frame);
   }
   absl::Status SendMasks(MasksInput masks) override {
-    if (!sending_) return FailedPrecondition("this stream was closed for sending");
-    return session_->TakeMasks(masks);
+    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+    return session_->ProcessMasks(masks);
   }
   absl::Status CloseSend() override {
-    if (!StopSending()) return FailedPrecondition("this stream was closed for sending");
+    if (!StopSending())
+      return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
     mailbox_->Close(absl::OkStatus());
     return absl::OkStatus();
   }
   void Cancel() override {
     StopSending();
     session_->Unsubscribe(mailbox_);
-    mailbox_->Close(absl::CancelledError("the stream was cancelled"));
+    mailbox_->Close(absl::CancelledError("the stream was canceled"));
   }
 
  private:
@@ -259,11 +263,11 @@ absl::StatusOr<SessionInfo> FakeMappingService::CreateSession(const SessionOptio
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
   std::lock_guard lock(mutex_);
   SessionInfo info;
-  info.id = fmt::format("fake-{}", ++sessions_made_);
+  info.id = fmt::format("fake-{}", ++sessions_created_);
   info.name = options.name;
   info.camera = options.camera;
   info.mode = options.mode;
-  info.created_unix_ns = static_cast<int64_t>(sessions_made_);
+  info.created_unix_ns = static_cast<int64_t>(sessions_created_);
   sessions_[info.id] = std::make_shared<FakeSession>(info);
   return info;
 }
@@ -314,7 +318,7 @@ absl::StatusOr<MapSnapshot> FakeMappingService::ExportMap(const std::string& ses
 absl::StatusOr<std::shared_ptr<FakeSession>> FakeMappingService::Find(const std::string& session_id) {
   std::lock_guard lock(mutex_);
   const auto it = sessions_.find(session_id);
-  if (it == sessions_.end()) return NotFound("no session '{}'", session_id);
+  if (it == sessions_.end()) return NotFound("session '{}' does not exist", session_id);
   return it->second;
 }
 

@@ -16,20 +16,20 @@ namespace romap::testing {
 
 class FakeSession;
 
-// A mapping service that does no mapping, for tests of whatever stands in front of one. Keeps the promises of
-// MappingService, and
-//   - answers every frame within Send(): a frame with an image is accepted, one without is not; and late masks within
-//     SendMasks(): those of an accepted frame without masks are accepted;
-//   - makes one confirmed object per class name among the instances, and with every frame that shows it sends an update
-//     and a mesh of it, each with a higher revision;
-//   - finishes a session at once.
-// Thread-safe; has no threads of its own.
+// A mapping service without mapping, for tests of its clients. Keeps the contract of MappingService, and
+//   - acknowledges every frame within Send(): a frame with an image is accepted, one without is rejected; and late
+//   masks
+//     within SendMasks(): those of an accepted frame without masks are accepted;
+//   - creates one confirmed object per class name of the instances, and publishes an update and a mesh, with a higher
+//     revision, for every frame with an instance of that class;
+//   - finishes a session immediately.
+// Thread-safe, without threads of its own.
 class FakeMappingService : public MappingService {
  public:
   FakeMappingService();
   ~FakeMappingService() override;
 
-  // Called within Send() before a frame is looked at; may block, to play a busy server. Set before the first frame.
+  // Called within Send() before a frame is processed; may block to simulate a busy server. Set before the first frame.
   void SetFrameHook(std::function<void(const FrameInput&)> hook) { frame_hook_ = std::move(hook); }
 
   absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) override;
@@ -46,7 +46,7 @@ class FakeMappingService : public MappingService {
 
   std::function<void(const FrameInput&)> frame_hook_ = [](const FrameInput&) {};
   std::mutex mutex_;
-  uint64_t sessions_made_ = 0;
+  uint64_t sessions_created_ = 0;
   std::map<std::string, std::shared_ptr<FakeSession>> sessions_;
 };
 

@@ -10,35 +10,36 @@
 
 namespace romap::testing {
 
-// Does to a map, at random, all that stages do to one: objects appear, change, are confirmed, lost, merged (in chains),
-// removed, get meshes and are moved by corrections. Now and then something comes late, of an object that is gone.
+// Applies random changes to a map, of every kind that the stages make: objects are created, changed, confirmed, lost,
+// merged (in chains), removed, get meshes and are moved by corrections. Some changes are late: their object was
+// removed.
 class RandomMap {
  public:
   RandomMap(uint64_t seed, session::MapState* map) : random_(seed), map_(map) {}
 
-  // One thing happens.
+  // Applies one change.
   void Step() {
-    const int what = Pick(0, 99);
-    if (what < 12 || live_.empty()) return Appear();
-    if (what < 40) return map_->Apply(Change(AnyLive()));
-    if (what < 60) return map_->PublishMesh(MeshOf(AnyLive()), {PlaceAt(Number()), {}});
-    if (what < 68) return Correct();
-    if (what < 78) return Merge();
-    if (what < 86) return Remove();
-    if (what < 92) return ComeLate();
-    Answer();
+    const int percent = Pick(0, 99);
+    if (percent < 12 || current_.empty()) return Create();
+    if (percent < 40) return map_->Apply(Change(AnyObject()));
+    if (percent < 60) return map_->PublishMesh(MeshOf(AnyObject()), {PoseAt(Number()), {}});
+    if (percent < 68) return Correct();
+    if (percent < 78) return Merge();
+    if (percent < 86) return Remove();
+    if (percent < 92) return ChangeRemovedObject();
+    PublishOtherEvents();
   }
 
   int Pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
 
  private:
   double Number() { return std::uniform_real_distribution<double>(-5, 5)(random_); }
-  uint64_t AnyLive() { return *std::next(live_.begin(), Pick(0, static_cast<int>(live_.size()) - 1)); }
+  uint64_t AnyObject() { return *std::next(current_.begin(), Pick(0, static_cast<int>(current_.size()) - 1)); }
 
-  static SE3<World, Object> PlaceAt(double x) { return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}; }
+  static SE3<World, Object> PoseAt(double x) { return {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}; }
 
-  void Appear() {
-    live_.insert(++last_id_);
+  void Create() {
+    current_.insert(++last_id_);
     map_->Apply(Change(last_id_));
   }
 
@@ -47,7 +48,7 @@ class RandomMap {
     update.id = ObjectId{id};
     update.state = static_cast<ObjectState>(Pick(0, 2));
     update.class_name = Pick(0, 1) == 0 ? "mug" : "book";
-    update.cuboid.T_world_object = PlaceAt(Number());
+    update.cuboid.T_world_object = PoseAt(Number());
     update.cuboid.half_extents = Eigen::Vector3d(0.1, 0.2, 0.3);
     update.observations = static_cast<uint64_t>(Pick(1, 1000));
     return update;
@@ -61,8 +62,8 @@ class RandomMap {
     return mesh;
   }
 
-  // What is not about objects, but waits with them.
-  void Answer() {
+  // Events that are not about objects, but share the outbox with them.
+  void PublishOtherEvents() {
     FrameAck ack;
     ack.frame_id = ++frames_;
     map_->Acknowledge(ack, static_cast<int64_t>(frames_));
@@ -72,16 +73,16 @@ class RandomMap {
     map_->Publish(statistics);
   }
 
-  // As a session does it: all objects move, then clients are told.
+  // Like Pipeline::Publish(): moves all objects first, then publishes their updates.
   void Correct() {
     const Sim3<World, World> S_new_old(1 + 0.01 * Number(), Eigen::Quaterniond::Identity(),
                                        Eigen::Vector3d(Number(), 0, 0));
-    for (const uint64_t id : live_) map_->MoveObject(ObjectId{id}, S_new_old);
-    for (const uint64_t id : live_) map_->Apply(Change(id));
+    for (const uint64_t id : current_) map_->MoveObject(ObjectId{id}, S_new_old);
+    for (const uint64_t id : current_) map_->Apply(Change(id));
   }
 
   void Merge() {
-    const uint64_t from = AnyLive(), into = AnyLive();
+    const uint64_t from = AnyObject(), into = AnyObject();
     if (from == into) return;
     End(from);
     map_->Apply(ObjectMerged{.from = ObjectId{from}, .into = ObjectId{into}});
@@ -89,30 +90,30 @@ class RandomMap {
   }
 
   void Remove() {
-    const uint64_t id = AnyLive();
+    const uint64_t id = AnyObject();
     End(id);
-    map_->Apply(ObjectRemoved{.id = ObjectId{id}, .revision = 0, .reason = "ghost"});
+    map_->Apply(ObjectRemoved{.id = ObjectId{id}, .revision = 0, .reason = "false landmark"});
   }
 
   void End(uint64_t id) {
-    live_.erase(id);
-    gone_.push_back(id);
+    current_.erase(id);
+    removed_.push_back(id);
   }
 
-  // None of it may show.
-  void ComeLate() {
-    if (gone_.empty()) return;
-    const uint64_t gone = gone_[static_cast<size_t>(Pick(0, static_cast<int>(gone_.size()) - 1))];
-    map_->Apply(Change(gone));
-    map_->PublishMesh(MeshOf(gone), {PlaceAt(0), {}});
-    map_->Apply(ObjectRemoved{.id = ObjectId{gone}, .revision = 0, .reason = "once more"});
-    map_->Apply(ObjectMerged{.from = ObjectId{gone}, .into = ObjectId{AnyLive()}});
+  // These changes must have no effect.
+  void ChangeRemovedObject() {
+    if (removed_.empty()) return;
+    const uint64_t id = removed_[static_cast<size_t>(Pick(0, static_cast<int>(removed_.size()) - 1))];
+    map_->Apply(Change(id));
+    map_->PublishMesh(MeshOf(id), {PoseAt(0), {}});
+    map_->Apply(ObjectRemoved{.id = ObjectId{id}, .revision = 0, .reason = "again"});
+    map_->Apply(ObjectMerged{.from = ObjectId{id}, .into = ObjectId{AnyObject()}});
   }
 
   std::mt19937_64 random_;
   session::MapState* const map_;
-  std::set<uint64_t> live_;
-  std::vector<uint64_t> gone_;
+  std::set<uint64_t> current_;
+  std::vector<uint64_t> removed_;
   uint64_t last_id_ = 0, frames_ = 0;
 };
 

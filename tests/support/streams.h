@@ -12,12 +12,11 @@
 
 #include "common/mapping_service.h"
 
-// Small tools for tests that talk to a MappingService.
+// Helpers for tests of a MappingService. All waits end with a test failure after kTimeout.
 
 namespace romap::testing {
 
-// Only an upper bound for what must not hang; nothing waits for it to pass.
-inline constexpr std::chrono::seconds kPatience{60};
+inline constexpr std::chrono::seconds kTimeout{60};
 
 inline CameraModel SmallCamera() {
   CameraModel camera;
@@ -29,7 +28,7 @@ inline CameraModel SmallCamera() {
   return camera;
 }
 
-// A frame of SmallCamera() that any service accepts. With `class_name` it shows one instance of that class.
+// A valid frame of SmallCamera(). With `class_name`, its masks have one instance of that class.
 inline FrameInput MakeFrame(uint64_t frame_id, const std::string& class_name = "") {
   const CameraModel camera = SmallCamera();
   FrameInput frame;
@@ -49,29 +48,29 @@ inline FrameInput MakeFrame(uint64_t frame_id, const std::string& class_name = "
   return frame;
 }
 
-// The next event of kind T; skips others. nullopt when the stream ends first.
+// The next event of type T; skips others. nullopt if the stream ends first.
 template <class T>
 std::optional<T> NextOf(EventStream& stream) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  const auto deadline = std::chrono::steady_clock::now() + kTimeout;
   while (std::chrono::steady_clock::now() < deadline) {
     std::optional<MapEvent> event = stream.Next(std::chrono::milliseconds(100));
     if (event && std::holds_alternative<T>(*event)) return std::get<T>(*std::move(event));
     if (!event && stream.Done()) return std::nullopt;
   }
-  ADD_FAILURE() << "no such event came and the stream did not end";
+  ADD_FAILURE() << "no event of this type within " << kTimeout.count() << " s, and the stream did not end";
   return std::nullopt;
 }
 
-// Everything up to the end of the stream.
+// All events up to the end of the stream.
 inline std::vector<MapEvent> ReadToEnd(EventStream& stream) {
   std::vector<MapEvent> events;
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  const auto deadline = std::chrono::steady_clock::now() + kTimeout;
   while (std::chrono::steady_clock::now() < deadline) {
     std::optional<MapEvent> event = stream.Next(std::chrono::milliseconds(100));
     if (event) events.push_back(*std::move(event));
     if (!event && stream.Done()) return events;
   }
-  ADD_FAILURE() << "the stream did not end";
+  ADD_FAILURE() << "the stream did not end within " << kTimeout.count() << " s";
   return events;
 }
 
@@ -84,19 +83,20 @@ std::vector<T> Only(const std::vector<MapEvent>& events) {
   return kind;
 }
 
-// Waits until the condition holds.
+// Waits until the condition is true. False, with a test failure, after kTimeout.
 inline bool Eventually(const std::function<bool()>& condition) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  const auto deadline = std::chrono::steady_clock::now() + kTimeout;
   while (std::chrono::steady_clock::now() < deadline) {
     if (condition()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
+  ADD_FAILURE() << "the condition did not become true within " << kTimeout.count() << " s";
   return false;
 }
 
 }  // namespace romap::testing
 
-// Assertions on absl's status that print it when they fail.
+// Assertions on absl::Status that print it on failure.
 #define EXPECT_OK(expression)                        \
   do {                                               \
     const absl::Status status_ = (expression);       \

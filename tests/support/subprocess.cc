@@ -1,6 +1,7 @@
 #include "tests/support/subprocess.h"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,6 +17,8 @@ namespace romap::testing_support {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::chrono::milliseconds kPollPeriod{10};
 
 std::string ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -62,17 +65,33 @@ std::string BackgroundProcess::WaitForLine(const std::string& prefix) {
     for (std::string line; std::getline(lines, line) && !lines.eof();) {
       if (line.starts_with(prefix)) return line.substr(prefix.size());
     }
-    siginfo_t info{};
-    if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_)
+    if (HasEnded()) {
+      ADD_FAILURE() << "the program ended without a line that begins with '" << prefix << "'";
       return "";
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    std::this_thread::sleep_for(kPollPeriod);
   }
+  ADD_FAILURE() << "no line that begins with '" << prefix << "' within 30 s";
   return "";
+}
+
+bool BackgroundProcess::HasEnded() const {
+  siginfo_t info{};
+  return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
 }
 
 void BackgroundProcess::Signal(int signal) const { kill(pid_, signal); }
 
 ProcessResult BackgroundProcess::Wait() {
+  const auto deadline = std::chrono::steady_clock::now() + kProcessTimeout;
+  while (!HasEnded()) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      ADD_FAILURE() << "the program did not end within " << kProcessTimeout.count() << " s";
+      Signal(SIGKILL);
+      break;
+    }
+    std::this_thread::sleep_for(kPollPeriod);
+  }
   ProcessResult result;
   int status = 0;
   waitpid(pid_, &status, 0);

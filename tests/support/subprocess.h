@@ -2,21 +2,24 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <string>
 #include <vector>
 
 namespace romap::testing_support {
 
+inline constexpr std::chrono::seconds kProcessTimeout{240};
+
 struct ProcessResult {
-  int exit_code = -1;  // 128 + signal when it was killed
+  int exit_code = -1;  // 128 + signal number if a signal ended it
   std::string out;
   std::string err;
 };
 
-// Runs a program to its end.
+// Runs a program and waits for its end. Kills it and adds a test failure after kProcessTimeout.
 ProcessResult RunProcess(const std::vector<std::string>& command);
 
-// A program in the background; killed when the object goes.
+// A program in the background; killed by the destructor.
 class BackgroundProcess {
  public:
   explicit BackgroundProcess(const std::vector<std::string>& command);
@@ -24,18 +27,21 @@ class BackgroundProcess {
   BackgroundProcess(const BackgroundProcess&) = delete;
   BackgroundProcess& operator=(const BackgroundProcess&) = delete;
 
-  // Waits until its output has a line that begins with `prefix` and returns the rest of that line; "" when it ends or
-  // half a minute passes before.
+  // Waits for a line of output that begins with `prefix` and returns the rest of that line. "", with a test failure, if
+  // the program ends first or after 30 s.
   std::string WaitForLine(const std::string& prefix);
   void Signal(int signal) const;
+  // Waits for the end of the program. Kills it and adds a test failure after kProcessTimeout.
   ProcessResult Wait();
 
  private:
+  bool HasEnded() const;
+
   pid_t pid_ = -1;
   std::string out_path_, err_path_;
 };
 
-// A folder of its own that goes with the object.
+// A new temporary folder; removed by the destructor.
 class TemporaryFolder {
  public:
   TemporaryFolder();

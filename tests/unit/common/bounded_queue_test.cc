@@ -21,7 +21,7 @@ TEST(BoundedQueueTest, KeepsOrderAndDrainsAfterClose) {
   EXPECT_TRUE(queue.Drained());
 }
 
-TEST(BoundedQueueTest, PushWaitsForRoom) {
+TEST(BoundedQueueTest, PushWaitsWhileTheQueueIsFull) {
   BoundedQueue<int> queue(1);
   ASSERT_TRUE(queue.Push(1));
   std::atomic<bool> pushed = false;
@@ -35,7 +35,7 @@ TEST(BoundedQueueTest, PushWaitsForRoom) {
   EXPECT_TRUE(pushed);
 }
 
-TEST(BoundedQueueTest, CloseReleasesAWaitingProducer) {
+TEST(BoundedQueueTest, CloseEndsAWaitingPush) {
   BoundedQueue<int> queue(1);
   ASSERT_TRUE(queue.Push(1));
   bool taken = true;
@@ -46,7 +46,7 @@ TEST(BoundedQueueTest, CloseReleasesAWaitingProducer) {
   EXPECT_EQ(queue.Pop(), 1);
 }
 
-TEST(BoundedQueueTest, DroppingOldestKeepsTheNewest) {
+TEST(BoundedQueueTest, PushDroppingOldestKeepsTheNewest) {
   BoundedQueue<int> queue(2);
   bool accepted = false;
   EXPECT_EQ(queue.PushDroppingOldest(1, &accepted), std::nullopt);

@@ -19,9 +19,10 @@ concept Composable = requires(A a, B b) {
   a* b;
 };
 static_assert(Composable<SE3<World, Camera>, SE3<Camera, Object>>);
-static_assert(!Composable<SE3<World, Camera>, SE3<World, Object>>, "frames that do not meet must not compose");
+static_assert(!Composable<SE3<World, Camera>, SE3<World, Object>>,
+              "transforms with different inner frames must not compose");
 
-TEST(GeometryTest, InverseUndoes) {
+TEST(GeometryTest, InverseTimesTransformIsIdentity) {
   const Eigen::Vector3d p(0.3, 0.4, 0.5);
   EXPECT_TRUE((SomePose().Inverse() * (SomePose() * p)).isApprox(p, 1e-12));
 }
@@ -39,7 +40,7 @@ TEST(GeometryTest, RotationFromZToUp) {
   }
 }
 
-TEST(GeometryTest, ShortestRotationTurnsNothingElse) {
+TEST(GeometryTest, ShortestRotationKeepsItsAxis) {
   const Eigen::Vector3d from(0.3, -1, 2), to(-5, 0.1, 0.4);
   const Eigen::Quaterniond rotation = ShortestRotation(from, to);
   EXPECT_TRUE((rotation * from.normalized()).isApprox(to.normalized(), 1e-12));
@@ -47,18 +48,18 @@ TEST(GeometryTest, ShortestRotationTurnsNothingElse) {
   EXPECT_TRUE((rotation * axis).isApprox(axis, 1e-12));
 }
 
-TEST(CameraModelTest, ProjectUndoesUnproject) {
+TEST(CameraModelTest, ProjectInvertsUnproject) {
   const CameraModel camera{640, 480, 500, 510, 319.5, 239.5, {}};
   const Eigen::Vector3d ray = camera.Unproject(17, 400);
   EXPECT_TRUE(camera.Project(ray * 2.5).isApprox(Eigen::Vector2d(17, 400), 1e-12));
 }
 
-TEST(CameraModelTest, FaultsAreNamed) {
+TEST(CameraModelTest, ErrorsNameTheField) {
   const CameraModel good{640, 480, 500, 510, 319.5, 239.5, {}};
   EXPECT_TRUE(ValidateCameraModel(good).ok());
   CameraModel bad = good;
   bad.width_px = 0;
-  EXPECT_NE(Message(ValidateCameraModel(bad)).find("size 0x480"), std::string::npos);
+  EXPECT_NE(Message(ValidateCameraModel(bad)).find("is 0x480 px"), std::string::npos);
   bad = good;
   bad.fx_px = -1;
   EXPECT_NE(Message(ValidateCameraModel(bad)).find("focal"), std::string::npos);

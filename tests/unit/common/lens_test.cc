@@ -27,7 +27,7 @@ CameraModel Camera(LensModel lens, const std::array<double, 5>& distortion) {
 CameraModel Barrel() { return Camera(LensModel::kRadialTangential, {-0.28, 0.09, 0.001, -0.0007, -0.01}); }
 CameraModel Fisheye() { return Camera(LensModel::kFisheye, {-0.02, 0.01, -0.005, 0.001, 0}); }
 
-std::vector<Eigen::Vector2f> PixelsAllOver(const CameraModel& camera) {
+std::vector<Eigen::Vector2f> PixelGrid(const CameraModel& camera) {
   std::vector<Eigen::Vector2f> pixels_px;
   for (int v = 0; v < camera.height_px; v += 13) {
     for (int u = 0; u < camera.width_px; u += 13) {
@@ -37,7 +37,7 @@ std::vector<Eigen::Vector2f> PixelsAllOver(const CameraModel& camera) {
   return pixels_px;
 }
 
-// Where OpenCV's own projections see the point (x, y, 1).
+// OpenCV's projection of the point (x, y, 1).
 cv::Point2d ProjectByOpenCv(const CameraModel& camera, const Eigen::Vector3d& ray) {
   const cv::Matx33d K(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
   const std::vector<cv::Point3d> points{{ray.x(), ray.y(), ray.z()}};
@@ -57,34 +57,35 @@ class LensTest : public testing::TestWithParam<CameraModel> {};
 
 TEST_P(LensTest, UndistortedPixelsDistortBack) {
   const CameraModel camera = GetParam();
-  const std::vector<Eigen::Vector2f> seen_px = PixelsAllOver(camera);
-  const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(camera, seen_px);
-  ASSERT_EQ(pinhole_px.size(), seen_px.size());
-  for (size_t i = 0; i < seen_px.size(); ++i) {
-    ASSERT_TRUE(pinhole_px[i].allFinite()) << seen_px[i].transpose();
+  const std::vector<Eigen::Vector2f> distorted_px = PixelGrid(camera);
+  const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(camera, distorted_px);
+  ASSERT_EQ(pinhole_px.size(), distorted_px.size());
+  for (size_t i = 0; i < distorted_px.size(); ++i) {
+    ASSERT_TRUE(pinhole_px[i].allFinite()) << distorted_px[i].transpose();
     const cv::Point2d again = ProjectByOpenCv(camera, camera.Unproject(pinhole_px[i].x(), pinhole_px[i].y()));
-    EXPECT_NEAR(again.x, seen_px[i].x(), 0.05);
-    EXPECT_NEAR(again.y, seen_px[i].y(), 0.05);
+    EXPECT_NEAR(again.x, distorted_px[i].x(), 0.05);
+    EXPECT_NEAR(again.y, distorted_px[i].y(), 0.05);
   }
 }
 
 TEST_P(LensTest, DistortPixelAgreesWithOpenCv) {
   const CameraModel camera = GetParam();
-  for (const Eigen::Vector2f& pinhole_px : PixelsAllOver(camera)) {
+  for (const Eigen::Vector2f& pinhole_px : PixelGrid(camera)) {
     const cv::Point2d expected = ProjectByOpenCv(camera, camera.Unproject(pinhole_px.x(), pinhole_px.y()));
-    const Eigen::Vector2d seen_px = DistortPixel(camera, pinhole_px.cast<double>());
-    EXPECT_NEAR(seen_px.x(), expected.x, 1e-6);
-    EXPECT_NEAR(seen_px.y(), expected.y, 1e-6);
+    const Eigen::Vector2d distorted_px = DistortPixel(camera, pinhole_px.cast<double>());
+    EXPECT_NEAR(distorted_px.x(), expected.x, 1e-6);
+    EXPECT_NEAR(distorted_px.y(), expected.y, 1e-6);
   }
 }
 
-TEST_P(LensTest, MapsPutADotWhereThePinholeSeesIt) {
+TEST_P(LensTest, MapsMoveADotToItsPinholePixel) {
   const CameraModel camera = GetParam();
   const Eigen::Vector2d pinhole_px(250, 310);
-  const Eigen::Vector2d seen_px = DistortPixel(camera, pinhole_px);
-  ASSERT_GT((seen_px - pinhole_px).norm(), 1);
+  const Eigen::Vector2d distorted_px = DistortPixel(camera, pinhole_px);
+  ASSERT_GT((distorted_px - pinhole_px).norm(), 1);
   cv::Mat image = cv::Mat::zeros(480, 640, CV_8UC1), undistorted;
-  const cv::Point center(static_cast<int>(std::lround(seen_px.x())), static_cast<int>(std::lround(seen_px.y())));
+  const cv::Point center(static_cast<int>(std::lround(distorted_px.x())),
+                         static_cast<int>(std::lround(distorted_px.y())));
   cv::circle(image, center, 4, 255, -1);
   const UndistortionMaps maps = MakeUndistortionMaps(camera);
   cv::remap(image, undistorted, maps.xy, maps.fraction, cv::INTER_LINEAR);
@@ -96,43 +97,43 @@ TEST_P(LensTest, MapsPutADotWhereThePinholeSeesIt) {
 INSTANTIATE_TEST_SUITE_P(Lenses, LensTest, testing::Values(Barrel(), Fisheye()),
                          [](const auto& info) { return info.index == 0 ? "RadialTangential" : "Fisheye"; });
 
-TEST(Lens, APinholeLeavesPixelsAlone) {
+TEST(Lens, PinholeDoesNotChangePixels) {
   const CameraModel pinhole = Barrel().Pinhole();
   EXPECT_FALSE(pinhole.HasDistortion());
-  const std::vector<Eigen::Vector2f> pixels_px = PixelsAllOver(pinhole);
+  const std::vector<Eigen::Vector2f> pixels_px = PixelGrid(pinhole);
   EXPECT_EQ(UndistortPixels(pinhole, pixels_px), pixels_px);
   EXPECT_TRUE(UndistortPixels(Barrel(), {}).empty());
 }
 
-TEST(Lens, AFisheyeIsNoPinholeEvenWithoutCoefficients) {
+TEST(Lens, FisheyeWithoutCoefficientsHasDistortion) {
   const CameraModel camera = Camera(LensModel::kFisheye, {});
   EXPECT_TRUE(camera.HasDistortion());
   EXPECT_FALSE(camera.Pinhole().HasDistortion());
-  const double theta_rad = 0.6;  // an equidistant lens shows it at f * theta
-  const std::array<Eigen::Vector2f, 1> seen_px{Eigen::Vector2f(321 + 400 * static_cast<float>(theta_rad), 238)};
-  EXPECT_NEAR(UndistortPixels(camera, seen_px).front().x(), 321 + 400 * std::tan(theta_rad), 0.01);
+  const double theta_rad = 0.6;  // an equidistant lens projects it to f * theta
+  const std::array<Eigen::Vector2f, 1> distorted_px{Eigen::Vector2f(321 + 400 * static_cast<float>(theta_rad), 238)};
+  EXPECT_NEAR(UndistortPixels(camera, distorted_px).front().x(), 321 + 400 * std::tan(theta_rad), 0.01);
 }
 
-TEST(Lens, PixelsThatNoPinholeSeesAreNotNumbers) {
+TEST(Lens, PixelsWithoutAPinholeEquivalentAreNaN) {
   CameraModel wide = Camera(LensModel::kFisheye, {});
-  wide.fx_px = wide.fy_px = 150;  // the corners look backwards
-  const std::array<Eigen::Vector2f, 2> seen_px{Eigen::Vector2f(2, 2), Eigen::Vector2f(300, 200)};
-  const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(wide, seen_px);
+  wide.fx_px = wide.fy_px = 150;  // rays at the corners point backwards
+  const std::array<Eigen::Vector2f, 2> distorted_px{Eigen::Vector2f(2, 2), Eigen::Vector2f(300, 200)};
+  const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(wide, distorted_px);
   EXPECT_FALSE(pinhole_px[0].allFinite());
   EXPECT_TRUE(pinhole_px[1].allFinite());
-  // With this much distortion, no ray arrives in the corners.
+  // With this distortion, no ray reaches the corners.
   const CameraModel strong = Camera(LensModel::kRadialTangential, {-0.6, 0, 0, 0, 0});
-  EXPECT_FALSE(UndistortPixels(strong, seen_px)[0].allFinite());
+  EXPECT_FALSE(UndistortPixels(strong, distorted_px)[0].allFinite());
 }
 
-TEST(Lens, FaultyCoefficientsAreNamed) {
+TEST(Lens, ErrorsNameTheCoefficients) {
   CameraModel camera = Fisheye();
   EXPECT_TRUE(ValidateCameraModel(camera).ok());
   camera.distortion[1] = NAN;
   EXPECT_NE(Message(ValidateCameraModel(camera)).find("k1 k2 k3 k4"), std::string::npos);
   camera = Fisheye();
   camera.distortion[4] = 0.1;
-  EXPECT_NE(Message(ValidateCameraModel(camera)).find("four distortion coefficients"), std::string::npos);
+  EXPECT_NE(Message(ValidateCameraModel(camera)).find("4 distortion coefficients"), std::string::npos);
 }
 
 }  // namespace

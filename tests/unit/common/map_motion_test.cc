@@ -11,7 +11,7 @@ Sim3<World, World> SomeCorrection() {
   return {1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())), {4, -5, 6}};
 }
 
-TEST(MapMotionTest, ACuboidKeepsItsCornersOnTheMovedPoints) {
+TEST(MapMotionTest, CuboidCornersMoveWithTheSpace) {
   const Cuboid cuboid{{Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(1, 2, 3)},
                       {0.1, 0.2, 0.3},
                       0.5};
@@ -24,7 +24,7 @@ TEST(MapMotionTest, ACuboidKeepsItsCornersOnTheMovedPoints) {
   EXPECT_EQ(moved.confidence, 0.5);
 }
 
-TEST(MapMotionTest, AViewStillSeesTheMovedWorldAtItsPixelsAndDepths) {
+TEST(MapMotionTest, MovedViewProjectsMovedPointsToTheSamePixels) {
   ObjectView view;
   view.camera = {64, 48, 50, 50, 31.5, 23.5, {}};
   view.T_world_camera = {Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX())),
@@ -37,7 +37,7 @@ TEST(MapMotionTest, AViewStillSeesTheMovedWorldAtItsPixelsAndDepths) {
   EXPECT_TRUE(moved.camera.Project(p_camera).isApprox(Eigen::Vector2d(40, 20), 1e-9));
   EXPECT_NEAR(p_camera.z(), moved.sparse_depth[0].z(), 1e-6);
   EXPECT_EQ(moved.depth_mu.at<float>(1, 1), 3.0f);
-  EXPECT_EQ(view.depth_mu.at<float>(1, 1), 2.0f) << "pixels of a sent view are shared and never written to";
+  EXPECT_EQ(view.depth_mu.at<float>(1, 1), 2.0f) << "the pixels of the original view are shared and must not change";
 }
 
 }  // namespace

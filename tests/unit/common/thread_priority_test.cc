@@ -11,7 +11,7 @@ namespace {
 
 int Niceness() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
 
-TEST(ThreadPriorityTest, OnlyTheCallingThreadYields) {
+TEST(ThreadPriorityTest, LowersOnlyTheCallingThread) {
   const int before = Niceness();
   int inside = before;
   std::thread thread([&] {

@@ -35,7 +35,7 @@ ObjectUpdate FullObject() {
   return object;
 }
 
-TEST(WireEvents, FrameAckComesBack) {
+TEST(WireEvents, FrameAckRoundTrips) {
   FrameAck ack;
   ack.frame_id = 3;
   ack.accepted = false;
@@ -55,14 +55,14 @@ TEST(WireEvents, FrameAckComesBack) {
   EXPECT_EQ(got.latency_s, ack.latency_s);
 }
 
-TEST(WireEvents, MasksAckComesBack) {
+TEST(WireEvents, MasksAckRoundTrips) {
   const MasksAck got = RoundTrip(MasksAck{.frame_id = 3, .accepted = false, .error = "too late"});
   EXPECT_EQ(got.frame_id, 3u);
   EXPECT_FALSE(got.accepted);
   EXPECT_EQ(got.error, "too late");
 }
 
-TEST(WireEvents, ObjectUpdateComesBack) {
+TEST(WireEvents, ObjectUpdateRoundTrips) {
   const ObjectUpdate object = FullObject();
   const ObjectUpdate got = RoundTrip(object);
   EXPECT_EQ(got.id, object.id);
@@ -79,17 +79,17 @@ TEST(WireEvents, ObjectUpdateComesBack) {
   EXPECT_EQ(got.mesh_scale, object.mesh_scale);
 }
 
-TEST(WireEvents, MeshScaleIsOneWhereAnOlderReleaseSaysNothing) {
+TEST(WireEvents, AbsentMeshScaleMeansOne) {
   v1::MapEvent proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->clear_mesh_scale();
   const auto got = FromProto(proto, "event");
   ASSERT_TRUE(got.ok()) << Message(got.status());
   EXPECT_EQ(std::get<ObjectUpdate>(*got).mesh_scale, 1);
   proto.mutable_object()->set_mesh_scale(-0.5);
-  EXPECT_THAT(Message(FromProto(proto, "event").status()), HasSubstr("event.object.mesh_scale: must be positive"));
+  EXPECT_THAT(Message(FromProto(proto, "event").status()), HasSubstr("event.object.mesh_scale: must not be negative"));
 }
 
-TEST(WireEvents, MeshUpdateComesBack) {
+TEST(WireEvents, MeshUpdateRoundTrips) {
   MeshUpdate mesh;
   mesh.id = ObjectId{5};
   mesh.revision = 6;
@@ -110,18 +110,18 @@ TEST(WireEvents, MeshUpdateComesBack) {
   EXPECT_EQ(got.draco, mesh.draco);
 }
 
-TEST(WireEvents, RemovalAndMergeComeBack) {
-  const auto removed = RoundTrip(ObjectRemoved{.id = ObjectId{1}, .revision = 2, .reason = "not seen again"});
+TEST(WireEvents, RemovalAndMergeRoundTrip) {
+  const auto removed = RoundTrip(ObjectRemoved{.id = ObjectId{1}, .revision = 2, .reason = "not detected again"});
   EXPECT_EQ(removed.id, ObjectId{1});
   EXPECT_EQ(removed.revision, 2u);
-  EXPECT_EQ(removed.reason, "not seen again");
+  EXPECT_EQ(removed.reason, "not detected again");
   const auto merged = RoundTrip(ObjectMerged{.from = ObjectId{3}, .into = ObjectId{4}, .revision = 5});
   EXPECT_EQ(merged.from, ObjectId{3});
   EXPECT_EQ(merged.into, ObjectId{4});
   EXPECT_EQ(merged.revision, 5u);
 }
 
-TEST(WireEvents, StatisticsComeBack) {
+TEST(WireEvents, StatisticsRoundTrip) {
   const Statistics statistics{.frames_received = 1,
                               .frames_processed = 2,
                               .frames_dropped = 3,
@@ -147,38 +147,38 @@ TEST(WireEvents, StatisticsComeBack) {
   EXPECT_EQ(got.resident_bytes, 1ull << 40);
 }
 
-void ExpectFault(const v1::MapEvent& proto, const char* message) {
+void ExpectError(const v1::MapEvent& proto, const char* message) {
   const auto got = FromProto(proto, "event");
   EXPECT_EQ(got.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(Message(got.status()), HasSubstr(message));
 }
 
-TEST(WireEvents, FaultsAreNamed) {
-  ExpectFault({}, "event: of a kind that is not known here");
+TEST(WireEvents, ErrorsNameTheField) {
+  ExpectError({}, "event: unknown kind of event");
 
   v1::MapEvent proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->set_id(0);
-  ExpectFault(proto, "event.object.id: missing");
+  ExpectError(proto, "event.object.id: missing");
 
   proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->clear_cuboid();
-  ExpectFault(proto, "event.object.cuboid: missing");
+  ExpectError(proto, "event.object.cuboid: missing");
 
   proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->mutable_cuboid()->mutable_half_extents()->set_y(-0.1);
-  ExpectFault(proto, "event.object.cuboid.half_extents");
+  ExpectError(proto, "event.object.cuboid.half_extents");
 
   proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->mutable_t_world_mesh()->mutable_rotation()->set_w(2);
-  ExpectFault(proto, "event.object.t_world_mesh.rotation");
+  ExpectError(proto, "event.object.t_world_mesh.rotation");
 
   proto = ToProto(MapEvent(FullObject()));
   proto.mutable_object()->set_state(v1::OBJECT_STATE_UNSPECIFIED);
-  ExpectFault(proto, "event.object.state: value 0");
+  ExpectError(proto, "event.object.state: must be one of OBJECT_STATE_PROVISIONAL");
 
   proto = ToProto(MapEvent(FrameAck{}));
   proto.mutable_frame_ack()->set_latency_s(std::numeric_limits<double>::quiet_NaN());
-  ExpectFault(proto, "event.frame_ack.latency_s");
+  ExpectError(proto, "event.frame_ack.latency_s");
 }
 
 }  // namespace

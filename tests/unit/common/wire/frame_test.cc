@@ -34,7 +34,7 @@ FrameInput FullFrame() {
   return frame;
 }
 
-TEST(WireFrame, EveryFieldComesBack) {
+TEST(WireFrame, EveryFieldRoundTrips) {
   const FrameInput sent = FullFrame();
   const auto got = FromProto(ToProto(sent));
   ASSERT_TRUE(got.ok()) << Message(got.status());
@@ -74,7 +74,7 @@ TEST(WireFrame, AbsentPartsStayAbsent) {
   EXPECT_FALSE(got->gravity_camera.has_value());
 }
 
-TEST(WireFrame, ADetectorThatFoundNothingDiffersFromNoDetector) {
+TEST(WireFrame, MasksWithoutInstancesDifferFromNoMasks) {
   FrameInput sent = FullFrame();
   sent.instances.clear();
   sent.mask_encoding = MaskEncoding::kLabelPng;
@@ -85,7 +85,7 @@ TEST(WireFrame, ADetectorThatFoundNothingDiffersFromNoDetector) {
   EXPECT_EQ(got->label_png, sent.label_png);
 }
 
-TEST(WireFrame, LateMasksComeBack) {
+TEST(WireFrame, LateMasksRoundTrip) {
   MasksInput sent;
   sent.frame_id = 42;
   static_cast<EncodedMasks&>(sent) = FullFrame();
@@ -105,18 +105,18 @@ TEST(WireFrame, LateMasksComeBack) {
   EXPECT_EQ(png->label_png, "png");
 }
 
-TEST(WireFrame, AFaultOfLateMasksIsNamed) {
+TEST(WireFrame, ErrorsInLateMasksNameTheField) {
   MasksInput sent;
   static_cast<EncodedMasks&>(sent) = FullFrame();
   v1::LateMasks without = ToProto(sent), bad = without;
   without.clear_masks();
   EXPECT_THAT(Message(FromProto(without).status()), HasSubstr("late_masks.masks: missing"));
-  EXPECT_THAT(Message(FromProto(ToProto(MasksInput{})).status()), HasSubstr("late_masks.masks: needs label_png"));
+  EXPECT_THAT(Message(FromProto(ToProto(MasksInput{})).status()), HasSubstr("late_masks.masks: must have label_png"));
   bad.mutable_masks()->mutable_instances(1)->set_label(3);
-  EXPECT_THAT(Message(FromProto(bad).status()), HasSubstr("late_masks.masks.instances[1].label: 3 occurs twice"));
+  EXPECT_THAT(Message(FromProto(bad).status()), HasSubstr("late_masks.masks.instances[1].label: 3 is listed twice"));
 }
 
-TEST(WireFrame, WhatAnInstanceLeavesOutHasADefault) {
+TEST(WireFrame, AbsentFieldsOfAnInstanceHaveDefaults) {
   v1::Frame proto = ToProto(FullFrame());
   v1::Instance& instance = *proto.mutable_masks()->mutable_instances(0);
   instance.clear_score();
@@ -127,7 +127,7 @@ TEST(WireFrame, WhatAnInstanceLeavesOutHasADefault) {
   EXPECT_EQ(got->instances[0].class_name, "object");
 }
 
-TEST(WireFrame, ARotationOfThirtyTwoBitFloatsIsNormalised) {
+TEST(WireFrame, RotationWithRoundingErrorIsNormalized) {
   v1::Frame proto = ToProto(FullFrame());
   proto.mutable_t_world_camera()->mutable_rotation()->set_w(0.5004);
   const auto got = FromProto(proto);
@@ -135,17 +135,17 @@ TEST(WireFrame, ARotationOfThirtyTwoBitFloatsIsNormalised) {
   EXPECT_NEAR(got->T_world_camera->rotation().norm(), 1, 1e-15);
 }
 
-struct Fault {
+struct InvalidFrame {
   const char* name;
   const char* message;  // part of the error
-  std::function<void(v1::Frame&)> commit;
+  std::function<void(v1::Frame&)> corrupt;
 };
 
-class WireFrameFault : public ::testing::TestWithParam<Fault> {};
+class WireFrameError : public ::testing::TestWithParam<InvalidFrame> {};
 
-TEST_P(WireFrameFault, IsNamed) {
+TEST_P(WireFrameError, NamesTheField) {
   v1::Frame proto = ToProto(FullFrame());
-  GetParam().commit(proto);
+  GetParam().corrupt(proto);
   const auto got = FromProto(proto);
   EXPECT_EQ(got.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(Message(got.status()), HasSubstr(GetParam().message));
@@ -155,48 +155,49 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 INSTANTIATE_TEST_SUITE_P(
-    All, WireFrameFault,
-    ::testing::ValuesIn(std::vector<Fault>{
+    All, WireFrameError,
+    ::testing::ValuesIn(std::vector<InvalidFrame>{
         {"NoImage", "frame.image: missing", [](v1::Frame& f) { f.clear_image(); }},
-        {"EmptyImage", "frame.image.data: empty", [](v1::Frame& f) { f.mutable_image()->clear_data(); }},
-        {"NoEncoding", "frame.image.encoding: value 0 is not known here, known are IMAGE_ENCODING_JPEG",
+        {"EmptyImage", "frame.image.data: missing", [](v1::Frame& f) { f.mutable_image()->clear_data(); }},
+        {"NoEncoding", "frame.image.encoding: must be one of IMAGE_ENCODING_JPEG",
          [](v1::Frame& f) { f.mutable_image()->clear_encoding(); }},
-        {"NewEncoding", "frame.image.encoding: value 99",
+        {"NewEncoding", "IMAGE_ENCODING_RAW_GRAY8; is 99",
          [](v1::Frame& f) { f.mutable_image()->set_encoding(static_cast<v1::ImageEncoding>(99)); }},
-        {"RawWithoutSize", "frame.image: size 0x1", [](v1::Frame& f) { f.mutable_image()->clear_width_px(); }},
-        {"RawTooLarge", "must lie in 1..8192", [](v1::Frame& f) { f.mutable_image()->set_height_px(4'000'000'000u); }},
-        {"NoLabels", "frame.masks: needs label_png or label_runs",
+        {"RawWithoutSize", "frame.image: raw size must be in 1..8192 px, is 0x1 px",
+         [](v1::Frame& f) { f.mutable_image()->clear_width_px(); }},
+        {"RawTooLarge", "is 2x4000000000 px", [](v1::Frame& f) { f.mutable_image()->set_height_px(4'000'000'000u); }},
+        {"NoLabels", "frame.masks: must have label_png or label_runs",
          [](v1::Frame& f) { f.mutable_masks()->clear_label_runs(); }},
-        {"HalfARun", "frame.masks.label_runs: 5 numbers",
+        {"HalfARun", "frame.masks.label_runs: must be (label, length) pairs, has 5 numbers",
          [](v1::Frame& f) { f.mutable_masks()->mutable_label_runs()->add_label_length_pairs(1); }},
-        {"EmptyPng", "frame.masks.label_png: empty", [](v1::Frame& f) { f.mutable_masks()->set_label_png(""); }},
-        {"LabelZero", "frame.masks.instances[1].label: 0",
+        {"EmptyPng", "frame.masks.label_png: missing", [](v1::Frame& f) { f.mutable_masks()->set_label_png(""); }},
+        {"LabelZero", "frame.masks.instances[1].label: must be in 1..65535, is 0",
          [](v1::Frame& f) { f.mutable_masks()->mutable_instances(1)->set_label(0); }},
-        {"LabelTooLarge", "frame.masks.instances[0].label: 65536",
+        {"LabelTooLarge", "frame.masks.instances[0].label: must be in 1..65535, is 65536",
          [](v1::Frame& f) { f.mutable_masks()->mutable_instances(0)->set_label(65536); }},
-        {"LabelTwice", "frame.masks.instances[1].label: 3 occurs twice",
+        {"LabelTwice", "frame.masks.instances[1].label: 3 is listed twice",
          [](v1::Frame& f) { f.mutable_masks()->mutable_instances(1)->set_label(3); }},
-        {"ScoreTooHigh", "frame.masks.instances[0].score: 1.5",
+        {"ScoreTooHigh", "frame.masks.instances[0].score: must be in 0..1, is 1.5",
          [](v1::Frame& f) { f.mutable_masks()->mutable_instances(0)->set_score(1.5); }},
-        {"ScoreNaN", "frame.masks.instances[0].score: nan",
+        {"ScoreNaN", "frame.masks.instances[0].score: must be in 0..1, is nan",
          [](v1::Frame& f) { f.mutable_masks()->mutable_instances(0)->set_score(kNaN); }},
         {"NoRotation", "frame.t_world_camera.rotation: missing",
          [](v1::Frame& f) { f.mutable_t_world_camera()->clear_rotation(); }},
         {"NoTranslation", "frame.t_world_camera.translation: missing",
          [](v1::Frame& f) { f.mutable_t_world_camera()->clear_translation(); }},
-        {"RotationIsNone", "must have norm 1",
+        {"RotationNotUnit", "must be a unit quaternion",
          [](v1::Frame& f) { f.mutable_t_world_camera()->mutable_rotation()->set_w(0.51); }},
-        {"RotationZero", "must have norm 1, has 0",
-         [](v1::Frame& f) { f.mutable_t_world_camera()->mutable_rotation()->Clear(); }},
+        {"RotationZero", "with norm 0", [](v1::Frame& f) { f.mutable_t_world_camera()->mutable_rotation()->Clear(); }},
         {"RotationNaN", "frame.t_world_camera.rotation",
          [](v1::Frame& f) { f.mutable_t_world_camera()->mutable_rotation()->set_x(kNaN); }},
         {"TranslationInfinite", "frame.t_world_camera.translation",
          [](v1::Frame& f) { f.mutable_t_world_camera()->mutable_translation()->set_z(kInfinity); }},
         {"NewDepthEncoding", "frame.depth.encoding",
          [](v1::Frame& f) { f.mutable_depth()->set_encoding(static_cast<v1::DepthEncoding>(-1)); }},
-        {"NoDepth", "frame.depth.data: empty", [](v1::Frame& f) { f.mutable_depth()->clear_data(); }},
-        {"DepthScaleZero", "frame.depth.scale_mu: 0", [](v1::Frame& f) { f.mutable_depth()->set_scale_mu(0); }},
-        {"DepthScaleInfinite", "frame.depth.scale_mu: inf",
+        {"NoDepth", "frame.depth.data: missing", [](v1::Frame& f) { f.mutable_depth()->clear_data(); }},
+        {"DepthScaleZero", "frame.depth.scale_mu: must be finite and positive, is 0",
+         [](v1::Frame& f) { f.mutable_depth()->set_scale_mu(0); }},
+        {"DepthScaleInfinite", "frame.depth.scale_mu: must be finite and positive, is inf",
          [](v1::Frame& f) { f.mutable_depth()->set_scale_mu(kInfinity); }},
         {"GravityZero", "frame.gravity_camera: must not be zero",
          [](v1::Frame& f) { f.mutable_gravity_camera()->Clear(); }},

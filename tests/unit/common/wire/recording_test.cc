@@ -70,7 +70,7 @@ class RecordingTest : public ::testing::Test {
   testing_support::TemporaryFolder folder_;
 };
 
-TEST_F(RecordingTest, GivesBackWhatWasWritten) {
+TEST_F(RecordingTest, RoundTrips) {
   WriteFrames(5);
   const auto recording = Recording::Open(path());
   ASSERT_TRUE(recording.ok()) << recording.status();
@@ -95,7 +95,7 @@ TEST_F(RecordingTest, GivesBackWhatWasWritten) {
   EXPECT_EQ(recording->Load(5).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-TEST_F(RecordingTest, KeepsLateMasksBetweenTheFramesWhereTheyCame) {
+TEST_F(RecordingTest, KeepsTheOrderOfFramesAndLateMasks) {
   auto writer = RecordingWriter::Create(path(), Options());
   ASSERT_TRUE(writer.ok()) << writer.status();
   ASSERT_TRUE((*writer)->Append(NumberedFrame(1)).ok());
@@ -115,7 +115,7 @@ TEST_F(RecordingTest, KeepsLateMasksBetweenTheFramesWhereTheyCame) {
   EXPECT_EQ(std::get<FrameInput>(*recording->Load(3)).frame_id, 5U);
 }
 
-// Before there were late masks a record was a bare frame.
+// The records of version 1 are Frames instead of MapRequests.
 TEST_F(RecordingTest, ReadsVersionOne) {
   WriteFrames(0);
   std::string bytes = Bytes();
@@ -131,16 +131,16 @@ TEST_F(RecordingTest, ReadsVersionOne) {
   EXPECT_EQ(std::get<FrameInput>(*recording->Load(0)).label_png, "mask");
 }
 
-TEST_F(RecordingTest, AFrameIsOnDiskAsSoonAsItWasAppended) {
+TEST_F(RecordingTest, AppendFlushesTheRecord) {
   auto writer = RecordingWriter::Create(path(), Options());
   ASSERT_TRUE(writer.ok()) << writer.status();
   ASSERT_TRUE((*writer)->Append(NumberedFrame(1)).ok());
-  const auto recording = Recording::Open(path());  // the writer is still there
+  const auto recording = Recording::Open(path());  // while the writer is open
   ASSERT_TRUE(recording.ok()) << recording.status();
   EXPECT_EQ(recording->size(), 1U);
 }
 
-TEST_F(RecordingTest, LosesOnlyTheRecordThatIsCutOff) {
+TEST_F(RecordingTest, IgnoresOnlyTheIncompleteLastRecord) {
   WriteFrames(3);
   const std::string whole = Bytes();
   WriteFrames(2);
@@ -155,29 +155,30 @@ TEST_F(RecordingTest, LosesOnlyTheRecordThatIsCutOff) {
   }
 }
 
-TEST_F(RecordingTest, SaysWhatIsNoRecording) {
+TEST_F(RecordingTest, RejectsOtherFiles) {
   EXPECT_EQ(Recording::Open(path()).status().code(), absl::StatusCode::kNotFound);
   SetBytes("");
   EXPECT_NE(OpenError().find("not a recording"), std::string::npos);
   SetBytes("\x89PNG\r\n\x1a\n and more");
-  EXPECT_NE(OpenError().find(path() + ": not a recording, it should begin with ROMAPREC"), std::string::npos);
+  EXPECT_NE(OpenError().find(path() + ": not a recording: must begin with ROMAPREC"), std::string::npos);
   std::filesystem::remove(path());
   std::filesystem::create_directory(path());
-  EXPECT_NE(OpenError().find("not a file"), std::string::npos);
+  EXPECT_EQ(Recording::Open(path()).status().code(), absl::StatusCode::kPermissionDenied);
+  EXPECT_NE(Message(Recording::Open(path()).status()).find("Is a directory"), std::string::npos);
 }
 
-TEST_F(RecordingTest, SaysWhichVersionItReads) {
+TEST_F(RecordingTest, RejectsUnknownVersions) {
   WriteFrames(1);
   std::string bytes = Bytes();
   bytes[8] = 7;
   SetBytes(bytes);
-  EXPECT_NE(OpenError().find("version 7, this program reads versions 1 to 2"), std::string::npos);
+  EXPECT_NE(OpenError().find("version must be 1 to 2, is 7"), std::string::npos);
 }
 
 TEST_F(RecordingTest, NamesTheDamagedRecord) {
   WriteFrames(2);
   const std::string whole = Bytes();
-  for (const size_t size : {8U, 10U, 14U, 20U}) {  // no whole head is left
+  for (const size_t size : {8U, 10U, 14U, 20U}) {  // the header is incomplete
     SetBytes(whole.substr(0, size));
     EXPECT_NE(OpenError().find(path()), std::string::npos) << size;
   }
@@ -187,10 +188,11 @@ TEST_F(RecordingTest, NamesTheDamagedRecord) {
   EXPECT_NE(OpenError().find("record 1"), std::string::npos);
 }
 
-TEST_F(RecordingTest, SaysWhereItCannotBeMade) {
+TEST_F(RecordingTest, ReportsWhyTheFileCannotBeWritten) {
   const auto writer = RecordingWriter::Create(folder_ / "missing/session.romaprec", Options());
-  EXPECT_EQ(writer.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_NE(Message(writer.status()).find("missing/session.romaprec"), std::string::npos);
+  EXPECT_EQ(writer.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_NE(Message(writer.status()).find("missing/session.romaprec: cannot create the recording: No such file"),
+            std::string::npos);
   const auto full = RecordingWriter::Create("/dev/full", Options());
   EXPECT_EQ(full.status().code(), absl::StatusCode::kResourceExhausted);
 }

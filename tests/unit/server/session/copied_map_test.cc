@@ -1,4 +1,4 @@
-// A client's copy of the map against the map itself, over everything that can happen to one.
+// Compares copies of the map, built from the events of an outbox, with the map itself after random changes.
 
 #include <gmock/gmock.h>
 
@@ -16,19 +16,19 @@ constexpr std::chrono::milliseconds kNoWait{0};
 constexpr uint64_t kSeeds = 100;
 constexpr int kSteps = 400;
 
-// A subscriber that takes `share` of 10 chances to read a few events.
+// A subscriber that reads a few events in `share` of 10 calls of MaybeRead().
 class Reader {
  public:
   Reader(MapState& map, Outbox::Acks acks, int share) : outbox_(map.Subscribe(acks, 50)), share_(share) {}
 
   void MaybeRead(testing::RandomMap& random) {
     if (random.Pick(0, 9) >= share_) return;
-    for (int n = random.Pick(1, 12); n > 0; --n) Take();
+    for (int n = random.Pick(1, 12); n > 0; --n) ReadOne();
   }
-  // What still waits; how many events of objects that was.
+  // Reads all waiting events; returns how many of them are about objects.
   int ReadToEnd() {
     int of_objects = 0;
-    while (const auto event = Take()) {
+    while (const auto event = ReadOne()) {
       const bool is_other = std::holds_alternative<FrameAck>(*event) || std::holds_alternative<MasksAck>(*event) ||
                             std::holds_alternative<Statistics>(*event);
       of_objects += is_other ? 0 : 1;
@@ -38,7 +38,7 @@ class Reader {
   const testing::CheckedCopy& copy() const { return copy_; }
 
  private:
-  std::optional<MapEvent> Take() {
+  std::optional<MapEvent> ReadOne() {
     std::optional<MapEvent> event = outbox_->Next(kNoWait);
     if (event) copy_.Apply(*event);
     return event;
@@ -50,12 +50,12 @@ class Reader {
 };
 
 std::map<ObjectId, std::string> TruthOf(MapState& map) {
-  Reader newcomer(map, Outbox::Acks::kAll, 0);
-  newcomer.ReadToEnd();
-  return newcomer.copy().Bytes();
+  Reader reader(map, Outbox::Acks::kAll, 0);
+  reader.ReadToEnd();
+  return reader.copy().Bytes();
 }
 
-TEST(CopiedMapTest, IsTheMapHoweverSlowlyItIsRead) {
+TEST(CopiedMapTest, EqualsTheMapForFastAndSlowReaders) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
@@ -63,7 +63,7 @@ TEST(CopiedMapTest, IsTheMapHoweverSlowlyItIsRead) {
     std::vector<Reader> readers;
     for (const int share : {10, 5, 1}) readers.emplace_back(map, Outbox::Acks::kAll, share);
     for (int step = 0; step < kSteps; ++step) {
-      if (step == kSteps / 3) readers.emplace_back(map, Outbox::Acks::kNewest, 2);  // in the middle of it all
+      if (step == kSteps / 3) readers.emplace_back(map, Outbox::Acks::kNewest, 2);  // subscribes late
       random.Step();
       for (Reader& reader : readers) reader.MaybeRead(random);
     }
@@ -74,7 +74,7 @@ TEST(CopiedMapTest, IsTheMapHoweverSlowlyItIsRead) {
   }
 }
 
-TEST(CopiedMapTest, WhatIsExportedIsTheMapWithoutProvisionalObjects) {
+TEST(CopiedMapTest, SnapshotIsTheMapWithoutProvisionalObjects) {
   size_t exported = 0, all = 0;
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
@@ -95,16 +95,16 @@ TEST(CopiedMapTest, WhatIsExportedIsTheMapWithoutProvisionalObjects) {
   EXPECT_LT(exported, all);
 }
 
-TEST(CopiedMapTest, WhatWaitsForOneWhoNeverReadsIsBoundedByTheMap) {
+TEST(CopiedMapTest, WaitingEventsOfAReaderThatNeverReadsAreBounded) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
     testing::RandomMap random(seed, &map);
-    Reader sleeper(map, Outbox::Acks::kAll, 0);
+    Reader idle(map, Outbox::Acks::kAll, 0);
     for (int step = 0; step < kSteps; ++step) random.Step();
     const auto truth = TruthOf(map);
-    EXPECT_LE(sleeper.ReadToEnd(), 3 * static_cast<int>(truth.size())) << "an announcement, a cuboid, a mesh of each";
-    EXPECT_EQ(sleeper.copy().Bytes(), truth);
+    EXPECT_LE(idle.ReadToEnd(), 3 * static_cast<int>(truth.size())) << "announcement, cuboid and mesh of each object";
+    EXPECT_EQ(idle.copy().Bytes(), truth);
   }
 }
 

@@ -1,17 +1,17 @@
-// A closed loop on its way through the stages: objects, fields, meshes, clients.
+// Corrections of the map, e.g. by a loop closure, passing through objects, fields, meshes and clients.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <map>
-#include <thread>
 
 #include "common/mesh_codec.h"
 #include "server/nerf/training_pool.h"
 #include "server/objects/object_mapper.h"
 #include "server/session/map_state.h"
 #include "server/session/mesher.h"
+#include "tests/support/streams.h"
 #include "tests/support/synthetic_world.h"
 
 namespace romap::session {
@@ -43,19 +43,19 @@ nerf::NerfConfig FastNerf() {
   return config;
 }
 
-// The stages behind tracking, joined as a session joins them.
+// The stages after tracking, connected as in Pipeline.
 class Stages {
  public:
   Stages() {
-    mesher_client_ =
+    mesher_session_ =
         mesher_.AddSession([this](MeshUpdate mesh, const MeshPose& pose) { map.PublishMesh(std::move(mesh), pose); });
     pool_client_ =
-        pool_.Register([this](FieldSnapshot snapshot) { mesher_.Offer(mesher_client_, std::move(snapshot)); });
+        pool_.Register([this](FieldSnapshot snapshot) { mesher_.Offer(mesher_session_, std::move(snapshot)); });
     outbox = map.Subscribe(Outbox::Acks::kAll, 100);
   }
   ~Stages() {
     pool_.Unregister(pool_client_);
-    mesher_.RemoveSession(mesher_client_);
+    mesher_.RemoveSession(mesher_session_);
   }
 
   void Publish(objects::ObjectOutput output) {
@@ -88,9 +88,13 @@ class Stages {
     WaitUntilIdle();
   }
   void WaitUntilIdle() const {
-    while (!pool_.Idle(pool_client_) || !mesher_.Idle(mesher_client_)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
+    ASSERT_TRUE(testing::Eventually([&] { return pool_.Idle(pool_client_) && mesher_.IsIdle(mesher_session_); }));
+  }
+  // Waits until at least one more training step was done, or nothing is left to train.
+  void WaitForTraining() const {
+    const uint64_t steps = pool_.GetProgress(pool_client_).steps;
+    ASSERT_TRUE(
+        testing::Eventually([&] { return pool_.GetProgress(pool_client_).steps > steps || pool_.Idle(pool_client_); }));
   }
 
   objects::ObjectMapper mapper{objects::ObjectsConfig{}};
@@ -101,10 +105,10 @@ class Stages {
  private:
   Mesher mesher_{mesh::MeshConfig{}};
   nerf::TrainingPool pool_{FastNerf(), 1};
-  uint64_t mesher_client_ = 0, pool_client_ = 0;
+  uint64_t mesher_session_ = 0, pool_client_ = 0;
 };
 
-// What a client that applies all events has.
+// The map of a client that applies all events.
 struct Client {
   std::map<ObjectId, ObjectUpdate> objects;
   std::map<ObjectId, MeshUpdate> meshes;
@@ -122,7 +126,7 @@ struct Client {
       }
     }
   }
-  // The mesh of an object as the client shows it.
+  // The vertices of an object's mesh as the client displays them.
   std::vector<Eigen::Vector3d> VerticesInWorld(ObjectId id) const {
     std::vector<Eigen::Vector3d> vertices;
     const auto mesh = DecodeDraco(meshes.at(id).draco);
@@ -139,7 +143,7 @@ Sim3<World, World> LoopClosure() {
   return {1.3, Eigen::Quaterniond(Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitZ())), {2, -1, 0.5}};
 }
 
-TEST(CorrectedMapTest, AClosedLoopMovesMeshesWithoutSendingThemAgain) {
+TEST(CorrectedMapTest, LoopClosureMovesMeshesWithoutSendingThemAgain) {
   const SyntheticWorld world(SmallWorld());
   Stages stages;
   stages.MapFrames(world);
@@ -164,29 +168,29 @@ TEST(CorrectedMapTest, AClosedLoopMovesMeshesWithoutSendingThemAgain) {
     for (size_t i = 0; i < vertices.size(); ++i) {
       ASSERT_TRUE(vertices[i].isApprox(LoopClosure() * old_vertices[i], 1e-9));
     }
-    // The cuboid and the mesh in it moved alike.
+    // The cuboid moved like its mesh.
     EXPECT_GT(ContainedShare(object.cuboid, vertices, 1.15), 0.95);
   }
 }
 
-TEST(CorrectedMapTest, MeshesMadeWhileTheMapIsCorrectedEndUpInTheirCuboids) {
+TEST(CorrectedMapTest, MeshesMadeDuringCorrectionsAreInsideTheirCuboids) {
   const SyntheticWorld world(SmallWorld());
   Stages stages;
   stages.MapFrames(world);
-  // Slices, snapshots and meshes are under way while the world turns and grows.
+  // Corrections alternate with training slices, snapshots and meshes.
   const Sim3<World, World> step(1.06, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
                                 {0.3, 0, 0});
   for (int i = 0; i < 8; ++i) {
     stages.Publish(stages.mapper.Correct(stages.CorrectionOfAll(step)));
     for (auto& [id, T_world_camera] : stages.keyframes) T_world_camera = step.Moved(T_world_camera);
-    std::this_thread::sleep_for(std::chrono::milliseconds(15));
+    stages.WaitForTraining();
   }
   stages.Publish(stages.mapper.Finish());
   stages.TrainToTheEnd();
   Client client;
   client.Read(*stages.outbox);
   ASSERT_THAT(client.meshes, SizeIs(2));
-  // The told cuboid is tight; the field learns in a larger box, and its mesh may stand out a little.
+  // The published cuboid is tight. The field is trained in a larger box, so its mesh may extend beyond the cuboid.
   for (const auto& [id, object] : client.objects) {
     EXPECT_GT(ContainedShare(object.cuboid, client.VerticesInWorld(id), 1.35), 0.95) << id;
   }

@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 const CameraModel kCamera{
     .width_px = 64, .height_px = 48, .fx_px = 60, .fy_px = 60, .cx_px = 31.5, .cy_px = 23.5, .distortion = {}};
 
-constexpr double kMaskPatience_s = 1;
+constexpr double kMaxMaskDelay_s = 1;
 
 std::string Encode(const char* extension, const cv::Mat& image) {
   std::vector<uint8_t> bytes;
@@ -33,7 +33,7 @@ cv::Mat Gradient(int width, int height) {
   return image;
 }
 
-FrameInput GoodFrame(uint64_t id = 1) {
+FrameInput ValidFrame(uint64_t id = 1) {
   FrameInput input;
   input.frame_id = id;
   input.timestamp_ns = static_cast<int64_t>(id) * 40'000'000;
@@ -43,7 +43,7 @@ FrameInput GoodFrame(uint64_t id = 1) {
   return input;
 }
 
-std::string Fault(Ingest& ingest, const FrameInput& input) {
+std::string ErrorOf(Ingest& ingest, const FrameInput& input) {
   const auto frame = ingest.Accept(input);
   if (frame.ok()) return "accepted";
   EXPECT_EQ(frame.status().code(), absl::StatusCode::kInvalidArgument);
@@ -52,20 +52,20 @@ std::string Fault(Ingest& ingest, const FrameInput& input) {
 
 TEST(IngestTest, DecodesEveryImageEncoding) {
   const cv::Mat image = Gradient(64, 48);
-  Ingest ingest(kCamera, kMaskPatience_s);
-  FrameInput png = GoodFrame(1);
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput png = ValidFrame(1);
   auto frame = ingest.Accept(png);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_EQ(cv::norm((*frame)->image_bgr, image, cv::NORM_INF), 0);
 
-  FrameInput jpeg = GoodFrame(2);
+  FrameInput jpeg = ValidFrame(2);
   jpeg.image_encoding = ImageEncoding::kJpeg;
   jpeg.image = Encode(".jpg", image);
   frame = ingest.Accept(jpeg);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_LT(cv::norm((*frame)->image_bgr, image, cv::NORM_L1) / image.total(), 10);
 
-  FrameInput raw = GoodFrame(3);
+  FrameInput raw = ValidFrame(3);
   raw.image_encoding = ImageEncoding::kRawRgb8;
   raw.raw_width_px = 64;
   raw.raw_height_px = 48;
@@ -80,10 +80,10 @@ TEST(IngestTest, DecodesEveryImageEncoding) {
 TEST(IngestTest, ReadsMasksAsPngAndAsRuns) {
   cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
   labels(cv::Rect(10, 10, 20, 8)) = 7;
-  FrameInput png = GoodFrame(1);
+  FrameInput png = ValidFrame(1);
   png.mask_encoding = MaskEncoding::kLabelPng;
   png.label_png = Encode(".png", labels);
-  FrameInput runs = GoodFrame(2);
+  FrameInput runs = ValidFrame(2);
   runs.mask_encoding = MaskEncoding::kRunLength;
   for (int i = 0; i < 48 * 64;) {
     const uint8_t label = labels.data[i];
@@ -92,109 +92,109 @@ TEST(IngestTest, ReadsMasksAsPngAndAsRuns) {
     runs.label_runs.insert(runs.label_runs.end(), {label, static_cast<uint32_t>(end - i)});
     i = end;
   }
-  Ingest ingest(kCamera, kMaskPatience_s);
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
   for (const FrameInput& input : {png, runs}) {
     const auto frame = ingest.Accept(input);
     ASSERT_TRUE(frame.ok()) << frame.status();
     EXPECT_TRUE((*frame)->has_masks);
     EXPECT_EQ(cv::countNonZero((*frame)->labels == 7), 160);
-    ASSERT_EQ((*frame)->instances.size(), 1u) << "a label that is not listed is listed by ingest";
+    ASSERT_EQ((*frame)->instances.size(), 1u) << "ingest adds labels that are not listed";
     EXPECT_EQ((*frame)->instances[0].label, 7u);
     EXPECT_EQ((*frame)->instances[0].class_name, "object");
   }
 }
 
-TEST(IngestTest, DepthBecomesMapUnits) {
+TEST(IngestTest, DepthIsConvertedToMapUnits) {
   const cv::Mat depth(48, 64, CV_16UC1, cv::Scalar(1500));
-  FrameInput input = GoodFrame();
+  FrameInput input = ValidFrame();
   input.depth_encoding = DepthEncoding::kPng16;
   input.depth = Encode(".png", depth);
   input.depth_scale_mu = 0.001;
-  const auto frame = Ingest(kCamera, kMaskPatience_s).Accept(input);
+  const auto frame = Ingest(kCamera, kMaxMaskDelay_s).Accept(input);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_FLOAT_EQ((*frame)->depth_mu.at<float>(20, 20), 1.5f);
 }
 
-TEST(IngestTest, TruncatedImagesAreRefused) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  FrameInput png = GoodFrame();
+TEST(IngestTest, TruncatedImagesAreRejected) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput png = ValidFrame();
   png.image.resize(png.image.size() / 2);
-  EXPECT_THAT(Fault(ingest, png), HasSubstr("image: PNG file is truncated"));
-  FrameInput jpeg = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, png), HasSubstr("image: PNG file is truncated"));
+  FrameInput jpeg = ValidFrame();
   jpeg.image_encoding = ImageEncoding::kJpeg;
   jpeg.image = Encode(".jpg", Gradient(64, 48));
   jpeg.image.resize(jpeg.image.size() / 2);
-  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("image: JPEG file is truncated"));
+  EXPECT_THAT(ErrorOf(ingest, jpeg), HasSubstr("image: JPEG file is truncated"));
   jpeg.image = "not an image";
-  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("image is not a JPEG file"));
+  EXPECT_THAT(ErrorOf(ingest, jpeg), HasSubstr("image: 12 bytes are not a JPEG file"));
   jpeg.image.clear();
-  EXPECT_THAT(Fault(ingest, jpeg), HasSubstr("(0 bytes)"));
-  EXPECT_EQ(Fault(ingest, GoodFrame()), "accepted") << "a refused frame must not count";
+  EXPECT_THAT(ErrorOf(ingest, jpeg), HasSubstr("image: 0 bytes are not a JPEG file"));
+  EXPECT_EQ(ErrorOf(ingest, ValidFrame()), "accepted") << "a rejected frame must have no effect";
 }
 
-TEST(IngestTest, WrongSizesAreNamed) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  FrameInput image = GoodFrame();
+TEST(IngestTest, ErrorsNameWrongSizes) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput image = ValidFrame();
   image.image = Encode(".png", Gradient(32, 48));
-  EXPECT_THAT(Fault(ingest, image), HasSubstr("image is 32x48 px, the session's camera says 64x48 px"));
-  FrameInput mask = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, image), HasSubstr("image: must be 64x48 px like the session's camera, is 32x48 px"));
+  FrameInput mask = ValidFrame();
   mask.mask_encoding = MaskEncoding::kLabelPng;
   mask.label_png = Encode(".png", cv::Mat(48, 65, CV_8UC1, cv::Scalar(0)));
-  EXPECT_THAT(Fault(ingest, mask), HasSubstr("mask is 65x48 px"));
-  FrameInput runs = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, mask), HasSubstr("masks: must be 64x48 px like the session's camera, is 65x48 px"));
+  FrameInput runs = ValidFrame();
   runs.mask_encoding = MaskEncoding::kRunLength;
   runs.label_runs = {0, 100};
-  EXPECT_THAT(Fault(ingest, runs), HasSubstr("do not add up to 64x48"));
+  EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("masks: run lengths must add up to 64x48"));
   runs.label_runs = {0, 4294967295u, 1, 2};
-  EXPECT_THAT(Fault(ingest, runs), HasSubstr("do not add up to 64x48"));
+  EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("masks: run lengths must add up to 64x48"));
   runs.label_runs = {0};
-  EXPECT_THAT(Fault(ingest, runs), HasSubstr("pairs"));
-  FrameInput raw = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("pairs"));
+  FrameInput raw = ValidFrame();
   raw.image_encoding = ImageEncoding::kRawGray8;
   raw.raw_width_px = 64;
   raw.raw_height_px = 48;
   raw.image = "abc";
-  EXPECT_THAT(Fault(ingest, raw), HasSubstr("3 bytes of raw pixels, 64x48x1 needs 3072"));
+  EXPECT_THAT(ErrorOf(ingest, raw), HasSubstr("image: raw pixels must have 64x48x1 = 3072 bytes, have 3"));
 }
 
-TEST(IngestTest, ASmallFileThatClaimsAHugeImageIsNotDecoded) {
-  FrameInput input = GoodFrame();
+TEST(IngestTest, HugeSizeInTheHeaderIsRejectedBeforeDecoding) {
+  FrameInput input = ValidFrame();
   for (size_t at : {16, 20}) input.image.replace(at, 4, "\x00\x01\x00\x00", 4);
-  Ingest ingest(kCamera, kMaskPatience_s);
-  EXPECT_THAT(Fault(ingest, input), HasSubstr("65536x65536"));
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  EXPECT_THAT(ErrorOf(ingest, input), HasSubstr("65536x65536"));
 }
 
-TEST(IngestTest, NumbersThatAreNotFiniteAreRefused) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  FrameInput pose = GoodFrame();
+TEST(IngestTest, InvalidNumbersAreRejected) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput pose = ValidFrame();
   pose.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, std::nan(""), 0));
-  EXPECT_THAT(Fault(ingest, pose), HasSubstr("T_world_camera"));
-  FrameInput gravity = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, pose), HasSubstr("t_world_camera: all numbers must be finite"));
+  FrameInput gravity = ValidFrame();
   gravity.gravity_camera = Eigen::Vector3d::Zero();
-  EXPECT_THAT(Fault(ingest, gravity), HasSubstr("gravity"));
-  FrameInput depth = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, gravity), HasSubstr("gravity_camera: must be a finite vector"));
+  FrameInput depth = ValidFrame();
   depth.depth_encoding = DepthEncoding::kPng16;
   depth.depth_scale_mu = -1;
-  EXPECT_THAT(Fault(ingest, depth), HasSubstr("depth: scale -1"));
-  FrameInput score = GoodFrame();
+  EXPECT_THAT(ErrorOf(ingest, depth), HasSubstr("depth: scale_mu must be a positive number, is -1"));
+  FrameInput score = ValidFrame();
   score.instances = {{.label = 3, .class_name = "cup", .score = std::nan(""), .track_id = std::nullopt}};
-  EXPECT_THAT(Fault(ingest, score), HasSubstr("label 3"));
+  EXPECT_THAT(ErrorOf(ingest, score), HasSubstr("masks: score of label 3 must be in 0..1"));
 }
 
-TEST(IngestTest, TimeAndIdsOnlyGrow) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  ASSERT_EQ(Fault(ingest, GoodFrame(5)), "accepted");
-  EXPECT_THAT(Fault(ingest, GoodFrame(5)), HasSubstr("frame id does not grow: 5 after 5"));
-  FrameInput back = GoodFrame(6);
+TEST(IngestTest, FrameIdAndTimestampMustIncrease) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  ASSERT_EQ(ErrorOf(ingest, ValidFrame(5)), "accepted");
+  EXPECT_THAT(ErrorOf(ingest, ValidFrame(5)), HasSubstr("frame_id must increase: got 5 after 5"));
+  FrameInput back = ValidFrame(6);
   back.timestamp_ns = 10;
-  EXPECT_THAT(Fault(ingest, back), HasSubstr("timestamp goes back: 10 ns after 200000000 ns"));
-  EXPECT_EQ(Fault(ingest, GoodFrame(6)), "accepted");
+  EXPECT_THAT(ErrorOf(ingest, back), HasSubstr("timestamp_ns must increase: got 10 after 200000000"));
+  EXPECT_EQ(ErrorOf(ingest, ValidFrame(6)), "accepted");
 }
 
-TEST(IngestTest, DistortionIsTakenOut) {
+TEST(IngestTest, ImageIsUndistorted) {
   CameraModel distorted = kCamera;
   distorted.distortion = {-0.2, 0.05, 0.001, -0.001, 0};
-  // A white dot where the distorted camera sees the ray (0.2, -0.15, 1).
+  // A white dot at the distorted pixel of the ray (0.2, -0.15, 1).
   const double x = 0.2, y = -0.15, r2 = x * x + y * y;
   const auto& d = distorted.distortion;
   const double radial = 1 + d[0] * r2 + d[1] * r2 * r2;
@@ -204,9 +204,9 @@ TEST(IngestTest, DistortionIsTakenOut) {
   cv::circle(image,
              cv::Point(static_cast<int>(std::lround(60 * xd + 31.5)), static_cast<int>(std::lround(60 * yd + 23.5))), 1,
              cv::Scalar::all(255), -1);
-  FrameInput input = GoodFrame();
+  FrameInput input = ValidFrame();
   input.image = Encode(".png", image);
-  const auto frame = Ingest(distorted, kMaskPatience_s).Accept(input);
+  const auto frame = Ingest(distorted, kMaxMaskDelay_s).Accept(input);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_FALSE((*frame)->camera.HasDistortion());
   cv::Mat gray;
@@ -216,17 +216,17 @@ TEST(IngestTest, DistortionIsTakenOut) {
   EXPECT_NEAR(moments.m01 / moments.m00, 60 * y + 23.5, 0.8);
 }
 
-// A white dot at `center` of a picture of kCamera's size, after Accept() by a session with `camera`.
+// A frame of kCamera's size with a white dot at `center`, accepted by a session with `camera`.
 std::shared_ptr<const Frame> AcceptDot(const CameraModel& camera, const Eigen::Vector2d& center) {
   cv::Mat image = cv::Mat::zeros(48, 64, CV_8UC3);
   cv::circle(image, cv::Point(static_cast<int>(std::lround(center.x())), static_cast<int>(std::lround(center.y()))), 1,
              cv::Scalar::all(255), -1);
-  FrameInput input = GoodFrame();
+  FrameInput input = ValidFrame();
   input.image = Encode(".png", image);
-  return Ingest(camera, kMaskPatience_s).Accept(input).value();
+  return Ingest(camera, kMaxMaskDelay_s).Accept(input).value();
 }
 
-TEST(IngestTest, AFisheyeImageBecomesAPinholeImage) {
+TEST(IngestTest, FisheyeImageBecomesAPinholeImage) {
   CameraModel fisheye = kCamera;
   fisheye.lens = LensModel::kFisheye;
   fisheye.distortion = {0.05, -0.01, 0, 0, 0};
@@ -240,7 +240,7 @@ TEST(IngestTest, AFisheyeImageBecomesAPinholeImage) {
   EXPECT_NEAR(moments.m10 / moments.m00, 60 * std::tan(theta) + 31.5, 0.8);
 }
 
-TEST(IngestTest, ThePictureIsKeptAsADistortingLensGaveIt) {
+TEST(IngestTest, SourceImageIsKeptForALensWithDistortion) {
   CameraModel distorted = kCamera;
   distorted.distortion = {-0.2, 0.05, 0.001, -0.001, 0};
   const auto frame = AcceptDot(distorted, {50, 10});
@@ -253,7 +253,7 @@ TEST(IngestTest, ThePictureIsKeptAsADistortingLensGaveIt) {
 
 // ------------------------------------------------------------------------------------------------ late masks
 
-MasksInput GoodMasks(uint64_t frame_id) {
+MasksInput ValidMasks(uint64_t frame_id) {
   cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
   labels(cv::Rect(10, 10, 20, 8)) = 7;
   labels(cv::Rect(40, 10, 5, 5)) = 9;
@@ -265,87 +265,87 @@ MasksInput GoodMasks(uint64_t frame_id) {
   return input;
 }
 
-std::string MaskFault(Ingest& ingest, const MasksInput& input) {
+std::string MaskErrorOf(Ingest& ingest, const MasksInput& input) {
   const auto masks = ingest.AcceptMasks(input);
   if (masks.ok()) return "accepted";
   EXPECT_EQ(masks.status().code(), absl::StatusCode::kInvalidArgument);
   return Message(masks.status());
 }
 
-TEST(IngestTest, LateMasksAreWhatTheFrameWouldHaveHad) {
+TEST(IngestTest, LateMasksEqualMasksSentWithTheFrame) {
   CameraModel lens = kCamera;
   lens.distortion = {-0.2, 0.05, 0, 0, 0};
   for (const CameraModel& camera : {kCamera, lens}) {
-    FrameInput whole = GoodFrame();
-    static_cast<EncodedMasks&>(whole) = GoodMasks(1);
-    const auto frame = Ingest(camera, kMaskPatience_s).Accept(whole).value();
-    Ingest ingest(camera, kMaskPatience_s);
-    ASSERT_EQ(Fault(ingest, GoodFrame()), "accepted");
-    const auto masks = ingest.AcceptMasks(GoodMasks(1));
+    FrameInput whole = ValidFrame();
+    static_cast<EncodedMasks&>(whole) = ValidMasks(1);
+    const auto frame = Ingest(camera, kMaxMaskDelay_s).Accept(whole).value();
+    Ingest ingest(camera, kMaxMaskDelay_s);
+    ASSERT_EQ(ErrorOf(ingest, ValidFrame()), "accepted");
+    const auto masks = ingest.AcceptMasks(ValidMasks(1));
     ASSERT_TRUE(masks.ok()) << masks.status();
     EXPECT_EQ(masks->frame_id, 1u);
     EXPECT_EQ(masks->labels.type(), CV_16UC1);
     EXPECT_EQ(cv::norm(masks->labels, frame->labels, cv::NORM_INF), 0);
-    ASSERT_EQ(masks->instances.size(), 2u) << "a label that is not listed is listed by ingest";
+    ASSERT_EQ(masks->instances.size(), 2u) << "ingest adds labels that are not listed";
     EXPECT_EQ(masks->instances[0].class_name, "mug");
     EXPECT_EQ(masks->instances[1].label, 9u);
   }
 }
 
-TEST(IngestTest, LateMasksNeedAFrameThatHasNone) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("no such frame was accepted"));
-  FrameInput with_masks = GoodFrame(2);
-  static_cast<EncodedMasks&>(with_masks) = GoodMasks(2);
-  FrameInput bad = GoodFrame(3);
+TEST(IngestTest, LateMasksNeedAFrameWithoutMasks) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(1)), HasSubstr("no accepted frame has id 1"));
+  FrameInput with_masks = ValidFrame(2);
+  static_cast<EncodedMasks&>(with_masks) = ValidMasks(2);
+  FrameInput bad = ValidFrame(3);
   bad.image.clear();
-  EXPECT_EQ(Fault(ingest, GoodFrame(1)), "accepted");
-  EXPECT_EQ(Fault(ingest, with_masks), "accepted");
-  EXPECT_NE(Fault(ingest, bad), "accepted");
-  EXPECT_EQ(Fault(ingest, GoodFrame(4)), "accepted");
-  EXPECT_EQ(MaskFault(ingest, GoodMasks(1)), "accepted");
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("has masks already"));
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(2)), HasSubstr("has masks already"));
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(3)), HasSubstr("no such frame was accepted"));
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(5)), HasSubstr("no such frame was accepted"));
+  EXPECT_EQ(ErrorOf(ingest, ValidFrame(1)), "accepted");
+  EXPECT_EQ(ErrorOf(ingest, with_masks), "accepted");
+  EXPECT_NE(ErrorOf(ingest, bad), "accepted");
+  EXPECT_EQ(ErrorOf(ingest, ValidFrame(4)), "accepted");
+  EXPECT_EQ(MaskErrorOf(ingest, ValidMasks(1)), "accepted");
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(1)), HasSubstr("already has masks"));
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(2)), HasSubstr("already has masks"));
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(3)), HasSubstr("no accepted frame has id 3"));
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(5)), HasSubstr("no accepted frame has id 5"));
 }
 
-TEST(IngestTest, BadLateMasksCountAsNeverSent) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  ASSERT_EQ(Fault(ingest, GoodFrame()), "accepted");
+TEST(IngestTest, InvalidLateMasksHaveNoEffect) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  ASSERT_EQ(ErrorOf(ingest, ValidFrame()), "accepted");
   MasksInput none;
   none.frame_id = 1;
-  EXPECT_THAT(MaskFault(ingest, none), HasSubstr("mask: missing"));
-  MasksInput small = GoodMasks(1);
+  EXPECT_THAT(MaskErrorOf(ingest, none), HasSubstr("masks: missing"));
+  MasksInput small = ValidMasks(1);
   small.label_png = Encode(".png", cv::Mat::zeros(24, 32, CV_8UC1));
-  EXPECT_THAT(MaskFault(ingest, small), HasSubstr("mask is 32x24 px, the session's camera says 64x48 px"));
-  MasksInput twice = GoodMasks(1);
+  EXPECT_THAT(MaskErrorOf(ingest, small), HasSubstr("masks: must be 64x48 px like the session's camera, is 32x24 px"));
+  MasksInput twice = ValidMasks(1);
   twice.instances.push_back(twice.instances[0]);
-  EXPECT_THAT(MaskFault(ingest, twice), HasSubstr("listed twice"));
-  EXPECT_EQ(MaskFault(ingest, GoodMasks(1)), "accepted");
+  EXPECT_THAT(MaskErrorOf(ingest, twice), HasSubstr("listed twice"));
+  EXPECT_EQ(MaskErrorOf(ingest, ValidMasks(1)), "accepted");
 }
 
-// Frames come every 40 ms; 25 of them make the patience of one second.
-TEST(IngestTest, LateMasksMayComeUntilThePatienceIsOver) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  for (uint64_t id = 1; id <= 30; ++id) ASSERT_EQ(Fault(ingest, GoodFrame(id)), "accepted");
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(4)), HasSubstr("more than 1 s (objects.max_mask_delay_s) behind"));
-  EXPECT_EQ(MaskFault(ingest, GoodMasks(5)), "accepted");
-  EXPECT_EQ(MaskFault(ingest, GoodMasks(30)), "accepted");
-  Ingest impatient(kCamera, 0);
-  for (uint64_t id = 1; id <= 2; ++id) ASSERT_EQ(Fault(impatient, GoodFrame(id)), "accepted");
-  EXPECT_THAT(MaskFault(impatient, GoodMasks(1)), HasSubstr("too late"));
-  EXPECT_EQ(MaskFault(impatient, GoodMasks(2)), "accepted");
+// Frames are 40 ms apart, so kMaxMaskDelay_s is 25 frames.
+TEST(IngestTest, LateMasksAreAcceptedUpToTheMaximumDelay) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  for (uint64_t id = 1; id <= 30; ++id) ASSERT_EQ(ErrorOf(ingest, ValidFrame(id)), "accepted");
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(4)), HasSubstr("more than 1 s (objects.max_mask_delay_s) older"));
+  EXPECT_EQ(MaskErrorOf(ingest, ValidMasks(5)), "accepted");
+  EXPECT_EQ(MaskErrorOf(ingest, ValidMasks(30)), "accepted");
+  Ingest no_delay(kCamera, 0);
+  for (uint64_t id = 1; id <= 2; ++id) ASSERT_EQ(ErrorOf(no_delay, ValidFrame(id)), "accepted");
+  EXPECT_THAT(MaskErrorOf(no_delay, ValidMasks(1)), HasSubstr("too late"));
+  EXPECT_EQ(MaskErrorOf(no_delay, ValidMasks(2)), "accepted");
 }
 
-TEST(IngestTest, TimestampsAtBothEndsOfTimeAreFarApart) {
-  Ingest ingest(kCamera, kMaskPatience_s);
-  FrameInput first = GoodFrame(1), last = GoodFrame(2);
+TEST(IngestTest, ExtremeTimestampsDoNotOverflow) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput first = ValidFrame(1), last = ValidFrame(2);
   first.timestamp_ns = std::numeric_limits<int64_t>::min();
   last.timestamp_ns = std::numeric_limits<int64_t>::max();
-  EXPECT_EQ(Fault(ingest, first), "accepted");
-  EXPECT_EQ(Fault(ingest, last), "accepted");
-  EXPECT_THAT(MaskFault(ingest, GoodMasks(1)), HasSubstr("too late"));
+  EXPECT_EQ(ErrorOf(ingest, first), "accepted");
+  EXPECT_EQ(ErrorOf(ingest, last), "accepted");
+  EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(1)), HasSubstr("too late"));
 }
 
 }  // namespace

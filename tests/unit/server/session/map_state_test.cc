@@ -20,64 +20,65 @@ MeshUpdate MeshOf(uint64_t id) {
   return mesh;
 }
 
-MeshPose PlaceAt(double x) { return {{Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}, {}}; }
+MeshPose PoseAt(double x) { return {{Eigen::Quaterniond::Identity(), Eigen::Vector3d(x, 0, 0)}, {}}; }
 
-std::shared_ptr<Outbox> Listen(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100); }
+std::shared_ptr<Outbox> Subscribe(MapState& map) { return map.Subscribe(Outbox::Acks::kAll, 100); }
 
-TEST(MapStateTest, RevisionsGrowOverCuboidsAndMeshes) {
+TEST(MapStateTest, CuboidsAndMeshesShareOneRevisionCounter) {
   MapState map;
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   map.Apply(Update(1));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 1u);
-  map.PublishMesh(MeshOf(1), PlaceAt(0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   EXPECT_EQ(std::get<MeshUpdate>(*outbox->Next(kNoWait)).revision, 2u);
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "the mesh's pose travels with the object";
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u)
+      << "the pose of the mesh is part of the object update";
   map.Apply(Update(1));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 4u);
-  map.Apply(ObjectRemoved{ObjectId{1}, 0, "ghost"});
+  map.Apply(ObjectRemoved{ObjectId{1}, 0, "false landmark"});
   EXPECT_EQ(std::get<ObjectRemoved>(*outbox->Next(kNoWait)).revision, 5u);
 }
 
-TEST(MapStateTest, AMeshWhoseObjectIsGoneIsNotPublished) {
+TEST(MapStateTest, MeshOfARemovedObjectIsNotPublished) {
   MapState map;
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   map.Apply(Update(1));
   map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
-  map.PublishMesh(MeshOf(1), PlaceAt(0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   while (const auto event = outbox->Next(kNoWait)) EXPECT_FALSE(std::holds_alternative<MeshUpdate>(*event));
 }
 
-TEST(MapStateTest, WhatIsGoneStaysGone) {
+TEST(MapStateTest, RemovedObjectsStayRemoved) {
   MapState map;
   for (uint64_t id : {1, 2, 3}) map.Apply(Update(id));
-  map.Apply(ObjectRemoved{ObjectId{1}, 0, "ghost"});
+  map.Apply(ObjectRemoved{ObjectId{1}, 0, "false landmark"});
   map.Apply(ObjectMerged{ObjectId{2}, ObjectId{3}, 0});
-  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100);
+  const auto outbox = Subscribe(map);
   for (uint64_t id : {1, 2}) {
     map.Apply(Update(id));
-    map.Apply(ObjectRemoved{ObjectId{id}, 0, "once more"});
+    map.Apply(ObjectRemoved{ObjectId{id}, 0, "again"});
     map.Apply(ObjectMerged{ObjectId{id}, ObjectId{3}, 0});
   }
   EXPECT_EQ(outbox->Next(kNoWait), std::nullopt);
   EXPECT_EQ(map.Snapshot().objects.size(), 1u);
 }
 
-TEST(MapStateTest, AMergeTellsTheRevisionOfWhatStays) {
+TEST(MapStateTest, MergeIncreasesTheRevisionOfTheRemainingObject) {
   MapState map;
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   for (uint64_t id : {1, 2}) {
     map.Apply(Update(id));
     EXPECT_TRUE(outbox->Next(kNoWait).has_value());
   }
   map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
   EXPECT_EQ(std::get<ObjectMerged>(*outbox->Next(kNoWait)).revision, 2u);
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "for those who do not hear of the merge";
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).revision, 3u) << "for readers that do not get the merge";
   EXPECT_EQ(map.Snapshot().objects.at(0).object.revision, 3u);
 }
 
-TEST(MapStateTest, WhatIsMergedIntoTheUnknownIsRemoved) {
+TEST(MapStateTest, MergeIntoAnUnknownObjectIsARemoval) {
   MapState map;
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   map.Apply(Update(1));
   EXPECT_TRUE(outbox->Next(kNoWait).has_value());
   map.Apply(ObjectMerged{ObjectId{1}, ObjectId{2}, 0});
@@ -86,12 +87,12 @@ TEST(MapStateTest, WhatIsMergedIntoTheUnknownIsRemoved) {
   EXPECT_EQ(removed.revision, 2u);
 }
 
-TEST(MapStateTest, UpdatesSayWhereTheMeshStands) {
+TEST(MapStateTest, UpdatesContainThePoseOfTheMesh) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1), PlaceAt(5));
+  map.PublishMesh(MeshOf(1), PoseAt(5));
   map.Apply(Update(1));
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   const auto update = std::get<ObjectUpdate>(*outbox->Next(kNoWait));
   ASSERT_TRUE(update.T_world_mesh.has_value());
   EXPECT_EQ(update.T_world_mesh->translation().x(), 5);
@@ -101,18 +102,18 @@ Sim3<World, World> Correction(double scale, double yaw_rad, double x) {
   return {scale, Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(x, 0, 0)};
 }
 
-// Where a vertex of the newest mesh is in the world.
-Eigen::Vector3d Placed(const ObjectUpdate& object, const Eigen::Vector3d& vertex) {
+// World position of a vertex of the newest mesh.
+Eigen::Vector3d VertexInWorld(const ObjectUpdate& object, const Eigen::Vector3d& vertex) {
   return *object.T_world_mesh * (object.mesh_scale * vertex);
 }
 
-TEST(MapStateTest, ACorrectionMovesTheMeshAndDoesNotSendItAgain) {
+TEST(MapStateTest, CorrectionMovesTheMeshWithoutSendingItAgain) {
   const Eigen::Vector3d vertex(0.1, -0.2, 0.3);
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1), PlaceAt(5));
-  const auto outbox = map.Subscribe(Outbox::Acks::kAll, 100);
-  const Eigen::Vector3d before = Placed(map.Snapshot().objects[0].object, vertex);
+  map.PublishMesh(MeshOf(1), PoseAt(5));
+  const auto outbox = Subscribe(map);
+  const Eigen::Vector3d before = VertexInWorld(map.Snapshot().objects[0].object, vertex);
   const Sim3<World, World> first = Correction(1.3, 0.35, 2), second = Correction(0.9, -0.1, -1);
   for (const Sim3<World, World>& S : {first, second}) {
     map.MoveObject(ObjectId{1}, S);
@@ -125,38 +126,38 @@ TEST(MapStateTest, ACorrectionMovesTheMeshAndDoesNotSendItAgain) {
   }
   ASSERT_TRUE(last.has_value());
   EXPECT_NEAR(last->mesh_scale, 1.3 * 0.9, 1e-12);
-  EXPECT_TRUE(Placed(*last, vertex).isApprox(second * (first * before), 1e-12));
+  EXPECT_TRUE(VertexInWorld(*last, vertex).isApprox(second * (first * before), 1e-12));
 }
 
-// A mesh is made while the map is corrected: its snapshot knows the first correction but not the second.
-TEST(MapStateTest, AMeshOfAnOlderSnapshotIsPutWhereItsObjectIsNow) {
+// The map is corrected while the mesh is made: the snapshot includes the first correction but not the second.
+TEST(MapStateTest, MeshOfAnOlderSnapshotGetsTheMissingCorrections) {
   const Eigen::Vector3d vertex(0.1, -0.2, 0.3);
   const Sim3<World, World> first = Correction(1.3, 0.35, 2), second = Correction(0.9, -0.1, -1);
   MapState map;
   map.Apply(Update(1));
   map.MoveObject(ObjectId{1}, first);
-  MeshPose place = PlaceAt(5);
-  place.S_new_first = first;
+  MeshPose pose = PoseAt(5);
+  pose.S_new_first = first;
   map.MoveObject(ObjectId{1}, second);
-  map.PublishMesh(MeshOf(1), place);
+  map.PublishMesh(MeshOf(1), pose);
   const ObjectUpdate late = map.Snapshot().objects[0].object;
-  EXPECT_TRUE(Placed(late, vertex).isApprox(second * (place.T_world_mesh * vertex), 1e-12));
+  EXPECT_TRUE(VertexInWorld(late, vertex).isApprox(second * (pose.T_world_mesh * vertex), 1e-12));
   EXPECT_NEAR(late.mesh_scale, 0.9, 1e-12);
 
-  // The next one knows all and needs no scale of its own.
-  place.S_new_first = second * first;
-  map.PublishMesh(MeshOf(1), place);
+  // The next snapshot includes both corrections; its scale is 1.
+  pose.S_new_first = second * first;
+  map.PublishMesh(MeshOf(1), pose);
   const ObjectUpdate current = map.Snapshot().objects[0].object;
-  EXPECT_TRUE(Placed(current, vertex).isApprox(place.T_world_mesh * vertex, 1e-12));
+  EXPECT_TRUE(VertexInWorld(current, vertex).isApprox(pose.T_world_mesh * vertex, 1e-12));
   EXPECT_NEAR(current.mesh_scale, 1, 1e-12);
-  map.MoveObject(ObjectId{99}, first);  // an object that is not there
+  map.MoveObject(ObjectId{99}, first);  // unknown object: ignored
 }
 
 SE3<World, Camera> CameraAt(double x, double yaw_rad = 0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d(x, 0, 0)};
 }
 
-TEST(MapStateTest, FramesFollowTheirKeyframes) {
+TEST(MapStateTest, FramesMoveWithTheirKeyframes) {
   MapState map;
   const SE3<Camera, Camera> T_reference_camera(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
                                                Eigen::Vector3d(0.5, 0, 0));
@@ -182,7 +183,7 @@ TEST(MapStateTest, FramesFollowTheirKeyframes) {
     const SE3<World, Camera>& before = i == 0 ? *keyframe.T_world_camera : *follower.T_world_camera;
     EXPECT_TRUE(moved[i].T_world_camera->Matrix().isApprox(S.Moved(before).Matrix(), 1e-12)) << i;
   }
-  EXPECT_EQ(moved[2].T_world_camera->translation(), given.T_world_camera->translation()) << "hangs on nothing";
+  EXPECT_EQ(moved[2].T_world_camera->translation(), given.T_world_camera->translation()) << "has no reference keyframe";
 
   // A frame that was tracked before the correction is acknowledged after it.
   follower.frame_id = 4;
@@ -191,19 +192,19 @@ TEST(MapStateTest, FramesFollowTheirKeyframes) {
                                                                              1e-12));
 }
 
-TEST(MapStateTest, ANewcomerGetsTheMapFirst) {
+TEST(MapStateTest, SubscriptionStartsWithTheCurrentObjects) {
   MapState map;
   map.Apply(Update(1));
-  map.PublishMesh(MeshOf(1), PlaceAt(0));
+  map.PublishMesh(MeshOf(1), PoseAt(0));
   map.Apply(Update(2));
-  const auto outbox = Listen(map);
+  const auto outbox = Subscribe(map);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).id, ObjectId{1});
   EXPECT_EQ(std::get<MeshUpdate>(*outbox->Next(kNoWait)).id, ObjectId{1});
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox->Next(kNoWait)).id, ObjectId{2});
   EXPECT_EQ(outbox->Next(kNoWait), std::nullopt);
 }
 
-TEST(MapStateTest, SnapshotLeavesOutProvisionalObjectsAndRejectedFrames) {
+TEST(MapStateTest, SnapshotOmitsProvisionalObjectsAndRejectedFrames) {
   MapState map;
   map.Apply(Update(1, ObjectState::kProvisional));
   map.Apply(Update(2, ObjectState::kConfirmed));
@@ -224,12 +225,12 @@ TEST(MapStateTest, SnapshotLeavesOutProvisionalObjectsAndRejectedFrames) {
   EXPECT_EQ(snapshot.timestamps_ns[0], 40);
 }
 
-TEST(MapStateTest, CloseEndsPresentAndLaterSubscriptions) {
+TEST(MapStateTest, CloseEndsCurrentAndLaterSubscriptions) {
   MapState map;
   map.Apply(Update(1));
-  const auto before = Listen(map);
+  const auto before = Subscribe(map);
   map.Close(absl::OkStatus());
-  const auto after = Listen(map);
+  const auto after = Subscribe(map);
   for (const auto& outbox : {before, after}) {
     EXPECT_TRUE(outbox->Next(kNoWait).has_value());
     EXPECT_TRUE(outbox->Done());

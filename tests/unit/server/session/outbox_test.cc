@@ -29,7 +29,7 @@ FrameAck Ack(uint64_t frame_id) {
   return ack;
 }
 
-TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaitsBehindItsAnnouncement) {
+TEST(OutboxTest, OnlyTheNewestRevisionWaitsBehindTheAnnouncement) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   outbox.Put(Update(1, 1));
   outbox.Put(Update(1, 2));
@@ -39,14 +39,14 @@ TEST(OutboxTest, OnlyTheNewestRevisionOfAnObjectWaitsBehindItsAnnouncement) {
   outbox.Put(NewMesh(1, 4));
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 1u);
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).id, ObjectId{2});
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u) << "revisions come in their order";
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u) << "revisions are read in order";
   EXPECT_EQ(std::get<MeshUpdate>(*outbox.Next(kNoWait)).revision, 4u);
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
   outbox.Put(Update(1, 5));
-  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 5u) << "what was taken no longer coalesces";
+  EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 5u) << "an event that was read is not replaced";
 }
 
-TEST(OutboxTest, AMeshWaitsBehindTheFirstUpdateEvenWhenAnotherFollows) {
+TEST(OutboxTest, MeshStaysBehindTheAnnouncement) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   outbox.Put(Update(1, 1));
   outbox.Put(NewMesh(1, 2));
@@ -56,14 +56,14 @@ TEST(OutboxTest, AMeshWaitsBehindTheFirstUpdateEvenWhenAnotherFollows) {
   EXPECT_EQ(std::get<ObjectUpdate>(*outbox.Next(kNoWait)).revision, 3u);
 }
 
-TEST(OutboxTest, WhatWaitsOfAGoneObjectIsForgotten) {
+TEST(OutboxTest, RemovalDropsTheWaitingEventsOfTheObject) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   for (uint64_t id : {1, 2, 3}) outbox.Put(Update(id, 1));
   while (outbox.Next(kNoWait)) {
   }
   outbox.Put(Update(1, 2));
   outbox.Put(NewMesh(1, 3));
-  outbox.Put(ObjectRemoved{ObjectId{1}, 4, "ghost"});
+  outbox.Put(ObjectRemoved{ObjectId{1}, 4, "false landmark"});
   outbox.Put(Update(2, 2));
   outbox.Put(ObjectMerged{ObjectId{2}, ObjectId{3}, 9});
   EXPECT_TRUE(std::holds_alternative<ObjectRemoved>(*outbox.Next(kNoWait)));
@@ -71,11 +71,11 @@ TEST(OutboxTest, WhatWaitsOfAGoneObjectIsForgotten) {
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, WhatCameAndWentUnheardIsPassedOverInSilence) {
+TEST(OutboxTest, ObjectRemovedBeforeItsAnnouncementIsReadProducesNoEvent) {
   Outbox outbox(Outbox::Acks::kAll, 100);
   outbox.Put(Update(1, 1));
   outbox.Put(NewMesh(1, 2));
-  outbox.Put(ObjectRemoved{ObjectId{1}, 3, "ghost"});
+  outbox.Put(ObjectRemoved{ObjectId{1}, 3, "false landmark"});
   outbox.Put(Update(2, 1));
   outbox.Put(Update(3, 1));
   outbox.Put(ObjectMerged{ObjectId{3}, ObjectId{2}, 2});
@@ -83,18 +83,18 @@ TEST(OutboxTest, WhatCameAndWentUnheardIsPassedOverInSilence) {
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, AMergeIntoWhatIsNotHeardOfGoesWhereThatWent) {
+TEST(OutboxTest, MergeIntoAnUnreadObjectFollowsItsRemovalOrMerge) {
   for (const bool removed : {false, true}) {
     Outbox outbox(Outbox::Acks::kAll, 100);
     outbox.Put(Update(1, 5));
-    EXPECT_TRUE(outbox.Next(kNoWait).has_value());  // the reader knows the first only
+    EXPECT_TRUE(outbox.Next(kNoWait).has_value());  // only object 1 is read
     outbox.Put(Update(2, 1));
     outbox.Put(ObjectMerged{ObjectId{1}, ObjectId{2}, 2});
     if (removed) {
-      outbox.Put(ObjectRemoved{ObjectId{2}, 3, "ghost"});
-      const auto gone = std::get<ObjectRemoved>(*outbox.Next(kNoWait));
-      EXPECT_EQ(gone.id, ObjectId{1});
-      EXPECT_EQ(gone.revision, 6u);
+      outbox.Put(ObjectRemoved{ObjectId{2}, 3, "false landmark"});
+      const auto end = std::get<ObjectRemoved>(*outbox.Next(kNoWait));
+      EXPECT_EQ(end.id, ObjectId{1});
+      EXPECT_EQ(end.revision, 6u);
     } else {
       outbox.Put(Update(3, 1));
       outbox.Put(ObjectMerged{ObjectId{2}, ObjectId{3}, 2});
@@ -107,7 +107,7 @@ TEST(OutboxTest, AMergeIntoWhatIsNotHeardOfGoesWhereThatWent) {
   }
 }
 
-TEST(OutboxTest, TheSenderGetsEveryAckAndAViewerTheNewest) {
+TEST(OutboxTest, SenderGetsEveryAckAndViewerTheNewest) {
   Outbox sender(Outbox::Acks::kAll, 100), viewer(Outbox::Acks::kNewest, 1);
   for (uint64_t i = 1; i <= 3; ++i) {
     sender.Put(Ack(i));
@@ -118,18 +118,18 @@ TEST(OutboxTest, TheSenderGetsEveryAckAndAViewerTheNewest) {
   EXPECT_EQ(viewer.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, OnlyTheSenderHearsOfItsMasks) {
+TEST(OutboxTest, OnlyTheSenderGetsMasksAcks) {
   Outbox sender(Outbox::Acks::kAll, 2), viewer(Outbox::Acks::kNewest, 1);
   sender.Put(Ack(1));
   for (Outbox* outbox : {&sender, &viewer}) {
     for (uint64_t i = 1; i <= 2; ++i) outbox->Put(MasksAck{.frame_id = i, .accepted = true, .error = ""});
   }
-  for (uint64_t i = 1; i <= 2; ++i) EXPECT_EQ(std::get<MasksAck>(*sender.Next(kNoWait)).frame_id, i) << "two may wait";
+  for (uint64_t i = 1; i <= 2; ++i) EXPECT_EQ(std::get<MasksAck>(*sender.Next(kNoWait)).frame_id, i) << "max_acks is 2";
   EXPECT_EQ(sender.Next(kNoWait), std::nullopt);
   EXPECT_EQ(viewer.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, AReaderThatSleepsCostsBoundedMemory) {
+TEST(OutboxTest, SlowReaderLosesTheOldestAcks) {
   Outbox outbox(Outbox::Acks::kAll, 4);
   outbox.Put(Update(1, 1));
   for (uint64_t i = 1; i <= 100; ++i) outbox.Put(Ack(i));
@@ -138,10 +138,10 @@ TEST(OutboxTest, AReaderThatSleepsCostsBoundedMemory) {
   EXPECT_EQ(outbox.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, ClosesWithAStatusAndDrains) {
+TEST(OutboxTest, ClosedOutboxKeepsWaitingEventsAndItsStatus) {
   Outbox outbox(Outbox::Acks::kAll, 4);
   outbox.Put(Ack(1));
-  outbox.Close(absl::NotFoundError("gone"));
+  outbox.Close(absl::NotFoundError("deleted"));
   outbox.Close(absl::OkStatus());
   outbox.Put(Ack(2));
   EXPECT_FALSE(outbox.Done());
@@ -150,7 +150,7 @@ TEST(OutboxTest, ClosesWithAStatusAndDrains) {
   EXPECT_EQ(outbox.status().code(), absl::StatusCode::kNotFound);
 }
 
-TEST(OutboxTest, CloseWakesAWaitingReader) {
+TEST(OutboxTest, CloseEndsAWaitingNext) {
   Outbox outbox(Outbox::Acks::kAll, 4);
   std::thread reader([&] { EXPECT_EQ(outbox.Next(std::chrono::minutes(1)), std::nullopt); });
   outbox.Close();

@@ -1,0 +1,104 @@
+#include "server/session/pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <vector>
+
+#include "tests/support/streams.h"
+
+namespace romap::session {
+namespace {
+
+constexpr std::chrono::milliseconds kNoWait{0};
+
+// A pipeline with a training pool and a mesher without threads: everything runs on the thread of the test.
+class PipelineTest : public ::testing::Test {
+ protected:
+  static ServerConfig SingleThread() {
+    ServerConfig config;
+    config.session.single_thread = true;
+    return config;
+  }
+  static SessionOptions Options() {
+    SessionOptions options;
+    options.camera = testing::SmallCamera();
+    return options;
+  }
+
+  void Process(SessionInput input) {
+    pipeline_.Process({std::move(input), std::chrono::steady_clock::now()},
+                      [this](MappingStep step) { steps_.push_back(std::move(step)); });
+  }
+  std::optional<FrameAck> NextAck() {
+    while (const auto event = outbox_->Next(kNoWait)) {
+      if (const auto* ack = std::get_if<FrameAck>(&*event)) return *ack;
+    }
+    return std::nullopt;
+  }
+  Statistics Counters() const {
+    Statistics statistics;
+    ledger_.FillIn(&statistics);
+    return statistics;
+  }
+
+  const ServerConfig config_ = SingleThread();
+  nerf::TrainingPool pool_{config_.nerf, /*threads=*/0};
+  Mesher mesher_{config_.mesh, Mesher::Threading::kCaller};
+  MapState map_;
+  std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);
+  FrameLedger ledger_{"session", &map_};
+  Pipeline pipeline_{"session", Options(), config_, &pool_, &mesher_, &map_, &ledger_, /*recorder=*/nullptr};
+  std::vector<MappingStep> steps_;
+};
+
+TEST_F(PipelineTest, AcknowledgesAFrameBeforeItIsMapped) {
+  Process(testing::MakeFrame(1));
+  const auto ack = NextAck();
+  ASSERT_TRUE(ack.has_value());
+  EXPECT_TRUE(ack->accepted) << ack->error;
+  EXPECT_EQ(Counters().frames_processed, 0u);
+  ASSERT_EQ(steps_.size(), 1u);
+  EXPECT_EQ(steps_[0].is_keyframe, ack->is_keyframe);
+  EXPECT_FALSE(steps_[0].changes_local_map) << "a given pose needs no local map";
+  steps_[0].run();
+  EXPECT_EQ(Counters().frames_processed, 1u);
+}
+
+TEST_F(PipelineTest, RejectedInputsAreNotMapped) {
+  FrameInput frame = testing::MakeFrame(1);
+  frame.image.clear();
+  Process(frame);
+  const auto ack = NextAck();
+  ASSERT_TRUE(ack.has_value());
+  EXPECT_FALSE(ack->accepted);
+  Process(MasksInput{});
+  EXPECT_TRUE(steps_.empty());
+  EXPECT_EQ(Counters().frames_rejected, 1u);
+}
+
+TEST_F(PipelineTest, LateMasksAreNeverSkipped) {
+  Process(testing::MakeFrame(1));
+  MasksInput masks;
+  masks.frame_id = 1;
+  static_cast<EncodedMasks&>(masks) = testing::MakeFrame(1, "mug");
+  Process(masks);
+  ASSERT_EQ(steps_.size(), 2u);
+  EXPECT_FALSE(steps_[1].may_be_skipped);
+  EXPECT_FALSE(steps_[1].changes_local_map);
+  for (const MappingStep& step : steps_) step.run();
+  bool settled = false;
+  ledger_.WhenSettled([&] { settled = true; });
+  EXPECT_TRUE(settled);
+}
+
+TEST_F(PipelineTest, FinishMappingWithoutObjectsLeavesNothingToTrain) {
+  Process(testing::MakeFrame(1));
+  steps_[0].run();
+  pipeline_.FinishMapping();
+  EXPECT_TRUE(pipeline_.IsTrainingDone());
+  EXPECT_EQ(pipeline_.TrainingProgress().objects_total, 0);
+}
+
+}  // namespace
+}  // namespace romap::session
