@@ -31,8 +31,8 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execu
   const bool is_lost = image.tracked.state == TrackingState::kLost;
   MappingStep step;
   step.is_keyframe = image.tracked.is_keyframe;
-  step.may_be_skipped = !image.tracked.is_keyframe && !image.start;
-  step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.start || is_lost);
+  step.may_be_skipped = !image.tracked.is_keyframe && !image.initial_views;
+  step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.initial_views || is_lost);
 
   step.run = [this, image = std::move(image)] {
     // Map.
