@@ -11,7 +11,7 @@ namespace romap {
 // Moves and scales the cuboid. It is no longer upright if the correction changed the up direction.
 Cuboid Moved(const Sim3<World, World>& S_new_old, Cuboid cuboid);
 
-// Moves the camera and scales its depths, so that the view stays consistent with an object that moves in the same way.
+// Moves the camera and scales its depths, so that the view stays consistent with an object that was moved equally.
 // The pixels stay shared; the depth image is shared unless the scale changes.
 ObjectView Moved(const Sim3<World, World>& S_new_old, ObjectView view);
 

@@ -16,8 +16,8 @@
 
 namespace romap::session {
 
-// Keeps account of the inputs (frames and late masks) of one session: counts them, acknowledges them to the client, and
-// reports when all inputs received so far are settled. An input is settled once it is mapped, rejected, dropped or
+// Tracks the inputs (frames and late masks) of one session: counts them, acknowledges them to the client, and reports
+// when all inputs received up to a point are settled. An input is settled when it is mapped, rejected, dropped or
 // skipped. Thread-safe.
 class FrameLedger {
  public:
@@ -40,8 +40,8 @@ class FrameLedger {
 
   // No further input will be settled.
   void SettleAll();
-  // Calls `done` once all inputs received before this call are settled: at once, or later on the thread that settles
-  // the last of them.
+  // Calls `done` when all inputs received before this call are settled: immediately, or later on the thread that
+  // settles the last of them.
   void WhenSettled(std::function<void()> done);
 
   // Sets the counters of frames, keyframes and map points.

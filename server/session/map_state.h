@@ -26,8 +26,8 @@ class MapState {
   // Applies an ObjectUpdate, ObjectRemoved or ObjectMerged; its revision is overwritten. Ignored if the object was
   // removed or, for removals and merges, never announced. A merge into an unknown object becomes a removal.
   void Apply(MapEvent event);
-  // Moves the mesh of an object with the space around it: p_new = S_new_old * p_old. Meshes still to come from older
-  // snapshots are moved too. Clients get the new pose with the object's next update, so call this before Apply() of the
+  // Moves the mesh of an object with the space around it: p_new = S_new_old * p_old. Later meshes of older snapshots
+  // are moved too. Clients get the new pose with the object's next update, so call this before Apply() of the
   // updates of the same correction. Also call it before the correction is passed to the field: snapshots must not
   // include corrections that are unknown here.
   void MoveObject(ObjectId object, const Sim3<World, World>& S_new_old);

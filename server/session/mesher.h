@@ -24,7 +24,7 @@ class Mesher {
 
   enum class Threading {
     kOwnThread,
-    kCaller,  // every mesh is made within Offer()
+    kCaller,  // Offer() makes the mesh before it returns
   };
 
   explicit Mesher(const mesh::MeshConfig& config, Threading threading = Threading::kOwnThread);

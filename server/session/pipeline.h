@@ -61,7 +61,7 @@ class Pipeline {
   // For a training pool without threads: trains for at most `count` slices.
   void TrainSlices(int count);
 
-  // From any thread: asks bundle adjustment to end early while keyframes wait.
+  // Makes bundle adjustment end early while keyframes wait. Thread-safe.
   void RequestEarlyStop(bool keyframes_wait) { sparse_mapper_.RequestEarlyStop(keyframes_wait); }
 
   nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_client_); }

@@ -40,9 +40,10 @@ class Scheduler {
 
   // Queues an input. False after CloseInputs() or a failure.
   bool Offer(SessionInput input);
-  // No more inputs. Returns at once; `finished` is called when everything is done.
+  // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
-  // Ends the threads without processing or training the rest, and joins them. Not from one of the callbacks.
+  // Ends the threads without processing the waiting inputs or training to the end, and joins them. Must not be called
+  // by a callback.
   void Stop();
 
  private:

@@ -21,8 +21,8 @@
 
 namespace romap::session {
 
-// One client's map and its life cycle: open -> finishing -> finished, or failed. What happens to a frame is in
-// Pipeline, on which thread in Scheduler, the accounts of inputs in FrameLedger, the map that clients see in MapState.
+// One client's map and its life cycle: open -> finishing -> finished, or failed. Pipeline defines how a frame is
+// processed, Scheduler on which thread; FrameLedger counts and acknowledges; MapState is the map that clients see.
 //
 // Accepted inputs are never lost while the session exists; closing a stream has no effect on them. Thread-safe.
 class Session {
@@ -38,10 +38,9 @@ class Session {
   // FAILED_PRECONDITION if the session accepts no more inputs.
   absl::Status CheckOpen() const;
   // Queues a frame, or the masks of an earlier frame; the FrameAck or MasksAck follows as an event. If the queue is
-  // full, kReplay waits and kLive drops the oldest input. Fails as
-  // CheckOpen() does.
+  // full, kReplay waits and kLive drops the oldest input. FAILED_PRECONDITION as CheckOpen().
   absl::Status Offer(SessionInput input);
-  // No more inputs. Returns at once; the state becomes kFinished when everything is mapped and trained.
+  // No more inputs. Returns immediately; the state becomes kFinished after everything is mapped and trained.
   void Finish();
   // Ends the threads without training to the end, and every stream with `status`. Called before deletion.
   void Stop(const absl::Status& status);
@@ -49,7 +48,7 @@ class Session {
   // Claims the right to send inputs; false if another stream holds it.
   bool AttachSender();
   void DetachSender();
-  // Calls `done` once everything offered before this call is settled: at once or on a session thread.
+  // Calls `done` when all inputs offered before this call are settled: immediately or on a session thread.
   void WhenSettled(std::function<void()> done) { ledger_.WhenSettled(std::move(done)); }
 
   MapState& map() { return map_; }
