@@ -103,8 +103,8 @@ TEST_F(ReplayTest, RejectsInvalidRecordingsWithOneLine) {
   std::ofstream(text) << "not a recording at all";
   std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\x9\0\0\0", 4);
   for (const auto& [file, fault, exit_code] :
-       {std::tuple{text, "should begin with ROMAPREC", 2},
-        std::tuple{folder_ / "old.romaprec", "of version 9, this program reads versions 1 to 2", 2},
+       {std::tuple{text, "must begin with ROMAPREC", 2},
+        std::tuple{folder_ / "old.romaprec", "version must be 1 to 2, is 9", 2},
         std::tuple{folder_ / "missing.romaprec", "missing.romaprec", 3}}) {
     const testing_support::ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});
     EXPECT_EQ(replay.exit_code, exit_code);
@@ -119,7 +119,7 @@ TEST_F(ReplayTest, ReportsAMissingRecordingFolderBeforeSendingFrames) {
   const testing_support::ProcessResult run =
       Romap({"run", folder_ / "sequence", "--local", "--set", "session.record_dir=" + (folder_ / "nowhere"), "--out",
              folder_ / "map"});
-  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_EQ(run.exit_code, 3);
   EXPECT_THAT(run.err, HasSubstr("nowhere"));
 }
 
