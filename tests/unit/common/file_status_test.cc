@@ -30,7 +30,7 @@ TEST(FileErrorTest, TakesErrnoOfAFailedStream) {
 
 TEST(FileErrorTest, TakesErrorCodeOfFilesystemFunctions) {
   std::error_code error;
-  std::filesystem::file_size("/nonexistent/file", error);
+  EXPECT_EQ(std::filesystem::file_size("/nonexistent/file", error), static_cast<uintmax_t>(-1));
   const absl::Status status = FileError("/nonexistent/file", "read the size", error);
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(Message(status), "/nonexistent/file: cannot read the size: No such file or directory");
