@@ -99,15 +99,8 @@ absl::Status RunSequence(const RunOptions& options) {
   return absl::OkStatus();
 }
 
-}  // namespace
-
-void AddRunCommand(CLI::App& app, Command* chosen) {
-  auto options = std::make_shared<RunOptions>();
-  CLI::App* command = app.add_subcommand("run", "Map a recorded sequence and write the map to files");
-  command->add_option("sequence", options->sequence_dir, "Sequence folder")->required();
-  command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory, images and summary")
-      ->required();
-  options->service.AddTo(*command, /*offer_local=*/true);
+// The options that select and modify the input.
+void AddInputOptions(RunOptions* options, CLI::App* command) {
   command
       ->add_option("--poses", options->poses,
                    "Use of the camera poses of the sequence: given (exact), prior (initial values for tracking, which "
@@ -136,12 +129,24 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--depth", options->sequence.use_depth, "Also send the depth images");
-  command->add_flag("--realtime", options->stream.realtime,
-                    "Send frames at the recorded rate; the server drops frames when overloaded");
   command
       ->add_option("--permute-labels", options->permute_labels_seed,
                    "Permute the labels at random in each frame with this seed, simulating a detector without a tracker")
       ->check(CLI::NonNegativeNumber);
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command = app.add_subcommand("run", "Map a recorded sequence and write the map to files");
+  command->add_option("sequence", options->sequence_dir, "Sequence folder")->required();
+  command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory, images and summary")
+      ->required();
+  options->service.AddTo(*command, /*offer_local=*/true);
+  AddInputOptions(options.get(), command);
+  command->add_flag("--realtime", options->stream.realtime,
+                    "Send frames at the recorded rate; the server drops frames when overloaded");
   command->add_option("--first", options->stream.first_frame, "Index of the first frame to send");
   command->add_option("--frames", options->stream.frame_count, "Maximal number of frames to send")
       ->check(CLI::PositiveNumber);

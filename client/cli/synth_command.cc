@@ -46,6 +46,27 @@ absl::Status RunSynth(SynthCommandOptions options) {
   return status;
 }
 
+void AddFaultOptions(SynthCommandOptions* options, CLI::App* command) {
+  synth::SynthOptions& synth = options->synth;
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    command->add_option(name, value, help)->capture_default_str();
+  };
+  add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
+  add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
+  command->add_flag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
+  add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
+  add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
+  add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
+  const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
+    command->add_option(name, texts, help)->type_name("FIRST:LAST");
+  };
+  add_ranges("--cut", options->cuts, "Omit these frames, simulating a jump of the camera");
+  add_ranges("--black", options->black, "Make these frames black (covered lens)");
+  add_ranges("--blur", options->blurred, "Blur these frames until tracking is impossible");
+  add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
+  add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
+}
+
 }  // namespace
 
 void AddSynthCommand(CLI::App& app, Command* chosen) {
@@ -71,7 +92,8 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
       ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
   add("--rounds", synth.rounds,
       "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
-  add("--hand-motion", synth.hand_motion, "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+  add("--hand-motion", synth.hand_motion,
+      "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
   add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");
@@ -84,20 +106,7 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
                                                              {"jpeg", synth::ImageFormat::kJpeg}};
   command->add_option("--format", synth.format, "Format of the color images: png or jpeg")
       ->transform(CLI::CheckedTransformer(formats, CLI::ignore_case));
-  add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
-  add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
-  command->add_flag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
-  add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
-  add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
-  add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
-  const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
-    command->add_option(name, texts, help)->type_name("FIRST:LAST");
-  };
-  add_ranges("--cut", options->cuts, "Omit these frames, simulating a jump of the camera");
-  add_ranges("--black", options->black, "Make these frames black (covered lens)");
-  add_ranges("--blur", options->blurred, "Blur these frames until tracking is impossible");
-  add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
-  add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
+  AddFaultOptions(options.get(), command);
   command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
 }
 
