@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/math/types.h"
 #include "server/nerf/training_box.h"
 #include "server/nerf/visual_hull.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "common/field_snapshot.h"
-#include "server/nerf/cpu/field_model.h"
+#include "server/nerf/model/field_model.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/training_box.h"
 

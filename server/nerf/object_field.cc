@@ -12,11 +12,11 @@
 #include "common/map_motion.h"
 #include "common/status.h"
 #include "common/thread_time.h"
-#include "server/nerf/cpu/field_trainer.h"
 #include "server/nerf/field_sampler.h"
 #include "server/nerf/field_surface.h"
 #include "server/nerf/hull_distance.h"
 #include "server/nerf/math/random.h"
+#include "server/nerf/model/step_source.h"
 #include "server/nerf/view_check.h"
 
 namespace romap::nerf {
@@ -27,7 +27,7 @@ constexpr double kLeastNewShift = 0.01;  // of the box's side: a view that moved
 
 // Limits of carrying a field over to another box; beyond them a new training costs no more.
 constexpr double kMostUnknownShare = 0.8;    // of the new box, that lies outside the old one
-constexpr double kLeastFeatureShare = 0.25;  // see FieldTrainer::Loosen
+constexpr double kLeastFeatureShare = 0.25;  // see Trainer::ShrinkFeatures
 constexpr double kMostGrowth = 2.5;          // of the longest side since the hash grid was laid out
 
 NerfConfig WithWholeWidths(NerfConfig config) {
@@ -98,7 +98,7 @@ bool ObjectField::CarryOverTo(const TrainingBox& box) {
   // A box that was too small made the field paint what lies outside on the box's walls. That must be able to go.
   // Only so far over all boxes together: output weights that outgrow their features make training diverge.
   const double looseness = std::max(kLeastFeatureShare, loosened_ * (1 - 3 * unknown_share));
-  trainer_->Loosen(static_cast<float>(looseness / loosened_));
+  trainer_->ShrinkFeatures(static_cast<float>(looseness / loosened_));
   loosened_ = looseness;
   plan_.OnNewBox(steps(), unknown_share);
   box_ = box;

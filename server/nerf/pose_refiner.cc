@@ -42,7 +42,7 @@ std::vector<RenderedPixel> Render(const ObjectView& view, uint16_t index, std::s
     const Eigen::Vector3d direction((pixels[i].x - view.camera.cx_px) / view.camera.fx_px,
                                     (pixels[i].y - view.camera.cy_px) / view.camera.fy_px, 1);
     const double z_mu = result.opacity > kSomething
-                            ? result.depth_excess / result.opacity * box.unit_mu / direction.norm()
+                            ? result.depth_error / result.opacity * box.unit_mu / direction.norm()
                             : middle_z_mu;
     rendered.push_back(
         {pixels[i].x, pixels[i].y, z_mu * direction, {result.rgb[2], result.rgb[1], result.rgb[0]}, result.opacity});

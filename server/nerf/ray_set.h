@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/stage_messages.h"
-#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/math/types.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/pixel_sampler.h"
 #include "server/nerf/training_box.h"

@@ -6,26 +6,25 @@
 #include <utility>
 
 #include "common/status.h"
-#include "server/nerf/cpu/field_trainer.h"
+#include "server/nerf/cpu/cpu_trainer.h"
 #include "server/nerf/cuda/cuda_trainer.h"
 
 namespace romap::nerf {
 
 std::unique_ptr<Trainer> MakeTrainer(const NerfConfig& config, uint64_t seed) {
-  if (config.backend != "cpu") {
-    static std::atomic_flag said;
-    absl::StatusOr<std::unique_ptr<Trainer>> trainer = cuda::MakeCudaTrainer(config, seed);
-    if (!said.test_and_set()) {
-      if (trainer.ok()) {
-        spdlog::info("fields are trained on a CUDA device");
-      } else {
-        spdlog::log(config.backend == "cuda" ? spdlog::level::warn : spdlog::level::info,
-                    "fields are trained on the CPU: {}", Message(trainer.status()));
-      }
+  std::unique_ptr<Trainer> cpu = std::make_unique<CpuTrainer>(config, seed);
+  if (config.backend == "cpu") return cpu;
+  const absl::Status cuda = cuda::Supports(config);
+  static std::atomic_flag logged;
+  if (!logged.test_and_set()) {
+    if (cuda.ok()) {
+      spdlog::info("training fields on the CUDA device");
+    } else {
+      spdlog::log(config.backend == "cuda" ? spdlog::level::warn : spdlog::level::info,
+                  "training fields on the CPU: {}", Message(cuda));
     }
-    if (trainer.ok()) return std::move(trainer).value();
   }
-  return std::make_unique<FieldTrainer>(config, seed);
+  return cuda.ok() ? cuda::MakeCudaTrainer(config, std::move(cpu)) : std::move(cpu);
 }
 
 }  // namespace romap::nerf

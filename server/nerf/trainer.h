@@ -12,32 +12,36 @@ namespace romap::nerf {
 class Occupancy;
 struct FieldModel;
 struct StepSource;
+struct TrainingState;
 
-// What optimises one FieldModel, on whichever back end. Not thread-safe. Between calls the model, the optimiser's
-// moments and the occupancy are in host memory, so that what a back end has learned outlives its device.
+// Trains one FieldModel on some back end. Not thread-safe. Between calls the model, the moments of the optimizer and
+// the occupancy are in host memory, so that a failing device loses nothing that was learned before.
 class Trainer {
  public:
   virtual ~Trainer() = default;
 
-  // `steps` more steps; `threads` (1..64) counts the threads of the CPU, the caller being one of them.
+  // Runs `steps` steps. `threads` (1..64): number of CPU threads, including the caller.
   virtual TrainStats Run(const StepSource& source, Occupancy& occupancy, int steps, int threads) = 0;
 
-  // Gives a new field of signed distances a shape to begin with; see cpu/distance_fit.h.
+  // Initializes a new signed-distance field with given distances; see cpu/distance_fit.h.
   virtual void FitDistances(const StepSource& source, std::span<const float> distance) = 0;
 
-  // Shrinks the features to `share`, (0..1], of what they are without changing what the field shows, so that it learns
-  // something else more readily; see FieldTrainer::Loosen.
-  virtual void Loosen(float share) = 0;
+  // Multiplies the features by `share`, (0..1], and the weights that read them by 1 / share. The outputs stay the same,
+  // because hidden neurons are linear or zero, but a step of Adam changes them more. Without this, large features from
+  // the first training keep their errors (loss of plasticity of warm starts: J. Ash, R. Adams, "On Warm-Starting Neural
+  // Network Training", 2020). No effect without learned features (frequency encoding).
+  virtual void ShrinkFeatures(float share) = 0;
 
-  // Gives back the memory that only Run() needs; the next Run() takes it again.
+  // Frees the memory that only Run() needs; the next Run() allocates it again.
   virtual void ReleaseScratch() = 0;
 
+  virtual TrainingState& state() = 0;
   virtual const FieldModel& model() const = 0;
   virtual uint64_t steps_done() const = 0;
 };
 
-// A new field and its trainer on the back end that `config.backend` asks for. Where that is not there, or has failed in
-// this process, on the CPU; the log says once which it is. The same seed gives the same new field on every back end.
+// A new field and its trainer on the back end of `config.backend`; on the CPU if that back end is not available or has
+// failed in this process. The choice is logged once. The same seed gives the same new field on every back end.
 std::unique_ptr<Trainer> MakeTrainer(const NerfConfig& config, uint64_t seed);
 
 }  // namespace romap::nerf

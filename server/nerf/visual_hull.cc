@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "server/nerf/cpu/kernels.h"
+#include "server/nerf/math/types.h"
 
 namespace romap::nerf {
 namespace {

@@ -19,7 +19,7 @@
 #include "client/files/sequence.h"
 #include "common/config.h"
 #include "common/status.h"
-#include "server/nerf/cpu/field_trainer.h"
+#include "server/nerf/cpu/cpu_trainer.h"
 #include "server/nerf/presets.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/visual_hull.h"
@@ -69,7 +69,7 @@ nerf::TrainStats TrainOnce(const Subject& subject, const nerf::NerfConfig& confi
   occupancy.SetHull(hull.Carve());
   nerf::RaySet rays(config, 1);
   rays.Build(subject.views, subject.box);
-  nerf::FieldTrainer trainer(config, 1, kernels);
+  nerf::CpuTrainer trainer(config, 1, kernels);
   const Eigen::Vector3f extent = subject.box.ExtentUnit();
   const double decay = std::log(config.final_learning_rate / config.learning_rate) / config.full_budget_steps;
   const nerf::StepSource source{

@@ -4,31 +4,31 @@
 #include <cmath>
 
 #include "server/nerf/math/random.h"
+#include "server/nerf/model/step_parameters.h"
 
 namespace romap::nerf {
 namespace {
 
 constexpr int kSteps = 30;
-constexpr int kChunks = 4;  // of a step
-constexpr int kPoints = 1024;
-constexpr float kNear = 0.1f;  // box sides; further away only a few points are set
-constexpr int kTries = 4;      // to find a near one
+constexpr int kChunks = 4;     // per step
+constexpr int kPoints = 1024;  // per chunk
+constexpr float kNear = 0.1f;  // box sides; most points are this close to the surface
+constexpr int kTries = 4;      // draws of a cell until one is near
 constexpr uint64_t kSeed = 99;
 
 class DistanceFit {
  public:
-  DistanceFit(const NerfConfig& config, const KernelTable& kernels, FieldTrainer::State field)
+  DistanceFit(const NerfConfig& config, const KernelTable& kernels, TrainingState& field)
       : kernels_(kernels),
         field_(field),
-        rates_{static_cast<float>(config.learning_rate), static_cast<float>(config.adam_beta1),
-               static_cast<float>(config.adam_beta2)},
+        rates_(MakeAdamRates(config, static_cast<float>(config.learning_rate))),
         points_(kPoints, field.model.layout.features, field.model.mlp.hidden),
         table_gradient_(field.model.table.size() + kMaxLanes),
         mlp_gradient_(field.model.mlp.parameters.size()) {}
 
   void Step(const StepSource& source, std::span<const float> distance, int step) {
     for (int chunk = 0; chunk < kChunks; ++chunk) {
-      Place(source, distance, static_cast<uint64_t>(step * kChunks + chunk));
+      PlacePoints(source, distance, static_cast<uint64_t>(step * kChunks + chunk));
       AddGradients(distance);
     }
     const auto update = [&](AlignedBuffer<float>& parameters, AlignedBuffer<float>& first, AlignedBuffer<float>& second,
@@ -42,7 +42,7 @@ class DistanceFit {
   }
 
  private:
-  void Place(const StepSource& source, std::span<const float> distance, uint64_t chunk) {
+  void PlacePoints(const StepSource& source, std::span<const float> distance, uint64_t chunk) {
     points_.size = kPoints;
     for (int i = 0; i < kPoints; ++i) {
       uint32_t cell = 0;
@@ -52,13 +52,13 @@ class DistanceFit {
         if (std::fabs(distance[cell]) < kNear) break;
       }
       constexpr uint32_t kSide = kOccupancyResolution;
-      const auto middle = [&](uint32_t index, int axis) {
+      const auto center = [&](uint32_t index, int axis) {
         return source.extent[static_cast<size_t>(axis)] * (static_cast<float>(index % kSide) + 0.5f) / kSide;
       };
       points_.cell[i] = cell;
-      points_.x[i] = middle(cell, 0);
-      points_.y[i] = middle(cell / kSide, 1);
-      points_.z[i] = middle(cell / (kSide * kSide), 2);
+      points_.x[i] = center(cell, 0);
+      points_.y[i] = center(cell / kSide, 1);
+      points_.z[i] = center(cell / (kSide * kSide), 2);
     }
     kernels_.to_grid(source.grid, kPoints, points_.x.data(), points_.y.data(), points_.z.data());
   }
@@ -80,7 +80,7 @@ class DistanceFit {
   }
 
   const KernelTable& kernels_;
-  FieldTrainer::State field_;
+  TrainingState& field_;
   AdamRates rates_;
   SampleChunk points_;
   AlignedBuffer<float> table_gradient_, mlp_gradient_;
@@ -89,7 +89,7 @@ class DistanceFit {
 }  // namespace
 
 void FitDistances(const NerfConfig& config, const KernelTable& kernels, const StepSource& source,
-                  std::span<const float> distance, FieldTrainer::State field) {
+                  std::span<const float> distance, TrainingState& field) {
   DistanceFit fit(config, kernels, field);
   for (int step = 0; step < kSteps; ++step) fit.Step(source, distance, step);
 }

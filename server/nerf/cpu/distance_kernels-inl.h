@@ -1,4 +1,4 @@
-// Opacities of signed-distance fields: memory and loops here, formulas in math/. Included like kernels-inl.h.
+// Opacities of signed-distance fields: memory and loops; the formulas are in math/. Included like kernels-inl.h.
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/signed_distance.h"
 
@@ -12,29 +12,29 @@
 ROMAP_MATH_BEGIN
 
 template <class Wide>
-void PassThroughDistances(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& c) {
+void DistanceOpacity(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& c) {
   using L = Lane<Wide>;
   for (int i = 0; i < c.size; i += L::kLanes) {
     Wide red, green, blue, raw;
     L::Load4(c.raw.data() + kOutputs * i, red, green, blue, raw);
-    L::Store(LightAtRaw(raw, L::Set(sharpness)), c.light.data() + i);
+    L::Store(TransmittanceAtRaw(raw, L::Set(sharpness)), c.transmittance.data() + i);
     L::Store(L::Set(1.0f), c.density.data() + i);
     L::Store(L::Set(1.0f), c.length.data() + i);
   }
   for (int r = 0; r < ray_count; ++r) {
     float before = 1;
     for (int i = spans[r].first; i < spans[r].first + spans[r].count; ++i) {
-      c.alpha[i] = OpacityBetween(before, c.light[i]);
-      before = c.light[i];
+      c.alpha[i] = OpacityBetween(before, c.transmittance[i]);
+      before = c.transmittance[i];
     }
   }
 }
 
-inline void PassThroughDistancesBackward(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& c) {
+inline void DistanceOpacityBackward(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& c) {
   for (int r = 0; r < ray_count; ++r) {
     const int at = spans[r].first;
     float* d = c.d_raw.data() + kOutputs * at + 3;
-    DistanceBackward(spans[r].count, sharpness, c.light.data() + at, c.alpha.data() + at, d, d, kOutputs);
+    DistanceBackward(spans[r].count, sharpness, c.transmittance.data() + at, c.alpha.data() + at, d, d, kOutputs);
   }
 }
 

@@ -1,5 +1,5 @@
-// Kernels for what the fast ones leave out: the frequency encoding, and MLPs of several hidden layers. Baselines and
-// ablations use them. Included by plain_kernels.cc and simd_kernels.cc like kernels-inl.h.
+// Kernels for the frequency encoding and for MLPs of several hidden layers, which the fast kernels do not support;
+// baselines and ablations use them. Included by plain_kernels.cc and simd_kernels.cc like kernels-inl.h.
 #include "server/nerf/cpu/kernels-inl.h"
 #include "server/nerf/math/frequency.h"
 
@@ -14,8 +14,8 @@ ROMAP_MATH_BEGIN
 
 // ----------------------------------------------------------------------------------------------------------- encoding
 
-// The waves of all features of a frequency encoding, see FrequencyFeature. Feature (axis, octave k) is the sine at
-// 2 (axis octaves + k), the cosine behind it.
+// The waves of all features of a frequency encoding, see FrequencyFeature. The sine of (axis, octave k) is feature
+// 2 (axis octaves + k), the cosine is the next one.
 struct FrequencyWaves {
   alignas(64) float along[3][kMaxFrequencyFeatures] = {};
   alignas(64) float phase[kMaxFrequencyFeatures] = {};
@@ -38,7 +38,7 @@ void EncodeFrequency(const GridLayout& layout, int count, const float* x, const 
   const FrequencyWaves waves(layout.octaves);
   const int wave_count = 6 * layout.octaves;
   for (int i = 0; i < count; ++i, features += layout.features) {
-    for (int f = 0; f < wave_count; f += L::kLanes) {  // whole vectors fit, as `features` is a multiple of 16
+    for (int f = 0; f < wave_count; f += L::kLanes) {  // whole vectors fit, because `features` is a multiple of 16
       const Wide wave =
           FrequencyFeature(L::Load(waves.along[0] + f), L::Load(waves.along[1] + f), L::Load(waves.along[2] + f),
                            L::Load(waves.phase + f), L::Set(x[i]), L::Set(y[i]), L::Set(z[i]));
@@ -52,7 +52,7 @@ void EncodeFrequency(const GridLayout& layout, int count, const float* x, const 
   }
 }
 
-// kEncode, kEncodeBackward: the kernels of the hash grid.
+// kEncode, kEncodeBackward: the hash grid kernels.
 template <class Wide, auto kEncode>
 void EncodeGeneral(const GridLayout& layout, const float* table, int count, const float* x, const float* y,
                    const float* z, float* features) {
@@ -66,13 +66,13 @@ void EncodeGeneral(const GridLayout& layout, const float* table, int count, cons
 template <auto kEncodeBackward>
 void EncodeBackwardGeneral(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
                            const float* d_features, float* gradient) {
-  if (layout.octaves > 0) return;  // nothing in it is learned
+  if (layout.octaves > 0) return;  // it has no learned parameters
   kEncodeBackward(layout, count, x, y, z, d_features, gradient);
 }
 
 // ---------------------------------------------------------------------------------------------------------------- MLP
 
-// The activations of a block of samples, layer by layer: [kMaxHiddenLayers][kDeepBlock][hidden].
+// Activations of a block of samples: [kMaxHiddenLayers][kDeepBlock][hidden].
 inline constexpr int kDeepBlock = 48;
 struct DeepActivations {
   alignas(64) float values[kMaxHiddenLayers * kDeepBlock * kMaxDeepWidth];
@@ -99,8 +99,8 @@ void DeepForward(const MlpWeights& mlp, int count, const float* features, float*
   }
 }
 
-// Computes the activations once more: those of all layers and samples of a chunk would not stay in the cache, and
-// about half of the samples need no backward pass.
+// Recomputes the activations: those of all layers and samples of a chunk would not fit into the cache, and about half
+// of the samples need no backward pass.
 template <class Wide>
 void DeepBackward(const MlpWeights& mlp, int count, float* features, float* /*hidden*/, const float* d_raw,
                   float* gradient) {
@@ -125,7 +125,7 @@ void DeepBackward(const MlpWeights& mlp, int count, float* features, float* /*hi
   }
 }
 
-// `fast` with the general table of the same instructions beside it. To be called once per instruction set.
+// Returns `fast` with a pointer to the general table of the same instruction set. Call once per instruction set.
 template <class Wide, class Output, auto kEncode, auto kEncodeBackward>
 KernelTable WithGeneralKernels(KernelTable fast) {
   static KernelTable general = fast;

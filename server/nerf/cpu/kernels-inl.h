@@ -1,5 +1,5 @@
-// The inner loops as templates over lane types: memory and loops here, formulas in math/. Included by plain_kernels.cc
-// with floats and by simd_kernels.cc once per instruction set with vectors.
+// The inner loops as templates over lane types: memory and loops; the formulas are in math/. Included by
+// plain_kernels.cc with floats and by simd_kernels.cc once per instruction set with vectors.
 #include <algorithm>
 #include <cstring>
 
@@ -10,7 +10,10 @@
 #include "server/nerf/math/composite.h"
 #include "server/nerf/math/dense.h"
 #include "server/nerf/math/hash_grid.h"
+#include "server/nerf/math/losses.h"
 #include "server/nerf/math/ray.h"
+#include "server/nerf/math/sample_budget.h"
+#include "server/nerf/math/sampling.h"
 
 #if defined(ROMAP_NERF_CPU_KERNELS_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef HWY_TARGET_TOGGLE
@@ -23,35 +26,16 @@ ROMAP_MATH_BEGIN
 
 // ----------------------------------------------------------------------------------------------------------- sampling
 
-// A ray in cells of the occupancy grid.
-template <class Wide>
-struct RayInCells {
-  Wide origin[3], direction[3];
-
-  RayInCells(const Ray& ray, const SamplingRule& rule) {
-    for (int a = 0; a < 3; ++a) {
-      const float cells_per_unit = kOccupancyResolution / rule.extent[a];
-      origin[a] = Lane<Wide>::Set(ray.origin[a] * cells_per_unit);
-      direction[a] = Lane<Wide>::Set(ray.direction[a] * cells_per_unit);
-    }
-  }
-  typename Lane<Wide>::Int CellAt(Wide t) const {
-    return CellIndex(MulAdd(direction[0], t, origin[0]), MulAdd(direction[1], t, origin[1]),
-                     MulAdd(direction[2], t, origin[2]), kOccupancyResolution);
-  }
-};
-
-// The occupied ones of the kRayProbes equal pieces, `piece` long, of a ray from `entry` on: their numbers, ascending,
-// in occupied[kRayProbes + kMaxLanes]; returns how many. A piece, which is at most 1.8 cells long, counts as occupied
-// when the cell in its middle is.
+// Finds the occupied pieces of a ray (math/sampling.h), of length `piece` from `entry` on: their numbers, ascending, in
+// occupied[kRayProbes + kMaxLanes]. Returns how many there are.
 template <class Wide>
 int FindOccupied(const RayInCells<Wide>& ray, const SamplingRule& rule, float entry, float piece, float* occupied) {
   using L = Lane<Wide>;
   int count = 0;
   for (int i = 0; i < kRayProbes; i += L::kLanes) {
     const Wide number = L::Iota() + L::Set(static_cast<float>(i));
-    if (rule.skip_empty) {
-      const auto cell = ray.CellAt(MulAdd(number + L::Set(0.5f), L::Set(piece), L::Set(entry)));
+    if (rule.budget.skip_empty) {
+      const auto cell = ray.CellAt(PieceCenter(number, L::Set(piece), L::Set(entry)));
       const auto word = L::Gather(rule.occupied_bits, L::WordOfBit(cell));
       count += L::StoreWhereBit(number, word, cell, occupied + count);
     } else {
@@ -62,7 +46,7 @@ int FindOccupied(const RayInCells<Wide>& ray, const SamplingRule& rule, float en
   return count;
 }
 
-// Spreads `count` samples evenly over the occupied pieces of a ray, as if these were one stretch.
+// Spreads `count` samples evenly over the occupied pieces of a ray, as if these were joined into one segment.
 template <class Wide>
 void SpreadSamples(const Ray& ray, const RayInCells<Wide>& in_cells, const SamplingRule& rule, float entry, float piece,
                    const float* occupied, int occupied_count, int count, SampleChunk& chunk) {
@@ -73,17 +57,16 @@ void SpreadSamples(const Ray& ray, const RayInCells<Wide>& in_cells, const Sampl
     const int to = chunk.size + i;
     const Wide number = L::Iota() + L::Set(static_cast<float>(i) + ray.jitter);
     const Wide at = number * L::Set(pieces_per_sample);
-    const Wide passed = Min(Floor(at), last_piece);  // occupied pieces before the one that holds the sample
-    const Wide place = L::Gather(occupied, L::WholeToInt(passed)) + (at - passed);
-    const Wide t = MulAdd(place, L::Set(piece), L::Set(entry));
+    const Wide joined = JoinedPieceAt(at, last_piece);
+    const Wide pieces = L::Gather(occupied, L::WholeToInt(joined)) + (at - joined);
+    const Wide t = PositionOnRay(pieces, L::Set(piece), L::Set(entry));
     L::Store(t, chunk.t.data() + to);
     L::Store(L::Set(piece * pieces_per_sample), chunk.length.data() + to);
     L::StoreInt(in_cells.CellAt(t), chunk.cell.data() + to);
     float* const position[3] = {chunk.x.data() + to, chunk.y.data() + to, chunk.z.data() + to};
     for (int a = 0; a < 3; ++a) {
-      // Rounding may put a point a hair outside the box; the encoding wants it inside.
-      const Wide p = MulAdd(L::Set(ray.direction[a]), t, L::Set(ray.origin[a]));
-      L::Store(Min(Max(p, L::Zero()), L::Set(rule.extent[a])), position[a]);
+      L::Store(SampleCoordinate(L::Set(ray.origin[a]), L::Set(ray.direction[a]), t, L::Set(rule.extent[a])),
+               position[a]);
     }
   }
 }
@@ -97,12 +80,10 @@ void PlaceSamples(const Ray* rays, int ray_count, const SamplingRule& rule, Samp
     float entry, exit;
     if (!IntersectBox(ray.origin, ray.direction, rule.extent.data(), entry, exit)) continue;
     const float piece = (exit - entry) / kRayProbes;
-    const RayInCells<Wide> in_cells(ray, rule);
+    const RayInCells<Wide> in_cells(ray, rule.extent.data());
     const int occupied_count = FindOccupied(in_cells, rule, entry, piece, occupied);
-    const float stretch = piece * static_cast<float>(occupied_count);
-    if (!(stretch > 1e-6f)) continue;
-    const int wanted = static_cast<int>(stretch / rule.finest_step) + 1;
-    const int count = rule.skip_empty ? std::clamp(wanted, rule.min_samples, rule.max_samples) : rule.max_samples;
+    const int count = SampleCount(rule.budget, piece * static_cast<float>(occupied_count));
+    if (count == 0) continue;
     SpreadSamples(ray, in_cells, rule, entry, piece, occupied, occupied_count, count, chunk);
     spans[r].count = count;
     chunk.size += count;
@@ -123,7 +104,7 @@ void ToGrid(const GridPose& pose, int count, float* x, float* y, float* z) {
   }
 }
 
-// One level after the other, as the formulas have it. Vector targets have their own form in vector_encode-inl.h.
+// The plain form, one level after the other. Vector targets use vector_encode-inl.h instead.
 
 inline GridCell<float> LocateOnLevel(const GridLayout& layout, int level, float x, float y, float z) {
   return LocateCell(x, y, z, layout.scale[level], layout.stride_y[level], layout.stride_z[level], layout.mask[level],
@@ -153,7 +134,7 @@ inline void EncodeBackward(const GridLayout& layout, int count, const float* x, 
 
 // ---------------------------------------------------------------------------------------------------------------- MLP
 
-// out[rows][n] = a[rows][k_count] b[k_count][n], in register tiles.
+// out[rows][n] = a[rows][k_count] b[k_count][n], computed in register tiles.
 template <class F, DenseMode kMode, int kRows, int kGroups>
 void DenseInTiles(int rows, const float* a, int k_count, const float* b, int n, float* out) {
   constexpr int kColumns = kGroups * Lane<F>::kLanes;
@@ -195,9 +176,9 @@ void Outer(int samples, const float* a, int k_count, const float* b, int n, floa
   }
 }
 
-inline constexpr int kMlpBlock = 96;  // samples whose activations stay in the first-level cache
+inline constexpr int kMlpBlock = 96;  // samples whose activations fit into the L1 cache
 
-// The output layer as a product like any other.
+// The output layer as an ordinary product.
 struct OutputByRows {
   static void Run(const MlpWeights& mlp, int samples, const float* hidden, float* raw) {
     Dense<float, DenseMode::kLinear>(samples, hidden, mlp.hidden, mlp.out_transposed.data(), kOutputs, raw);
@@ -258,20 +239,20 @@ inline void Composite(const Ray* rays, const RaySpan* spans, int ray_count, cons
     if (spans[r].count == 0) continue;
     const int at = spans[r].first;
     results[r] =
-        CompositeForward(SamplesOf(spans[r], c), rays[r].target, weights, c.weight.data() + at, c.behind.data() + at);
+        CompositeForward(SamplesOf(spans[r], c), rays[r].target.depth, c.weight.data() + at, c.behind.data() + at);
   }
   for (int r = 0; r < ray_count; ++r) {
     if (spans[r].count == 0) continue;
-    RayTarget target = rays[r].target;
+    const RayTarget& target = rays[r].target;
     const int partner = r + target.partner;
-    if (partner != r && partner >= 0 && partner < ray_count && spans[partner].count > 0) {
-      float error[3], partner_error[3];
-      ColorError(results[r], target, weights, error);
-      ColorError(results[partner], rays[partner].target, weights, partner_error);
-      target = ContrastTarget(target, weights, error, partner_error, results[r]);
-    }
+    const bool has_partner = partner != r && partner >= 0 && partner < ray_count && spans[partner].count > 0;
+    float partner_error[3];
+    if (has_partner) ColorError(results[partner], rays[partner].target, weights, partner_error);
+    const RayLoss loss = LossOfRay(results[r], target, weights, has_partner ? partner_error : nullptr);
+    results[r].loss = loss.value;
+    results[r].color_loss = loss.color;
     const int at = spans[r].first;
-    CompositeBackward(SamplesOf(spans[r], c), target, weights, results[r], c.weight.data() + at, c.behind.data() + at,
+    CompositeBackward(SamplesOf(spans[r], c), target.depth, loss, c.weight.data() + at, c.behind.data() + at,
                       c.d_raw.data() + kOutputs * at);
   }
 }
@@ -283,9 +264,9 @@ int KeepActive(float cut, float scale, int features, int hidden, SampleChunk& c)
   for (int i = 0; i < c.size; i += L::kLanes) {
     Wide red, green, blue, density;
     L::Load4(c.d_raw.data() + kOutputs * i, red, green, blue, density);
-    // What lies behind the last sample is of no size.
-    const Wide sum = L::FirstLanes(c.size - i, Abs(red) + Abs(green) + Abs(blue) + Abs(density));
-    active += L::StoreWhereGreater(sum, L::Set(cut), L::IotaInt(static_cast<uint32_t>(i)), c.active.data() + active);
+    // Lanes after the last sample are excluded.
+    const Wide size = L::FirstLanes(c.size - i, GradientSize(red, green, blue, density));
+    active += L::StoreWhereGreater(size, L::Set(cut), L::IotaInt(static_cast<uint32_t>(i)), c.active.data() + active);
   }
   const auto move_row = [](float* rows, int width, uint32_t from, int to) {
     for (int f = 0; f < width; f += L::kLanes) L::Store(L::Load(rows + from * width + f), rows + to * width + f);
@@ -309,7 +290,7 @@ void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, f
   for (size_t i = begin; i < end; i += L::kLanes) {
     Wide gradient = L::Load(gradients[0] + i);
     for (int g = 1; g < gradient_count; ++g) gradient = gradient + L::Load(gradients[g] + i);
-    if (L::AllZero(gradient)) continue;  // most entries of the fine levels, at any one step
+    if (L::AllZero(gradient)) continue;  // true for most entries of the fine levels in any one step
     for (int g = 0; g < gradient_count; ++g) L::Store(L::Zero(), gradients[g] + i);
     Wide p = L::Load(parameters + i), m = L::Load(first + i), v = L::Load(second + i);
     AdamUpdate(gradient, rates, p, m, v);
@@ -319,7 +300,7 @@ void Adam(const AdamRates& rates, size_t begin, size_t end, float* parameters, f
   }
 }
 
-// Wide: as many lanes as there are. Output: of the MLP.
+// Wide: the lane type of this instruction set. Output: computes the output layer of the MLP.
 template <class Wide, class Output>
 KernelTable MakeKernelTable(const char* name) {
   return {.name = name,
@@ -330,8 +311,8 @@ KernelTable MakeKernelTable(const char* name) {
           .mlp_forward = MlpForward<Wide, Output>,
           .mlp_backward = MlpBackward<Wide>,
           .activate = Activate<Wide>,
-          .distance_opacity = PassThroughDistances<Wide>,
-          .distance_backward = PassThroughDistancesBackward,
+          .distance_opacity = DistanceOpacity<Wide>,
+          .distance_backward = DistanceOpacityBackward,
           .composite = Composite,
           .keep_active = KeepActive<Wide>,
           .adam = Adam<Wide>};

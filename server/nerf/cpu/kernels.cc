@@ -5,7 +5,7 @@ namespace romap::nerf {
 SampleChunk::SampleChunk(int capacity_, int feature_count, int hidden_width) : capacity(capacity_) {
   const size_t n = static_cast<size_t>(capacity + kMaxLanes);
   for (AlignedBuffer<float>* array :
-       {&x, &y, &z, &t, &length, &red, &green, &blue, &density, &alpha, &light, &weight, &behind}) {
+       {&x, &y, &z, &t, &length, &red, &green, &blue, &density, &alpha, &transmittance, &weight, &behind}) {
     *array = AlignedBuffer<float>(n);
   }
   cell = AlignedBuffer<uint32_t>(n);

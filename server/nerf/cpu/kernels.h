@@ -4,55 +4,55 @@
 #include <cstdint>
 #include <string>
 
-#include "server/nerf/cpu/field_model.h"
+#include "server/nerf/math/loss_weights.h"
+#include "server/nerf/math/sample_budget.h"
 #include "server/nerf/math/types.h"
+#include "server/nerf/model/field_model.h"
 
 namespace romap::nerf {
 
-// Widest vector any kernel uses, in floats. Arrays handed to kernels have this many readable and writable values behind
-// their last sample; kernels work in whole vectors.
+// Widest vector of any kernel, in floats. Arrays passed to kernels have this many readable and writable values after
+// their last sample, because kernels process whole vectors.
 inline constexpr int kMaxLanes = 16;
 
+// Where rays are sampled, and how densely.
 struct SamplingRule {
   const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
   std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
-  float finest_step = 0.01f;                // samples are not set closer than this, down to min_samples
-  int min_samples = 4;
-  int max_samples = 16;
-  bool skip_empty = true;  // false: max_samples between entry and exit of the box
+  SampleBudget budget;
 };
 
-// Sample arrays of one chunk of rays, reused from chunk to chunk. `size` samples are in use.
+// Sample arrays of one chunk of rays, reused for every chunk. The first `size` samples are in use.
 struct SampleChunk {
   SampleChunk(int capacity, int features, int hidden);
 
   int capacity;
   int size = 0;
-  AlignedBuffer<float> x, y, z;           // Unit space of the box, then of the grid
-  AlignedBuffer<float> t, length;         // along the ray and step, units of box side
+  AlignedBuffer<float> x, y, z;           // in Unit space of the box; after to_grid, of the grid
+  AlignedBuffer<float> t, length;         // along the ray, and of the step; units of box side
   AlignedBuffer<uint32_t> cell;           // of the occupancy grid
-  AlignedBuffer<float> features;          // [capacity][features]; backward: their gradient
+  AlignedBuffer<float> features;          // [capacity][features]; after the backward pass their gradient
   AlignedBuffer<float> hidden;            // [capacity][hidden]
   AlignedBuffer<float> raw;               // [capacity][kOutputs], before activation
   AlignedBuffer<float> d_raw;             // [capacity][kOutputs]
   AlignedBuffer<float> red, green, blue;  // 0..1
   AlignedBuffer<float> density, alpha;    // per box side; opacity of the step
-  AlignedBuffer<float> light;             // of signed-distance fields: see LightAtRaw
+  AlignedBuffer<float> transmittance;     // of signed-distance fields: see TransmittanceAtRaw
   AlignedBuffer<float> weight, behind;    // see CompositeForward
-  AlignedBuffer<uint32_t> active;         // numbers of the samples that keep_active chose
+  AlignedBuffer<uint32_t> active;         // indices of the samples that keep_active kept
 };
 
-// The inner loops, one table per instruction set and one in plain floats. All arrays are aligned to 64 bytes.
+// The inner loops: one table per instruction set, and one in plain floats. All arrays are aligned to 64 bytes.
 struct KernelTable {
   std::string name;
 
   // Places samples on `rays` and appends them to `chunk` (x, y, z, t, length, cell); `spans` has one entry per ray.
   void (*place_samples)(const Ray* rays, int ray_count, const SamplingRule& rule, SampleChunk& chunk, RaySpan* spans);
 
-  // Moves points from the Unit space of the box to that of the grid.
+  // Transforms points from the Unit space of the box to that of the grid.
   void (*to_grid)(const GridPose& pose, int count, float* x, float* y, float* z);
 
-  // features[count][layout.features] of points in the grid's Unit space.
+  // features[count][layout.features] of points in Unit space of the grid.
   void (*encode)(const GridLayout& layout, const float* table, int count, const float* x, const float* y,
                  const float* z, float* features);
   // Adds to gradient[entries][2].
@@ -61,34 +61,36 @@ struct KernelTable {
 
   // hidden[count][hidden] after ReLU, raw[count][kOutputs] without density bias.
   void (*mlp_forward)(const MlpWeights& mlp, int count, const float* features, float* hidden, float* raw);
-  // Adds to gradient (laid out as MlpWeights::parameters). Overwrites `features` with their gradient and `hidden`.
+  // Adds to gradient (same layout as MlpWeights::parameters). Overwrites `features` with their gradient, and `hidden`.
   void (*mlp_backward)(const MlpWeights& mlp, int count, float* features, float* hidden, const float* d_raw,
                        float* gradient);
 
   // raw, length -> red, green, blue, density, alpha of the chunk's samples.
   void (*activate)(SampleChunk& chunk, float density_bias);
 
-  // What activate does for density, for signed distances; to be called behind it. Opacities come of neighbouring
-  // samples (see math/signed_distance.h), and density and length are set to 1: d_raw of `composite` is then the
-  // derivative by the optical depth of a sample's stretch, which distance_backward turns into that by the raw output.
+  // Opacities of signed-distance fields; call after `activate`. They depend on adjacent samples
+  // (math/signed_distance.h). Density and length are set to 1, so that d_raw from `composite` is the derivative with
+  // respect to the optical depth in front of a sample; distance_backward converts it to the derivative with respect to
+  // the raw output.
   void (*distance_opacity)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
   void (*distance_backward)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
 
-  // Renders rays and their adjoint (see math/composite.h): weight, behind and d_raw of the chunk's samples, and
-  // `results`, one per ray; rays without samples keep theirs. A ray whose partner is not among them, or has no samples,
-  // has none.
+  // Renders rays, computes their losses, and the adjoint of both (math/composite.h, math/losses.h): weight, behind and
+  // d_raw of the samples in the chunk, and `results`, one per ray, unchanged for rays without samples. A ray whose
+  // partner is not in the chunk or has no samples is treated as a ray without a partner.
   void (*composite)(const Ray* rays, const RaySpan* spans, int ray_count, const LossWeights& weights,
                     SampleChunk& chunk, RayResult* results);
 
-  // Moves the samples whose |d_raw| sums to more than `cut` to the front, in their order: x, y, z, features, hidden and
-  // d_raw, this multiplied by `scale`. Returns how many they are; the arrays behind them are left in no order.
+  // Moves the samples with a GradientSize of d_raw above `cut` to the front, in their order: x, y, z, features, hidden
+  // and d_raw, which is also multiplied by `scale`. Returns their number; the contents after them are unspecified.
   int (*keep_active)(float cut, float scale, int features, int hidden, SampleChunk& chunk);
 
-  // Sums `gradient_count` gradient arrays, zeroes them, and updates parameters [begin, end), multiples of kMaxLanes.
+  // Sums `gradient_count` gradient arrays, zeroes them, and updates parameters [begin, end), both multiples of
+  // kMaxLanes.
   void (*adam)(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
                float* const* gradients, int gradient_count);
 
-  // The same for every encoding and depth of MLP; null where this is that table. `hidden` of its MLP kernels is unused.
+  // The table for all encodings and MLP depths; null in that table itself. Its MLP kernels do not use `hidden`.
   const KernelTable* general = nullptr;
 
   // The table that can run `model`.
@@ -96,7 +98,7 @@ struct KernelTable {
 };
 
 const KernelTable& PlainKernels();
-// The best instruction set of this machine (Highway's dynamic dispatch).
+// The table for the best instruction set of this machine (Highway's dynamic dispatch).
 const KernelTable& SimdKernels();
 
 }  // namespace romap::nerf

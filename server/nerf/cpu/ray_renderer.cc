@@ -3,13 +3,15 @@
 #include <algorithm>
 
 #include "server/nerf/math/composite.h"
+#include "server/nerf/math/losses.h"
+#include "server/nerf/model/step_parameters.h"
 
 namespace romap::nerf {
 namespace {
 
 constexpr int kChunkSamples = 1024;
 
-// Rays of one chunk, whose samples are placed and evaluated.
+// Appends the results of the rays of one chunk, whose samples have been placed and evaluated.
 void Composite(std::span<const Ray> rays, std::span<const RaySpan> spans, SampleChunk& c,
                std::vector<RayResult>& results) {
   for (size_t r = 0; r < rays.size(); ++r) {
@@ -17,8 +19,10 @@ void Composite(std::span<const Ray> rays, std::span<const RaySpan> spans, Sample
     const RaySamples samples{spans[r].count,        c.t.data() + at,
                              c.length.data() + at,  c.alpha.data() + at,
                              c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
-    results.push_back(
-        plain::CompositeForward(samples, rays[r].target, LossWeights{}, c.weight.data() + at, c.behind.data() + at));
+    const RayTarget& target = rays[r].target;
+    RayResult result = plain::CompositeForward(samples, target.depth, c.weight.data() + at, c.behind.data() + at);
+    result.color_loss = plain::LossOfRay(result, target, LossWeights{}, nullptr).color;
+    results.push_back(result);
   }
 }
 
@@ -27,12 +31,8 @@ void Composite(std::span<const Ray> rays, std::span<const RaySpan> spans, Sample
 std::vector<RayResult> RenderRays(const FieldModel& model, const NerfConfig& config, const RenderSpace& space,
                                   std::span<const Ray> rays) {
   const KernelTable& kernels = SimdKernels();
-  const SamplingRule rule{.occupied_bits = space.occupied_bits,
-                          .extent = space.extent,
-                          .finest_step = static_cast<float>(config.min_sample_spacing),
-                          .min_samples = std::min(config.min_samples_per_ray, config.max_samples_per_ray),
-                          .max_samples = config.max_samples_per_ray,
-                          .skip_empty = config.sampling == "occupied"};
+  const SamplingRule rule{
+      .occupied_bits = space.occupied_bits, .extent = space.extent, .budget = MakeSampleBudget(config)};
   const size_t chunk_rays = static_cast<size_t>(kChunkSamples / config.max_samples_per_ray);
   SampleChunk chunk(kChunkSamples, model.layout.features, model.mlp.hidden);
   std::vector<RaySpan> spans(chunk_rays);

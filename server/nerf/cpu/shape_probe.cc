@@ -5,15 +5,16 @@
 
 #include "server/nerf/math/random.h"
 #include "server/nerf/math/signed_distance.h"
+#include "server/nerf/model/step_parameters.h"
 
 namespace romap::nerf {
 namespace {
 
-constexpr int kMostPlaces = 200;          // of a chunk
-constexpr float kShareOfRays = 0.25f;     // each costs as much as five samples
-constexpr float kShareOfAnyPlace = 0.5f;  // the others are where the surface is
+constexpr int kMaxChosen = 200;            // samples per chunk
+constexpr float kShareOfRays = 0.25f;      // a chosen sample costs as much as five ordinary ones
+constexpr float kShareOfAnySample = 0.5f;  // the other choices are the sample nearest to the surface
 
-int SampleOfMostWeight(const SampleChunk& samples, const RaySpan& span) {
+int SampleOfLargestWeight(const SampleChunk& samples, const RaySpan& span) {
   const float* weight = samples.weight.data() + span.first;
   return static_cast<int>(std::max_element(weight, weight + span.count) - weight);
 }
@@ -21,18 +22,18 @@ int SampleOfMostWeight(const SampleChunk& samples, const RaySpan& span) {
 }  // namespace
 
 ShapeProbe::ShapeProbe(const NerfConfig& config, const FieldModel& model)
-    : weights_{static_cast<float>(config.eikonal_weight), static_cast<float>(config.curvature_weight)},
-      points_(kMostPlaces * kStencilPoints, model.layout.features, model.mlp.hidden) {}
+    : weights_(MakeShapeWeights(config)),
+      points_(kMaxChosen * kStencilPoints, model.layout.features, model.mlp.hidden) {}
 
-void ShapeProbe::Choose(const SampleChunk& samples, std::span<const RaySpan> spans, float spacing, uint64_t key) {
+void ShapeProbe::ChoosePoints(const SampleChunk& samples, std::span<const RaySpan> spans, float spacing, uint64_t key) {
   points_.size = 0;
   for (size_t r = 0; r < spans.size(); ++r) {
     const RaySpan& span = spans[r];
     if (points_.size == points_.capacity || span.count == 0) continue;
     const auto random = [&](uint64_t of) { return RandomUniform(key, r, of); };
     if (random(0) >= kShareOfRays) continue;
-    const int sample = random(1) < kShareOfAnyPlace ? static_cast<int>(random(2) * static_cast<float>(span.count))
-                                                    : SampleOfMostWeight(samples, span);
+    const int sample = random(1) < kShareOfAnySample ? static_cast<int>(random(2) * static_cast<float>(span.count))
+                                                     : SampleOfLargestWeight(samples, span);
     const size_t from = static_cast<size_t>(span.first + sample);
     const std::array<float, 3> at = {samples.x[from], samples.y[from], samples.z[from]};
     const std::array<float*, 3> to = {points_.x.data(), points_.y.data(), points_.z.data()};
@@ -47,7 +48,7 @@ void ShapeProbe::Choose(const SampleChunk& samples, std::span<const RaySpan> spa
 void ShapeProbe::AddGradients(const FieldModel& model, const KernelTable& kernels, const SampleChunk& samples,
                               std::span<const RaySpan> spans, float spacing, uint64_t key, float scale,
                               float* table_gradient, float* mlp_gradient) {
-  Choose(samples, spans, spacing, key);
+  ChoosePoints(samples, spans, spacing, key);
   SampleChunk& p = points_;
   if (p.size == 0) return;
   kernels.encode(model.layout, model.table.data(), p.size, p.x.data(), p.y.data(), p.z.data(), p.features.data());

@@ -3,29 +3,30 @@
 #include <cstdint>
 #include <span>
 
-#include "server/nerf/cpu/field_model.h"
 #include "server/nerf/cpu/kernels.h"
+#include "server/nerf/model/field_model.h"
 #include "server/nerf/nerf_config.h"
 
 namespace romap::nerf {
 
-// Looks at the shape of a signed-distance field where rays were sampled, and adds the gradients of ShapeLoss. One
-// thread at a time.
+// Evaluates the shape of a signed-distance field near samples of rays and adds the gradients of ShapeLoss. Not
+// thread-safe.
 class ShapeProbe {
  public:
   ShapeProbe(const NerfConfig& config, const FieldModel& model);
 
-  // At a sample of some of the rays of a rendered chunk, half of the time of the one of most weight. `spacing` of the
-  // stencil in box sides; `key` makes the choice; `scale` multiplies the gradients.
+  // Evaluates one sample of a random subset of the rays of a rendered chunk: with equal probability any sample or the
+  // one of the largest weight. `spacing`: of the stencil, box sides; `key`: random seed; `scale`: factor of the
+  // gradients.
   void AddGradients(const FieldModel& model, const KernelTable& kernels, const SampleChunk& samples,
                     std::span<const RaySpan> spans, float spacing, uint64_t key, float scale, float* table_gradient,
                     float* mlp_gradient);
 
  private:
-  void Choose(const SampleChunk& samples, std::span<const RaySpan> spans, float spacing, uint64_t key);
+  void ChoosePoints(const SampleChunk& samples, std::span<const RaySpan> spans, float spacing, uint64_t key);
 
   ShapeWeights weights_;
-  SampleChunk points_;  // kStencilPoints for each place
+  SampleChunk points_;  // kStencilPoints per chosen sample
 };
 
 }  // namespace romap::nerf

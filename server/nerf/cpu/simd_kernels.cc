@@ -1,4 +1,4 @@
-// SSE4, AVX2, AVX-512, and plain floats for machines older than those.
+// SSE4, AVX2, AVX-512, and plain floats for older machines.
 #define HWY_DISABLED_TARGETS HWY_SSSE3
 #define ROMAP_MATH_SIMD
 

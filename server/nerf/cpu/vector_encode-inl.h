@@ -1,6 +1,6 @@
-// The hash grid's encoding and its adjoint with several levels of a point in one vector: the formulas of
-// math/hash_grid.h, of which InterpolateCell and ScatterCell take one level at a time. Included once per instruction
-// set, behind ROMAP_MATH_SIMD and vector_lane-inl.h.
+// The hash grid encoding and its adjoint with several levels of a point in one vector. The formulas are those of
+// InterpolateCell and ScatterCell (math/hash_grid.h), which process one level at a time. Included once per instruction
+// set, after ROMAP_MATH_SIMD and vector_lane-inl.h.
 #include <algorithm>
 #include <atomic>
 
@@ -18,8 +18,8 @@
 
 ROMAP_MATH_BEGIN
 
-// The cells of some points on all levels. They go through memory on purpose: taking indices out of vector registers one
-// by one costs more than loading them, and the loads from the table of many points are then in flight at a time.
+// The cells of a block of points on all levels. They are stored to memory on purpose: extracting indices from vector
+// registers one by one is slower than loading them, and table loads of many points can then overlap.
 struct CellBlock {
   static constexpr int kPoints = 16;
   alignas(64) uint32_t pair[kPoints][4][kMaxLevels];
@@ -27,7 +27,7 @@ struct CellBlock {
   alignas(64) float along_x[kPoints][kMaxLevels];
 };
 
-// Fills in `count` (<= kPoints) points on all levels, rounded up to whole vectors V and to whole CellVectors.
+// Fills in `count` (<= kPoints) points on all levels, padded to whole vectors V and to whole CellVectors.
 template <class V>
 HWY_INLINE void LocateCells(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
                             CellBlock& cells) {
@@ -46,7 +46,7 @@ HWY_INLINE void LocateCells(const GridLayout& layout, int count, const float* x,
       L::Store(cell.along_x, cells.along_x[i] + level);
     }
   }
-  // Levels that do not exist have no say.
+  // Padding levels get weight 0.
   for (int level = layout.levels; level % L::kLanes != 0; ++level) {
     for (int i = 0; i < count; ++i) {
       for (int c = 0; c < 4; ++c) cells.weight[i][c][level] = 0.0f;
@@ -54,7 +54,7 @@ HWY_INLINE void LocateCells(const GridLayout& layout, int count, const float* x,
   }
 }
 
-// The pairs of entries of as many levels as D has groups of four lanes, side by side.
+// The pairs of entries of consecutive levels, one level per group of four lanes of D.
 template <class D>
 HWY_INLINE hn::VFromD<D> LoadPairs(D d, const float* table, const uint32_t* pair) {
   if constexpr (Lane<hn::VFromD<D> >::kLanes == 4) {
@@ -66,7 +66,7 @@ HWY_INLINE hn::VFromD<D> LoadPairs(D d, const float* table, const uint32_t* pair
   }
 }
 
-// Adds to each of these pairs, one after the other: they may be the same.
+// Adds to each of these pairs in sequence, because they may be identical.
 template <class D>
 HWY_INLINE void AddToPairs(D d, float* table, const uint32_t* pair, hn::VFromD<D> v) {
   if constexpr (Lane<hn::VFromD<D> >::kLanes == 4) {
@@ -80,7 +80,7 @@ HWY_INLINE void AddToPairs(D d, float* table, const uint32_t* pair, hn::VFromD<D
   }
 }
 
-// From where each lane of a vector is taken: first + from(lane).
+// Source of each lane in a table lookup: first + from(lane).
 struct LaneSources {
   template <class From>
   constexpr LaneSources(int first, const From& from) {
@@ -89,7 +89,7 @@ struct LaneSources {
   alignas(64) int32_t lane[kMaxLanes] = {};
 };
 
-// 2 kCells neighbouring levels of one point in two vectors, four floats a level: those of its pair of entries (see
+// 2 kCells consecutive levels of one point in two vectors, four floats per level: its pair of entries (see
 // math/hash_grid.h).
 struct CellVectors {
   using D = hn::CappedTag<float, kMaxLanes>;
@@ -99,13 +99,13 @@ struct CellVectors {
   static constexpr int kLevels = 2 * kCells;
   V low, high;
 
-  // Value k of p[kLevels] to all four floats of level k. Loads no more than these: a load that reaches beyond what one
-  // store wrote would wait for that store to leave the core.
+  // Broadcasts p[k], k < kLevels, to all four floats of level k. Loads exactly these values: a load wider than the
+  // preceding store defeats store forwarding and stalls.
   static HWY_INLINE CellVectors Spread(const float* p) {
     static constexpr LaneSources kLow(0, [](int i) { return i / 4; }), kHigh(kCells, [](int i) { return i / 4; });
     return Pick(hn::ZeroExtendVector(D(), hn::LoadU(hn::Half<D>(), p)), kLow, kHigh);
   }
-  // Values 2k and 2k + 1 of p[2 kLevels] to both halves of level k.
+  // Copies p[2k] and p[2k + 1] to both halves of level k.
   static HWY_INLINE CellVectors Twice(const float* p) {
     constexpr auto kFrom = [](int i) { return i / 4 * 2 + i % 2; };
     static constexpr LaneSources kLow(0, kFrom), kHigh(2 * kCells, kFrom);
@@ -123,14 +123,14 @@ struct CellVectors {
   HWY_INLINE CellVectors Plus(const CellVectors& a, const CellVectors& b) const {
     return {hn::MulAdd(a.low, b.low, low), hn::MulAdd(a.high, b.high, high)};
   }
-  // Times 1 - s in the lower half of each level, times s in the upper half.
-  HWY_INLINE CellVectors TimesShares(const CellVectors& s) const {
+  // Multiplies the lower half of each level by 1 - s, the upper half by s.
+  HWY_INLINE CellVectors TimesBlend(const CellVectors& s) const {
     alignas(64) static constexpr float kSign[16] = {-1, -1, 1, 1, -1, -1, 1, 1, -1, -1, 1, 1, -1, -1, 1, 1};
     alignas(64) static constexpr float kOne[16] = {1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0};
     const V sign = hn::Load(D(), kSign), one = hn::Load(D(), kOne);
     return {low * hn::MulAdd(s.low, sign, one), high * hn::MulAdd(s.high, sign, one)};
   }
-  // Lower half + (upper half - lower half) s of each level, two values: p[2 kLevels].
+  // p[2k], p[2k + 1] = lower half + (upper half - lower half) s of level k.
   HWY_INLINE void StoreBlend(const CellVectors& s, float* p) const {
     const hn::RepartitionToWide<D> d_pair;
     const V blend_low = hn::MulAdd(hn::Shuffle1032(low) - low, s.low, low);
@@ -146,7 +146,7 @@ struct CellVectors {
   }
 };
 
-// Vectors no wider than the levels there are.
+// Uses the narrower vectors if they hold all levels.
 template <class Narrow, class Wide>
 HWY_NOINLINE void LocateBlock(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
                               CellBlock& cells) {
@@ -168,7 +168,7 @@ void EncodeLevels(const GridLayout& layout, const float* table, int count, const
     LocateBlock<Narrow, Wide>(layout, n, x + begin, y + begin, z + begin, cells);
     for (int i = 0; i < n; ++i, features += layout.features) {
       for (int level = 0; level < layout.levels; level += C::kLevels) {
-        // Keeps the compiler from carrying cells over from turn to turn, in more registers than there are.
+        // Prevents the compiler from keeping cells of several iterations in registers, which would spill.
         std::atomic_signal_fence(std::memory_order_seq_cst);
         C sum = C::Load(table, cells.pair[i][0] + level).Times(C::Spread(cells.weight[i][0] + level));
         for (int c = 1; c < 4; ++c) {
@@ -192,7 +192,7 @@ void EncodeLevelsBackward(const GridLayout& layout, int count, const float* x, c
     for (int i = 0; i < n; ++i, d_features += layout.features) {
       for (int level = 0; level < layout.levels; level += C::kLevels) {
         std::atomic_signal_fence(std::memory_order_seq_cst);  // as above
-        const C d = C::Twice(d_features + kFeaturesPerLevel * level).TimesShares(C::Spread(cells.along_x[i] + level));
+        const C d = C::Twice(d_features + kFeaturesPerLevel * level).TimesBlend(C::Spread(cells.along_x[i] + level));
         for (int c = 0; c < 4; ++c) {
           d.Times(C::Spread(cells.weight[i][c] + level)).AddTo(gradient, cells.pair[i][c] + level);
         }

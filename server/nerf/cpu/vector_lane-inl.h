@@ -1,4 +1,4 @@
-// Highway vectors as lane types of the formulas (see math/lane.h). Included once per instruction set, behind
+// Highway vectors as lane types of the formulas (see math/lane.h). Included once per instruction set, after
 // ROMAP_MATH_SIMD and <hwy/highway.h>.
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
@@ -36,7 +36,7 @@ struct Lane {
   static HWY_INLINE void Load4(const float* p, V& a, V& b, V& c, V& d) { hn::LoadInterleaved4(D(), p, a, b, c, d); }
   static HWY_INLINE V Exp(V x) { return hn::Exp(D(), x); }
   static HWY_INLINE Int WholeToInt(V x) {
-    // 1.5 * 2^23 leaves no bits behind the point, and x in the lowest bits of the mantissa.
+    // Adding 1.5 * 2^23 leaves no fractional bits and puts x into the lowest bits of the mantissa.
     return hn::BitCast(DInt(), x + hn::Set(D(), 12582912.0f)) - SetInt(0x4b400000u);
   }
   static HWY_INLINE Int WordOfBit(Int bit) { return hn::ShiftRight<5>(bit); }

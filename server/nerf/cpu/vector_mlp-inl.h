@@ -1,8 +1,8 @@
-// The MLP's output layer with lanes over the hidden neurons. Included once per instruction set, behind ROMAP_MATH_SIMD
-// and vector_lane-inl.h.
-#include "server/nerf/cpu/field_model.h"
+// The output layer of the MLP with lanes over the hidden neurons. Included once per instruction set, after
+// ROMAP_MATH_SIMD and vector_lane-inl.h.
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/cpu/vector_lane-inl.h"
+#include "server/nerf/model/field_model.h"
 
 #if defined(ROMAP_NERF_CPU_VECTOR_MLP) == defined(HWY_TARGET_TOGGLE)
 #ifdef HWY_TARGET_TOGGLE
@@ -13,7 +13,7 @@
 
 ROMAP_MATH_BEGIN
 
-// Adds the groups of four lanes of a vector.
+// Sum of the groups of four lanes of a vector.
 template <class D>
 HWY_INLINE hn::Vec<hn::FixedTag<float, 4> > AddGroups(D d, hn::VFromD<D> v) {
   if constexpr (Lane<hn::VFromD<D> >::kLanes == 4) {
@@ -24,8 +24,8 @@ HWY_INLINE hn::Vec<hn::FixedTag<float, 4> > AddGroups(D d, hn::VFromD<D> v) {
   }
 }
 
-// Four outputs are too few for lanes of their own (see math/dense.h), so each output is a sum across lanes, and the
-// four sums of a sample share their additions.
+// Four outputs do not fill a vector (see math/dense.h), so each output is a sum across lanes; the four sums of a sample
+// share their additions.
 struct OutputAcrossLanes {
   static void Run(const MlpWeights& mlp, int samples, const float* hidden, float* raw) {
     using D = hn::CappedTag<float, kMaxLanes>;

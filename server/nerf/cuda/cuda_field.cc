@@ -4,11 +4,11 @@ namespace romap::nerf::cuda {
 
 absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
   if (model.mlp.hidden > kMaxHidden) {
-    return InvalidArgument("CUDA: a field with {} hidden neurons; at most {} are possible", model.mlp.hidden,
-                           kMaxHidden);
+    return InvalidArgument("CUDA supports at most {} hidden neurons, got {}", kMaxHidden, model.mlp.hidden);
   }
   if (model.NeedsGeneralKernels()) {
-    return InvalidArgument("CUDA: a frequency encoding or several hidden layers; a hash grid with one is possible");
+    return InvalidArgument("CUDA supports only a hash grid with one hidden layer, got {} octaves and {} hidden layers",
+                           model.layout.octaves, model.mlp.layers);
   }
   CudaField field;
   field.grid_ = model.layout;
@@ -22,7 +22,7 @@ absl::StatusOr<CudaField> CudaField::Create(const FieldModel& model) {
 absl::StatusOr<std::vector<float>> CudaField::Evaluate(std::span<const float> x, std::span<const float> y,
                                                        std::span<const float> z, MlpPath path) const {
   if (x.size() != y.size() || x.size() != z.size()) {
-    return InvalidArgument("CUDA: {} x, {} y and {} z coordinates; there must be as many of each", x.size(), y.size(),
+    return InvalidArgument("CUDA: x, y and z must have the same length, got {}, {} and {}", x.size(), y.size(),
                            z.size());
   }
   std::vector<float> value(x.size() * kOutputs);

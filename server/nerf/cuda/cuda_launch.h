@@ -1,9 +1,9 @@
 #pragma once
 
-// How this folder meets CUDA. Kernels are launched by ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream,
-// arguments...) and declare dynamic shared memory by ROMAP_DYNAMIC_SHARED(type, name). A program that runs them on the
-// host defines both, and what it needs of CUDA, before it includes the sources of this folder; everywhere else the real
-// CUDA is used.
+// The interface of this folder to CUDA. Kernels are launched by ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes,
+// stream, arguments...) and declare dynamic shared memory by ROMAP_DYNAMIC_SHARED(type, name). A program that runs them
+// on the host defines both macros and the CUDA functions it needs before it includes the sources of this folder;
+// otherwise the real CUDA is used.
 #ifndef ROMAP_LAUNCH
 
 #include <cuda_runtime.h>

@@ -1,18 +1,21 @@
 #pragma once
 
-#include <absl/status/statusor.h>
+#include <absl/status/status.h>
 
-#include <cstdint>
 #include <memory>
 
 #include "server/nerf/trainer.h"
 
 namespace romap::nerf::cuda {
 
-// A new field that is trained on the CUDA device, on the stream of the thread that calls Run(). Should the device fail,
-// it is marked unhealthy and the field goes on on the CPU from where the last Run() left it; while it has too little
-// memory, the CPU stands in. UNAVAILABLE, in one line: this build or machine has no CUDA, or the device failed before.
-// INVALID_ARGUMENT: a field that the kernels cannot hold.
-absl::StatusOr<std::unique_ptr<Trainer>> MakeCudaTrainer(const NerfConfig& config, uint64_t seed);
+// Whether fields of this configuration can be trained on the CUDA device. UNAVAILABLE: this build or machine has no
+// CUDA, or the device has failed; INVALID_ARGUMENT: the kernels do not support the configuration. The message is one
+// line.
+absl::Status Supports(const NerfConfig& config);
+
+// Trains the field of `cpu` on the CUDA device, on the stream of the thread that calls Run(). Requires
+// Supports(config). If the device fails, it is marked unhealthy, and `cpu` continues from the end of the last Run();
+// while the device has too little memory, `cpu` trains instead.
+std::unique_ptr<Trainer> MakeCudaTrainer(const NerfConfig& config, std::unique_ptr<Trainer> cpu);
 
 }  // namespace romap::nerf::cuda

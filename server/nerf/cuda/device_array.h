@@ -12,18 +12,29 @@
 
 namespace romap::nerf::cuda {
 
-// OK, or "CUDA: cannot <doing>: <CUDA's words>": RESOURCE_EXHAUSTED when memory is, which harms nobody else,
-// UNAVAILABLE for everything that leaves the device in doubt.
+// OK, or "CUDA: cannot <doing>: <message of CUDA>": RESOURCE_EXHAUSTED if the device is out of memory, which does not
+// affect other fields; UNAVAILABLE for all errors after which the device may be unusable.
 inline absl::Status ToStatus(cudaError_t error, const char* doing) {
   if (error == cudaSuccess) return absl::OkStatus();
-  cudaGetLastError();  // else the next launch would report this error once more
+  cudaGetLastError();  // clears the error, or the next launch would report it again
   const std::string what = fmt::format("CUDA: cannot {}: {}", doing, cudaGetErrorString(error));
   return error == cudaErrorMemoryAllocation ? absl::ResourceExhaustedError(what) : absl::UnavailableError(what);
 }
 
-// Owns an array in device memory, or one of the host's that devices copy from and to without detour.
+inline absl::Status CopyToDevice(void* to, const void* from, size_t bytes, cudaStream_t stream) {
+  return ToStatus(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream), "copy to the device");
+}
+inline absl::Status CopyToHost(void* to, const void* from, size_t bytes, cudaStream_t stream) {
+  return ToStatus(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream), "copy from the device");
+}
+inline absl::Status Synchronize(cudaStream_t stream) {
+  return ToStatus(cudaStreamSynchronize(stream), "train a field");
+}
+
+// Memory of an array: on the device, or page-locked on the host for direct copies by the device.
 enum class MemoryKind { kDevice, kPinned };
 
+// Owns an array.
 template <class T, MemoryKind kKind>
 class CudaArray {
  public:
@@ -39,7 +50,7 @@ class CudaArray {
     if (data_ != nullptr) kKind == MemoryKind::kDevice ? cudaFree(data_) : cudaFreeHost(data_);
   }
 
-  // Not initialised.
+  // The values are uninitialized.
   static absl::StatusOr<CudaArray> Allocate(size_t count) {
     CudaArray array;
     array.size_ = count;
@@ -51,14 +62,16 @@ class CudaArray {
   }
   static absl::StatusOr<CudaArray> CopyOf(std::span<const T> values) {
     ROMAP_ASSIGN_OR_RETURN(CudaArray array, Allocate(values.size()));
-    ROMAP_RETURN_IF_ERROR(
-        ToStatus(cudaMemcpy(array.data_, values.data(), values.size_bytes(), cudaMemcpyHostToDevice), "copy to it"));
+    ROMAP_RETURN_IF_ERROR(ToStatus(cudaMemcpy(array.data_, values.data(), values.size_bytes(), cudaMemcpyHostToDevice),
+                                   "copy to the device"));
     return array;
   }
-  // Waits for the launches before it on the default stream; `values` must be as long as the array.
+  // Waits for earlier launches on the default stream. INVALID_ARGUMENT if the lengths differ.
   absl::Status Read(std::span<T> values) const {
-    if (values.size() != size_) return InvalidArgument("CUDA: read {} values of {}", values.size(), size_);
-    return ToStatus(cudaMemcpy(values.data(), data_, values.size_bytes(), cudaMemcpyDeviceToHost), "copy from it");
+    if (values.size() != size_)
+      return InvalidArgument("CUDA: cannot read {} values from an array of {}", values.size(), size_);
+    return ToStatus(cudaMemcpy(values.data(), data_, values.size_bytes(), cudaMemcpyDeviceToHost),
+                    "copy from the device");
   }
 
   T* data() { return data_; }

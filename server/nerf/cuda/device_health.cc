@@ -14,7 +14,7 @@ namespace {
 
 struct Health {
   std::mutex mutex;
-  std::optional<absl::Status> status;  // none: not tried yet
+  std::optional<absl::Status> status;  // empty: not tested yet
 };
 
 Health& TheHealth() {
@@ -24,10 +24,10 @@ Health& TheHealth() {
 
 absl::Status Probe() {
   int count = 0;
-  ROMAP_RETURN_IF_ERROR(ToStatus(cudaGetDeviceCount(&count), "find a device"));
-  if (count == 0) return absl::UnavailableError("CUDA: there is no device");
+  ROMAP_RETURN_IF_ERROR(ToStatus(cudaGetDeviceCount(&count), "count devices"));
+  if (count == 0) return absl::UnavailableError("CUDA: no device found");
   ROMAP_RETURN_IF_ERROR(ToStatus(cudaSetDevice(0), "use device 0"));
-  // A device that counts may still be unable to run our code: too old, or out of order. A field of zeros shows it.
+  // A device that is listed may be too old or broken to run these kernels, so a field of zeros is evaluated.
   DeviceField field{};
   field.grid.features = 16;
   field.hidden = 16;
@@ -41,7 +41,7 @@ absl::Status Probe() {
                "run a kernel on device 0"));
   std::vector<float> outputs(kOutputs);
   ROMAP_RETURN_IF_ERROR(value.Read(outputs));
-  if (outputs[0] != 0.5f) return absl::UnavailableError("CUDA: device 0 miscalculates");
+  if (outputs[0] != 0.5f) return absl::UnavailableError("CUDA: device 0 returned wrong values in the self-test");
   return absl::OkStatus();
 }
 
@@ -59,13 +59,7 @@ void MarkUnhealthy(const absl::Status& why) {
   std::lock_guard lock(health.mutex);
   if (health.status && !health.status->ok()) return;
   health.status = why;
-  spdlog::error("the CUDA device failed; all fields go on on the CPU: {}", Message(why));
-}
-
-void ForgetDevice() {
-  Health& health = TheHealth();
-  std::lock_guard lock(health.mutex);
-  health.status.reset();
+  spdlog::error("the CUDA device failed, falling back to the CPU for all fields: {}", Message(why));
 }
 
 }  // namespace romap::nerf::cuda

@@ -1,17 +1,19 @@
 #pragma once
 
-// The field engine's inner loops as CUDA kernels: memory and launches here, formulas in math/, shared with the CPU. A
-// training step is three launches, made to be captured in a graph once and replayed: what differs from step to step is
-// read from device memory.
+// The inner loops of training as CUDA kernels: memory and launches; the formulas are in math/ and shared with the CPU.
+// A training step is three launches, which are captured in a graph once and then replayed: everything that changes from
+// step to step is read from device memory.
 //
-// Pointers in the structs below point to device memory. Launches are asynchronous on `stream` and return what
-// cudaGetLastError says about them; errors during the run show at the next synchronisation.
+// Pointers in the structs below point to device memory. Launches are asynchronous on `stream` and return the result of
+// cudaGetLastError; errors during execution are reported by the next synchronization.
 
 #include <cstddef>
 #include <cstdint>
 
 #include "server/nerf/cuda/cuda_launch.h"
-#include "server/nerf/math/sampling.h"
+#include "server/nerf/math/loss_weights.h"
+#include "server/nerf/math/occupancy_rules.h"
+#include "server/nerf/math/sample_budget.h"
 #include "server/nerf/math/types.h"
 
 namespace romap::nerf::cuda {
@@ -20,19 +22,19 @@ inline constexpr int kMaxFeatures = kFeaturesPerLevel * kMaxLevels;
 inline constexpr int kMaxHidden = 128;
 inline constexpr int kWarpThreads = 32;
 inline constexpr unsigned kWholeWarp = 0xffffffffu;
-inline constexpr int kTileSamples = 128;  // samples that a block works on at a time, a thread each
+inline constexpr int kTileSamples = 128;  // samples that a block processes at a time, one per thread
 inline constexpr int kMaxStepBlocks = 256;
 inline constexpr int kCells = kOccupancyResolution * kOccupancyResolution * kOccupancyResolution;
 inline constexpr int kLayers = 3 * kOccupancyResolution;
 inline constexpr float kLayerUnit = 1.0f / (1 << 20);  // of StepParams::layer_weight
 
-// How the products of the MLP are made.
+// How the matrix products of the MLP are computed.
 enum class MlpPath {
   kTensorCores,  // factors rounded to half precision, sums in single precision
-  kFloat,        // single precision throughout, in the CPU's order of sums
+  kFloat,        // single precision, in the same order of summation as on the CPU
 };
 
-// A FieldModel whose arrays lie on the device.
+// A FieldModel in device memory.
 struct DeviceField {
   GridLayout grid;
   const float* table;       // [grid.entries][2]
@@ -41,7 +43,7 @@ struct DeviceField {
   float density_bias;
 };
 
-// Values of the field at `count` points of the grid's Unit space.
+// Values of the field at `count` points in Unit space of the grid.
 struct EvaluateParams {
   DeviceField field;
   int count;
@@ -52,47 +54,43 @@ struct EvaluateParams {
 };
 cudaError_t LaunchEvaluate(const EvaluateParams& params, MlpPath path, cudaStream_t stream);
 
-// What the steps of one upload have in common, and how far they are.
+// State shared by the steps of one upload.
 struct SliceState {
-  uint32_t next;        // step of the upload that begins next
-  uint32_t running;     // the one that runs
-  uint64_t first_step;  // of the upload, counted since training began
+  uint32_t next;        // index within the upload of the next step
+  uint32_t running;     // index of the current step
+  uint64_t first_step;  // number of steps before the upload, since training started
   float extent[3];      // of the box in Unit space
   GridPose grid;        // of the box
 };
 
-// Added up over steps; see TrainStats.
+// Sums over steps; see TrainStats.
 struct StepCounters {
   unsigned long long rays, samples, active_samples;
 };
 
-// When the occupied cells are made anew: after every `interval`-th step from step `start` on.
-struct OccupancyPlan {
-  uint64_t start, interval;
-};
-
-// Rays to gradients: sampling, encoding, MLP, rendering, losses, and all of their adjoints. A block takes tiles of
-// whole rays, one tile after another, and keeps everything between rays and gradients in shared memory.
+// First launch: from rays to gradients, that is sampling, encoding, MLP, rendering, losses, and the adjoints of all of
+// them. A block processes tiles of whole rays, one tile after another, with all intermediate values in shared memory.
 struct StepParams {
   DeviceField field;
   SliceState* slice;
   StepCounters* counters;
   const Ray* rays;    // [steps of the upload][rays_per_step]
-  float* color_loss;  // out, laid out as `rays`: squared colour error; < 0 where a ray has none
+  float* color_loss;  // out, layout of `rays`: squared color error of object rays, < 0 for other rays
   int rays_per_step;
   SampleBudget budget;
   LossWeights loss_weights;
-  float gradient_cut;                // samples whose |d_raw| sums to no more are left out, as on the CPU
-  const uint32_t* occupied_bits;     // see Occupancy::bits
-  uint32_t* cell_visits;             // [kCells], counts samples
-  uint32_t* cell_weight;             // [kCells], bits of the largest weight, a float >= 0; this order is that of floats
-  unsigned long long* layer_weight;  // [3][kOccupancyResolution], in units of kLayerUnit: integers add in any order
-  float* table_gradient;             // [grid.entries][2], added to
-  float* mlp_partial;                // out, [(grid.features + kOutputs) hidden][StepBlocks()], one sum per block
+  float gradient_cut;             // samples with a GradientSize up to this skip the backward pass
+  const uint32_t* occupied_bits;  // see Occupancy::bits
+  uint32_t* cell_visits;          // [kCells], number of samples
+  uint32_t* cell_weight;  // [kCells], bits of the largest weight, a float >= 0: such bits compare as the floats do
+  unsigned long long*
+      layer_weight;       // [3][kOccupancyResolution], in units of kLayerUnit: sums of integers do not depend on order
+  float* table_gradient;  // [grid.entries][2], added to
+  float* mlp_partial;     // out, [(grid.features + kOutputs) hidden][StepBlocks()]: one sum per block
 };
 
-// Gradients to parameters, and the occupancy's scores.
-struct OptimiseParams {
+// Second launch: from gradients to parameters, and the scores of the occupancy.
+struct OptimizeParams {
   const SliceState* slice;
   const float* learning_rate;  // [steps of the upload]
   float beta1, beta2;
@@ -109,10 +107,10 @@ struct OptimiseParams {
   float decay, threshold;
   OccupancyPlan plan;
   const uint32_t* hull_bits;  // [kCells / 32]
-  uint32_t* live_bits;        // out when the plan says so, [kCells / 32]: hull cells whose score exceeds the threshold
+  uint32_t* live_bits;        // out if an update is due, [kCells / 32]: hull cells that are live
 };
 
-// When the plan says so: the occupied cells from the live ones. Ends the step.
+// Third launch: if an update is due, the occupied cells from the live ones. Ends the step.
 struct OccupancyParams {
   SliceState* slice;
   OccupancyPlan plan;
@@ -124,26 +122,26 @@ struct OccupancyParams {
 
 struct StepLaunch {
   StepParams step;
-  OptimiseParams optimise;
+  OptimizeParams optimize;
   OccupancyParams occupancy;
 };
 
-// Blocks that work on a step; the same on every device, so that sums are made in the same order.
+// Number of blocks of the first launch; the same on every device, so that the order of sums is, too.
 int StepBlocks(int rays_per_step, int most_samples);
 
 // Dynamic shared memory of a block.
 size_t StepSharedBytes(const DeviceField& field, const SampleBudget& budget, MlpPath path);
 
-// To be called once for a shape before LaunchStep, not while a stream captures: asks for the shared memory.
-// cudaErrorInvalidValue when the device has too little of it.
+// Requests the shared memory. Call once per field before LaunchStep, not during capture. cudaErrorInvalidValue if the
+// device has too little of it.
 cudaError_t PrepareStep(const StepParams& params, MlpPath path);
 
 // The first of the three launches of a step, and the other two.
 cudaError_t LaunchGradients(const StepParams& params, MlpPath path, cudaStream_t stream);
-cudaError_t LaunchOptimise(const StepLaunch& launch, cudaStream_t stream);
+cudaError_t LaunchOptimize(const StepLaunch& launch, cudaStream_t stream);
 
-// The three launches of one step. The order in which blocks add to table_gradient is the device's, so that entries may
-// differ in their last bits from run to run; all other sums are made in a fixed order.
+// The three launches of one step. The order in which blocks add to table_gradient is not specified, so entries may
+// differ in their last bits from run to run; all other sums have a fixed order.
 cudaError_t LaunchStep(const StepLaunch& launch, MlpPath path, cudaStream_t stream);
 
 }  // namespace romap::nerf::cuda

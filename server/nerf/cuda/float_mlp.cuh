@@ -1,7 +1,7 @@
 #pragma once
 
-// The MLP of a tile in single precision, a thread per sample or weight: the CPU's formulas as they are, to hold the
-// tensor cores' form against.
+// The MLP of a tile in single precision, one thread per sample or weight: the same formulas as on the CPU, the
+// reference for TensorMlp.
 
 #include "server/nerf/cuda/grid_access.cuh"
 #include "server/nerf/cuda/tile.cuh"
@@ -17,10 +17,10 @@ struct FloatMlp {
     return field.parameters + field.grid.features * field.hidden;
   }
 
-  // Weights are read where they are.
+  // Nothing to do: the weights are read from device memory.
   __device__ static void Prepare(const DeviceField&, Tile<float>&) {}
 
-  // tile.feature -> tile.neuron, tile.raw; every warp its own rows.
+  // tile.feature -> tile.neuron, tile.raw; each warp processes its own rows.
   __device__ static void Forward(const DeviceField& field, Tile<float>& tile) {
     const int s = threadIdx.x;
     const float* feature = tile.feature + s * tile.feature_row;
@@ -30,14 +30,14 @@ struct FloatMlp {
                                                       tile.hidden, neuron + n);
     }
     for (int o = 0; o < kOutputs; ++o) {
-      // A row of the weights read as a column: consecutive k are 1 apart.
+      // A row of the weights read as a column: stride 1 along k.
       plain::DenseTile<float, 1, 1, DenseMode::kLinear>(
           neuron, tile.hidden, tile.hidden, OutWeights(field) + o * tile.hidden, 1, tile.raw + s * kOutputs + o);
     }
   }
 
-  // The adjoint, from the derivatives in tile.raw: adds to tile.weight_gradient and `table_gradient`. All threads of
-  // the block take part, after a barrier. No scale is needed here.
+  // The adjoint, from the derivatives in tile.raw: adds to tile.weight_gradient and `table_gradient`. Call by all
+  // threads of the block, after a barrier. The scale of TensorMlp is not needed here.
   __device__ static void Backward(const DeviceField& field, Tile<float>& tile, float, float* table_gradient) {
     const int s = threadIdx.x;
     float* out_gradient = tile.weight_gradient + tile.features * tile.hidden;
@@ -46,7 +46,7 @@ struct FloatMlp {
                                     tile.hidden_row, out_gradient + w);
     }
     __syncthreads();
-    float* neuron = tile.neuron + s * tile.hidden_row;  // its gradient from now on
+    float* neuron = tile.neuron + s * tile.hidden_row;  // replaced by its gradient
     for (int n = 0; n < tile.hidden; ++n) {
       plain::DenseTile<float, 1, 1, DenseMode::kMaskedByOut>(tile.raw + s * kOutputs, kOutputs, kOutputs,
                                                              OutWeights(field) + n, tile.hidden, neuron + n);

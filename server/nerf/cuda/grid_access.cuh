@@ -1,13 +1,13 @@
 #pragma once
 
-// The hash grid, one point and level at a time.
+// Access to the hash grid, one point and one level at a time.
 
 #include "server/nerf/cuda/cuda_launch.h"
 #include "server/nerf/math/hash_grid.h"
 
 namespace romap::nerf::cuda {
 
-// A Quad that is loaded in two pieces: entries are aligned to 8 bytes, no more.
+// A Quad that is loaded in two parts, because entries are aligned to 8 bytes only.
 struct PairQuad : plain::Quad {
   __device__ PairQuad(const plain::Quad& quad) : plain::Quad(quad) {}
   static __device__ PairQuad Load(const float* p) {
@@ -18,7 +18,7 @@ struct PairQuad : plain::Quad {
   __device__ PairQuad Plus(const plain::Quad& other, float s) const { return plain::Quad::Plus(other, s); }
 };
 
-// Takes the place of Quad where many threads add to one table: loading gives zeros, storing adds.
+// Replaces Quad where many threads add to one table: loading returns zeros, storing adds atomically.
 struct AtomicQuad : plain::Quad {
   __device__ AtomicQuad(const plain::Quad& quad) : plain::Quad(quad) {}
   static __device__ AtomicQuad Load(const float*) { return plain::Quad{{0.0f, 0.0f, 0.0f, 0.0f}}; }

@@ -1,10 +1,10 @@
-// Takes the place of the CUDA back end in builds without nvcc.
+// Replaces the CUDA back end in builds without nvcc.
 #include "server/nerf/cuda/cuda_trainer.h"
 
 namespace romap::nerf::cuda {
 
-absl::StatusOr<std::unique_ptr<Trainer>> MakeCudaTrainer(const NerfConfig&, uint64_t) {
-  return absl::UnavailableError("CUDA: this build has no CUDA back end");
-}
+absl::Status Supports(const NerfConfig&) { return absl::UnavailableError("CUDA: not compiled into this build"); }
+
+std::unique_ptr<Trainer> MakeCudaTrainer(const NerfConfig&, std::unique_ptr<Trainer> cpu) { return cpu; }
 
 }  // namespace romap::nerf::cuda

@@ -1,4 +1,4 @@
-// Rays to gradients in one launch, and the field's values at given points.
+// From rays to gradients in one launch, and the evaluation of a field at given points.
 
 #include "server/nerf/cuda/field_kernels.h"
 #include "server/nerf/cuda/float_mlp.cuh"
@@ -6,11 +6,14 @@
 #include "server/nerf/cuda/tile.cuh"
 #include "server/nerf/math/activation.h"
 #include "server/nerf/math/composite.h"
+#include "server/nerf/math/losses.h"
+#include "server/nerf/math/sampling.h"
 
 namespace romap::nerf::cuda {
 namespace {
 
-constexpr float kLargestScaled = 16.0f;  // of a tile's derivatives as halves: far from 65504, for sums of products
+// Largest derivative of a tile after scaling: far below 65504, the largest half, because products are summed.
+constexpr float kLargestScaled = 16.0f;
 
 // The rays of one tile.
 struct TileRays {
@@ -19,62 +22,86 @@ struct TileRays {
   int count;
 };
 
-// A ray's way through the box; a warp works on one ray, its lanes on two probes each.
+// Number of the set bit of `bits` that has `n` set bits below it; there must be more than n set bits.
+__device__ int NumberOfSetBit(uint64_t bits, int n) {
+  int number = 0;
+  for (int width = 32; width > 0; width /= 2) {
+    const uint64_t low = bits & ((uint64_t{1} << width) - 1);
+    const int in_low = __popcll(low);
+    if (n < in_low) {
+      bits = low;
+    } else {
+      n -= in_low;
+      bits >>= width;
+      number += width;
+    }
+  }
+  return number;
+}
+
+// Computes the segments of the rays. One warp per ray, each lane tests two pieces.
 template <class T>
-__device__ void FindWays(const StepParams& p, const TileRays& in, Tile<T>& tile) {
+__device__ void FindSegments(const StepParams& p, const TileRays& in, Tile<T>& tile) {
   const int lane = threadIdx.x % kWarpThreads;
   const float* extent = p.slice->extent;
   for (int r = threadIdx.x / kWarpThreads; r < in.count; r += kTileWarps) {
     const Ray& ray = in.rays[r];
-    RayWay way{0.0f, 0.0f, 0.0f, 0, 0};
+    RaySegment segment{0.0f, 0.0f, 0.0f, 0, 0};
     float exit;
-    if (plain::IntersectBox(ray.origin, ray.direction, extent, way.entry, exit)) {
-      way.piece = (exit - way.entry) / kRayProbes;
+    if (plain::IntersectBox(ray.origin, ray.direction, extent, segment.entry, exit)) {
+      segment.piece = (exit - segment.entry) / kRayProbes;
+      const plain::RayInCells<float> in_cells(ray, extent);
       for (int half = 0; half < kRayProbes / kWarpThreads; ++half) {
-        const int probe = half * kWarpThreads + lane;
-        const uint32_t cell = CellOnRay(ray, extent, ProbePlace(probe, way.piece, way.entry));
+        const float number = static_cast<float>(half * kWarpThreads + lane);
+        const uint32_t cell = in_cells.CellAt(plain::PieceCenter(number, segment.piece, segment.entry));
         const int occupied = !p.budget.skip_empty || (p.occupied_bits[cell / 32] >> (cell % 32) & 1) != 0;
-        way.occupied |= static_cast<uint64_t>(__ballot_sync(kWholeWarp, occupied)) << (half * kWarpThreads);
+        segment.occupied |= static_cast<uint64_t>(__ballot_sync(kWholeWarp, occupied)) << (half * kWarpThreads);
       }
-      const float pieces = static_cast<float>(CountBits(way.occupied));
-      way.count = SampleCount(p.budget, way.piece * pieces);
-      if (way.count > 0) way.length = way.piece * (pieces / static_cast<float>(way.count));
+      const float pieces = static_cast<float>(__popcll(segment.occupied));
+      segment.count = SampleCount(p.budget, segment.piece * pieces);
+      if (segment.count > 0) segment.length = segment.piece * (pieces / static_cast<float>(segment.count));
     }
-    if (lane == 0) tile.ways[r] = way;
+    if (lane == 0) tile.segments[r] = segment;
   }
 }
 
-// Position, cell and features of the calling thread's sample; its features are 0 if it has none. Returns the cell, or
-// kCells without a sample.
+// t of sample `i` of a segment. `jitter`: 0..1, position of the sample within its stratum.
+__device__ float SamplePosition(const RaySegment& segment, int i, float jitter) {
+  const int pieces = __popcll(segment.occupied);
+  const float at = (static_cast<float>(i) + jitter) * (static_cast<float>(pieces) / static_cast<float>(segment.count));
+  const float joined = plain::JoinedPieceAt(at, static_cast<float>(pieces - 1));
+  const int number = NumberOfSetBit(segment.occupied, static_cast<int>(joined));
+  return plain::PositionOnRay(static_cast<float>(number) + (at - joined), segment.piece, segment.entry);
+}
+
+// Computes position, cell and features of the calling thread's sample; the features are 0 if it has no sample. Returns
+// the cell, or kCells without a sample.
 template <class T>
 __device__ uint32_t PlaceSample(const StepParams& p, const TileRays& in, Tile<T>& tile) {
   const int s = threadIdx.x, r = s / tile.samples_per_ray, i = s % tile.samples_per_ray;
   T* feature = tile.feature + s * tile.feature_row;
-  const bool used = r < in.count && i < tile.ways[r].count;
+  const bool used = r < in.count && i < tile.segments[r].count;
   const GridLayout& grid = p.field.grid;
   for (int f = used ? kFeaturesPerLevel * grid.levels : 0; f < grid.features; ++f) feature[f] = T(0.0f);
   if (!used) return kCells;
   const Ray& ray = in.rays[r];
-  const RayWay way = tile.ways[r];
+  const RaySegment segment = tile.segments[r];
   const float* extent = p.slice->extent;
-  const float t = SamplePlace(i, way.count, ray.jitter, way.occupied, way.piece, way.entry);
+  const float t = SamplePosition(segment, i, ray.jitter);
   float at[3];
-  for (int a = 0; a < 3; ++a) {
-    // Rounding may put a point a hair outside the box; the encoding wants it inside.
-    at[a] = plain::Min(plain::Max(RayPoint(ray, a, t), 0.0f), extent[a]);
-  }
+  for (int a = 0; a < 3; ++a) at[a] = plain::SampleCoordinate(ray.origin[a], ray.direction[a], t, extent[a]);
   plain::MoveToGrid(p.slice->grid, at[0], at[1], at[2]);
   tile.x[s] = at[0];
   tile.y[s] = at[1];
   tile.z[s] = at[2];
   tile.t[s] = t;
-  tile.length[s] = way.length;
+  tile.length[s] = segment.length;
   for (int level = 0; level < grid.levels; ++level) {
     float value[kFeaturesPerLevel];
     EncodeLevel(grid, p.field.table, level, at[0], at[1], at[2], value);
     for (int f = 0; f < kFeaturesPerLevel; ++f) feature[kFeaturesPerLevel * level + f] = Rounded<T>(value[f]);
   }
-  return CellOnRay(ray, extent, t);
+  return plain::RayInCells<float>(ray, extent).CellAt(t);
 }
 
 template <class T>
@@ -88,12 +115,12 @@ __device__ void Activate(const DeviceField& field, Tile<T>& tile) {
   tile.alpha[s] = plain::StepOpacity(tile.density[s], tile.length[s]);
 }
 
-// Renders the calling thread's ray and turns tile.raw into the derivatives of its loss. To be called by whole warps:
-// partners exchange their errors.
+// Renders the calling thread's ray and replaces tile.raw by the derivatives of its loss. Call by whole warps, because
+// partners exchange their color errors.
 template <class T>
 __device__ void RenderRay(const StepParams& p, const TileRays& in, Tile<T>& tile) {
   const int r = threadIdx.x;
-  const int count = r < in.count ? tile.ways[r].count : 0;
+  const int count = r < in.count ? tile.segments[r].count : 0;
   if (r < in.count) in.color_loss[r] = -1.0f;
   const int at = r * tile.samples_per_ray;
   const RaySamples ray{count,           tile.t + at,       tile.length + at,
@@ -103,29 +130,27 @@ __device__ void RenderRay(const StepParams& p, const TileRays& in, Tile<T>& tile
   float error[3] = {}, partner_error[3];
   if (count > 0) {
     target = in.rays[r].target;
-    result = plain::CompositeForward(ray, target, p.loss_weights, tile.weight + at, tile.behind + at);
+    result = plain::CompositeForward(ray, target.depth, tile.weight + at, tile.behind + at);
     plain::ColorError(result, target, p.loss_weights, error);
   }
-  // A ray at an even place and the one behind it are partners or have none, and lie in one warp.
-  const bool partner_seen = __shfl_xor_sync(kWholeWarp, count, 1) > 0;
+  // A ray with an even index and the next one are partners or have none, and belong to the same warp.
+  const bool partner_has_samples = __shfl_xor_sync(kWholeWarp, count, 1) > 0;
   for (int c = 0; c < 3; ++c) partner_error[c] = __shfl_xor_sync(kWholeWarp, error[c], 1);
   if (count == 0) return;
-  if (target.is_object) in.color_loss[r] = result.color_loss;
-  if (target.partner != 0 && partner_seen) {
-    target = plain::ContrastTarget(target, p.loss_weights, error, partner_error, result);
-  }
-  plain::CompositeBackward(ray, target, p.loss_weights, result, tile.weight + at, tile.behind + at,
-                           tile.raw + kOutputs * at);
+  const bool has_partner = target.partner != 0 && partner_has_samples;
+  const RayLoss loss = plain::LossOfRay(result, target, p.loss_weights, has_partner ? partner_error : nullptr);
+  if (target.is_object) in.color_loss[r] = loss.color;
+  plain::CompositeBackward(ray, target.depth, loss, tile.weight + at, tile.behind + at, tile.raw + kOutputs * at);
   atomicAdd(&p.counters->rays, 1ull);
   atomicAdd(&p.counters->samples, static_cast<unsigned long long>(count));
 }
 
-// Tells the occupancy of the calling thread's sample.
+// Records the calling thread's sample for the occupancy.
 template <class T>
 __device__ void RecordVisit(const StepParams& p, uint32_t cell, Tile<T>& tile) {
   const float weight = tile.weight[threadIdx.x];
   atomicAdd(p.cell_visits + cell, 1u);
-  if (!(weight > 0.0f)) return;  // nor what is not a number
+  if (!(weight > 0.0f)) return;  // also excludes NaN
   atomicMax(p.cell_weight + cell, __float_as_uint(weight));
   const uint32_t units = static_cast<uint32_t>(weight * (1.0f / kLayerUnit));
   constexpr uint32_t kSide = kOccupancyResolution;
@@ -134,13 +159,12 @@ __device__ void RecordVisit(const StepParams& p, uint32_t cell, Tile<T>& tile) {
   atomicAdd(tile.layer_weight + 2 * kSide + cell / (kSide * kSide), units);
 }
 
-// Cuts off or scales the derivatives of the calling thread's sample; the largest of them, 0 without any.
+// Sets small derivatives of the calling thread's sample to 0, scales the others, and returns the largest.
 template <class T>
-__device__ float CutDerivatives(const StepParams& p, bool used, Tile<T>& tile) {
+__device__ float FilterDerivatives(const StepParams& p, bool used, Tile<T>& tile) {
   float* d_raw = tile.raw + threadIdx.x * kOutputs;
-  float size = 0.0f;
-  for (int o = 0; o < kOutputs && used; ++o) size += std::fabs(d_raw[o]);
-  // Written so that what is not a number passes.
+  const float size = used ? plain::GradientSize(d_raw[0], d_raw[1], d_raw[2], d_raw[3]) : 0.0f;
+  // The negated comparison lets NaN pass, so that it reaches the parameters and is detected there.
   const bool active = used && !(size <= p.gradient_cut);
   tile.active[threadIdx.x] = active;
   const float scale = 1.0f / static_cast<float>(p.rays_per_step);
@@ -152,8 +176,8 @@ __device__ float CutDerivatives(const StepParams& p, bool used, Tile<T>& tile) {
   return largest;
 }
 
-// The power of two that brings the largest derivative of the block just below kLargestScaled. To be called between
-// barriers by all threads; `active` gets the number of samples that have one.
+// The power of two that scales the largest derivative of the block to just below kLargestScaled. Call between barriers
+// by all threads. `active`, out: number of active samples of the block.
 template <class T>
 __device__ float DerivativeScale(float largest, Tile<T>& tile, int& active) {
   for (int delta = kWarpThreads / 2; delta > 0; delta /= 2) {
@@ -168,8 +192,8 @@ __device__ float DerivativeScale(float largest, Tile<T>& tile, int& active) {
 }
 
 template <class Mlp>
-__device__ void WorkOnTile(const StepParams& p, const TileRays& in, Tile<typename Mlp::Factor>& tile) {
-  FindWays(p, in, tile);
+__device__ void ProcessTile(const StepParams& p, const TileRays& in, Tile<typename Mlp::Factor>& tile) {
+  FindSegments(p, in, tile);
   __syncthreads();
   const uint32_t cell = PlaceSample(p, in, tile);
   const bool used = cell < kCells;
@@ -181,7 +205,7 @@ __device__ void WorkOnTile(const StepParams& p, const TileRays& in, Tile<typenam
   if (static_cast<int>(threadIdx.x) / kWarpThreads * kWarpThreads < in.count) RenderRay(p, in, tile);
   __syncthreads();
   if (used) RecordVisit(p, cell, tile);
-  const float largest = CutDerivatives(p, used, tile);
+  const float largest = FilterDerivatives(p, used, tile);
   int active = 0;
   const float scale = DerivativeScale(largest, tile, active);
   if (active == 0) return;
@@ -203,7 +227,7 @@ __global__ void __launch_bounds__(kTileSamples, 4) StepKernel(StepParams p) {
   const size_t begin = static_cast<size_t>(step) * p.rays_per_step;
   for (int first = blockIdx.x * tile.ray_slots; first < p.rays_per_step; first += gridDim.x * tile.ray_slots) {
     const int left = p.rays_per_step - first;
-    WorkOnTile<Mlp>(
+    ProcessTile<Mlp>(
         p, {p.rays + begin + first, p.color_loss + begin + first, left < tile.ray_slots ? left : tile.ray_slots}, tile);
   }
   __syncthreads();
@@ -217,7 +241,7 @@ __global__ void __launch_bounds__(kTileSamples, 4) StepKernel(StepParams p) {
   }
 }
 
-// A block per tile of points.
+// One block per tile of points.
 template <class Mlp>
 __global__ void __launch_bounds__(kTileSamples, 4) EvaluateKernel(EvaluateParams p) {
   using T = typename Mlp::Factor;
@@ -260,7 +284,7 @@ size_t EvaluateBytes(const DeviceField& field) {
   return arena.bytes();
 }
 
-bool Fits(const DeviceField& field) {
+bool IsSupported(const DeviceField& field) {
   return field.hidden <= kMaxHidden && field.hidden % kEdge == 0 && field.grid.features <= kMaxFeatures &&
          field.grid.features % kEdge == 0;
 }
@@ -273,7 +297,7 @@ cudaError_t AllowShared(Kernel kernel, size_t bytes) {
 }  // namespace
 
 cudaError_t LaunchEvaluate(const EvaluateParams& params, MlpPath path, cudaStream_t stream) {
-  if (!Fits(params.field)) return cudaErrorInvalidValue;
+  if (!IsSupported(params.field)) return cudaErrorInvalidValue;
   if (params.count == 0) return cudaSuccess;
   const dim3 grid(static_cast<unsigned>((params.count + kTileSamples - 1) / kTileSamples)), block(kTileSamples);
   const bool tensor = path == MlpPath::kTensorCores;
@@ -290,7 +314,7 @@ cudaError_t LaunchEvaluate(const EvaluateParams& params, MlpPath path, cudaStrea
 }
 
 int StepBlocks(int rays_per_step, int most_samples) {
-  const int rays_per_tile = RaySlots(most_samples);
+  const int rays_per_tile = RaysThatFit(kTileSamples, most_samples);
   const int tiles = (rays_per_step + rays_per_tile - 1) / rays_per_tile;
   return tiles < kMaxStepBlocks ? tiles : kMaxStepBlocks;
 }
@@ -300,7 +324,7 @@ size_t StepSharedBytes(const DeviceField& field, const SampleBudget& budget, Mlp
 }
 
 cudaError_t PrepareStep(const StepParams& params, MlpPath path) {
-  if (!Fits(params.field)) return cudaErrorInvalidValue;
+  if (!IsSupported(params.field)) return cudaErrorInvalidValue;
   const size_t bytes = StepSharedBytes(params.field, params.budget, path);
   return path == MlpPath::kTensorCores ? AllowShared(StepKernel<TensorMlp>, bytes)
                                        : AllowShared(StepKernel<FloatMlp>, bytes);

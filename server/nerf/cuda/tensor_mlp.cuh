@@ -1,7 +1,7 @@
 #pragma once
 
-// The MLP of a tile on tensor cores: products of 16 x 16 tiles with factors in half precision and sums in single. A
-// warp owns the rows of its own samples, and some of the weights' gradients.
+// The MLP of a tile on tensor cores: products of 16 x 16 matrices with factors in half precision and sums in single
+// precision. A warp owns the rows of its own samples, and some of the weight gradients.
 
 #include "server/nerf/cuda/grid_access.cuh"
 #include "server/nerf/cuda/tile.cuh"
@@ -16,7 +16,7 @@ struct TensorMlp {
 
   static constexpr int kRowsOfWarp = kWarpThreads;
 
-  // sum += a b over `k_tiles` tiles along k; the next tile of a begins a_step further on, and so does b's.
+  // sum += a b over `k_tiles` tiles along k. a_row, b_row: stride of rows; a_step, b_step: stride of tiles along k.
   template <class LayoutA, class LayoutB>
   __device__ static void Multiply(const __half* a, int a_row, int a_step, const __half* b, int b_row, int b_step,
                                   int k_tiles, Sum& sum) {
@@ -30,10 +30,10 @@ struct TensorMlp {
     }
   }
 
-  // To the warp's staging area, for lanes to read: which element of a Sum a lane holds is not known.
+  // Stores a Sum to the staging area of the warp, because the assignment of its elements to lanes is not specified.
   __device__ static float* Stage(const Tile<__half>& tile, const Sum& sum) {
     float* staging = tile.staging + threadIdx.x / kWarpThreads * kEdge * kEdge;
-    __syncwarp();  // the last reader is done
+    __syncwarp();  // earlier readers have finished
     nvcuda::wmma::store_matrix_sync(staging, sum, kEdge, nvcuda::wmma::mem_row_major);
     __syncwarp();
     return staging;
@@ -47,12 +47,12 @@ struct TensorMlp {
     nvcuda::wmma::store_matrix_sync(gradient, total, row, nvcuda::wmma::mem_row_major);
   }
 
-  // Two neighbours at once; `to` is at an even place of a row.
+  // Stores two adjacent values; `to` has an even index in its row.
   __device__ static void StorePair(__half* to, float first, float second) {
     *reinterpret_cast<__half2*>(to) = __half2{Rounded<__half>(first), Rounded<__half>(second)};
   }
 
-  // Rounds the weights. To be followed by a barrier.
+  // Rounds the weights to half precision. A barrier must follow.
   __device__ static void Prepare(const DeviceField& field, Tile<__half>& tile) {
     const int pairs = tile.hidden / 2;
     for (int i = threadIdx.x; i < tile.features * pairs; i += kTileSamples) {
@@ -67,7 +67,7 @@ struct TensorMlp {
     }
   }
 
-  // tile.feature -> tile.neuron, tile.raw; every warp its own rows.
+  // tile.feature -> tile.neuron, tile.raw; each warp processes its own rows.
   __device__ static void Forward(const DeviceField&, Tile<__half>& tile) {
     const int lane = threadIdx.x % kWarpThreads, first = threadIdx.x - lane;
     for (int row = first; row < first + kRowsOfWarp; row += kEdge) {
@@ -94,8 +94,8 @@ struct TensorMlp {
     }
   }
 
-  // The adjoint, from the derivatives in tile.raw, as FloatMlp::Backward. Derivatives are multiplied by `scale`, a
-  // power of two, while they are halves, so that they neither vanish nor overflow.
+  // The adjoint, from the derivatives in tile.raw, as FloatMlp::Backward. Derivatives in half precision are multiplied
+  // by `scale`, a power of two, so that they neither underflow nor overflow.
   __device__ static void Backward(const DeviceField& field, Tile<__half>& tile, float scale, float* table_gradient) {
     const int warp = threadIdx.x / kWarpThreads;
     const int columns = tile.hidden / kEdge, sample_tiles = kTileSamples / kEdge;
@@ -127,7 +127,7 @@ struct TensorMlp {
   }
 
  private:
-  // Makes tile.neuron its gradient, every warp in its own rows.
+  // Replaces tile.neuron by its gradient; each warp processes its own rows.
   __device__ static void BackwardThroughRelu(Tile<__half>& tile) {
     const int lane = threadIdx.x % kWarpThreads, first = threadIdx.x - lane;
     for (int row = first; row < first + kRowsOfWarp; row += kEdge) {
@@ -146,10 +146,10 @@ struct TensorMlp {
     }
   }
 
-  // Scatters the features' gradients, every warp those of its own rows.
+  // Scatters the gradients of the features; each warp processes its own rows.
   __device__ static void BackwardToTable(const DeviceField& field, const Tile<__half>& tile, float factor,
                                          float* table_gradient) {
-    constexpr int kLevels = kEdge / kFeaturesPerLevel;  // of one tile of features
+    constexpr int kLevels = kEdge / kFeaturesPerLevel;  // per tile of features
     const int lane = threadIdx.x % kWarpThreads, first = threadIdx.x - lane;
     for (int row = first; row < first + kRowsOfWarp; row += kEdge) {
       if (!__any_sync(kWholeWarp, tile.active[row + lane % kEdge])) continue;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a block keeps in shared memory of the samples it works on.
+// The shared memory of a block: the samples of one tile of rays, and sums over tiles.
 
 #include "server/nerf/cuda/cuda_launch.h"
 #include "server/nerf/cuda/field_kernels.h"
@@ -8,9 +8,9 @@
 namespace romap::nerf::cuda {
 
 inline constexpr int kTileWarps = kTileSamples / kWarpThreads;
-inline constexpr int kEdge = 16;  // of the square tiles that tensor cores multiply
+inline constexpr int kEdge = 16;  // side of the square matrices that tensor cores multiply
 
-// A factor of the MLP's products. What is too large for a half becomes the largest one; what is not a number stays so.
+// A factor of the MLP's products. Values beyond the range of a half are clamped to it; NaN is kept.
 template <class T>
 __device__ T Rounded(float x);
 template <>
@@ -23,37 +23,34 @@ __device__ inline __half Rounded<__half>(float x) {
   return __float2half(x > kLargest ? kLargest : x < -kLargest ? -kLargest : x);
 }
 
-// How a ray runs through the box.
-struct RayWay {
-  float entry, piece;  // see sampling.h
-  float length;        // of each sample's step
-  int count;           // samples; 0 when the ray meets nothing
-  uint64_t occupied;
+// The segment of a ray inside the box; see math/sampling.h.
+struct RaySegment {
+  float entry, piece;  // t at the entry, length of a piece
+  float length;        // of the step of each sample
+  int count;           // samples; 0 if the ray meets no occupied cell
+  uint64_t occupied;   // bit k: piece k is occupied
 };
 
-// Rays of a tile: an even number, so that pairs stay together.
-__host__ __device__ inline int RaySlots(int samples_per_ray) { return kTileSamples / samples_per_ray / 2 * 2; }
-
-// Places in a block's memory, all aligned to 128 bytes. T holds the MLP's factors: half or float.
+// Arrays in the memory of a block, all aligned to 128 bytes. T: type of the MLP's factors, half or float.
 template <class T>
 struct Tile {
-  // Rows of T are longer than what they hold, so that columns spread over the banks and, of halves, every 16th row
-  // begins at a multiple of 32 bytes, as tensor cores want.
+  // Rows of T are padded, so that columns spread over the banks of shared memory. For halves, every 16th row starts at
+  // a multiple of 32 bytes, as tensor cores require.
   static constexpr int kPad = sizeof(T) == 2 ? 8 : 1;
-  static constexpr int kOutputRow = kEdge;  // without, to fit where it lies
+  static constexpr int kOutputRow = kEdge;  // no padding, so that d_output fits into the arrays it reuses
 
   int features, hidden;         // of the field
-  int feature_row, hidden_row;  // T from row to row
+  int feature_row, hidden_row;  // stride of rows, in T
   int ray_slots, samples_per_ray;
 
-  RayWay* ways;  // [ray_slots]
-  // [kTileSamples]: the samples of ray r begin at r * samples_per_ray.
+  RaySegment* segments;  // [ray_slots]
+  // [kTileSamples]: the samples of ray r start at r * samples_per_ray.
   float *x, *y, *z, *t, *length, *red, *green, *blue, *density, *alpha, *weight, *behind;
-  float* raw;   // [kTileSamples][kOutputs]: outputs, then the loss' derivatives by them
-  int* active;  // whether the sample has a backward pass
+  float* raw;   // [kTileSamples][kOutputs]: raw outputs, then the derivatives of the loss with respect to them
+  int* active;  // [kTileSamples]: whether the sample has a backward pass
   T* feature;   // [kTileSamples][feature_row]
   T* neuron;    // [kTileSamples][hidden_row]: after ReLU, then its gradient
-  // For tensor cores.
+  // Only for tensor cores.
   T* d_output;     // [kTileSamples][kOutputRow]: raw, scaled; 0 from kOutputs on
   T* in_weight;    // [features][hidden_row]
   T* out_weight;   // [kEdge][hidden_row]: 0 from kOutputs on
@@ -67,13 +64,13 @@ struct Tile {
   __host__ __device__ int WeightGradients() const { return (features + OutputRows()) * hidden; }
 };
 
-// Hands out parts of a block's memory; without memory it only counts.
+// Allocates parts of the memory of a block; with null memory it only computes their total size.
 class Arena {
  public:
   __host__ __device__ explicit Arena(unsigned char* memory) : memory_(memory) {}
   template <class V>
-  __host__ __device__ void Take(V*& place, int count) {
-    place = memory_ == nullptr ? nullptr : reinterpret_cast<V*>(memory_ + bytes_);
+  __host__ __device__ void Allocate(V*& array, int count) {
+    array = memory_ == nullptr ? nullptr : reinterpret_cast<V*>(memory_ + bytes_);
     bytes_ += (static_cast<size_t>(count) * sizeof(V) + 127) / 128 * 128;
   }
   __host__ __device__ size_t bytes() const { return bytes_; }
@@ -83,20 +80,20 @@ class Arena {
   size_t bytes_ = 0;
 };
 
-// The part that evaluating points needs, too.
+// The arrays that the evaluation of points needs, too.
 template <class T>
 __host__ __device__ void LayOutMlp(const DeviceField& field, Arena& arena, Tile<T>& tile) {
   tile.features = field.grid.features;
   tile.hidden = field.hidden;
   tile.feature_row = tile.features + Tile<T>::kPad;
   tile.hidden_row = tile.hidden + Tile<T>::kPad;
-  arena.Take(tile.raw, kTileSamples * kOutputs);
-  arena.Take(tile.feature, kTileSamples * tile.feature_row);
-  arena.Take(tile.neuron, kTileSamples * tile.hidden_row);
+  arena.Allocate(tile.raw, kTileSamples * kOutputs);
+  arena.Allocate(tile.feature, kTileSamples * tile.feature_row);
+  arena.Allocate(tile.neuron, kTileSamples * tile.hidden_row);
   if (sizeof(T) != 2) return;
-  arena.Take(tile.in_weight, tile.features * tile.hidden_row);
-  arena.Take(tile.out_weight, kEdge * tile.hidden_row);
-  arena.Take(tile.staging, kTileWarps * kEdge * kEdge);
+  arena.Allocate(tile.in_weight, tile.features * tile.hidden_row);
+  arena.Allocate(tile.out_weight, kEdge * tile.hidden_row);
+  arena.Allocate(tile.staging, kTileWarps * kEdge * kEdge);
 }
 
 template <class T>
@@ -105,19 +102,19 @@ __host__ __device__ size_t LayOutTile(const DeviceField& field, int samples_per_
   Arena arena(memory);
   LayOutMlp(field, arena, tile);
   tile.samples_per_ray = samples_per_ray;
-  tile.ray_slots = RaySlots(samples_per_ray);
-  arena.Take(tile.ways, tile.ray_slots);
-  for (float** array : {&tile.x, &tile.y, &tile.z, &tile.weight}) arena.Take(*array, kTileSamples);
-  arena.Take(tile.active, kTileSamples);
+  tile.ray_slots = RaysThatFit(kTileSamples, samples_per_ray);
+  arena.Allocate(tile.segments, tile.ray_slots);
+  for (float** array : {&tile.x, &tile.y, &tile.z, &tile.weight}) arena.Allocate(*array, kTileSamples);
+  arena.Allocate(tile.active, kTileSamples);
   float** const rendering[] = {&tile.t,    &tile.length,  &tile.red,   &tile.green,
                                &tile.blue, &tile.density, &tile.alpha, &tile.behind};
-  for (float** array : rendering) arena.Take(*array, kTileSamples);
-  // When a backward pass begins, rendering is over; its arrays, one after another, make place.
+  for (float** array : rendering) arena.Allocate(*array, kTileSamples);
+  // The backward pass reuses the arrays of the rendering, which are contiguous and no longer needed.
   static_assert(sizeof(rendering) / sizeof(*rendering) * sizeof(float) >= Tile<T>::kOutputRow * sizeof(__half));
   tile.d_output = reinterpret_cast<T*>(tile.t);
-  arena.Take(tile.weight_gradient, tile.WeightGradients());
-  arena.Take(tile.layer_weight, kLayers);
-  arena.Take(tile.warp_largest, kTileWarps);
+  arena.Allocate(tile.weight_gradient, tile.WeightGradients());
+  arena.Allocate(tile.layer_weight, kLayers);
+  arena.Allocate(tile.warp_largest, kTileWarps);
   return arena.bytes();
 }
 

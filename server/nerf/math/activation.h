@@ -9,24 +9,31 @@
 
 ROMAP_MATH_BEGIN
 
-// Colour of a raw output: 1 / (1 + e^-raw).
+// Color of a raw output: 1 / (1 + e^-raw).
 template <class F>
 ROMAP_HD F Sigmoid(F raw) {
   const F one = Lane<F>::Set(1.0f);
   return one / (one + Lane<F>::Exp(Lane<F>::Zero() - Max(raw, Lane<F>::Set(-80.0f))));
 }
 
-// Density per unit of length: e^raw, also its own derivative. Held at e^12, where any step is opaque; the derivative is
-// not cut off there, so that a saturated sample can come back.
+// Density per unit of length: e^raw, which is also its own derivative. Clamped to e^12, where any step is opaque; the
+// backward pass does not clamp the derivative, so that a saturated sample can recover.
 template <class F>
 ROMAP_HD F Density(F raw) {
   return Lane<F>::Exp(Min(Max(raw, Lane<F>::Set(-80.0f)), Lane<F>::Set(12.0f)));
 }
 
-// Occupancy probability of a step: o = 1 - exp(-sigma delta) (paper, volume rendering).
+// Opacity of a step: o = 1 - exp(-sigma delta) (paper, volume rendering).
 template <class F>
 ROMAP_HD F StepOpacity(F density, F length) {
   return Lane<F>::Set(1.0f) - Lane<F>::Exp(Lane<F>::Zero() - density * length);
+}
+
+// Size of the derivatives of a sample with respect to its raw outputs. Samples below a threshold skip the backward
+// pass.
+template <class F>
+ROMAP_HD F GradientSize(F d_red, F d_green, F d_blue, F d_density) {
+  return Abs(d_red) + Abs(d_green) + Abs(d_blue) + Abs(d_density);
 }
 
 ROMAP_MATH_END

@@ -9,16 +9,17 @@
 
 ROMAP_MATH_BEGIN
 
-// Small matrix products of the MLP. Lanes run over output neurons, R rows times C lane groups are kept in registers, so
-// no sum ever runs across lanes. With F = float, R = C = 1 this is the textbook triple loop.
+// Small matrix products of the MLP. Lanes run over output neurons and a tile of R rows by C lane groups stays in
+// registers, so no sum runs across lanes. With F = float and R = C = 1 this is the textbook triple loop.
 
 enum class DenseMode {
   kLinear,       // out = a b
   kRelu,         // out = max(a b, 0)
-  kMaskedByOut,  // out = out > 0 ? a b : 0, the adjoint of kRelu when out holds its result
+  kMaskedByOut,  // out = out > 0 ? a b : 0; the adjoint of kRelu if out holds the result of kRelu
 };
 
-// out[R][n] (R rows, C lane groups of them) = a[R][k_count] b[k_count][n]. `a_stride`, `n`: floats from row to row.
+// out[R][C lane groups] = a[R][k_count] b[k_count][C lane groups]. `a_stride`: floats between rows of a; `n`: floats
+// between rows of b and out.
 template <class F, int R, int C, DenseMode kMode>
 ROMAP_HD void DenseTile(const float* a, int a_stride, int k_count, const float* b, int n, float* out) {
   constexpr int kLanes = Lane<F>::kLanes;
@@ -52,7 +53,8 @@ ROMAP_HD void DenseTile(const float* a, int a_stride, int k_count, const float* 
   }
 }
 
-// out[R][n] (R rows, C lane groups) += a^T b over `samples` rows: out[r] += sum_s a[s][r] b[s]. The weight gradient.
+// The weight gradient: out[R][C lane groups] += a^T b, that is out[r] += sum_s a[s][r] b[s] over `samples` rows.
+// `a_stride`: floats between rows of a; `n`: floats between rows of b and out.
 template <class F, int R, int C>
 ROMAP_HD void OuterTile(int samples, const float* a, int a_stride, const float* b, int n, float* out) {
   constexpr int kLanes = Lane<F>::kLanes;

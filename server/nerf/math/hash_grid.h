@@ -11,13 +11,13 @@ ROMAP_MATH_BEGIN
 
 // Multi-resolution hash encoding (Mueller et al., 2022; paper section on the NeRF model), two features per entry.
 //
-// The index of corner (x, y, z) is (x + y stride_y + z stride_z) & mask: a dense array where a level fits, a lattice
-// hash where it does not. Either way (x, x + 1) lie side by side, so that the eight corners of a cell are four pairs of
-// entries, each one load of four floats. Every level owns one entry more than its mask spans for the pair at its end.
-// The grid has no end: a dense level repeats beyond its array, so that no two corners of any window of stride_y^3
-// corners share an entry, wherever the window lies.
+// The index of corner (x, y, z) is (x + y stride_y + z stride_z) & mask: a dense array for levels that fit into the
+// table, a lattice hash for finer levels. In both cases x and x + 1 are adjacent, so the eight corners of a cell are
+// four pairs of entries, and each pair is one load of four floats. Every level has one entry more than its mask spans,
+// for the pair at its end. The grid is unbounded: a dense level repeats beyond its array, so that no two corners of any
+// window of stride_y^3 corners share an entry, independent of the position of the window.
 
-// The four pairs of a cell and their weights, one level (or one lane per level).
+// The four pairs of a cell and their weights on one level (or one level per lane).
 template <class F>
 struct GridCell {
   typename Lane<F>::Int pair[4];  // entry of the corner with the lower x: (y, z), (y+1, z), (y, z+1), (y+1, z+1)
@@ -25,8 +25,8 @@ struct GridCell {
   F along_x;                      // 0..1 within the pair
 };
 
-// Finds the cell of a point of Unit space on a level of `scale` cells per unit. The half shifts the lattices of the
-// levels against each other.
+// Finds the cell of a point of Unit space on a level with `scale` cells per unit. The offset by one half shifts the
+// lattices of the levels relative to each other.
 template <class F>
 ROMAP_HD GridCell<F> LocateCell(F x_unit, F y_unit, F z_unit, F scale, typename Lane<F>::Int stride_y,
                                 typename Lane<F>::Int stride_z, typename Lane<F>::Int mask,
@@ -52,7 +52,7 @@ ROMAP_HD GridCell<F> LocateCell(F x_unit, F y_unit, F z_unit, F scale, typename 
   return cell;
 }
 
-// From the training box's Unit space to the grid's, in place.
+// Transforms a point from the Unit space of the training box to that of the grid, in place.
 template <class F>
 ROMAP_HD void MoveToGrid(const GridPose& pose, F& x, F& y, F& z) {
   const auto row = [&](int r) {
@@ -67,7 +67,7 @@ ROMAP_HD void MoveToGrid(const GridPose& pose, F& x, F& y, F& z) {
   z = gz;
 }
 
-// Trilinear value of one level: feature[0..1]. `pair` and `weight` are those of one lane, `step` apart in memory.
+// Trilinear interpolation on one level: feature[0..1]. `pair` and `weight` belong to one lane, with stride `step`.
 template <class Q>
 ROMAP_HD void InterpolateCell(const float* table, const uint32_t* pair, const float* weight, float along_x, int step,
                               float* feature) {
@@ -78,7 +78,7 @@ ROMAP_HD void InterpolateCell(const float* table, const uint32_t* pair, const fl
   sum.StoreBlend(along_x, feature);
 }
 
-// Adjoint of InterpolateCell: adds d_feature[0..1] times each corner's weight to the gradient table.
+// Adjoint of InterpolateCell: adds d_feature[0..1] times the weight of each corner to the gradient table.
 template <class Q>
 ROMAP_HD void ScatterCell(float* gradient, const uint32_t* pair, const float* weight, float along_x, int step,
                           const float* d_feature) {

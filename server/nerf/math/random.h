@@ -6,8 +6,9 @@
 
 namespace romap::nerf {
 
-// Counter-based randomness: the same (seed, a, b) gives the same number on every back end and for every order of work.
-// The mixer is splitmix64's finaliser (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014).
+// Counter-based random numbers: the same (seed, a, b) gives the same number on every back end and in every order of
+// evaluation. The mixer is the finalizer of splitmix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number
+// generators", 2014).
 ROMAP_HD uint64_t MixBits(uint64_t x) {
   x += 0x9e3779b97f4a7c15ull;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;

@@ -9,15 +9,15 @@
 
 ROMAP_MATH_BEGIN
 
-// Ray against the box [0, extent] by slabs (Kay and Kajiya, 1986). `origin`, `direction`, `extent`: 3 values each.
-// False when the ray misses the box or the box lies behind the origin; otherwise entry >= 0 and exit > entry along the
-// ray.
+// Intersects a ray with the box [0, extent] by the slab method (Kay and Kajiya, 1986). `origin`, `direction`, `extent`:
+// 3 values each. Returns false if the ray misses the box or the box lies behind the origin; otherwise entry >= 0 and
+// exit > entry, in units of `direction`.
 template <class F>
 ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent, F& entry, F& exit) {
   entry = 0;
   exit = static_cast<F>(1e30);
   for (int a = 0; a < 3; ++a) {
-    const F inverse = 1 / direction[a];  // an infinity is what the comparisons below want
+    const F inverse = 1 / direction[a];  // may be infinite; the comparisons below handle that
     F near = -origin[a] * inverse;
     F far = (extent[a] - origin[a]) * inverse;
     if (near > far) {
@@ -25,7 +25,7 @@ ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent,
       near = far;
       far = swap;
     }
-    // Written so that a NaN (origin on a slab, direction along it) leaves the bound as it is.
+    // A NaN (origin on a slab plane, direction parallel to it) leaves the bound unchanged.
     if (near > entry) entry = near;
     if (far < exit) exit = far;
     if (direction[a] == 0 && (origin[a] < 0 || origin[a] > extent[a])) return false;
@@ -33,8 +33,8 @@ ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent,
   return exit > entry;
 }
 
-// Index of the cell of a `resolution`^3 (at most 128^3) grid that holds a point; the point is in cells and is clamped
-// into the grid.
+// Index of the cell that contains a point in a grid of `resolution`^3 cells (at most 128^3), x fastest. The point is in
+// units of cells and is clamped to the grid.
 template <class F>
 ROMAP_HD typename Lane<F>::Int CellIndex(F x_cells, F y_cells, F z_cells, int resolution) {
   const F zero = Lane<F>::Zero(), last = Lane<F>::Set(static_cast<float>(resolution - 1));
@@ -42,7 +42,7 @@ ROMAP_HD typename Lane<F>::Int CellIndex(F x_cells, F y_cells, F z_cells, int re
   const F y = Floor(Min(Max(y_cells, zero), last));
   const F z = Floor(Min(Max(z_cells, zero), last));
   const F r = Lane<F>::Set(static_cast<float>(resolution));
-  return Lane<F>::WholeToInt(MulAdd(MulAdd(z, r, y), r, x));  // exact: all are whole and small
+  return Lane<F>::WholeToInt(MulAdd(MulAdd(z, r, y), r, x));  // exact: all values are small integers
 }
 
 ROMAP_MATH_END

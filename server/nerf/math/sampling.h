@@ -1,84 +1,64 @@
-#pragma once
-
-// Where a ray is sampled, point by point: the form for back ends that give each probe and each sample a thread of its
-// own. The ray's way through the box is cut into kRayProbes equal pieces; a piece is occupied when the cell in its
-// middle is; samples spread evenly over the occupied pieces, as if these were one stretch.
-
-#include <cstdint>
-
+#include "server/nerf/math/lane.h"
 #include "server/nerf/math/ray.h"
 #include "server/nerf/math/types.h"
 
-namespace romap::nerf {
-
-// How many samples a ray gets.
-struct SampleBudget {
-  float finest_step = 0.01f;  // box sides; samples are not set closer than this, down to `least`
-  int least = 4;
-  int most = 16;
-  bool skip_empty = true;  // false: `most` samples between entry and exit of the box, occupied or not
-};
-
-ROMAP_HD int CountBits(uint64_t bits) {
-#ifdef __CUDA_ARCH__
-  return __popcll(bits);
+#if defined(ROMAP_NERF_MATH_SAMPLING) == defined(HWY_TARGET_TOGGLE)
+#ifdef HWY_TARGET_TOGGLE
+#undef ROMAP_NERF_MATH_SAMPLING
 #else
-  return __builtin_popcountll(bits);
+#define ROMAP_NERF_MATH_SAMPLING
 #endif
-}
 
-// Place of the set bit before which `n` others are set; there must be more than n.
-ROMAP_HD int PlaceOfBit(uint64_t bits, int n) {
-  int place = 0;
-  for (int width = 32; width > 0; width /= 2) {
-    const uint64_t low = bits & ((uint64_t{1} << width) - 1);
-    const int in_low = CountBits(low);
-    if (n < in_low) {
-      bits = low;
-    } else {
-      n -= in_low;
-      bits >>= width;
-      place += width;
+ROMAP_MATH_BEGIN
+
+// Where a ray is sampled. The segment of the ray inside the box is divided into kRayProbes equal pieces; a piece, which
+// is at most 1.8 cells long, is occupied if the cell at its center is. Samples are spread evenly over the occupied
+// pieces, as if these were joined into one segment. sample_budget.h has their number.
+
+// A ray in units of cells of the occupancy grid. `extent`: of the box in Unit space.
+template <class F>
+struct RayInCells {
+  F origin[3], direction[3];
+
+  ROMAP_HD RayInCells(const Ray& ray, const float* extent) {
+    for (int a = 0; a < 3; ++a) {
+      const float cells_per_unit = kOccupancyResolution / extent[a];
+      origin[a] = Lane<F>::Set(ray.origin[a] * cells_per_unit);
+      direction[a] = Lane<F>::Set(ray.direction[a] * cells_per_unit);
     }
   }
-  return place;
-}
-
-// Point of a ray at t, in the Unit space of the box.
-ROMAP_HD float RayPoint(const Ray& ray, int axis, float t) {
-  return plain::MulAdd(ray.direction[axis], t, ray.origin[axis]);
-}
-
-// The cell of the occupancy grid at t; points outside [0, extent] count as those at its border.
-ROMAP_HD uint32_t CellOnRay(const Ray& ray, const float* extent, float t) {
-  float at_cell[3];
-  for (int a = 0; a < 3; ++a) {
-    const float cells_per_unit = kOccupancyResolution / extent[a];
-    at_cell[a] = plain::MulAdd(ray.direction[a] * cells_per_unit, t, ray.origin[a] * cells_per_unit);
+  // The cell at t; points outside the box are clamped to the cells at its border.
+  ROMAP_HD typename Lane<F>::Int CellAt(F t) const {
+    return CellIndex(MulAdd(direction[0], t, origin[0]), MulAdd(direction[1], t, origin[1]),
+                     MulAdd(direction[2], t, origin[2]), kOccupancyResolution);
   }
-  return plain::CellIndex(at_cell[0], at_cell[1], at_cell[2], kOccupancyResolution);
+};
+
+// t at position `pieces` along the segment, in pieces. `piece`: length of a piece; `entry`: t where the segment begins.
+template <class F>
+ROMAP_HD F PositionOnRay(F pieces, F piece, F entry) {
+  return MulAdd(pieces, piece, entry);
 }
 
-// Middle of piece `i`, `piece` long, of a way that begins at `entry`.
-ROMAP_HD float ProbePlace(int i, float piece, float entry) {
-  return plain::MulAdd(static_cast<float>(i) + 0.5f, piece, entry);
+// t at the center of piece `number`.
+template <class F>
+ROMAP_HD F PieceCenter(F number, F piece, F entry) {
+  return PositionOnRay(number + Lane<F>::Set(0.5f), piece, entry);
 }
 
-// Samples for a ray whose occupied pieces are `stretch` long together.
-ROMAP_HD int SampleCount(const SampleBudget& budget, float stretch) {
-  if (!(stretch > 1e-6f)) return 0;
-  if (!budget.skip_empty) return budget.most;
-  const int wanted = static_cast<int>(stretch / budget.finest_step) + 1;
-  return wanted < budget.least ? budget.least : wanted > budget.most ? budget.most : wanted;
+// Of the joined occupied pieces, 0..last_piece: the one that contains position `at`.
+template <class F>
+ROMAP_HD F JoinedPieceAt(F at, F last_piece) {
+  return Min(Floor(at), last_piece);
 }
 
-// t of sample `i` of `count`; bit k of `occupied`: piece k is. `jitter` in 0..1 places a sample in its stratum.
-ROMAP_HD float SamplePlace(int i, int count, float jitter, uint64_t occupied, float piece, float entry) {
-  const int pieces = CountBits(occupied);
-  const float at = (static_cast<float>(i) + jitter) * (static_cast<float>(pieces) / static_cast<float>(count));
-  const int passed = static_cast<int>(at) < pieces ? static_cast<int>(at) : pieces - 1;
-  const float place = static_cast<float>(PlaceOfBit(occupied, passed)) + (at - static_cast<float>(passed));
-  return plain::MulAdd(place, piece, entry);
+// Coordinate of a sample in Unit space, clamped to the box: rounding may move it slightly outside, which the encoding
+// does not allow.
+template <class F>
+ROMAP_HD F SampleCoordinate(F origin, F direction, F t, F extent) {
+  return Min(Max(MulAdd(direction, t, origin), Lane<F>::Zero()), extent);
 }
 
-}  // namespace romap::nerf
+ROMAP_MATH_END
+
+#endif

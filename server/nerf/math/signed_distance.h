@@ -10,54 +10,56 @@
 
 ROMAP_MATH_BEGIN
 
-// Fields of signed distances, in box sides, positive outside; the surface is where they are 0.
+// Fields of signed distances, in box sides, positive outside; the surface is the zero level set.
 //
-// A ray's light passes a place at distance d with the share Sigmoid(s d): the cumulative logistic distribution of
-// Wang et al. ("NeuS", 2021), s being its sharpness. What lies between two samples takes away the share by which that
-// falls, so that the weights of a ray peak where it meets the surface, and rays that leave a surface lose nothing.
+// The transmittance of a point at distance d is Sigmoid(s d), the cumulative logistic distribution of Wang et al.
+// ("NeuS", 2021) with sharpness s. The opacity between two samples is the relative decrease of that transmittance, so
+// the weights of a ray peak where it enters the surface, and a ray that leaves a surface is not attenuated.
 
-// Share of light at a raw output.
+// Transmittance at a raw output.
 template <class F>
-ROMAP_HD F LightAtRaw(F raw, F sharpness) {
-  const F most = Lane<F>::Set(30.0f);  // keeps ratios of shares finite
+ROMAP_HD F TransmittanceAtRaw(F raw, F sharpness) {
+  const F limit = Lane<F>::Set(30.0f);  // keeps ratios of transmittances finite
   const F exponent = Lane<F>::Set(kDistancePerRaw) * sharpness * raw;
   const F one = Lane<F>::Set(1.0f);
-  return one / (one + Lane<F>::Exp(Min(Max(exponent, Lane<F>::Zero() - most), most)));
+  return one / (one + Lane<F>::Exp(Min(Max(exponent, Lane<F>::Zero() - limit), limit)));
 }
 
-// Opacity of the stretch between a sample and the one before it; `before` is 1 for the first of a ray, which comes from
-// outside.
+// Opacity between the previous sample, of transmittance `before`, and this one. The first sample of a ray has
+// `before` = 1, because rays start outside.
 template <class F>
-ROMAP_HD F OpacityBetween(F before, F light) {
-  return light < before ? 1 - light / before : 0;
+ROMAP_HD F OpacityBetween(F before, F transmittance) {
+  return transmittance < before ? 1 - transmittance / before : 0;
 }
 
-// Adjoint of LightAtRaw and OpacityBetween along a ray: d_depth[i] is the loss's derivative by the optical depth
-// -log(1 - opacity) of stretch i, and d_raw[i] its derivative by the raw output of sample i. Both may be the same
-// array; they are `step` apart.
+// Adjoint of TransmittanceAtRaw and OpacityBetween along a ray. d_depth[i]: derivative of the loss with respect to the
+// optical depth -log(1 - opacity) in front of sample i; d_raw[i], out: with respect to the raw output of sample i. Both
+// may be the same array; their elements are `step` apart.
 template <class F>
-ROMAP_HD void DistanceBackward(int count, F sharpness, const F* light, const F* opacity, const F* d_depth, F* d_raw,
-                               int step) {
+ROMAP_HD void DistanceBackward(int count, F sharpness, const F* transmittance, const F* opacity, const F* d_depth,
+                               F* d_raw, int step) {
   for (int i = 0; i < count; ++i) {
-    // The depth of stretch i is log(light before it) - log(light), where that is positive.
-    F d_log_light = opacity[i] > 0 ? -d_depth[i * step] : 0;
-    if (i + 1 < count && opacity[i + 1] > 0) d_log_light += d_depth[(i + 1) * step];
-    d_raw[i * step] = -static_cast<F>(kDistancePerRaw) * sharpness * (1 - light[i]) * d_log_light;
+    // Optical depth i is log(transmittance before) - log(transmittance), where that is positive.
+    F d_log = opacity[i] > 0 ? -d_depth[i * step] : 0;
+    if (i + 1 < count && opacity[i + 1] > 0) d_log += d_depth[(i + 1) * step];
+    d_raw[i * step] = -static_cast<F>(kDistancePerRaw) * sharpness * (1 - transmittance[i]) * d_log;
   }
 }
 
-// Where the shape of a field is looked at, in units of the spacing: the corners of a tetrahedron, then its centre.
+// Points at which the shape of a field is evaluated, in units of the spacing: the corners of a tetrahedron, then its
+// center.
 ROMAP_HD float StencilOffset(int point, int axis) {
   if (point == kStencilPoints - 1) return 0.0f;
   const int bit = point == 0 ? 0 : axis != point - 1;
   return bit ? -1.0f : 1.0f;
 }
 
-// Loss on the shape of a field of distances about one place, from the distances of the stencil's points, which lie
-// `spacing` box sides apart from the centre along every axis:
-//   eikonal (|grad d| - 1)^2 + curvature (spacing trace of the Hessian)^2,
-// the first because a distance grows by 1 per unit (Gropp et al., "Implicit Geometric Regularization", 2020), the
-// second so that the surface bends only where the views ask for it. d_distance[kStencilPoints]: derivatives.
+// Loss on the shape of a distance field around one center, from the distances at the points of the stencil, which are
+// offset from the center by `spacing` box sides along every axis:
+//   eikonal (|grad d| - 1)^2 + curvature (spacing trace of the Hessian)^2.
+// The first term holds because a distance grows by 1 per unit (Gropp et al., "Implicit Geometric Regularization",
+// 2020); the second keeps the surface flat where the views do not require it to bend. d_distance[kStencilPoints], out:
+// derivatives.
 template <class F>
 ROMAP_HD F ShapeLoss(const ShapeWeights& weights, F spacing, const F* distance, F* d_distance) {
   constexpr int kCorners = kStencilPoints - 1;

@@ -41,6 +41,7 @@ inline void __threadfence_block() { __threadfence(); }
 // Spin loops must sleep: fibers take turns only when they wait.
 inline void __nanosleep(unsigned) { romap::cuda_on_host::YieldInSpin(); }
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
+inline int __popcll(unsigned long long x) { return __builtin_popcountll(x); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline unsigned __float_as_uint(float x) { return __builtin_bit_cast(unsigned, x); }
 inline float __uint_as_float(unsigned x) { return __builtin_bit_cast(float, x); }

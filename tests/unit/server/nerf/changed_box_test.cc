@@ -188,29 +188,5 @@ TEST(ChangedBoxSpaceTest, IsDeterministic) {
   EXPECT_EQ(train(2), train(2));
 }
 
-TEST(OccupancyTest, ScoresGoAlongToAnotherBox) {
-  constexpr int kSide = nerf::kOccupancyResolution;
-  NerfConfig config;
-  config.occupancy_decay = 0;
-  nerf::Occupancy occupancy(config);
-  const auto index = [](int x, int y, int z) { return static_cast<uint32_t>((z * kSide + y) * kSide + x); };
-  // A sheet one cell thick, all else empty.
-  for (int z = 0; z < kSide; ++z) {
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) occupancy.Record(index(x, y, z), x == 21 ? 1.0f : 0.0f);
-    }
-  }
-  // The new box is twice as long along x, from the same lowest corner.
-  occupancy.MoveTo(Eigen::Affine3f(Eigen::Scaling(2.0f, 1.0f, 1.0f)));
-  occupancy.SetHull(std::vector<uint8_t>(static_cast<size_t>(kSide) * kSide * kSide, 1));
-  const auto occupied = [&](int x, int y, int z) {
-    const uint32_t cell = index(x, y, z);
-    return (occupancy.bits()[cell / 32] >> (cell % 32) & 1u) != 0;
-  };
-  for (int x = 0; x < kSide; ++x) {
-    EXPECT_EQ(occupied(x, 30, 30), (x >= 9 && x <= 11) || x >= 31) << x;  // dilated by a cell; unknown beyond 32
-  }
-}
-
 }  // namespace
 }  // namespace romap::nerf

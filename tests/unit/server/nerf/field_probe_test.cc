@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/nerf/cpu/occupancy.h"
+#include "server/nerf/model/occupancy.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
 namespace romap::nerf {

@@ -250,23 +250,6 @@ TEST(VisualHullTest, HoldsTheBallAndLittleMore) {
   EXPECT_LT(kept, 1.35 * inside);
 }
 
-TEST(OccupancyTest, TrimmedHullEndsWhereRaysEnd) {
-  constexpr uint32_t kRow = nerf::kOccupancyResolution, kLayer = kRow * kRow;
-  nerf::Occupancy occupancy(NerfConfig{});
-  for (uint32_t z = 20; z < 50; ++z) {
-    for (uint32_t x = 10; x < 60; ++x) occupancy.Record(z * kLayer + 30 * kRow + x, 0.5f);
-  }
-  const std::vector<uint8_t> hull = occupancy.TrimmedHull(0.002);
-  const auto at = [&](uint32_t x, uint32_t y, uint32_t z) { return hull[z * kLayer + y * kRow + x]; };
-  EXPECT_EQ(at(30, 30, 19), 1);  // one layer of margin
-  EXPECT_EQ(at(30, 30, 18), 0);
-  EXPECT_EQ(at(30, 30, 50), 1);
-  EXPECT_EQ(at(30, 30, 51), 0);
-  EXPECT_EQ(at(8, 30, 30), 0);
-  EXPECT_EQ(at(30, 28, 30), 0);
-  EXPECT_EQ(occupancy.TrimmedHull(0), occupancy.hull());
-}
-
 TEST(VisualHullTest, OneBadMaskIsOutvoted) {
   const testing::BallScene scene;
   NerfConfig config;

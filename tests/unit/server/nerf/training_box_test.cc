@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "server/nerf/cpu/field_model.h"
 #include "server/nerf/math/hash_grid.h"
+#include "server/nerf/model/field_model.h"
 
 namespace romap::nerf {
 namespace {
