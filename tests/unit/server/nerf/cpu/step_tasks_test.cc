@@ -2,17 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <atomic>
 #include <thread>
 #include <vector>
 
 namespace romap::nerf {
 namespace {
 
-TEST(StepTasksTest, HandsOutEveryTaskInOrder) {
+TEST(StepTasksTest, ReturnsEveryTaskInOrder) {
   StepTasks tasks(2, {2, 3});
   std::vector<std::array<uint64_t, 3> > seen;
-  while (const std::optional<StepTasks::Task> task = tasks.Take()) {
+  while (const std::optional<StepTasks::Task> task = tasks.Next()) {
     seen.push_back({task->step, static_cast<uint64_t>(task->phase), task->index});
     tasks.Finish();
   }
@@ -21,11 +21,11 @@ TEST(StepTasksTest, HandsOutEveryTaskInOrder) {
   EXPECT_EQ(seen, wanted);
 }
 
-TEST(StepTasksTest, NoStepsNoTasks) { EXPECT_FALSE(StepTasks(0, {1, 1}).Take()); }
+TEST(StepTasksTest, HasNoTasksWithoutSteps) { EXPECT_FALSE(StepTasks(0, {1, 1}).Next()); }
 
-// Each task of a phase must see all that those of the phase before have written. Plain integers, so that the thread
-// sanitizer would notice a missing order, too.
-TEST(StepTasksTest, PhasesFollowOneAnother) {
+// Each task must see everything that the tasks of the previous phase wrote. Plain integers, so that the thread sanitizer
+// also reports a missing synchronization.
+TEST(StepTasksTest, PhasesDoNotOverlap) {
   constexpr uint64_t kSteps = 200, kShares = 3;
   for (const int threads : {1, 2, 4}) {
     StepTasks tasks(kSteps, {kShares, 2});
@@ -33,7 +33,7 @@ TEST(StepTasksTest, PhasesFollowOneAnother) {
     std::array<uint64_t, 2> optimized = {};
     std::atomic<int> faults = 0;
     const auto work = [&] {
-      while (const std::optional<StepTasks::Task> task = tasks.Take()) {
+      while (const std::optional<StepTasks::Task> task = tasks.Next()) {
         if (task->phase == 0) {
           for (const uint64_t steps : optimized) faults += steps != task->step;
           ++rendered[task->index];
@@ -55,23 +55,26 @@ TEST(StepTasksTest, PhasesFollowOneAnother) {
   }
 }
 
-TEST(StepTasksTest, WaitsForATaskAtWorkOnly) {
+TEST(StepTasksTest, APhaseWaitsForAllTasksOfThePreviousOne) {
   StepTasks tasks(1, {2, 1});
-  ASSERT_TRUE(tasks.Take());
-  ASSERT_TRUE(tasks.Take());
-  std::atomic<bool> taken = false;
+  ASSERT_TRUE(tasks.Next());
+  ASSERT_TRUE(tasks.Next());
+  std::atomic<bool> first_phase_finished = false;
+  bool finished_before = false;
+  int phase = -1;
   std::jthread other([&] {
-    const std::optional<StepTasks::Task> task = tasks.Take();
-    taken = task && task->phase == 1;
+    const std::optional<StepTasks::Task> task = tasks.Next();
+    finished_before = first_phase_finished;
+    if (task) phase = task->phase;
     tasks.Finish();
   });
   tasks.Finish();
-  std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_FALSE(taken);  // the other task of the phase is still at work
+  first_phase_finished = true;
   tasks.Finish();
   other.join();
-  EXPECT_TRUE(taken);
-  EXPECT_FALSE(tasks.Take());
+  EXPECT_EQ(phase, 1);
+  EXPECT_TRUE(finished_before);
+  EXPECT_FALSE(tasks.Next());
 }
 
 }  // namespace
