@@ -19,24 +19,24 @@ namespace romap::measure::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Sum of the four floats at each of `count` (a multiple of 4) places.
-float LoadAt(const float* table, const uint32_t* places, size_t count) {
+// Sum of the four floats at each of `count` positions; `count` is a multiple of 4.
+float LoadAt(const float* table, const uint32_t* positions, size_t count) {
   const hn::CappedTag<float, 4> d;
-  auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;  // so that no addition waits for another
+  auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;  // so that additions are independent
   for (size_t i = 0; i < count; i += 4) {
-    s0 = s0 + hn::LoadU(d, table + places[i]);
-    s1 = s1 + hn::LoadU(d, table + places[i + 1]);
-    s2 = s2 + hn::LoadU(d, table + places[i + 2]);
-    s3 = s3 + hn::LoadU(d, table + places[i + 3]);
+    s0 = s0 + hn::LoadU(d, table + positions[i]);
+    s1 = s1 + hn::LoadU(d, table + positions[i + 1]);
+    s2 = s2 + hn::LoadU(d, table + positions[i + 2]);
+    s3 = s3 + hn::LoadU(d, table + positions[i + 3]);
   }
   return hn::GetLane(s0 + s1 + s2 + s3);
 }
 
-void UpdateAt(float* table, const uint32_t* places, size_t count) {
+void UpdateAt(float* table, const uint32_t* positions, size_t count) {
   const hn::CappedTag<float, 4> d;
   const auto summand = hn::Set(d, 1e-9f);
   for (size_t i = 0; i < count; ++i) {
-    float* at = table + places[i];
+    float* at = table + positions[i];
     hn::StoreU(hn::LoadU(d, at) + summand, d, at);
   }
 }
@@ -67,7 +67,7 @@ volatile float g_sink;
 
 double Now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// Shortest time of several calls: what the machine can do when nobody disturbs it.
+// Shortest time of several calls, which excludes interruptions by other processes.
 template <class Work>
 double ShortestSeconds(const Work& work) {
   double best_s = std::numeric_limits<double>::infinity();
@@ -79,26 +79,26 @@ double ShortestSeconds(const Work& work) {
   return best_s;
 }
 
-// Calls access(places) for batches of random places in a table, the places in the first-level cache, and returns the
-// time of one access.
+// Calls access(table, positions) for batches of random positions in a table and returns the time per access. The
+// positions are in the L1 cache.
 template <class Access>
 double RandomAccessSeconds(size_t table_bytes, const Access& access) {
-  const size_t pairs = table_bytes / 8;  // accesses start at every second float, as those of the hash grid do
+  const size_t pairs = table_bytes / 8;  // accesses start at even floats, like those of the hash grid
   constexpr size_t kBatch = 2048;
   constexpr int kBatches = 64;
   std::vector<float> table(2 * pairs + kFloatsPerAccess);
-  std::vector<uint32_t> places(kBatch);
+  std::vector<uint32_t> positions(kBatch);
   uint64_t state = 88172645463325252ull;
   double best_s = std::numeric_limits<double>::infinity();
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
     double spent_s = 0;
     for (int batch = 0; batch < kBatches; ++batch) {
-      for (uint32_t& place : places) {
+      for (uint32_t& position : positions) {
         state = state * 6364136223846793005ull + 1442695040888963407ull;
-        place = static_cast<uint32_t>(2 * ((state >> 32) * pairs >> 32));
+        position = static_cast<uint32_t>(2 * ((state >> 32) * pairs >> 32));
       }
       const double start_s = Now_s();
-      access(table.data(), places);
+      access(table.data(), positions);
       spent_s += Now_s() - start_s;
     }
     best_s = std::min(best_s, spent_s / (kBatch * kBatches));
@@ -111,14 +111,14 @@ double RandomAccessSeconds(size_t table_bytes, const Access& access) {
 double PeakFlopPerSecond() { return 1e9 * bench::MeasureFmaPeakGflops(1); }
 
 double RandomLoadSeconds(size_t table_bytes) {
-  return RandomAccessSeconds(table_bytes, [](const float* table, const std::vector<uint32_t>& places) {
-    g_sink = HWY_DYNAMIC_DISPATCH(LoadAt)(table, places.data(), places.size());
+  return RandomAccessSeconds(table_bytes, [](const float* table, const std::vector<uint32_t>& positions) {
+    g_sink = HWY_DYNAMIC_DISPATCH(LoadAt)(table, positions.data(), positions.size());
   });
 }
 
 double RandomUpdateSeconds(size_t table_bytes) {
-  return RandomAccessSeconds(table_bytes, [](float* table, const std::vector<uint32_t>& places) {
-    HWY_DYNAMIC_DISPATCH(UpdateAt)(table, places.data(), places.size());
+  return RandomAccessSeconds(table_bytes, [](float* table, const std::vector<uint32_t>& positions) {
+    HWY_DYNAMIC_DISPATCH(UpdateAt)(table, positions.data(), positions.size());
   });
 }
 

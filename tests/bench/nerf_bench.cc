@@ -1,13 +1,13 @@
-// What training costs, phase by phase, against what this machine can do at best and against the plain form:
+// Time of training by phase, compared with the limits of this machine and with the plain form of the kernels:
 //   nerf_bench [SEQUENCE] [--preset fast|paper|both] [--set nerf.FIELD=VALUE ..] [--steps 0] [--repeats 5] [--threads
 //   2]
 // Trains each object of SEQUENCE (true cuboids, poses, masks; every fourth frame) or, without one, of a synthetic
-// world. Of `repeats` interleaved runs the fastest counts. All times are of this run; on shared machines only their
-// ratios say anything. `steps` 0 = as many as suit the preset.
+// world. Reports the fastest of `repeats` interleaved runs. On shared machines only the ratios of the times are
+// meaningful. `steps` 0 = a default for each preset.
 //
-// The limit of a phase is the larger of two times, both from counted work of what the method asks for and measured
-// peaks of one core: floating-point operations at the peak of multiply-adds, and memory accesses (random loads and
-// updates of tables as large as the model's; streams for the optimiser).
+// The limit of a phase is the larger of two times, computed from the counted work of the method and the measured peak
+// rates of one core: floating-point operations at the peak rate of multiply-adds, and memory accesses (random loads and
+// updates of tables of the size of the model's; sequential access for the optimizer).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -101,7 +101,7 @@ nerf::TrainStats TrainAll(const std::vector<Subject>& subjects, const nerf::Nerf
 
 double Rate(const nerf::TrainStats& stats) { return static_cast<double>(stats.samples) / stats.wall_s; }
 
-// Peaks of one core for a model of some size.
+// Peak rates of one core for a model of a given size.
 struct Limits {
   double flop_s, probe_s, load_s, update_s, byte_s;
 };
@@ -113,7 +113,7 @@ Limits MeasureLimits(const nerf::GridLayout& layout) {
           RandomUpdateSeconds(table_bytes), 1 / StreamBytesPerSecond(4 * table_bytes)};
 }
 
-// Least time of each phase per sample [s], of one thread working alone.
+// Lower bound of the time of each phase per sample [s], for one thread.
 std::array<double, kPhases> PhaseLimits(const nerf::NerfConfig& config, const nerf::TrainStats& stats,
                                         const Limits& limits) {
   const nerf::GridLayout layout = nerf::MakeGridLayout(config);
@@ -128,10 +128,10 @@ std::array<double, kPhases> PhaseLimits(const nerf::NerfConfig& config, const ne
   constexpr double kCellFlop = 24, kBlendFlop = 36;  // of one level
   const double mlp_flop = 2 * (inputs * hidden + hidden * nerf::kOutputs);
   const double table_bytes = static_cast<double>(layout.entries) * nerf::kFeaturesPerLevel * sizeof(float);
-  // Eight neighbouring entries share what the optimiser reads; those without a gradient are only looked at.
+  // The optimizer reads groups of eight adjacent entries; groups without a gradient are only read.
   const double groups = table_bytes / 64;
   const double touched = 1 - std::exp(-active * samples / stats.steps * levels * 4 / groups);
-  const double bytes = steps * table_bytes * (1 + 7 * touched) / 2;  // of read and write pairs
+  const double bytes = steps * table_bytes * (1 + 7 * touched) / 2;  // pairs of one read and one write
   const double grid_flop = levels * (kCellFlop + kBlendFlop);
   return {std::max((probes * kProbeFlop + rays * kRayFlop + kPlaceFlop) * limits.flop_s, probes * limits.probe_s),
           std::max(grid_flop * limits.flop_s, levels * 4 * limits.load_s),
@@ -167,7 +167,7 @@ void BenchPreset(const char* name, const nerf::NerfConfig& config, int default_s
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     one = faster(one, TrainAll(subjects, config, nerf::SimdKernels(), steps, 1));
     many = faster(many, TrainAll(subjects, config, nerf::SimdKernels(), steps, options.threads));
-    if (repeat > 1) continue;  // the plain form takes its time
+    if (repeat > 1) continue;  // the plain form is slow
     plain = faster(plain, TrainAll(subjects, config, nerf::PlainKernels(), plain_steps, 1));
     short_run = faster(short_run, TrainAll(subjects, config, nerf::SimdKernels(), plain_steps, 1));
   }
@@ -204,7 +204,7 @@ absl::Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   romap::measure::Options options;
-  CLI::App app("Cost of training by phase, against this machine's own limits");
+  CLI::App app("Time of training by phase, compared with the limits of this machine");
   app.add_option("sequence", options.sequence);
   app.add_option("--preset", options.preset)->check(CLI::IsMember({"fast", "paper", "both"}));
   app.add_option("--set", options.assignments)->allow_extra_args(false);

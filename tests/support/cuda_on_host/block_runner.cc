@@ -18,8 +18,8 @@ namespace {
 namespace context = boost::context;
 
 constexpr size_t kStackBytes = 256 * 1024;
-constexpr size_t kSharedAlignment = 128;  // what kernels ask for by ROMAP_DYNAMIC_SHARED
-// Passes over a block in which threads only spun. A lock is free after a few; more is a lock that nobody opens.
+constexpr size_t kSharedAlignment = 128;  // alignment promised by ROMAP_DYNAMIC_SHARED
+// Limit of consecutive passes over a block in which threads only spin; a spin lock that is released needs only a few.
 constexpr int kMaxSpinPasses = 100'000;
 
 RunOptions g_options;
@@ -27,8 +27,8 @@ std::atomic<uint64_t> g_launches{0};
 
 struct Warp {
   uint64_t barriers = 0;
-  uint32_t arrived = 0;   // lanes that wait
-  uint32_t released = 0;  // lanes whose collective is complete but that did not run since
+  uint32_t arrived = 0;   // waiting lanes
+  uint32_t released = 0;  // lanes whose collective is complete but that have not resumed yet
   uint32_t exited = 0;
   LaneSlot slots[kWarpSize];
 };
@@ -40,7 +40,7 @@ struct Thread {
   bool done = true;
 };
 
-// The threads of one block after another; fibers are kept from block to block.
+// Runs the threads of one block after another; the fibers are reused for every block.
 class BlockRunner {
  public:
   BlockRunner(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& kernel)
@@ -113,7 +113,7 @@ void BlockRunner::Reset(uint64_t block_number) {
   live_ = thread_count;
   waiting_ = votes_ = 0;
   warps.assign((thread_count + kWarpSize - 1) / kWarpSize, Warp{});
-  std::fill(dynamic_shared.begin(), dynamic_shared.end(), 0xff);  // NaN: nobody may count on zeros
+  std::fill(dynamic_shared.begin(), dynamic_shared.end(), 0xff);  // NaN: kernels must not rely on zeros
   for (unsigned i = 0; i < thread_count; ++i) {
     threads_[i].index = {i % block_dim.x, i / block_dim.x % block_dim.y, i / block_dim.x / block_dim.y};
     threads_[i].linear = i;
@@ -135,7 +135,7 @@ void BlockRunner::Run(uint64_t block_number) {
     if (progress_) {
       spin_passes = 0;
     } else if (!spun_ || ++spin_passes > kMaxSpinPasses) {
-      Die("deadlock: threads wait for others that never come");
+      Die("deadlock: threads wait for others that never arrive");
     }
   }
 }
@@ -154,7 +154,7 @@ void BlockRunner::Resume(Thread& thread) {
                                     return std::move(scheduler_);
                                   });
   }
-  // While a fiber runs, `scheduler_` is the way back; Yield() refreshes it each time.
+  // While a fiber runs, `scheduler_` returns to this function; Yield() updates it each time.
   thread.fiber = std::move(thread.fiber).resume();
   current = nullptr;
   if (thread.done) OnExit(thread);
@@ -196,8 +196,8 @@ void BlockRunner::WarpArrive(uint32_t mask, bool orders_memory) {
   const uint32_t self = 1u << lane;
   const unsigned lanes = std::min(kWarpSize, thread_count - current->linear / kWarpSize * kWarpSize);
   if (lanes < kWarpSize) mask &= (1u << lanes) - 1;
-  if ((mask & self) == 0) Die("a lane calls a warp collective whose mask does not name it");
-  if ((warp.exited & mask) != 0) Die("a warp collective names a lane that has returned");
+  if ((mask & self) == 0) Die("a lane calls a warp collective whose mask does not contain it");
+  if ((warp.exited & mask) != 0) Die("the mask of a warp collective contains a lane that has returned");
   warp.arrived |= self;
   progress_ = true;
   if ((warp.arrived & mask) == mask) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Runs the threads of CUDA blocks on the host: one fiber per CUDA thread, one block at a time per OS thread. Kernels do
-// not include this file; they see it through device_builtins.h.
+// Runs the threads of CUDA blocks on the host: one fiber per CUDA thread, one block at a time per OS thread. Kernels
+// use it through device_builtins.h.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,30 +14,30 @@ namespace romap::cuda_on_host {
 inline constexpr unsigned kWarpSize = 32;
 inline constexpr unsigned kMaxThreadsPerBlock = 1024;
 
-// In which order the runnable threads of a block take their turns. A missing barrier often shows in one order only, so
-// tests run kernels in all of them.
+// Order in which the runnable threads of a block are scheduled. A missing barrier often fails in one order only, so
+// tests run kernels in all orders.
 enum class ThreadOrder { kForward, kReverse, kShuffled };
 
 struct RunOptions {
   ThreadOrder order = ThreadOrder::kForward;
   uint32_t shuffle_seed = 1;
-  int workers = 1;  // OS threads that take blocks
-  // A barrier that some threads of the block never reach, because they returned, is an error. Real devices let it pass.
+  int workers = 1;  // OS threads that run blocks
+  // Treats a barrier as an error if some threads of the block have returned before it. Real devices allow this.
   bool strict_barriers = false;
 };
 
-// For all launches from now on; not during a launch.
+// Applies to all later launches. Do not call during a launch.
 void SetRunOptions(const RunOptions& options);
 const RunOptions& GetRunOptions();
 
-// Runs `kernel` once per thread of the grid and returns when all have. Launch limits are the caller's to check. A
-// kernel that breaks the rules (a barrier at two places, a warp collective that a named lane never joins, a deadlock)
-// ends the process with a message that begins with "cuda_on_host:".
+// Runs `kernel` once per thread of the grid and returns when all threads have returned. The caller checks the launch
+// limits. Invalid kernels (a barrier at two lines, a warp collective that a lane of its mask never joins, a deadlock)
+// end the process with a message that starts with "cuda_on_host:".
 void RunGrid(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& kernel);
 
 [[noreturn]] void Die(const char* what, int line = 0);
 
-// ------------------------------------------------------------------- for the thread that runs now
+// ------------------------------------------------------------------- for the current CUDA thread
 
 const uint3& ThreadIndex();
 const uint3& BlockIndex();
@@ -46,27 +46,28 @@ const dim3& GridDim();
 unsigned Lane();
 void* DynamicShared();  // 128-byte aligned, all NaN when the block starts
 
-// Waits for all threads of the block; returns for how many of them `predicate` held. `line` tells barriers apart.
+// Waits for all threads of the block; returns the number of threads whose `predicate` is true. `line` identifies the
+// barrier.
 unsigned BlockBarrier(int line, bool predicate);
 
-// Waits for all lanes in `mask` (those that exist). A barrier also orders what they do to memory; a meeting, which
-// other warp collectives are, does not.
+// Waits for all existing lanes in `mask`. WarpBarrier also orders their memory accesses; WarpMeeting, which is part of
+// the other warp collectives, does not.
 void WarpBarrier(unsigned mask);
 void WarpMeeting(unsigned mask);
 
-// Where the lanes of a warp hand values to each other between two WarpMeetings.
+// Lanes of a warp exchange values through these slots, between two WarpMeetings.
 struct alignas(16) LaneSlot {
   unsigned char bytes[16];
   const void* pointers[2];
 };
 LaneSlot& SlotOfLane(unsigned lane);
 
-// Lets the other threads run: for loops that wait for what another thread writes.
+// Lets other threads run, in loops that wait for a write by another thread.
 void YieldInSpin();
 
 // ------------------------------------------------------------------- for the race checker
 
-// Who runs now and what it has synchronised with. `active` is false outside kernels.
+// The current CUDA thread and its synchronization so far. `active` is false outside kernels.
 struct ThreadStamp {
   bool active = false;
   uint64_t launch = 0;

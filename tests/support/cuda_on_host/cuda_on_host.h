@@ -1,9 +1,9 @@
 #pragma once
 
-// One source of kernels for nvcc and for the host: include this instead of the CUDA headers, and launch and declare
-// dynamic shared memory by the two macros below. Under nvcc they are what CUDA says; elsewhere the kernels run on the
-// host, one fiber per CUDA thread. That proves their logic, not their speed, nor memory ordering, tensor core rounding
-// or register limits.
+// Compiles the same kernels with nvcc and for the host: include this instead of the CUDA headers, and use the two
+// macros below for launches and dynamic shared memory. With nvcc they expand to CUDA; otherwise the kernels run on the
+// host, one fiber per CUDA thread. This tests their logic, but not speed, memory ordering, tensor core rounding or
+// register limits.
 
 #if defined(__CUDACC__)
 
@@ -14,7 +14,7 @@
 // ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, arguments...)
 #define ROMAP_LAUNCH(kernel, grid, block, dynamic_shared_bytes, stream, ...) \
   kernel<<<grid, block, dynamic_shared_bytes, stream>>>(__VA_ARGS__)
-// Declares `T* name`, the block's dynamic shared memory.
+// Declares `T* name`, the dynamic shared memory of the block.
 #define ROMAP_DYNAMIC_SHARED(T, name)                                 \
   extern __shared__ __align__(128) unsigned char name##_shared_raw[]; \
   T* const name = reinterpret_cast<T*>(name##_shared_raw)

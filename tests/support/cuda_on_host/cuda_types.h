@@ -1,6 +1,6 @@
 #pragma once
 
-// The vector and half precision types of CUDA C++, as far as our kernels use them. Names are CUDA's.
+// The vector and half precision types of CUDA C++ that the kernels use. Names are those of CUDA.
 
 #include <cstdint>
 
@@ -29,7 +29,7 @@ inline float2 make_float2(float x, float y) { return {x, y}; }
 inline float3 make_float3(float x, float y, float z) { return {x, y, z}; }
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
 
-// Half precision is storage; arithmetic happens in float with one rounding per operation, as on the device.
+// Half precision is only storage; operations compute in float and round once, as on the device.
 struct __half {
   _Float16 value;
   __half() = default;

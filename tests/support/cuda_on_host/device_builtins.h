@@ -1,7 +1,7 @@
 #pragma once
 
-// What CUDA C++ gives to device code, as far as our kernels use it: qualifiers, built-in variables, barriers, warp
-// collectives and atomics. Names are CUDA's.
+// The features of CUDA device code that the kernels use: qualifiers, built-in variables, barriers, warp collectives and
+// atomics. Names are those of CUDA.
 
 #include <algorithm>
 #include <atomic>
@@ -22,7 +22,7 @@
 #define __constant__ static
 #define __launch_bounds__(...)
 #define __align__(n) alignas(n)
-#define __shared__ static thread_local  // a block never leaves its OS thread
+#define __shared__ static thread_local  // a block runs on one OS thread
 
 #define threadIdx (::romap::cuda_on_host::ThreadIndex())
 #define blockIdx (::romap::cuda_on_host::BlockIndex())
@@ -38,7 +38,7 @@ static constexpr int warpSize = 32;
 inline void __syncwarp(unsigned mask = 0xffffffffu) { romap::cuda_on_host::WarpBarrier(mask); }
 inline void __threadfence() { std::atomic_thread_fence(std::memory_order_seq_cst); }
 inline void __threadfence_block() { __threadfence(); }
-// Spin loops must sleep: fibers take turns only when they wait.
+// Spin loops must call this: a fiber runs until it yields.
 inline void __nanosleep(unsigned) { romap::cuda_on_host::YieldInSpin(); }
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
 inline int __popcll(unsigned long long x) { return __builtin_popcountll(x); }
@@ -69,7 +69,7 @@ T Exchange(unsigned mask, const T& value, int source) {
   return result;
 }
 
-// Replaces *target by update(*target) at once with respect to all other atomics; returns the old value.
+// Replaces *target by update(*target) atomically; returns the old value.
 template <class Bits, class T, class Update>
 T AtomicUpdate(T* target, Update update) {
   static_assert(sizeof(Bits) == sizeof(T));
@@ -157,7 +157,7 @@ template <class T>
 T atomicCAS(T* target, T expected, T desired) {
   const T old = romap::cuda_on_host::AtomicUpdate<romap::cuda_on_host::BitsOf<T>>(
       target, [=](T now) { return now == expected ? desired : now; });
-  // Whoever fails is likely to spin: let the holder run.
+  // The caller will probably retry, so let the thread that holds the lock run.
   if (old != expected) romap::cuda_on_host::YieldInSpin();
   return old;
 }

@@ -48,7 +48,7 @@ struct Range {
   uintptr_t end = 0;
 };
 
-// The thread-local data of the main program for this OS thread: where the emulated __shared__ variables live.
+// The thread-local data of the main program for this OS thread, which contain the emulated __shared__ variables.
 Range ThreadLocalData() {
   thread_local Range range;
   if (range.begin != 0) return range;
@@ -72,7 +72,7 @@ Memory KindOf(uintptr_t address) {
   return InDeviceMemory(address) ? Memory::kDevice : Memory::kOther;
 }
 
-// Whether something made `earlier` happen before `now`, or both are of one thread.
+// Whether a barrier orders `earlier` before `now`, or both belong to one thread.
 bool Ordered(const ThreadStamp& earlier, const ThreadStamp& now, Memory memory) {
   if (!earlier.active || earlier.launch != now.launch) return true;
   if (earlier.block != now.block) return memory == Memory::kShared;  // each block has its own
@@ -92,7 +92,7 @@ void Report(const Access& earlier, const Access& now, Memory memory, bool write)
   std::fprintf(stderr, "cuda_on_host: race in %s\n", text);
 }
 
-void NoteWord(Word& word, const Access& now, Memory memory, bool write) {
+void RecordWord(Word& word, const Access& now, Memory memory, bool write) {
   const auto clashes = [&](const Access& earlier) {
     return !Ordered(earlier.stamp, now.stamp, memory) && !(earlier.atomic && now.atomic);
   };
@@ -112,7 +112,7 @@ void NoteWord(Word& word, const Access& now, Memory memory, bool write) {
   }
 }
 
-void Note(const volatile void* p, size_t bytes, bool write, bool atomic) {
+void Record(const volatile void* p, size_t bytes, bool write, bool atomic) {
   const Access now{CurrentStamp(), atomic};
   if (!now.stamp.active) return;
   const auto address = reinterpret_cast<uintptr_t>(p);
@@ -128,7 +128,7 @@ void Note(const volatile void* p, size_t bytes, bool write, bool atomic) {
     }
   }
   for (uintptr_t at = address / kWordBytes * kWordBytes; at < address + bytes; at += kWordBytes) {
-    NoteWord(TheLog().words[at], now, memory, write);
+    RecordWord(TheLog().words[at], now, memory, write);
   }
 }
 
@@ -158,8 +158,8 @@ void ResetRaces() {
 
 }  // namespace romap::cuda_on_host
 
-// What code compiled with -fsanitize=thread calls. The names and signatures are the compiler's.
-using romap::cuda_on_host::Note;
+// Functions called by code compiled with -fsanitize=thread. Names and signatures are those of the compiler.
+using romap::cuda_on_host::Record;
 
 extern "C" {
 
@@ -168,18 +168,18 @@ void __tsan_func_entry(void*) {}
 void __tsan_func_exit() {}
 void __tsan_vptr_update(void**, void*) {}
 void __tsan_vptr_read(void**) {}
-void __tsan_read_range(void* p, size_t bytes) { Note(p, bytes, false, false); }
-void __tsan_write_range(void* p, size_t bytes) { Note(p, bytes, true, false); }
+void __tsan_read_range(void* p, size_t bytes) { Record(p, bytes, false, false); }
+void __tsan_write_range(void* p, size_t bytes) { Record(p, bytes, true, false); }
 void __tsan_atomic_thread_fence(int) { __atomic_thread_fence(__ATOMIC_SEQ_CST); }
 void __tsan_atomic_signal_fence(int) {}
 
-#define ROMAP_TSAN_ACCESS(bytes)                                               \
-  void __tsan_read##bytes(void* p) { Note(p, bytes, false, false); }           \
-  void __tsan_write##bytes(void* p) { Note(p, bytes, true, false); }           \
-  void __tsan_volatile_read##bytes(void* p) { Note(p, bytes, false, false); }  \
-  void __tsan_volatile_write##bytes(void* p) { Note(p, bytes, true, false); }  \
-  void __tsan_unaligned_read##bytes(void* p) { Note(p, bytes, false, false); } \
-  void __tsan_unaligned_write##bytes(void* p) { Note(p, bytes, true, false); }
+#define ROMAP_TSAN_ACCESS(bytes)                                                 \
+  void __tsan_read##bytes(void* p) { Record(p, bytes, false, false); }           \
+  void __tsan_write##bytes(void* p) { Record(p, bytes, true, false); }           \
+  void __tsan_volatile_read##bytes(void* p) { Record(p, bytes, false, false); }  \
+  void __tsan_volatile_write##bytes(void* p) { Record(p, bytes, true, false); }  \
+  void __tsan_unaligned_read##bytes(void* p) { Record(p, bytes, false, false); } \
+  void __tsan_unaligned_write##bytes(void* p) { Record(p, bytes, true, false); }
 ROMAP_TSAN_ACCESS(1)
 ROMAP_TSAN_ACCESS(2)
 ROMAP_TSAN_ACCESS(4)
@@ -188,29 +188,29 @@ ROMAP_TSAN_ACCESS(16)
 
 #define ROMAP_TSAN_UPDATE(bits, T, name)                        \
   T __tsan_atomic##bits##_##name(volatile T* p, T value, int) { \
-    Note(p, sizeof(T), true, true);                             \
+    Record(p, sizeof(T), true, true);                           \
     return __atomic_##name(p, value, __ATOMIC_SEQ_CST);         \
   }
 #define ROMAP_TSAN_COMPARE(bits, T, strength, weak)                                                      \
   int __tsan_atomic##bits##_compare_exchange_##strength(volatile T* p, T* expected, T value, int, int) { \
-    Note(p, sizeof(T), true, true);                                                                      \
+    Record(p, sizeof(T), true, true);                                                                    \
     return __atomic_compare_exchange_n(p, expected, value, weak, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);    \
   }
 #define ROMAP_TSAN_ATOMIC(bits, T)                                                               \
   T __tsan_atomic##bits##_load(const volatile T* p, int) {                                       \
-    Note(p, sizeof(T), false, true);                                                             \
+    Record(p, sizeof(T), false, true);                                                           \
     return __atomic_load_n(p, __ATOMIC_SEQ_CST);                                                 \
   }                                                                                              \
   void __tsan_atomic##bits##_store(volatile T* p, T value, int) {                                \
-    Note(p, sizeof(T), true, true);                                                              \
+    Record(p, sizeof(T), true, true);                                                            \
     __atomic_store_n(p, value, __ATOMIC_SEQ_CST);                                                \
   }                                                                                              \
   T __tsan_atomic##bits##_exchange(volatile T* p, T value, int) {                                \
-    Note(p, sizeof(T), true, true);                                                              \
+    Record(p, sizeof(T), true, true);                                                            \
     return __atomic_exchange_n(p, value, __ATOMIC_SEQ_CST);                                      \
   }                                                                                              \
   T __tsan_atomic##bits##_compare_exchange_val(volatile T* p, T expected, T value, int, int) {   \
-    Note(p, sizeof(T), true, true);                                                              \
+    Record(p, sizeof(T), true, true);                                                            \
     __atomic_compare_exchange_n(p, &expected, value, false, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST); \
     return expected;                                                                             \
   }                                                                                              \

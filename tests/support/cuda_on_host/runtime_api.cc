@@ -22,7 +22,7 @@ struct Machine {
   bool lost = false;
   std::map<uintptr_t, size_t> allocations;  // address -> bytes
   size_t allocated_bytes = 0;
-  std::map<const void*, size_t> shared_limits;  // of kernels that asked for more
+  std::map<const void*, size_t> shared_limits;  // of kernels that requested more
 };
 
 Machine& TheMachine() {
@@ -71,7 +71,7 @@ bool FitsDevice(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared
 
 }  // namespace
 
-// Runs a kernel, unless it is the one that is to fail.
+// Runs a kernel, unless DeviceTraits make it fail.
 cudaError_t RunKernel(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& body) {
   {
     std::lock_guard lock(TheMachine().mutex);

@@ -1,8 +1,9 @@
 #pragma once
 
-// The part of the CUDA runtime API that we use. Device memory is host memory that starts as NaN, and copies are checked
-// against what was allocated. What is asked of a stream is done as late as CUDA allows, when somebody waits for it, so
-// that code which forgets to wait sees NaN or old values; the default stream works at once.
+// The part of the CUDA runtime API that the back end uses. Device memory is host memory initialized to NaN, and copies
+// are checked against the allocations. Work of a stream is executed as late as CUDA allows, at the next
+// synchronization, so that code without the necessary synchronization reads NaN or old values; the default stream
+// executes immediately.
 
 #include <cstddef>
 #include <cstdint>
@@ -44,7 +45,7 @@ struct cudaDeviceProp {
 };
 
 const char* cudaGetErrorString(cudaError_t error);
-cudaError_t cudaGetLastError();  // and forgets it
+cudaError_t cudaGetLastError();  // also clears it
 cudaError_t cudaPeekAtLastError();
 cudaError_t cudaGetDeviceCount(int* count);
 cudaError_t cudaSetDevice(int device);
@@ -90,12 +91,12 @@ cudaError_t cudaFuncSetAttribute(void (*kernel)(Args...), cudaFuncAttribute attr
 namespace romap::cuda_on_host {
 
 // Checks the launch against the limits of a device (1024 threads, grid sides, dynamic shared memory of 48 KB or what
-// cudaFuncSetAttribute allowed for `kernel`) and gives `body`, one thread's work, to the stream. A refused launch
-// leaves cudaErrorInvalidConfiguration.
+// cudaFuncSetAttribute allowed for `kernel`) and adds `body`, the work of one thread, to the stream. A rejected launch
+// sets cudaErrorInvalidConfiguration.
 void LaunchBody(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared_bytes, cudaStream_t stream,
                 std::function<void()> body);
 
-// The same with the arguments, of which CUDA takes copies.
+// The same with copies of the arguments, as in CUDA.
 template <class... Params, class... Args>
 void Launch(void (*kernel)(Params...), dim3 grid, dim3 block, size_t dynamic_shared_bytes, cudaStream_t stream,
             Args&&... args) {
@@ -103,18 +104,18 @@ void Launch(void (*kernel)(Params...), dim3 grid, dim3 block, size_t dynamic_sha
              [kernel, copies = std::tuple<std::decay_t<Params>...>(args...)] { std::apply(kernel, copies); });
 }
 
-// Gives an operation to a stream: done at once on the default stream, recorded while the stream captures, and otherwise
-// when somebody waits.
+// Adds an operation to a stream: executed immediately on the default stream, recorded while the stream captures, and
+// otherwise executed at the next synchronization.
 cudaError_t Enqueue(cudaStream_t stream, std::function<cudaError_t()> operation);
-// Does what waits in any stream.
+// Executes the pending operations of all streams.
 cudaError_t FinishAllStreams();
 
-// What the pretended machine is like; for tests of what happens on others. Also forgets the last error.
+// Properties of the emulated machine. Setting them also clears the last error and the failure of the device.
 struct DeviceTraits {
   int devices = 1;  // 0: every call fails with cudaErrorNoDevice
   size_t memory_bytes = size_t{1} << 32;
-  // This many kernels run; the next one fails as if it had touched memory that is not there, and with it, as on a real
-  // device, every later call. Negative: none fails.
+  // Number of kernels that succeed; the next one fails like an invalid memory access, and so does, as on a real device,
+  // every later call. Negative: no failure.
   int kernels_before_fault = -1;
 };
 void SetDeviceTraits(const DeviceTraits& traits);

@@ -16,7 +16,7 @@ struct CudaGraphOnHost {
   std::vector<Operation> operations;
 };
 struct CudaStreamOnHost {
-  std::mutex mutex;  // held while operations run, which keeps their order
+  std::mutex mutex;  // held while operations run, to keep their order
   std::deque<Operation> waiting;
   std::unique_ptr<CudaGraphOnHost> capture;
 };

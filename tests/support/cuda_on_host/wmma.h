@@ -1,7 +1,7 @@
 #pragma once
 
-// Scalar stand-ins for nvcuda::wmma. A fragment is spread over the lanes of a warp in an order that is scrambled on
-// purpose: the real one is unspecified, and code that relies on it must fail here.
+// Scalar replacements for nvcuda::wmma. The elements of a fragment are assigned to the lanes of a warp in a scrambled
+// order: the order on devices is unspecified, and code that relies on it must fail here.
 
 #include <cstdint>
 #include <type_traits>
@@ -33,10 +33,10 @@ struct fragment {
   static int IndexOf(int row, int col) { return (row * kCols + col) / 32; }
 };
 
-// Lanes come together for an operation, which says nothing of what they wrote before it.
+// Synchronizes the lanes for an operation without ordering their memory accesses.
 inline void Meet() { romap::cuda_on_host::WarpMeeting(0xffffffffu); }
 
-// The alignment that the device asks of loads and stores.
+// Checks the alignment that devices require for loads and stores.
 template <class T>
 void CheckAccess(const T* p, unsigned leading_dimension) {
   if (reinterpret_cast<uintptr_t>(p) % 32 != 0) romap::cuda_on_host::Die("wmma pointer is not aligned to 32 bytes");
@@ -90,7 +90,7 @@ void store_matrix_sync(T* p, const fragment<accumulator, M, N, K, T>& f, unsigne
   Meet();
 }
 
-// Products of tiles that warps have begun since the program began.
+// Number of matrix products since the program started.
 inline std::atomic<uint64_t> tile_products{0};
 
 // d = a * b + c, summed in float.

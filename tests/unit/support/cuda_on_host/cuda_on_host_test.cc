@@ -11,11 +11,6 @@
 namespace romap {
 namespace {
 
-using cuda_on_host::RunOptions;
-using cuda_on_host::SetDeviceTraits;
-using cuda_on_host::SetRunOptions;
-using cuda_on_host::ThreadOrder;
-
 // Device memory that holds a copy of a vector.
 template <class T>
 class DeviceArray {
@@ -56,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(Orders, CudaOnHost,
                                          cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kShuffled, 4, 2, true}),
                          [](const auto& info) { return "Order" + std::to_string(info.index); });
 
-TEST_P(CudaOnHost, ScatteredFloatsAreAllAdded) {
+TEST_P(CudaOnHost, AtomicAddsOfFloatsLoseNothing) {
   const int n = 5000;
   const unsigned entries = 1 << 10;
   DeviceArray<float> table(std::vector<float>(entries, 0.0f));
@@ -71,7 +66,7 @@ TEST_P(CudaOnHost, ScatteredFloatsAreAllAdded) {
   EXPECT_EQ(table.Read(), expected);  // sixteenths: exact in any order
 }
 
-TEST_P(CudaOnHost, ScatteredHalvesAreAllAdded) {
+TEST_P(CudaOnHost, AtomicAddsOfHalvesLoseNothing) {
   const int n = 2000;
   const unsigned entries = 1 << 9;
   DeviceArray<__half2> table(std::vector<__half2>(entries, __half2{0.0f, 0.0f}));
@@ -103,7 +98,7 @@ TEST_P(CudaOnHost, ReductionsSumEachBlock) {
   EXPECT_EQ(again.Read(), expected);
 }
 
-TEST_P(CudaOnHost, TensorCoreProductIsThePlainProduct) {
+TEST_P(CudaOnHost, TensorCoreProductEqualsThePlainProduct) {
   const int m = 32, n = 32, k = 48;
   std::vector<__half> a(m * k), b(n * k);
   for (int i = 0; i < m * k; ++i) a[i] = static_cast<float>(i * 37 % 17 - 8) * 0.125f;
@@ -135,7 +130,7 @@ TEST_P(CudaOnHost, ScanGivesPrefixSums) {
   EXPECT_EQ(sums.Read()[0], expected[255] + values[255]);
 }
 
-TEST_P(CudaOnHost, SpinLockIsPassedOn) {
+TEST_P(CudaOnHost, SpinLockIsExclusive) {
   DeviceArray<int> lock({0}), counter({0});
   ROMAP_LAUNCH(CountUnderLock, dim3(3), dim3(70), 0, nullptr, lock.get(), counter.get());
   EXPECT_EQ(counter.Read()[0], 210);
@@ -154,7 +149,7 @@ TEST_P(CudaOnHost, EveryThreadOfEveryBlockRunsOnce) {
   for (unsigned i = 0; i < result.size(); ++i) EXPECT_EQ(result[i], i / 24 * 1000 + i % 24);
 }
 
-// Two halves of a warp that synchronise on their own, and a last warp that is not full.
+// The two halves of a warp synchronize independently.
 __global__ void PartialMasks(int* out) {
   const int lane = static_cast<int>(threadIdx.x % 32);
   const unsigned mask = lane < 16 ? 0x0000ffffu : 0xffff0000u;
@@ -166,7 +161,7 @@ __global__ void PartialMasks(int* out) {
   out[threadIdx.x] = sum;
 }
 
-TEST_P(CudaOnHost, MasksOfOneWarpDoNotDisturbEachOther) {
+TEST_P(CudaOnHost, DisjointMasksOfOneWarpAreIndependent) {
   DeviceArray<int> out(std::vector<int>(32, 0));
   ROMAP_LAUNCH(PartialMasks, dim3(1), dim3(32), 0, nullptr, out.get());
   const std::vector<int> result = out.Read();

@@ -7,11 +7,6 @@
 namespace romap {
 namespace {
 
-using cuda_on_host::AllocatedBytes;
-using cuda_on_host::DeviceTraits;
-using cuda_on_host::SetDeviceTraits;
-using cuda_on_host::SetRunOptions;
-
 class CudaLimits : public testing::Test {
  protected:
   void SetUp() override {
@@ -29,7 +24,7 @@ cudaError_t LaunchNothing(dim3 grid, dim3 block, size_t shared_bytes) {
   return cudaGetLastError();
 }
 
-TEST_F(CudaLimits, LaunchesBeyondADeviceAreRefused) {
+TEST_F(CudaLimits, LaunchesBeyondTheLimitsAreRejected) {
   EXPECT_EQ(LaunchNothing(dim3(1), dim3(1024), 48 * 1024), cudaSuccess);
   EXPECT_EQ(LaunchNothing(dim3(1), dim3(1025), 0), cudaErrorInvalidConfiguration);
   EXPECT_EQ(LaunchNothing(dim3(1), dim3(32, 33), 0), cudaErrorInvalidConfiguration);
@@ -40,7 +35,7 @@ TEST_F(CudaLimits, LaunchesBeyondADeviceAreRefused) {
 
 __global__ void NothingShared() {}
 
-TEST_F(CudaLimits, MoreSharedMemoryMustBeAskedFor) {
+TEST_F(CudaLimits, MoreSharedMemoryMustBeRequested) {
   const auto launch = [] {
     ROMAP_LAUNCH(NothingShared, dim3(1), dim3(1), 60 * 1024, nullptr);
     return cudaGetLastError();
@@ -52,7 +47,7 @@ TEST_F(CudaLimits, MoreSharedMemoryMustBeAskedFor) {
             cudaErrorInvalidValue);
 }
 
-TEST_F(CudaLimits, MemoryRunsOutAndIsAccountedFor) {
+TEST_F(CudaLimits, MemoryIsLimitedAndCounted) {
   cuda_on_host::SetDeviceTraits({.memory_bytes = 1000});
   const size_t before = cuda_on_host::AllocatedBytes();
   char* first = nullptr;
@@ -66,7 +61,7 @@ TEST_F(CudaLimits, MemoryRunsOutAndIsAccountedFor) {
   EXPECT_EQ(cudaFree(&second), cudaErrorInvalidValue);
 }
 
-TEST_F(CudaLimits, CopiesBeyondAnAllocationAreRefused) {
+TEST_F(CudaLimits, CopiesBeyondAnAllocationAreRejected) {
   char* device = nullptr;
   ASSERT_EQ(cudaMalloc(&device, 100), cudaSuccess);
   std::vector<char> host(200);
@@ -77,7 +72,7 @@ TEST_F(CudaLimits, CopiesBeyondAnAllocationAreRefused) {
   EXPECT_EQ(cudaFree(device), cudaSuccess);
 }
 
-TEST_F(CudaLimits, WithoutADeviceEveryCallSaysSo) {
+TEST_F(CudaLimits, WithoutADeviceEveryCallFails) {
   cuda_on_host::SetDeviceTraits({.devices = 0});
   int count = -1;
   EXPECT_EQ(cudaGetDeviceCount(&count), cudaErrorNoDevice);
@@ -103,7 +98,7 @@ __global__ void ShuffleThatSomeSkip(int* out) {
   if (threadIdx.x == 5) return;
   *out = __shfl_sync(0xffffffffu, 1, 0);
 }
-__global__ void WaitForNobody(int* flag) {
+__global__ void WaitForever(int* flag) {
   while (atomicAdd(flag, 0) == 0) __nanosleep(100);
 }
 __global__ void WarpWaitsForBarrier(int* out) {
@@ -119,14 +114,15 @@ __global__ void MisalignedTile(float* p) {
   nvcuda::wmma::store_matrix_sync(p + 1, tile, 16, nvcuda::wmma::mem_row_major);
 }
 
-TEST_F(CudaLimitsDeathTest, KernelsThatBreakTheRulesEndTheProcess) {
+TEST_F(CudaLimitsDeathTest, InvalidKernelsEndTheProcess) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   int* out = nullptr;
   ASSERT_EQ(cudaMalloc(&out, 2048), cudaSuccess);
   ASSERT_EQ(cudaMemset(out, 0, 2048), cudaSuccess);
   EXPECT_DEATH(ROMAP_LAUNCH(BarrierInBothBranches, dim3(1), dim3(32), 0, nullptr), "reached at two different places");
-  EXPECT_DEATH(ROMAP_LAUNCH(ShuffleThatSomeSkip, dim3(1), dim3(32), 0, nullptr, out), "names a lane that has returned");
-  EXPECT_DEATH(ROMAP_LAUNCH(WaitForNobody, dim3(1), dim3(2), 0, nullptr, out), "deadlock");
+  EXPECT_DEATH(ROMAP_LAUNCH(ShuffleThatSomeSkip, dim3(1), dim3(32), 0, nullptr, out),
+               "contains a lane that has returned");
+  EXPECT_DEATH(ROMAP_LAUNCH(WaitForever, dim3(1), dim3(2), 0, nullptr, out), "deadlock");
   EXPECT_DEATH(ROMAP_LAUNCH(WarpWaitsForBarrier, dim3(1), dim3(32), 0, nullptr, out), "deadlock");
   EXPECT_DEATH(ROMAP_LAUNCH(MisalignedTile, dim3(1), dim3(32), 0, nullptr, reinterpret_cast<float*>(out)),
                "not aligned to 32 bytes");
@@ -135,7 +131,7 @@ TEST_F(CudaLimitsDeathTest, KernelsThatBreakTheRulesEndTheProcess) {
 
 TEST_F(CudaLimitsDeathTest, StrictBarriersMustBeReachedByAll) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
-  ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr);  // devices let it pass
+  ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr);  // real devices allow it
   cuda_on_host::SetRunOptions({.strict_barriers = true});
   EXPECT_DEATH(ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr), "__syncthreads");
 }

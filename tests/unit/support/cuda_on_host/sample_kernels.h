@@ -1,7 +1,7 @@
 #pragma once
 
-// Kernels with the patterns that ours use: scattering atomics, reductions by shuffles and by shared memory, a product
-// of matrices on tensor cores, a scan.
+// Kernels with the patterns of the CUDA back end: scattered atomics, reductions by shuffles and in shared memory, a
+// matrix product on tensor cores, a scan.
 
 #include "tests/support/cuda_on_host/cuda_on_host.h"
 
@@ -11,7 +11,7 @@ __host__ __device__ inline unsigned SampleHash(unsigned x, unsigned y, unsigned 
   return x ^ (y * 2654435761u) ^ (z * 805459861u);
 }
 
-// As the backward pass of a hash grid: each thread adds to eight entries.
+// Like the backward pass of a hash grid: each thread adds to eight entries.
 __global__ void ScatterFloat(float* table, unsigned mask, int n) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i >= n) return;
@@ -74,7 +74,7 @@ __global__ void MultiplyTiles(const __half* a, const __half* b, float* c, int n,
   wmma::store_matrix_sync(c + blockIdx.y * 16 * n + blockIdx.x * 16, sum, n, wmma::mem_row_major);
 }
 
-// Exclusive scan within blocks of 256; `sums` gets each block's total.
+// Exclusive scan within blocks of 256; `sums`: total of each block.
 __global__ void ScanBlocks(const unsigned* in, unsigned* out, unsigned* sums, int n) {
   __shared__ unsigned buffer[2][256];
   const int t = static_cast<int>(threadIdx.x);
@@ -92,7 +92,7 @@ __global__ void ScanBlocks(const unsigned* in, unsigned* out, unsigned* sums, in
   if (t == 255) sums[blockIdx.x] = buffer[front][t];
 }
 
-// Each thread adds 1 to a counter that only a spin lock protects.
+// Each thread adds 1 to a counter protected by a spin lock.
 __global__ void CountUnderLock(int* lock, int* counter) {
   while (atomicCAS(lock, 0, 1) != 0) {
   }

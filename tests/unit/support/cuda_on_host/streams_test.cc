@@ -1,4 +1,4 @@
-// Streams that work late, graphs, and devices that fail.
+// Streams, which execute as late as possible, graphs, and failing devices.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -7,8 +7,6 @@
 
 namespace romap {
 namespace {
-
-using cuda_on_host::SetDeviceTraits;
 
 __global__ void AddOne(int* value, const int* limit) {
   if (*value < *limit) *value += 1;
@@ -40,7 +38,7 @@ class CudaStreams : public testing::Test {
   int* device_ = nullptr;
 };
 
-TEST_F(CudaStreams, WorkIsDoneWhenSomebodyWaits) {
+TEST_F(CudaStreams, WorkRunsAtTheNextSynchronization) {
   Launch();
   int copied = 77;
   EXPECT_EQ(cudaMemcpyAsync(&copied, device_, sizeof(copied), cudaMemcpyDeviceToHost, stream_), cudaSuccess);
@@ -51,15 +49,15 @@ TEST_F(CudaStreams, WorkIsDoneWhenSomebodyWaits) {
   EXPECT_EQ(copied, 1);
 }
 
-TEST_F(CudaStreams, SourcesOfCopiesAreReadLate) {
+TEST_F(CudaStreams, SourcesOfCopiesAreReadAtSynchronization) {
   int source = 5;
   EXPECT_EQ(cudaMemcpyAsync(device_, &source, sizeof(source), cudaMemcpyHostToDevice, stream_), cudaSuccess);
-  source = 6;  // a mistake that must show
+  source = 6;  // a mistake that must have an effect
   EXPECT_EQ(cudaDeviceSynchronize(), cudaSuccess);
   EXPECT_EQ(Value(), 6);
 }
 
-TEST_F(CudaStreams, EventsWaitForWhatCameBefore) {
+TEST_F(CudaStreams, EventsWaitForEarlierWork) {
   cudaEvent_t event = nullptr;
   ASSERT_EQ(cudaEventCreate(&event), cudaSuccess);
   Launch();
@@ -69,7 +67,7 @@ TEST_F(CudaStreams, EventsWaitForWhatCameBefore) {
   EXPECT_EQ(cudaEventDestroy(event), cudaSuccess);
 }
 
-TEST_F(CudaStreams, GraphsReplayWhatWasCaptured) {
+TEST_F(CudaStreams, GraphsReplayCapturedWork) {
   ASSERT_EQ(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), cudaSuccess);
   Launch();
   Launch();
@@ -87,7 +85,7 @@ TEST_F(CudaStreams, GraphsReplayWhatWasCaptured) {
   EXPECT_EQ(cudaGraphExecDestroy(executable), cudaSuccess);
 }
 
-TEST_F(CudaStreams, AFaultStaysUntilTheMachineIsAnother) {
+TEST_F(CudaStreams, AFaultPersistsUntilTheDeviceIsReplaced) {
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 1});
   Launch();
   Launch();
@@ -98,7 +96,7 @@ TEST_F(CudaStreams, AFaultStaysUntilTheMachineIsAnother) {
   int value = 0;
   EXPECT_EQ(cudaMemcpy(&value, device_, sizeof(value), cudaMemcpyDeviceToHost), cudaErrorLaunchFailure);
   cuda_on_host::SetDeviceTraits({});
-  EXPECT_EQ(Value(), 1);  // what the first kernel did
+  EXPECT_EQ(Value(), 1);  // the effect of the first kernel
 }
 
 }  // namespace

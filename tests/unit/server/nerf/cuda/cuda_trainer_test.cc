@@ -1,6 +1,6 @@
 // Whole trainings on a device emulated on the host.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include <thread>
 
 #include "common/status.h"
@@ -21,6 +21,7 @@ NerfConfig SmallConfig() {
   config.finest_resolution = 64;
   config.hidden_width = 16;
   config.rays_per_step = 64;
+  config.max_samples_per_ray = 8;
   config.occupancy_start_step = 4;
   config.occupancy_interval_steps = 3;
   return config;

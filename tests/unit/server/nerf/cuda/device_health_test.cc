@@ -1,6 +1,6 @@
 // Missing, failing and too small devices.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include "common/status.h"
 #include "server/nerf/cuda/cuda_field.h"
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"

@@ -1,6 +1,6 @@
 // Objects and the training pool on a device emulated on the host.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include <chrono>
 #include <map>
 #include <mutex>
@@ -51,6 +51,14 @@ std::vector<float> Train(const NerfConfig& config, int steps) {
   return testing::RawOnGrid(field.Snapshot(), 0.7f);
 }
 
+void WaitUntilIdle(TrainingPool& pool, uint64_t client) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
+  while (!pool.Idle(client)) {
+    ASSERT_LT(std::chrono::steady_clock::now(), end) << "the pool did not become idle within two minutes";
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
 TEST_F(ObjectsOnDeviceTest, AnObjectLearnsLikeOnTheCpu) {
   NerfConfig config = TinyConfig();
   const std::vector<float> on_device = Train(config, 8);
@@ -74,7 +82,7 @@ TEST_F(ObjectsOnDeviceTest, TrainingTimeIsLimited) {
   const testing::BallScene scene = TinyScene(1);
   pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   pool.Finish(client);
-  while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  WaitUntilIdle(pool, client);
   EXPECT_EQ(pool.GetProgress(client).steps, 4u) << "one slice takes more than that";
   pool.Unregister(client);
 }
@@ -93,7 +101,7 @@ TEST_F(ObjectsOnDeviceTest, APoolFinishesEveryObjectAfterADeviceFailure) {
     pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   }
   pool.Finish(client);
-  while (!pool.Idle(client)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  WaitUntilIdle(pool, client);
   pool.Unregister(client);
   EXPECT_EQ(DeviceStatus().code(), absl::StatusCode::kUnavailable) << "the device has not failed";
   ASSERT_EQ(last.size(), 2u);

@@ -1,6 +1,6 @@
-// Optimizer and occupancy of a training step, run on the host in every order of threads, against the CPU's.
+// OptimizeKernel and OccupancyKernel, run on the host in several orders of threads and compared with the CPU.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include <array>
 #include <bit>
 
@@ -34,7 +34,7 @@ struct Adam {
 constexpr int kSteps = 3;
 constexpr uint32_t kRunning = 1;  // of kSteps
 
-// A whole step: its first launch works on rays that miss, so that only what is put into its arrays by hand counts.
+// A whole step whose rays all miss the box, so that only the values that the test puts into its arrays have an effect.
 class OptimizeOnDevice {
  public:
   OptimizeOnDevice(const FieldModel& field, uint64_t first_step, const NerfConfig& config) {
@@ -125,13 +125,13 @@ std::array<DeviceArray<float>, 4> AdamOnDevice(const Adam& adam) {
           ToDevice<float>(adam.second.span()), ToDevice<float>(adam.gradient.span())};
 }
 
-TEST_P(OptimizeKernelsTest, ParametersMoveAsOnTheCpu) {
-  constexpr size_t kTable = 400, kMlp = 331;  // no multiples of a block
-  constexpr int kBlocks = 37;                 // nor of a warp
+TEST_P(OptimizeKernelsTest, ParametersEqualThoseOfTheCpu) {
+  constexpr size_t kTable = 400, kMlp = 331;  // not multiples of the block size
+  constexpr int kBlocks = 37;                 // not a multiple of the warp size
   Adam table(10, kTable), mlp(20, kMlp);
   for (size_t i = 100; i < 200; ++i) table.gradient[i] = 0.0f;
   auto device_table = AdamOnDevice(table), device_mlp = AdamOnDevice(mlp);
-  // The gradient of a weight, shared out to blocks.
+  // The gradient of each weight as a sum over the blocks.
   std::vector<float> partial;
   for (size_t w = 0; w < kMlp; ++w) {
     float left = mlp.gradient[w];
@@ -143,11 +143,11 @@ TEST_P(OptimizeKernelsTest, ParametersMoveAsOnTheCpu) {
   }
   DeviceArray<float> device_partial = ToDevice<float>(partial);
   OptimizeOnDevice device(NoisyField(2, 16), 100, NerfConfig{});
-  // Not the partial sums of the step that ran before.
+  // These partial sums, not those of the first launch.
   StepLaunch launch = device.Launch(device_table.data(), device_mlp.data(), device_partial, kBlocks);
   device.Run(launch);
 
-  const AdamRates rates{0.01f, 0.8f, 0.95f};  // that of step kRunning
+  const AdamRates rates{0.01f, 0.8f, 0.95f};  // the learning rate of step kRunning
   for (Adam* adam : {&table, &mlp}) {
     float* gradient = adam->gradient.data();
     PlainKernels().adam(rates, 0, adam->parameters.size(), adam->parameters.data(), adam->first.data(),
@@ -164,7 +164,7 @@ TEST_P(OptimizeKernelsTest, ParametersMoveAsOnTheCpu) {
   EXPECT_EQ(device.Slice().next, kRunning + 1);
 }
 
-// Scores, hull and visits at random, thick at the borders of the grid, where neighbours are missing.
+// Random scores, hull and visits, denser at the borders of the grid, where cells have fewer neighbors.
 struct Cells {
   std::vector<uint8_t> hull = std::vector<uint8_t>(kCells);
   std::vector<float> score = std::vector<float>(kCells), weight = std::vector<float>(kCells);
@@ -189,7 +189,7 @@ std::vector<uint32_t> Pack(const std::vector<uint8_t>& cells) {
   return bits;
 }
 
-TEST_P(OptimizeKernelsTest, CellsAreScoredAndOccupiedAsOnTheCpu) {
+TEST_P(OptimizeKernelsTest, ScoresAndOccupiedCellsEqualThoseOfTheCpu) {
   NerfConfig config;
   config.occupancy_start_step = 40;
   config.occupancy_interval_steps = 20;
@@ -200,7 +200,7 @@ TEST_P(OptimizeKernelsTest, CellsAreScoredAndOccupiedAsOnTheCpu) {
     state.score = cells.score;
     std::ranges::fill(state.bits, 0u);
     occupancy.SetState(state);
-    for (size_t i = 0; i < kCells; ++i) {  // the largest weight comes last, when the order does not matter
+    for (size_t i = 0; i < kCells; ++i) {  // the largest weight last: then the order has no effect
       for (uint32_t visit = 1; visit < cells.visits[i]; ++visit) occupancy.Record(static_cast<uint32_t>(i), 0.0f);
       if (cells.visits[i] > 0) occupancy.Record(static_cast<uint32_t>(i), cells.weight[i]);
     }

@@ -1,7 +1,7 @@
 // Memory traffic and operations of one training step of the fast preset, counted while it runs on the host, and the
 // least time they take according to the data sheets of two devices. Prints the table of server/nerf/cuda/README.md.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include "server/nerf/cpu/cpu_trainer.h"
 #include "tests/unit/server/nerf/cuda/loaded_step.h"
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
@@ -117,7 +117,7 @@ void RooflineTest::CountStep(int rays_per_step) {
   EXPECT_EQ(parts[1].products, 0);
 }
 
-TEST_F(RooflineTest, SmallStep) { CountStep(104); }
+TEST_F(RooflineTest, SmallStep) { CountStep(64); }
 
 // Slow; prints the table of the README: --gtest_also_run_disabled_tests --gtest_filter=*TableOfTheReadme
 TEST_F(RooflineTest, DISABLED_TableOfTheReadme) { CountStep(NerfConfig{}.rays_per_step); }

@@ -1,6 +1,6 @@
-// The CUDA kernels, run on the host in every order of threads, against the CPU's kernels.
+// StepKernel and EvaluateKernel, run on the host in several orders of threads and compared with the kernels of the CPU.
 #include "tests/unit/server/nerf/cuda/device_test.h"
-// Its macros must come first.
+// The include above defines macros and must come first.
 #include <bit>
 #include <limits>
 
@@ -11,15 +11,15 @@
 namespace romap::nerf::cuda {
 namespace {
 
-// The same formulas in the same precision: only the order of sums differs. Against vectors, cells of the finest level
-// magnify the rounding of positions, as between the CPU's own kernels. Sums that lie between two halves may be rounded
-// to either. Between halves and floats neurons near 0 make a difference, which are on or off.
+// kPlain: same formulas and precision, only the order of sums differs. kRounded: sums halfway between two halves may be
+// rounded to either one. kSimd: cells of the finest level amplify the rounding of positions, as between the kernels of
+// the CPU. kHalf: neurons near 0 may be active with halves and inactive with floats.
 #ifndef ROMAP_TEST_ON_DEVICE
 constexpr double kPlainTolerance = 2e-5;
 constexpr double kRoundedTolerance = 5e-4;
 constexpr double kCountTolerance = 0;
 #else
-// Devices fuse products and sums, as vectors do, so that points at a border may fall to the other side.
+// Devices fuse multiplications and additions, so points at the border of a cell may fall on the other side.
 constexpr double kPlainTolerance = 2e-3;
 constexpr double kRoundedTolerance = 2e-2;
 constexpr double kCountTolerance = 0.01;
@@ -50,7 +50,7 @@ std::vector<float> EvaluateOnCpu(const KernelTable& kernels, const FieldModel& f
 }
 
 TEST_P(CudaKernelsTest, FieldHasTheValuesOfTheCpu) {
-  constexpr size_t kPoints = 131;  // no multiple of a block
+  constexpr size_t kPoints = 131;  // not a multiple of the block size
   SampleChunk points(kPoints, 16, 16);
   points.size = kPoints;
   for (size_t i = 0; i < kPoints; ++i) {
@@ -81,7 +81,7 @@ struct Shape {
   bool random_background;
 };
 
-// Tiles that are not full, tiles of many and of two rays, rays across warps, fields that need padding.
+// Partly filled tiles, tiles of many and of two rays, rays that span warps, fields that need padding.
 const Shape kShapes[] = {
     {5, 32, 23, {.finest_step = 0.02f, .least = 3, .most = 12}, false},
     {8, 32, 17, {.finest_step = 0.01f, .least = 4, .most = 16}, true},
@@ -114,12 +114,12 @@ TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
                   static_cast<double>(std::ranges::count_if(cpu.spans, [](RaySpan span) { return span.count > 0; })));
       ExpectCount(counters.active_samples, cpu.active_samples);
       EXPECT_EQ(device.Slice().running, 0u);
-      EXPECT_EQ(device.Slice().next, 0u);  // the last launch of a step moves it
+      EXPECT_EQ(device.Slice().next, 0u);  // the last launch of a step increments it
     }
   }
 }
 
-TEST_P(CudaKernelsTest, StepTellsTheOccupancyWhereRaysEnded) {
+TEST_P(CudaKernelsTest, StepRecordsTheWeightsOfItsSamples) {
   const FieldModel field = NoisyField(5, 16);
   const StepInput input = TestStep(60, {.finest_step = 0.02f, .least = 4, .most = 14}, false);
   StepOnCpu cpu(field, input);
@@ -149,10 +149,10 @@ TEST_P(CudaKernelsTest, StepTellsTheOccupancyWhereRaysEnded) {
   EXPECT_EQ(Difference(layers, got, kPlainTolerance), "");
 }
 
-// A block works on a second tile when there are more tiles than blocks.
-TEST_P(CudaKernelsTest, BlocksTakeTileAfterTile) {
+// With more tiles than blocks, a block processes a second tile.
+TEST_P(CudaKernelsTest, BlocksProcessSeveralTiles) {
   const FieldModel field = NoisyField(2, 16);
-  const StepInput input = TestStep(2 * kMaxStepBlocks + 7, {.finest_step = 0.3f, .least = 1, .most = 64}, false);
+  const StepInput input = TestStep(2 * kMaxStepBlocks + 7, {.finest_step = 0.9f, .least = 1, .most = 64}, false);
   ASSERT_EQ(StepBlocks(static_cast<int>(input.rays.size()), input.budget.most), kMaxStepBlocks);
   StepOnCpu cpu(field, input);
   cpu.Run(PlainKernels(), field, input);
@@ -165,7 +165,7 @@ TEST_P(CudaKernelsTest, BlocksTakeTileAfterTile) {
   EXPECT_EQ(Difference(cpu.ColorLosses(input), FromDevice(device.color_loss), kPlainTolerance), "");
 }
 
-// Derivatives far below what a half can hold, and far above, come through.
+// Derivatives far below and far above the range of a half keep their precision.
 TEST_P(CudaKernelsTest, TensorCoresKeepSmallAndLargeDerivatives) {
   const FieldModel field = NoisyField(8, 32);
   for (const float factor : {1e-7f, 1e6f}) {
@@ -173,7 +173,7 @@ TEST_P(CudaKernelsTest, TensorCoresKeepSmallAndLargeDerivatives) {
     input.gradient_cut = 0;
     LossWeights& w = input.loss_weights;
     w = {.opacity_object = factor, .opacity_background = factor, .density = 0.01f * factor};
-    for (Ray& ray : input.rays) ray.target.is_object = false;  // else colours count, too
+    for (Ray& ray : input.rays) ray.target.is_object = false;  // so that only these weights determine the derivatives
     StepOnCpu cpu(field, input);
     cpu.RunRounded(field, input);
     StepOnDevice device(field, input);
@@ -185,7 +185,7 @@ TEST_P(CudaKernelsTest, TensorCoresKeepSmallAndLargeDerivatives) {
   }
 }
 
-TEST_P(CudaKernelsTest, WhatIsNotANumberShows) {
+TEST_P(CudaKernelsTest, NanReachesTheGradients) {
   const FieldModel field = NoisyField(8, 32);
   StepInput input = TestStep(20, {}, false);
   for (Ray& ray : input.rays) ray.target.rgb[1] = std::numeric_limits<float>::quiet_NaN();
@@ -197,7 +197,7 @@ TEST_P(CudaKernelsTest, WhatIsNotANumberShows) {
   }
 }
 
-// The largest field that the configuration allows fits into what every device since compute capability 8.0 has.
+// The largest field of the configuration fits into the shared memory of every device since compute capability 8.0.
 TEST_P(CudaKernelsTest, TheLargestFieldFitsIntoABlock) {
   const FieldModel field = NoisyField(16, kMaxHidden);
   StepOnDevice device(field, TestStep(8, {}, false));
@@ -208,7 +208,7 @@ TEST_P(CudaKernelsTest, TheLargestFieldFitsIntoABlock) {
   }
 }
 
-TEST(DifferenceTest, IsSeenAlsoWhenNotANumber) {
+TEST(DifferenceTest, DetectsDifferencesAndNan) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<float> values = {1, 2, 3};
   EXPECT_EQ(Difference(values, values, 1e-6), "");

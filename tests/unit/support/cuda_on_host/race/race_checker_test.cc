@@ -11,51 +11,46 @@ namespace {
 using cuda_on_host::FirstRace;
 using cuda_on_host::RaceCount;
 using cuda_on_host::ResetRaces;
-using cuda_on_host::RunOptions;
 using cuda_on_host::SetRunOptions;
 using cuda_on_host::ThreadOrder;
 
 struct Pattern {
   const char* name;
-  void (*run)(bool right);
+  void (*run)(bool correct);
   const char* memory;
 };
 
 class RaceChecker : public testing::TestWithParam<Pattern> {
  protected:
-  void SetUp() override { cuda_on_host::ResetRaces(); }
+  void SetUp() override { ResetRaces(); }
 };
 
 INSTANTIATE_TEST_SUITE_P(Patterns, RaceChecker,
                          testing::Values(Pattern{"TreeSum", RunTreeSum, "shared"},
                                          Pattern{"LaneExchange", RunLaneExchange, "shared"},
                                          Pattern{"Count", RunCount, "device"},
-                                         Pattern{"NeighbourRead", RunNeighbourRead, "device"},
+                                         Pattern{"NeighborRead", RunNeighborRead, "device"},
                                          Pattern{"BufferReuse", RunBufferReuse, "shared"}),
                          [](const auto& info) { return info.param.name; });
 
-TEST_P(RaceChecker, RightKernelsHaveNoRace) {
-  for (const cuda_on_host::ThreadOrder order :
-       {cuda_on_host::ThreadOrder::kForward, cuda_on_host::ThreadOrder::kReverse,
-        cuda_on_host::ThreadOrder::kShuffled}) {
+TEST_P(RaceChecker, CorrectKernelsHaveNoRace) {
+  for (const ThreadOrder order : {ThreadOrder::kForward, ThreadOrder::kReverse, ThreadOrder::kShuffled}) {
     for (const int workers : {1, 2}) {
-      cuda_on_host::SetRunOptions({.order = order, .workers = workers});
+      SetRunOptions({.order = order, .workers = workers});
       GetParam().run(true);
-      EXPECT_EQ(cuda_on_host::RaceCount(), 0) << cuda_on_host::FirstRace();
+      EXPECT_EQ(RaceCount(), 0) << FirstRace();
     }
   }
 }
 
-// In every order, also in those where the result happens to be right.
-TEST_P(RaceChecker, PlantedMistakesAreFound) {
-  for (const cuda_on_host::ThreadOrder order :
-       {cuda_on_host::ThreadOrder::kForward, cuda_on_host::ThreadOrder::kReverse,
-        cuda_on_host::ThreadOrder::kShuffled}) {
-    cuda_on_host::SetRunOptions({.order = order});
-    cuda_on_host::ResetRaces();
+// In every order, including those in which the result happens to be correct.
+TEST_P(RaceChecker, MistakesAreReported) {
+  for (const ThreadOrder order : {ThreadOrder::kForward, ThreadOrder::kReverse, ThreadOrder::kShuffled}) {
+    SetRunOptions({.order = order});
+    ResetRaces();
     GetParam().run(false);
-    EXPECT_GT(cuda_on_host::RaceCount(), 0);
-    EXPECT_NE(cuda_on_host::FirstRace().find(GetParam().memory), std::string::npos) << cuda_on_host::FirstRace();
+    EXPECT_GT(RaceCount(), 0);
+    EXPECT_NE(FirstRace().find(GetParam().memory), std::string::npos) << FirstRace();
   }
 }
 

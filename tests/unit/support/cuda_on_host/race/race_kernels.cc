@@ -8,7 +8,7 @@ namespace {
 constexpr int kBlock = 64;
 constexpr int kBlocks = 3;
 
-// Device memory of one word per thread, zeroed, for as long as a kernel runs.
+// Zeroed device memory with one word per thread.
 class Words {
  public:
   Words() {
@@ -43,7 +43,7 @@ __global__ void LaneExchange(int* out, bool with_warp_barrier) {
   if (with_warp_barrier) {
     __syncwarp();
   } else {
-    __any_sync(0xffffffffu, 1);  // lanes come together, but what they wrote need not be seen
+    __any_sync(0xffffffffu, 1);  // synchronizes the lanes, but does not order their memory accesses
   }
   out[blockIdx.x * kBlock + t] = values[t ^ 1];
 }
@@ -56,7 +56,7 @@ __global__ void Count(int* counter, bool atomically) {
   }
 }
 
-__global__ void NeighbourRead(int* words, bool own_word) {
+__global__ void NeighborRead(int* words, bool own_word) {
   const unsigned i = blockIdx.x * kBlock + threadIdx.x;
   words[i] = 1;
   __syncthreads();
@@ -91,9 +91,9 @@ void RunCount(bool atomically) {
   Words words;
   ROMAP_LAUNCH(Count, dim3(kBlocks), dim3(kBlock), 0, nullptr, words.get(), atomically);
 }
-void RunNeighbourRead(bool own_word) {
+void RunNeighborRead(bool own_word) {
   Words words;
-  ROMAP_LAUNCH(NeighbourRead, dim3(kBlocks), dim3(kBlock), 0, nullptr, words.get(), own_word);
+  ROMAP_LAUNCH(NeighborRead, dim3(kBlocks), dim3(kBlock), 0, nullptr, words.get(), own_word);
 }
 void RunBufferReuse(bool with_barrier_before_refill) {
   Words words;
