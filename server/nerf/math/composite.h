@@ -36,7 +36,7 @@ ROMAP_HD RayResult CompositeForward(const RaySamples& s, F target_depth, F* weig
 template <class F>
 ROMAP_HD void CompositeBackward(const RaySamples& s, F target_depth, const RayLoss& loss, const F* weight,
                                 const F* behind, F* d_raw) {
-  F after = 0;  // sum over the samples behind of w_j G_j
+  F after = 0;  // sum over the later samples j of w_j G_j
   for (int i = s.count - 1; i >= 0; --i) {
     F d_weight = loss.d_opacity;
     for (int c = 0; c < 3; ++c) d_weight += loss.d_rgb[c] * s.rgb[c][i];

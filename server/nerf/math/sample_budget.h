@@ -13,11 +13,11 @@ struct SampleBudget {
   bool skip_empty = true;  // false: `most` samples between entry and exit of the box, in occupied and empty space
 };
 
-// Number of samples of a ray whose occupied pieces have the total length `stretch` [box sides].
-ROMAP_HD int SampleCount(const SampleBudget& budget, float stretch) {
-  if (!(stretch > 1e-6f)) return 0;
+// Number of samples of a ray whose occupied pieces have the total length `length` [box sides].
+ROMAP_HD int SampleCount(const SampleBudget& budget, float length) {
+  if (!(length > 1e-6f)) return 0;
   if (!budget.skip_empty) return budget.most;
-  const int wanted = static_cast<int>(stretch / budget.finest_step) + 1;
+  const int wanted = static_cast<int>(length / budget.finest_step) + 1;
   return wanted < budget.least ? budget.least : wanted > budget.most ? budget.most : wanted;
 }
 

@@ -185,7 +185,7 @@ cudaError_t cudaMalloc(void** p, size_t bytes) {
   constexpr size_t kAlignment = 256;
   *p = std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment);
   if (*p == nullptr) return Fail(cudaErrorMemoryAllocation);
-  std::memset(*p, 0xff, bytes);  // NaN: nobody may count on zeros
+  std::memset(*p, 0xff, bytes);  // NaN: kernels must not rely on zeros
   TheMachine().allocations[reinterpret_cast<uintptr_t>(*p)] = bytes;
   TheMachine().allocated_bytes += bytes;
   return cudaSuccess;
