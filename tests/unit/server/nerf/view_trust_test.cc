@@ -6,7 +6,7 @@ namespace romap::nerf {
 namespace {
 
 ProbeReport Report(size_t views, ViewResidual ordinary = {0.02f, 0.05f, 0.01f}) {
-  return {std::vector<ViewResidual>(views, ordinary), {}};
+  return {std::vector<ViewResidual>(views, ordinary)};
 }
 
 ViewTrust WithViews(size_t views) {
