@@ -246,7 +246,7 @@ inline void Composite(const Ray* rays, const RaySpan* spans, int ray_count, cons
     const RayTarget& target = rays[r].target;
     const int partner = r + target.partner;
     const bool has_partner = partner != r && partner >= 0 && partner < ray_count && spans[partner].count > 0;
-    float partner_error[3];
+    float partner_error[3] = {};
     if (has_partner) ColorError(results[partner], rays[partner].target, weights, partner_error);
     const RayLoss loss = LossOfRay(results[r], target, weights, has_partner ? partner_error : nullptr);
     results[r].loss = loss.value;

@@ -36,9 +36,9 @@ RayTarget TargetOf(const LossCase& c) {
 
 // One ray of kSamples samples with random raw outputs.
 struct TestRay {
-  std::array<float, kSamples> t, length, alpha, density, weight, behind;
-  std::array<std::array<float, kSamples>, 3> rgb;
-  std::array<float, kSamples * kOutputs> raw;
+  std::array<float, kSamples> t = {}, length = {}, alpha = {}, density = {}, weight = {}, behind = {};
+  std::array<std::array<float, kSamples>, 3> rgb = {};
+  std::array<float, kSamples* kOutputs> raw = {};
 
   TestRay() {
     for (size_t i = 0; i < kSamples; ++i) {
@@ -80,7 +80,7 @@ TEST_P(LossGradientTest, MatchesFiniteDifferences) {
     return static_cast<double>(rest) + 2.0 * static_cast<double>(own.value - rest);
   };
   const RayLoss own = LossOf(ray.Render(c.depth), c);
-  std::array<float, kSamples * kOutputs> d_raw;
+  std::array<float, kSamples* kOutputs> d_raw = {};
   plain::CompositeBackward(ray.Samples(), c.depth, own, ray.weight.data(), ray.behind.data(), d_raw.data());
   testing::ExpectGradient(loss, ray.raw.data(), d_raw.data(), d_raw.size(), d_raw.size(), 1e-2f, 5e-3);
 }
