@@ -21,7 +21,6 @@ NerfConfig SmallConfig() {
   config.finest_resolution = 64;
   config.hidden_width = 16;
   config.rays_per_step = 64;
-  config.max_samples_per_ray = 8;
   config.occupancy_start_step = 4;
   config.occupancy_interval_steps = 3;
   return config;
