@@ -62,6 +62,9 @@ class ReferenceToolsTest : public testing::Test {
   void SetUp() override {
     const char* tools_dir = std::getenv("ROMAP_TOOLS_DIR");
     if (tools_dir == nullptr) GTEST_SKIP() << "ROMAP_TOOLS_DIR is not set";
+    if (std::system("/usr/bin/python3 -c 'import numpy, scipy' 2>/dev/null") != 0) {
+      GTEST_SKIP() << "the reference tools need python3-numpy and python3-scipy";
+    }
     tools_dir_ = tools_dir;
   }
 
