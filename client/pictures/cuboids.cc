@@ -74,15 +74,6 @@ void DrawLabel(cv::Mat& image_bgr, const std::string& text, cv::Point anchor, co
 
 }  // namespace
 
-std::array<Eigen::Vector3d, 8> CuboidCorners(const Cuboid& cuboid) {
-  std::array<Eigen::Vector3d, 8> corners;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d signs((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1);
-    corners[static_cast<size_t>(i)] = cuboid.T_world_object * cuboid.half_extents.cwiseProduct(signs).eval();
-  }
-  return corners;
-}
-
 std::vector<cv::Point> DrawCuboidEdges(cv::Mat& image_bgr, const CameraModel& camera,
                                        const SE3<World, Camera>& T_world_camera, const Cuboid& cuboid,
                                        const cv::Scalar& color_bgr) {

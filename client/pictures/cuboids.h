@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -9,10 +8,6 @@
 #include "common/cuboid.h"
 
 namespace romap::pictures {
-
-// The corners of a cuboid [World, map units]. Corner i is at +half_extents along x, y, z of the Object frame if bit 0,
-// 1, 2 of i is set, otherwise at -half_extents.
-std::array<Eigen::Vector3d, 8> CuboidCorners(const Cuboid& cuboid);
 
 // Draws the twelve edges of a cuboid, clipped at a near plane at one thousandth of its half diagonal. Returns the end
 // pixels of the drawn segments; empty if nothing is visible.

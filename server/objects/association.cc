@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/objects/assignment.h"
 #include "server/objects/projection.h"
+#include "server/objects/score_assignment.h"
 
 namespace romap::objects {
 namespace {
 
-constexpr uint64_t kRecentFrames = 15;
+constexpr uint64_t kRecentFrames = 15;  // the box of an observation at most this old still predicts the next one
 constexpr double kMinMatchScore = 0.3;  // between a detection and a landmark
-constexpr size_t kFewestBodyPoints = 4;
+constexpr size_t kMinBodyPoints = 4;
+constexpr double kMinShareInImage = 0.3;  // of the body points: enough to compare the body with masks
+constexpr double kMinBetterFit = 0.1;     // IoU by which two boxes together must fit better than one alone
+constexpr double kMostlyCovered = 0.7;    // share of the body under one mask
 
 double BoxIou(const cv::Rect& a, const cv::Rect& b) {
   const double both = (a & b).area();
@@ -21,8 +24,8 @@ double BoxIou(const cv::Rect& a, const cv::Rect& b) {
   return either > 0 ? both / either : 0;
 }
 
-// The box of the last sighting as the present camera would see it, had it the given depth in the last one.
-cv::Rect CarryBox(const Landmark& landmark, const TrackedFrame& tracked, double depth_mu) {
+// The box of the last observation in the present image, if its corners were at depth `depth_mu`.
+cv::Rect PredictBox(const Landmark& landmark, const TrackedFrame& tracked, double depth_mu) {
   const CameraModel& camera = tracked.frame->camera;
   const SE3<Camera, World> T_camera_world = tracked.T_world_camera.Inverse();
   const cv::Rect& box = landmark.last_box_px;
@@ -31,49 +34,51 @@ cv::Rect CarryBox(const Landmark& landmark, const TrackedFrame& tracked, double 
     const double u_px = box.x + (corner % 2 == 0 ? 0 : box.width - 1);
     const double v_px = box.y + (corner / 2 == 0 ? 0 : box.height - 1);
     const Eigen::Vector3d ray = camera.Unproject(u_px, v_px);
-    // Without any depth only the rotation is undone: right for things far away.
+    // Without a depth only the rotation is compensated: right for distant objects.
     corners.push_back(depth_mu > 0 ? T_camera_world * (landmark.last_T_world_camera * (depth_mu * ray))
                                    : T_camera_world.rotation() * (landmark.last_T_world_camera.rotation() * ray));
   }
   return BoundProjections(corners, camera);
 }
 
-// Where a landmark's body falls in the frame.
-struct BodySight {
-  bool known = false;
-  std::vector<double> share_in_detection;  // of the points in the image
-  double share_in_image = 0;
-  double share_hidden = 0;  // of the points in the image: under any mask
+// Where a landmark's body points project to. Shares are 0..1.
+struct BodyProjection {
+  bool known = false;                      // some point is in the image
+  std::vector<double> share_in_detection;  // of the points in the image, per detection
+  double share_in_image = 0;               // of all points
+  double share_masked = 0;                 // of the points in the image: under any mask
 };
 
-BodySight ProjectBody(const Landmark& landmark, const TrackedFrame& tracked, const std::vector<Detection>& detections) {
-  BodySight sight{.share_in_detection = std::vector<double>(detections.size(), 0)};
-  if (landmark.body_world.size() < kFewestBodyPoints) return sight;
+BodyProjection ProjectBody(const Landmark& landmark, const TrackedFrame& tracked,
+                           const std::vector<Detection>& detections) {
+  BodyProjection projection{.share_in_detection = std::vector<double>(detections.size(), 0)};
+  const std::vector<Eigen::Vector3d>& body_world = landmark.geometry.body_world;
+  if (body_world.size() < kMinBodyPoints) return projection;
   const SE3<Camera, World> T_camera_world = tracked.T_world_camera.Inverse();
   const CameraModel& camera = tracked.frame->camera;
   const cv::Mat& labels = tracked.frame->labels;
   int in_image = 0;
-  int hidden = 0;
-  for (const Eigen::Vector3d& p_world : landmark.body_world) {
+  int masked = 0;
+  for (const Eigen::Vector3d& p_world : body_world) {
     const auto pixel = ProjectToPixel(T_camera_world * p_world, camera);
     if (!pixel) continue;
     ++in_image;
     if (labels.empty()) continue;
     const uint16_t label = labels.at<uint16_t>(pixel->y, pixel->x);
     if (label == 0) continue;
-    ++hidden;
+    ++masked;
     const auto d = std::lower_bound(detections.begin(), detections.end(), label,
                                     [](const Detection& detection, uint16_t l) { return detection.label < l; });
     if (d != detections.end() && d->label == label) {
-      sight.share_in_detection[static_cast<size_t>(d - detections.begin())] += 1;
+      projection.share_in_detection[static_cast<size_t>(d - detections.begin())] += 1;
     }
   }
-  if (in_image == 0) return sight;
-  sight.known = true;
-  for (double& share : sight.share_in_detection) share /= in_image;
-  sight.share_in_image = static_cast<double>(in_image) / static_cast<double>(landmark.body_world.size());
-  sight.share_hidden = static_cast<double>(hidden) / in_image;
-  return sight;
+  if (in_image == 0) return projection;
+  projection.known = true;
+  for (double& share : projection.share_in_detection) share /= in_image;
+  projection.share_in_image = static_cast<double>(in_image) / static_cast<double>(body_world.size());
+  projection.share_masked = static_cast<double>(masked) / in_image;
+  return projection;
 }
 
 // Weighted mean of the cues that are available.
@@ -87,10 +92,10 @@ class Score {
     Add(weight, value);
     best_geometric_ = std::max(best_geometric_, value);
   }
-  // Class and track alone never make a match.
+  // 0 without geometric overlap: class and track id alone never make a match.
   double Value() const {
-    constexpr double kLeastOverlap = 0.2;
-    return weights_ > 0 && best_geometric_ >= kLeastOverlap ? sum_ / weights_ : 0;
+    constexpr double kMinOverlap = 0.2;
+    return weights_ > 0 && best_geometric_ >= kMinOverlap ? sum_ / weights_ : 0;
   }
 
  private:
@@ -99,183 +104,188 @@ class Score {
   double best_geometric_ = 0;
 };
 
-// Share of the visible body in the mask. What lies under other masks may be hidden and says little: so a thing that
-// comes out from behind another one is known by the first of it that shows, if that lies where the thing is.
-void AddBodyCue(const BodySight& sight, size_t d, const cv::Rect& projected, const cv::Rect& box, Score* score) {
+// Share of the visible body in the mask. Points under other masks may be occluded and count less. So an object that
+// reappears from behind another one matches as soon as a part of it is visible, if that part lies in its cuboid.
+void AddBodyCue(const BodyProjection& body, size_t d, const cv::Rect& projected, const cv::Rect& box, Score* score) {
   constexpr double kWeight = 1.5;
-  constexpr double kMostlyHidden = 0.5;
-  constexpr double kLeastWeightShare = 0.2;
-  const double in_mask = sight.share_in_detection[d];
-  const double under_others = sight.share_hidden - in_mask;
-  if (under_others < kMostlyHidden || in_mask <= 0 || projected.empty()) return score->AddGeometric(kWeight, in_mask);
-  const double lies_there = static_cast<double>((box & projected).area()) / box.area();
-  const double weight = kWeight * std::max(kLeastWeightShare, 1 - under_others);
-  score->AddGeometric(weight, lies_there * in_mask / (1 - under_others));
+  constexpr double kMostlyOccluded = 0.5;   // share of the body under other masks
+  constexpr double kMinWeightFactor = 0.2;  // of a body that is nearly all occluded
+  const double in_mask = body.share_in_detection[d];
+  const double under_others = body.share_masked - in_mask;
+  if (under_others < kMostlyOccluded || in_mask <= 0 || projected.empty()) return score->AddGeometric(kWeight, in_mask);
+  const double share_in_cuboid = static_cast<double>((box & projected).area()) / box.area();
+  const double weight = kWeight * std::max(kMinWeightFactor, 1 - under_others);
+  score->AddGeometric(weight, share_in_cuboid * in_mask / (1 - under_others));
 }
 
+// Mean depth of the body in the last observation.
 double DepthOf(const Landmark& landmark, double scene_depth_mu) {
-  if (landmark.body_world.empty()) return scene_depth_mu;
+  const std::vector<Eigen::Vector3d>& body_world = landmark.geometry.body_world;
+  if (body_world.empty()) return scene_depth_mu;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : landmark.body_world) mean += p;
-  mean /= static_cast<double>(landmark.body_world.size());
+  for (const Eigen::Vector3d& p : body_world) mean += p;
+  mean /= static_cast<double>(body_world.size());
   return (landmark.last_T_world_camera.Inverse() * mean).z();
 }
 
-constexpr double kInImage = 0.3;  // of the body: enough to compare it with masks
-
-// Everything that is compared in one frame.
+// A frame and the landmarks in it. Boxes and bodies are per landmark.
 struct Scene {
   const TrackedFrame& tracked;
   const std::vector<Detection>& detections;
   const std::vector<std::unique_ptr<Landmark>>& landmarks;
   uint64_t frame_index;
   double scene_depth_mu;
-  std::vector<BodySight> sights;    // per landmark
-  std::vector<cv::Rect> projected;  // per landmark: its cuboid; empty = unknown
-  std::vector<cv::Rect> carried;    // per landmark: its last sighting; empty = too long ago
+  std::vector<BodyProjection> bodies;
+  std::vector<cv::Rect> projected;  // its cuboid; empty = unknown
+  std::vector<cv::Rect> predicted;  // the box of its last observation, see PredictBox; empty = too long ago
 };
 
+// The scores of landmark `l` with every detection.
 void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> scores) {
+  constexpr double kCuboidWeight = 0.7;
+  constexpr double kClassWeight = 0.25;
+  constexpr double kTrackWeight = 0.1;
+  // Part of an object that the detector split off must not win the object's mask afterwards.
+  constexpr double kProvisionalFactor = 0.8;
   const Landmark& landmark = *scene.landmarks[l];
-  const BodySight& sight = scene.sights[l];
-  const uint64_t gap = scene.frame_index - landmark.last_frame;
+  const LandmarkEvidence& known = landmark.evidence;
+  const BodyProjection& body = scene.bodies[l];
+  const uint64_t gap = scene.frame_index - known.last_frame;
   const bool recent = gap <= kRecentFrames;
-  const cv::Rect& carried = scene.carried[l];
-  // A piece that was cut off a thing must not take its mask afterwards.
-  constexpr double kUnsure = 0.8;
-  const double trust = landmark.state == ObjectState::kProvisional ? kUnsure : 1;
+  const cv::Rect& predicted = scene.predicted[l];
+  const double factor = landmark.state == ObjectState::kProvisional ? kProvisionalFactor : 1;
   double total_evidence = 0;
-  for (const auto& [name, evidence] : landmark.class_evidence) total_evidence += evidence;
+  for (const auto& [name, evidence] : known.class_evidence) total_evidence += evidence;
   for (size_t d = 0; d < scene.detections.size(); ++d) {
     const Detection& detection = scene.detections[d];
     Score score;
     if (recent) {
-      score.AddGeometric(1.0 - static_cast<double>(gap) / (kRecentFrames + 1), BoxIou(carried, detection.box_px));
+      score.AddGeometric(1.0 - static_cast<double>(gap) / (kRecentFrames + 1), BoxIou(predicted, detection.box_px));
     }
-    if (sight.share_in_image > kInImage) AddBodyCue(sight, d, scene.projected[l], detection.box_px, &score);
-    if (scene.projected[l].area() > 0) score.AddGeometric(0.7, BoxIou(scene.projected[l], detection.box_px));
-    const auto evidence = landmark.class_evidence.find(detection.class_name);
-    const bool known_class = evidence != landmark.class_evidence.end() && total_evidence > 0;
-    score.Add(0.25, known_class ? evidence->second / total_evidence : 0);
+    if (body.share_in_image > kMinShareInImage) AddBodyCue(body, d, scene.projected[l], detection.box_px, &score);
+    if (scene.projected[l].area() > 0) {
+      score.AddGeometric(kCuboidWeight, BoxIou(scene.projected[l], detection.box_px));
+    }
+    const auto evidence = known.class_evidence.find(detection.class_name);
+    const bool known_class = evidence != known.class_evidence.end() && total_evidence > 0;
+    score.Add(kClassWeight, known_class ? evidence->second / total_evidence : 0);
     if (recent && landmark.last_track_id && detection.track_id) {
-      score.Add(0.1, *landmark.last_track_id == *detection.track_id ? 1 : 0);
+      score.Add(kTrackWeight, *landmark.last_track_id == *detection.track_id ? 1 : 0);
     }
-    scores[static_cast<Eigen::Index>(d)] = trust * score.Value();
+    scores[static_cast<Eigen::Index>(d)] = factor * score.Value();
     if (score.Value() > 0 && spdlog::should_log(spdlog::level::debug)) {
-      spdlog::debug("objects: frame {}: label {} as landmark {}: {:.2f} (body {:.2f}, box {:.2f}, carried {:.2f})",
-                    scene.tracked.frame->frame_id, detection.label, landmark.key, score.Value(),
-                    sight.share_in_detection[d], BoxIou(scene.projected[l], detection.box_px),
-                    BoxIou(carried, detection.box_px));
+      spdlog::debug(
+          "objects: frame {}: label {} scores {:.2f} as landmark {} (body {:.2f}, cuboid {:.2f}, last {:.2f})",
+          scene.tracked.frame->frame_id, detection.label, score.Value(), landmark.key, body.share_in_detection[d],
+          BoxIou(scene.projected[l], detection.box_px), BoxIou(predicted, detection.box_px));
     }
   }
 }
 
-// Whether another pairing of either partner scores almost as well. Landmarks that were never seen side by side may be
-// one thing twice, and would keep each other from learning for ever: they are no rivals.
+// Whether another pair with the landmark or the detection scores almost as well. Landmarks that were never observed
+// together are not rivals: they may be one object twice, and would block each other's updates forever.
 bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::Index detection) {
   constexpr double kMargin = 0.1;
-  const std::map<LandmarkKey, uint64_t>& seen_beside = scene.landmarks[static_cast<size_t>(landmark)]->seen_beside;
+  const auto& observed_with = scene.landmarks[static_cast<size_t>(landmark)]->evidence.observed_with;
   const double rival_score = scores(landmark, detection) - kMargin;
   for (Eigen::Index d = 0; d < scores.cols(); ++d) {
     if (d != detection && scores(landmark, d) > rival_score) return true;
   }
   for (Eigen::Index l = 0; l < scores.rows(); ++l) {
-    const bool are_two = seen_beside.contains(scene.landmarks[static_cast<size_t>(l)]->key);
-    if (l != landmark && are_two && scores(l, detection) > rival_score) return true;
+    const bool are_two_objects = observed_with.contains(scene.landmarks[static_cast<size_t>(l)]->key);
+    if (l != landmark && are_two_objects && scores(l, detection) > rival_score) return true;
   }
   return false;
 }
 
-// Whether the mask of `d`, matched to landmark `l`, is that of `l` and of another thing in one: the other one has no
-// mask, its body lies under this one, and this one fits both together better than `l`. (A thing that stands behind `l`
-// lies under its mask as well, but does not make the mask larger.)
+// Whether the mask of detection `d`, matched to landmark `l`, covers another object too: that object has no mask, its
+// body projects into this one, and this one fits both together better than `l` alone. (An object behind `l` also
+// projects into its mask, but does not make the mask larger.)
 bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<bool>& matched) {
-  constexpr double kUnderMask = 0.7;
-  constexpr double kBetter = 0.1;
   const cv::Rect& box = scene.detections[d].box_px;
   if (scene.projected[l].empty()) return false;
   const double alone = BoxIou(box, scene.projected[l]);
   for (size_t other = 0; other < scene.landmarks.size(); ++other) {
     if (other == l || matched[other] || scene.projected[other].empty()) continue;
     if (scene.landmarks[other]->state == ObjectState::kProvisional) continue;
-    const BodySight& sight = scene.sights[other];
-    if (sight.share_in_image < kInImage || sight.share_in_detection[d] < kUnderMask) continue;
-    if (BoxIou(box, scene.projected[l] | scene.projected[other]) > alone + kBetter) return true;
+    const BodyProjection& body = scene.bodies[other];
+    if (body.share_in_image < kMinShareInImage || body.share_in_detection[d] < kMostlyCovered) continue;
+    if (BoxIou(box, scene.projected[l] | scene.projected[other]) > alone + kMinBetterFit) return true;
   }
   return false;
 }
 
-// Whether detection `piece`, which is no known landmark, is cut off a known thing: it lies where that one is, whose
-// mask `d` is too small without it.
-bool IsPieceOf(const Scene& scene, size_t piece, size_t d, size_t l) {
-  constexpr double kInside = 0.8;
-  constexpr double kBetter = 0.1;
+// Whether the unmatched detection `part` was split off landmark `l`: it lies in the landmark's cuboid, and the
+// landmark's mask `d` fits the cuboid better with it.
+bool IsPartOf(const Scene& scene, size_t part, size_t d, size_t l) {
+  constexpr double kMinShareInCuboid = 0.8;  // of the area of the detection's box
   if (scene.projected[l].empty() || scene.landmarks[l]->state == ObjectState::kProvisional) return false;
-  const cv::Rect& box = scene.detections[piece].box_px;
-  if ((box & scene.projected[l]).area() < kInside * box.area()) return false;
+  const cv::Rect& box = scene.detections[part].box_px;
+  if ((box & scene.projected[l]).area() < kMinShareInCuboid * box.area()) return false;
   const cv::Rect& main_box = scene.detections[d].box_px;
-  return BoxIou(main_box | box, scene.projected[l]) > BoxIou(main_box, scene.projected[l]) + kBetter;
+  return BoxIou(main_box | box, scene.projected[l]) > BoxIou(main_box, scene.projected[l]) + kMinBetterFit;
 }
 
-void DoubtPieces(const Scene& scene, std::vector<Match>* matches) {
-  for (size_t piece = 0; piece < matches->size(); ++piece) {
-    if ((*matches)[piece].landmark >= 0) continue;
+// Adds doubts to unmatched detections that are part of a landmark, and to the match of that landmark.
+void MarkParts(const Scene& scene, std::vector<Match>* matches) {
+  for (size_t part = 0; part < matches->size(); ++part) {
+    if ((*matches)[part].landmark >= 0) continue;
     for (size_t d = 0; d < matches->size(); ++d) {
       const int l = (*matches)[d].landmark;
-      if (l < 0 || !IsPieceOf(scene, piece, d, static_cast<size_t>(l))) continue;
-      (*matches)[piece].doubt = "it is a piece of another thing";
-      (*matches)[d].doubt = "a piece of it is missing";
-      spdlog::debug("objects: frame {}: label {} is a piece of landmark {}", scene.tracked.frame->frame_id,
-                    scene.detections[piece].label, scene.landmarks[static_cast<size_t>(l)]->key);
+      if (l < 0 || !IsPartOf(scene, part, d, static_cast<size_t>(l))) continue;
+      (*matches)[part].doubt = "part of another object";
+      (*matches)[d].doubt = "part of the object is missing";
+      spdlog::debug("objects: frame {}: label {} is part of landmark {}", scene.tracked.frame->frame_id,
+                    scene.detections[part].label, scene.landmarks[static_cast<size_t>(l)]->key);
       break;
     }
   }
 }
 
-// Share of the body in the mask, and overlap of the mask's box with the cuboid's. Where the image or other masks cut
-// the landmark nothing is said.
+// Mean of the share of the body in the mask and of the overlap of the mask's box with the cuboid's. nullopt where the
+// image or other masks cut off the landmark.
 std::optional<double> Agreement(const Scene& scene, size_t d, size_t l) {
-  constexpr double kWhole = 0.95;
-  const BodySight& sight = scene.sights[l];
-  if (!sight.known || scene.projected[l].empty() || sight.share_in_image < kWhole) return std::nullopt;
-  const double in_mask = sight.share_in_detection[d];
-  const double under_others = sight.share_hidden - in_mask;
-  if (under_others > 1 - kWhole && under_others > 0.1 * in_mask) return std::nullopt;
+  constexpr double kMinWhole = 0.95;          // share of the body in the image and not under other masks
+  constexpr double kMaxOtherPerInMask = 0.1;  // body points under other masks, per point in this one: masks touch
+  const BodyProjection& body = scene.bodies[l];
+  if (!body.known || scene.projected[l].empty() || body.share_in_image < kMinWhole) return std::nullopt;
+  const double in_mask = body.share_in_detection[d];
+  const double under_others = body.share_masked - in_mask;
+  if (under_others > 1 - kMinWhole && under_others > kMaxOtherPerInMask * in_mask) return std::nullopt;
   return 0.5 * (in_mask + BoxIou(scene.projected[l], scene.detections[d].box_px));
 }
 
-// The landmark whose mask lies over landmark `l`, see Association::covered_by.
+// The landmark whose mask covers landmark `l`, see Association::covered_by.
 int CoveringLandmark(const Scene& scene, size_t l, const std::vector<Match>& matches) {
-  constexpr double kMost = 0.7;
-  constexpr double kPlainlyInImage = 0.6;
-  const BodySight& sight = scene.sights[l];
-  const cv::Rect& carried = scene.carried[l];
+  constexpr double kMinBodyInImage = 0.6;  // share of the body
+  const BodyProjection& body = scene.bodies[l];
+  const cv::Rect& predicted = scene.predicted[l];
+  const auto covered_share = [&](size_t d) -> double {
+    if (body.known) return body.share_in_image < kMinBodyInImage ? 0 : body.share_in_detection[d];
+    // A landmark without a body is compared by its predicted box.
+    if (predicted.empty()) return 0;
+    return static_cast<double>((predicted & scene.detections[d].box_px).area()) / predicted.area();
+  };
   for (size_t d = 0; d < matches.size(); ++d) {
-    if (matches[d].doubt != nullptr) continue;
-    // What has no body yet is compared by its box.
-    const double covered = sight.known ? (sight.share_in_image < kPlainlyInImage ? 0 : sight.share_in_detection[d])
-                           : carried.empty()
-                               ? 0
-                               : static_cast<double>((carried & scene.detections[d].box_px).area()) / carried.area();
-    if (covered >= kMost) return matches[d].landmark;
+    if (matches[d].doubt == nullptr && covered_share(d) >= kMostlyCovered) return matches[d].landmark;
   }
   return -1;
 }
 
-// The paper's first stage: the box of the frame before, best overlap first. What it does not find is a new landmark,
-// until its points tell that it is an old one.
+// The first stage of the paper: the boxes of the frame before, best overlap first. A detection without a match becomes
+// a new landmark, which is merged later if its points belong to an old one.
 std::vector<Match> MatchGreedily(const Scene& scene) {
-  constexpr double kLeastIou = 0.3;
+  constexpr double kMinIou = 0.3;
   struct Pair {
     double iou;
     size_t landmark, detection;
   };
   std::vector<Pair> pairs;
   for (size_t l = 0; l < scene.landmarks.size(); ++l) {
-    if (scene.frame_index - scene.landmarks[l]->last_frame != 1) continue;
+    if (scene.frame_index - scene.landmarks[l]->evidence.last_frame != 1) continue;
     for (size_t d = 0; d < scene.detections.size(); ++d) {
       const double iou = BoxIou(scene.landmarks[l]->last_box_px, scene.detections[d].box_px);
-      if (iou >= kLeastIou) pairs.push_back({iou, l, d});
+      if (iou >= kMinIou) pairs.push_back({iou, l, d});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.iou > b.iou; });
@@ -289,7 +299,7 @@ std::vector<Match> MatchGreedily(const Scene& scene) {
   return matches;
 }
 
-std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
+std::vector<Match> MatchGlobally(const Scene& scene) {
   const auto rows = static_cast<Eigen::Index>(scene.landmarks.size());
   const auto columns = static_cast<Eigen::Index>(scene.detections.size());
   Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(rows, columns);
@@ -298,7 +308,7 @@ std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
     ScoreLandmark(scene, l, row);
     scores.row(static_cast<Eigen::Index>(l)) = row;
   }
-  const std::vector<int> detection_of = AssignMaximal(scores, min_score);
+  const std::vector<int> detection_of = AssignByScore(scores, kMinMatchScore);
   std::vector<bool> matched(scene.landmarks.size(), false);
   for (size_t l = 0; l < matched.size(); ++l) matched[l] = detection_of[l] >= 0;
   std::vector<Match> matches(scene.detections.size());
@@ -309,16 +319,16 @@ std::vector<Match> MatchGlobally(const Scene& scene, double min_score) {
     match.landmark = static_cast<int>(l);
     match.agreement = Agreement(scene, d, l);
     if (CoversAnother(scene, d, l, matched)) {
-      match.doubt = "it covers another thing as well";
+      match.doubt = "covers another object too";
     } else if (IsAmbiguous(scene, scores, static_cast<Eigen::Index>(l), detection_of[l])) {
-      match.doubt = "another match is as good";
+      match.doubt = "another match scores nearly as well";
     }
-    spdlog::debug("objects: frame {}: label {} ({}) is landmark {} with {:.2f}{}{}", scene.tracked.frame->frame_id,
+    spdlog::debug("objects: frame {}: label {} ({}) is landmark {}, score {:.2f}{}{}", scene.tracked.frame->frame_id,
                   scene.detections[d].label, scene.detections[d].class_name, scene.landmarks[l]->key,
-                  scores(static_cast<Eigen::Index>(l), detection_of[l]), match.doubt ? ", in doubt: " : "",
+                  scores(static_cast<Eigen::Index>(l), detection_of[l]), match.doubt ? ", doubt: " : "",
                   match.doubt ? match.doubt : "");
   }
-  DoubtPieces(scene, &matches);
+  MarkParts(scene, &matches);
   return matches;
 }
 
@@ -332,21 +342,21 @@ Association Associate(const TrackedFrame& tracked, const std::vector<Detection>&
               .landmarks = landmarks,
               .frame_index = frame_index,
               .scene_depth_mu = scene_depth_mu,
-              .sights = {},
+              .bodies = {},
               .projected = {},
-              .carried = {}};
+              .predicted = {}};
   Association association;
   for (const auto& landmark : landmarks) {
-    const BodySight& sight = scene.sights.emplace_back(ProjectBody(*landmark, tracked, detections));
-    scene.projected.push_back(landmark->cuboid
-                                  ? ProjectCuboid(*landmark->cuboid, 1, tracked.frame->camera, tracked.T_world_camera)
-                                  : cv::Rect());
-    const bool recent = frame_index - landmark->last_frame <= kRecentFrames;
-    scene.carried.push_back(recent ? CarryBox(*landmark, tracked, DepthOf(*landmark, scene_depth_mu)) : cv::Rect());
-    association.visible_share.push_back(sight.share_in_image * (1 - sight.share_hidden));
+    const BodyProjection& body = scene.bodies.emplace_back(ProjectBody(*landmark, tracked, detections));
+    const auto& cuboid = landmark->geometry.cuboid;
+    scene.projected.push_back(cuboid ? ProjectCuboid(*cuboid, 1, tracked.frame->camera, tracked.T_world_camera)
+                                     : cv::Rect());
+    const bool recent = frame_index - landmark->evidence.last_frame <= kRecentFrames;
+    scene.predicted.push_back(recent ? PredictBox(*landmark, tracked, DepthOf(*landmark, scene_depth_mu)) : cv::Rect());
+    association.visible_share.push_back(body.share_in_image * (1 - body.share_masked));
   }
   const bool greedy = config.association == "greedy_iou";
-  association.matches = greedy ? MatchGreedily(scene) : MatchGlobally(scene, kMinMatchScore);
+  association.matches = greedy ? MatchGreedily(scene) : MatchGlobally(scene);
   std::vector<bool> matched(landmarks.size(), false);
   for (const Match& match : association.matches) {
     if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;

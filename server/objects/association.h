@@ -13,40 +13,40 @@
 
 namespace romap::objects {
 
-// What one detection of a frame shows.
+// The landmark that one detection of a frame shows.
 struct Match {
   int landmark = -1;  // index into the landmarks; -1: none of them
-  // The match is good enough to stay on track, but not to learn from: why. nullptr = nothing speaks against it. Without
-  // a landmark: why it is not the sight of a new thing either.
+  // Why the detection must not update the landmark's shape and points; nullptr if it may. A detection with a doubt but
+  // without a landmark does not create one.
   const char* doubt = nullptr;
-  // How well the mask agrees with what is known of the landmark's shape, 0..1; nullopt while nothing is.
+  // How well the mask agrees with the landmark's body and cuboid, 0..1; nullopt while these are unknown or cut off.
   std::optional<double> agreement;
 };
 
-// Which landmark each detection of a frame shows.
 struct Association {
   std::vector<Match> matches;  // per detection
-  // Per landmark: share of its body that this frame ought to show unless something is in front of it; 0 when unknown.
+  // Per landmark: share of its body that is in the image and not under a mask, 0..1. 0 while it has no body.
   std::vector<double> visible_share;
-  // Per landmark without a detection: the landmark (index) whose mask lies over most of its body; -1: none. Not where
-  // that mask plainly covers two things.
+  // Per landmark without a detection: index of the landmark whose mask covers most of its body, -1 if none does. Masks
+  // with a doubt, for instance those that cover two objects, do not count.
   std::vector<int> covered_by;
 };
 
-// Scores every pair by what is known of it and assigns globally (see AssignMaximal):
-//  - share of the landmark's body (map points and hull) that projects into the mask: holds from any direction and after
-//    any gap;
-//  - overlap of the mask's box with the projected cuboid, and with the last sighting's box carried along by the
-//    camera's motion, as long as that is recent;
-//  - class and detector track: evidence, not a verdict.
-// A match is doubted when another one is nearly as good, and when the mask covers a second landmark as well and fits
-// both together better than one of them: neighbours that the detector took for one thing. So are two masks that fit one
-// landmark together better than the matched one does alone: a thing that the detector cut in pieces.
+// Scores every pair of landmark and detection and finds the best one-to-one assignment (AssignByScore). The score is
+// the weighted mean of these cues:
+//  - share of the landmark's body (map points and hull) that projects into the mask: valid from any direction and after
+//    any gap in time;
+//  - overlap (IoU) of the mask's box with the projected cuboid, and with the box of the last observation transformed by
+//    the camera's motion while that observation is recent;
+//  - class and detector track id, with small weights.
+// A match gets a doubt if another one scores nearly as well, if the mask also covers a second landmark and fits both
+// together better than the matched one (the detector merged two neighbors), and if two masks together fit one landmark
+// better than the matched mask alone (the detector split an object).
 //
-// With ObjectsConfig::association = "greedy_iou" the recipe of the paper's first stage instead: boxes of consecutive
-// frames, best overlap first.
+// With ObjectsConfig::association = "greedy_iou" the first stage of the paper instead: the boxes of consecutive frames,
+// best overlap first.
 //
-// `frame_index` counts frames; `scene_depth_mu` is a typical distance for landmarks without geometry (0: unknown).
+// `frame_index` counts frames. `scene_depth_mu` is a typical depth for landmarks without geometry, 0 if unknown.
 Association Associate(const TrackedFrame& tracked, const std::vector<Detection>& detections,
                       const std::vector<std::unique_ptr<Landmark>>& landmarks, uint64_t frame_index,
                       double scene_depth_mu, const ObjectsConfig& config);

@@ -7,26 +7,28 @@
 namespace romap::objects {
 namespace {
 
-// Costs of a map unit that an outline falls short of a mask or reaches farther: 19 masks in 20 are to be covered.
+// Cost per map unit by which an outline falls short of a mask or extends beyond it: optimal if 19 of 20 masks are
+// covered.
 constexpr float kFallShortWeight = 0.95F;
 constexpr float kReachFartherWeight = 1 - kFallShortWeight;
-// A corner that sticks out by more than this share of the object's size is one that the object does not fill; what it
-// costs is bounded, or round things would be squeezed.
+// A corner beyond the mask by more than this share of the object's size is one that the object does not fill. Its cost
+// is bounded, otherwise boxes of round objects would be too small.
 constexpr float kFilledCornerShare = 0.07F;
-// Most that one silhouette may cost, in terms of the object's size.
-constexpr float kMostSilhouetteCost = 0.3F;
-// Weights per silhouette, which a direction of a mask has as well: small extents, the mean distance of points outside
-// the box, the distance of the bottom from the support, of a face from where it was. A height costs more than a width:
-// from above on one side, a higher top hides as much as a far side that is about twice as much farther, and a
-// box would rather grow tall than deep.
+// Largest cost of one silhouette, in terms of the object's size.
+constexpr float kMaxSilhouetteCost = 0.3F;
+// Weights per silhouette, relative to one direction of a mask, of the box's extents, of the mean distance of points
+// outside the box, of the distance of the bottom from the support, and of the distance of each face from its previous
+// position. Height costs more than width: seen from above and from one side only, a top that is higher by some amount
+// covers as much of the image as a far side that is farther by about twice that amount, so that the box would grow tall
+// rather than deep.
 constexpr double kExtentWeight = 0.04;
 constexpr double kHeightWeight = 0.08;
 constexpr double kPointsWeight = 3;
 constexpr double kSupportWeight = 2;
 constexpr double kPreviousWeight = 0.02;
-// A point farther outside than this share of the object's size is taken for a stray one.
-constexpr double kStrayPointShare = 0.02;
-constexpr size_t kMostPoints = 120;
+// Largest cost of one point outside the box, in terms of the object's size: the point may be an outlier.
+constexpr double kOutlierShare = 0.02;
+constexpr size_t kMaxPoints = 120;  // used, for speed
 
 }  // namespace
 
@@ -35,7 +37,7 @@ BoxSearch::BoxSearch(const BoxCriteria& criteria, const std::vector<Silhouette>&
   for (size_t k = 0; k < kHalf; ++k) directions_[k] = ExtentDirection(static_cast<int>(k)).cast<float>();
   criteria_.points.clear();
   const Eigen::Rotation2Dd to_box(-yaw_rad);
-  const size_t count = std::min(kMostPoints, criteria.points.size());
+  const size_t count = std::min(kMaxPoints, criteria.points.size());
   for (size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d& p = criteria.points[i * criteria.points.size() / count];
     const Eigen::Vector2d xy = to_box * p.head<2>();
@@ -58,13 +60,13 @@ void BoxSearch::AddTarget(const Silhouette& silhouette) {
   P.row(0) = (P.row(0) - origin_px.x() * P.row(2)) * mu_per_px;
   P.row(1) = (P.row(1) - origin_px.y() * P.row(2)) * mu_per_px;
   P.leftCols<2>() *= Eigen::Rotation2Dd(yaw_rad_).toRotationMatrix();
-  Target target{.P = P.cast<float>(), .reach_mu = {}, .ends_freely = {}};
+  Target target{.P = P.cast<float>(), .reach_mu = {}, .is_free = {}};
   const Eigen::Vector3d center_world = region.ToWorld(criteria_.center);
   for (size_t k = 0; k < kExtentDirections; ++k) {
     const auto direction = static_cast<int>(k);
     const double reach_px = silhouette.extents.reach_px[k] - ExtentDirection(direction).dot(origin_px);
     target.reach_mu[k] = static_cast<float>(reach_px * mu_per_px);
-    target.ends_freely[k] = silhouette.EndsFreely(direction, center_world);
+    target.is_free[k] = silhouette.IsFreeExtent(direction, center_world);
   }
   targets_.push_back(target);
 }
@@ -77,7 +79,7 @@ BoxSearch::Reaches BoxSearch::OutlineOf(const UprightBox& box, const Target& tar
   const Corners y{low.y(), low.y(), high.y(), high.y(), low.y(), low.y(), high.y(), high.y()};
   const Corners z{low.z(), low.z(), low.z(), low.z(), high.z(), high.z(), high.z(), high.z()};
   const auto& P = target.P;
-  // A corner behind the camera is far outside the image on some side.
+  // The minimum moves a corner behind the camera far outside the image.
   const Corners depth = (P(2, 0) * x + P(2, 1) * y + P(2, 2) * z + P(2, 3)).max(1e-6F);
   const Corners u = (P(0, 0) * x + P(0, 1) * y + P(0, 2) * z + P(0, 3)) / depth;
   const Corners v = (P(1, 0) * x + P(1, 1) * y + P(1, 2) * z + P(1, 3)) / depth;
@@ -99,11 +101,11 @@ float BoxSearch::SilhouetteCost(const UprightBox& box, const Target& target) con
     const float farther = outline[k] - target.reach_mu[k];
     if (farther < 0) {
       cost -= kFallShortWeight * farther;
-    } else if (target.ends_freely[k]) {
+    } else if (target.is_free[k]) {
       cost += kReachFartherWeight * farther * filled_mu / (filled_mu + farther);
     }
   }
-  return std::min(cost, kMostSilhouetteCost * size_mu);
+  return std::min(cost, kMaxSilhouetteCost * size_mu);
 }
 
 double BoxSearch::PriorCost(const UprightBox& box) const {
@@ -112,7 +114,7 @@ double BoxSearch::PriorCost(const UprightBox& box) const {
   double outside = 0;
   for (const Eigen::Vector3d& p : criteria_.points) {
     const double distance = (box.low - p).cwiseMax(p - box.high).maxCoeff();
-    outside += std::clamp(distance, 0.0, kStrayPointShare * criteria_.object_size_mu);
+    outside += std::clamp(distance, 0.0, kOutlierShare * criteria_.object_size_mu);
   }
   if (outside > 0) cost += kPointsWeight * outside / static_cast<double>(criteria_.points.size());
   if (criteria_.support_height) cost += kSupportWeight * std::abs(box.low.z() - *criteria_.support_height);
@@ -132,7 +134,8 @@ bool BoxSearch::TryMove(int axis, double low_step, double high_step, UprightBox*
   UprightBox moved = *box;
   moved.low[axis] += low_step;
   moved.high[axis] += high_step;
-  if (!(moved.high[axis] - moved.low[axis] > 1e-3 * criteria_.object_size_mu)) return false;
+  constexpr double kMinExtent = 1e-3;  // of the object's size
+  if (!(moved.high[axis] - moved.low[axis] > kMinExtent * criteria_.object_size_mu)) return false;
   const double moved_cost = Cost(moved);
   if (moved_cost >= *cost) return false;
   *box = moved;
@@ -141,32 +144,32 @@ bool BoxSearch::TryMove(int axis, double low_step, double high_step, UprightBox*
 }
 
 UprightBox BoxSearch::Refine(const UprightBox& start, double step_mu) const {
-  constexpr double kLeastStepShare = 0.004;
-  constexpr double kLeastGain = 1e-3;  // of the cost, by a round of moves: less is not worth another round
+  constexpr double kMinStepShare = 0.004;  // of the object's size
+  constexpr double kMinGain = 1e-3;        // share of the cost, per round of moves; below it the step is halved
   UprightBox box = start;
   double cost = Cost(box);
-  for (double step = step_mu; step > kLeastStepShare * criteria_.object_size_mu;) {
+  for (double step = step_mu; step > kMinStepShare * criteria_.object_size_mu;) {
     const double cost_before = cost;
     for (int axis = 0; axis < 3; ++axis) {
       if (!TryMove(axis, step, 0, &box, &cost)) TryMove(axis, -step, 0, &box, &cost);
       if (!TryMove(axis, 0, -step, &box, &cost)) TryMove(axis, 0, step, &box, &cost);
       if (!TryMove(axis, step, step, &box, &cost)) TryMove(axis, -step, -step, &box, &cost);
     }
-    if (cost > (1 - kLeastGain) * cost_before) step /= 2;
+    if (cost > (1 - kMinGain) * cost_before) step /= 2;
   }
   return box;
 }
 
 double BoxSearch::Agreement(const UprightBox& box) const {
   constexpr float kGoodShare = 0.05F;  // of the object's size
-  constexpr int kMostShort = 2;        // directions
+  constexpr int kMaxShort = 2;         // directions in which a covering box may fall short
   if (targets_.empty()) return 0;
   const float tolerance_mu = kGoodShare * static_cast<float>(criteria_.object_size_mu);
   const auto agreeing = std::count_if(targets_.begin(), targets_.end(), [&](const Target& target) {
     const Reaches outline = OutlineOf(box, target);
     int fall_short = 0;
     for (size_t k = 0; k < kExtentDirections; ++k) fall_short += target.reach_mu[k] - outline[k] > tolerance_mu ? 1 : 0;
-    return fall_short <= kMostShort;
+    return fall_short <= kMaxShort;
   });
   return static_cast<double>(agreeing) / static_cast<double>(targets_.size());
 }
@@ -177,7 +180,7 @@ double BoxSearch::Looseness(const UprightBox& box) const {
   for (const Target& target : targets_) {
     const Reaches outline = OutlineOf(box, target);
     for (size_t k = 0; k < kExtentDirections; ++k) {
-      if (!target.ends_freely[k]) continue;
+      if (!target.is_free[k]) continue;
       sum += std::max(0.0F, outline[k] - target.reach_mu[k]);
       ++count;
     }

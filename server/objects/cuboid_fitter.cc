@@ -38,14 +38,15 @@ Interval Bounds(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3
   return bounds;
 }
 
-// Bounds of the points without the outermost 2 % on either side.
+// Bounds of the points without the outermost ones on either side.
 Interval TrimmedBounds(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& axis) {
+  constexpr double kTrimmed = 0.02;  // share of the points, on each side
   const std::vector<double> values = Along(points, axis);
-  return {NearestQuantile(values, 0.02), NearestQuantile(values, 0.98)};
+  return {NearestQuantile(values, kTrimmed), NearestQuantile(values, 1 - kTrimmed)};
 }
 
-// The horizontal direction in which the hull is unbounded because all cameras look along it; nullopt when they stand
-// around the object. A camera bounds the hull across its direction of view, from either side alike.
+// The horizontal direction in which the hull is unbounded because all cameras look along it; nullopt when the cameras
+// surround the object. A camera bounds the hull across its view direction, the same from opposite sides.
 std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence,
                                                   const std::vector<Silhouette>& silhouettes) {
   std::vector<double> azimuths;
@@ -63,8 +64,8 @@ std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence
     gap = azimuths[i] - azimuths[i - 1];
     gap_middle = azimuths[i - 1] + gap / 2;
   }
-  constexpr double kWidestHarmlessGap = 60 * std::numbers::pi / 180;
-  if (gap < kWidestHarmlessGap) return std::nullopt;
+  constexpr double kMaxGap_rad = 60 * std::numbers::pi / 180;  // between view directions that bound the hull
+  if (gap < kMaxGap_rad) return std::nullopt;
   const double direction = gap_middle + std::numbers::pi / 2;
   return Eigen::Vector3d(std::cos(direction), std::sin(direction), 0);
 }
@@ -72,6 +73,8 @@ std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence
 // Hull cells between two heights and, where no camera bounds them, within the depth of the points.
 std::vector<Eigen::Vector3d> ClipCells(const CuboidEvidence& evidence, const Interval& heights,
                                        const std::optional<Eigen::Vector3d>& unbounded) {
+  constexpr double kDepthPerWidth = 0.7;  // half depth without points, in terms of the width
+  constexpr double kPointsMargin = 0.2;   // around the points in depth, in terms of the width
   const double half_cell = evidence.cell_size.z() / 2;
   std::vector<Eigen::Vector3d> cells;
   for (const Eigen::Vector3d& cell : evidence.hull_cells) {
@@ -81,10 +84,11 @@ std::vector<Eigen::Vector3d> ClipCells(const CuboidEvidence& evidence, const Int
   const Eigen::Vector3d across = unbounded->cross(Eigen::Vector3d::UnitZ());
   const Interval sides = Bounds(cells, across);
   const double width = sides.high - sides.low;
-  Interval depths{unbounded->dot(evidence.center) - 0.7 * width, unbounded->dot(evidence.center) + 0.7 * width};
+  Interval depths{unbounded->dot(evidence.center) - kDepthPerWidth * width,
+                  unbounded->dot(evidence.center) + kDepthPerWidth * width};
   if (evidence.points.size() >= static_cast<size_t>(evidence.min_points)) {
     depths = TrimmedBounds(evidence.points, *unbounded);
-    depths = {depths.low - 0.2 * width, depths.high + 0.2 * width};
+    depths = {depths.low - kPointsMargin * width, depths.high + kPointsMargin * width};
   }
   std::erase_if(cells, [&](const Eigen::Vector3d& cell) { return !depths.Contains(unbounded->dot(cell)); });
   return cells;
@@ -111,10 +115,13 @@ std::optional<Interval> HeightsInsidePrism(const Footprint& footprint, const Eig
   return heights;
 }
 
-// The lowest top and the highest bottom with which a box over the footprint still covers every silhouette: each ray of
-// an outline must meet the box. Bad outlines are outvoted. nullopt without outlines.
+// The highest bottom and the lowest top with which a box over the footprint still covers every silhouette: each ray of
+// an outline must intersect the box. Quantiles ignore bad rays and outlines. nullopt without outlines.
 std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                         const Footprint& footprint) {
+  constexpr size_t kMinRays = 8;            // of an outline
+  constexpr double kRaysOutside = 0.02;     // share of an outline's rays that may miss the box, at either end
+  constexpr double kOutlinesOutside = 0.1;  // share of the outlines, likewise
   std::vector<double> tops;
   std::vector<double> bottoms;
   for (const Silhouette& silhouette : silhouettes) {
@@ -127,18 +134,18 @@ std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const st
       lows.push_back(heights->low);
       highs.push_back(heights->high);
     }
-    if (lows.size() < 8) continue;
-    tops.push_back(NearestQuantile(lows, 0.98));
-    bottoms.push_back(NearestQuantile(highs, 0.02));
+    if (lows.size() < kMinRays) continue;
+    tops.push_back(NearestQuantile(lows, 1 - kRaysOutside));
+    bottoms.push_back(NearestQuantile(highs, kRaysOutside));
   }
   if (tops.empty()) return std::nullopt;
-  return Interval{NearestQuantile(bottoms, 0.1), NearestQuantile(tops, 0.9)};
+  return Interval{NearestQuantile(bottoms, kOutlinesOutside), NearestQuantile(tops, 1 - kOutlinesOutside)};
 }
 
-// The heights between which a hull is broad. Above and below it tapers like the cones that every hull wears.
+// The heights between which a hull is broad. Above and below, it tapers like a cone, as every visual hull does.
 Interval BroadHeights(const std::vector<Eigen::Vector3d>& cells, double cell_height) {
-  constexpr double kBroadShare = 0.2;
-  std::vector<std::pair<double, int>> layers;  // cells come layer by layer
+  constexpr double kBroadShare = 0.2;          // of the largest layer's area
+  std::vector<std::pair<double, int>> layers;  // height and number of cells; cells are ordered by layers
   for (const Eigen::Vector3d& cell : cells) {
     if (layers.empty() || cell.z() > layers.back().first + cell_height / 2) layers.emplace_back(cell.z(), 0);
     ++layers.back().second;
@@ -162,26 +169,26 @@ UprightBox BoxOver(const Footprint& footprint, const Interval& heights) {
   return box;
 }
 
-// A thing that leaves the corners of its box empty (a ball, a plant) gets a box that is too small: across the corners
-// the outline reaches farther than the masks from whatever side, and the search gives in to that a little. What it
-// gives in grows with the looseness: boxes have 0.01, things of revolution 0.1, and for these it is a tenth. The bottom
-// is where the support says. The top is that of the points and outlines: little looks over it. Never the hull's other
-// faces: it is much wider wherever something hid the object.
+// Compensates for a bias of the search. An object that does not fill the corners of its box (a ball, a plant) gets a
+// box that is too small, because the outline of the true box extends beyond the masks at the corners in every view. The
+// bias grows with the looseness: boxes have a looseness of 0.01, solids of revolution of 0.1 and a bias of a tenth of
+// their width. The bottom is that of the support. The top of round objects is that of the points and outlines, because
+// few views look over it. The hull's other faces are not used: it is much wider where something occluded the object.
 UprightBox Loosened(UprightBox tight, double outer_top, double looseness) {
-  constexpr double kBoxLike = 0.02;
-  constexpr double kGrowth = 1.2;
+  constexpr double kBoxLike = 0.02;  // looseness up to which a box needs no correction
+  constexpr double kGrowth = 1.2;    // share of the width, per looseness
   const double growth = kGrowth * std::max(0.0, looseness - kBoxLike);
   const Eigen::Vector2d grown = growth / 2 * (tight.high - tight.low).head<2>();
   tight.low.head<2>() -= grown;
   tight.high.head<2>() += grown;
-  constexpr double kFlatTop = 0.07;
-  constexpr double kRoundTop = 0.09;
+  constexpr double kFlatTop = 0.07;   // looseness up to which the search finds the top
+  constexpr double kRoundTop = 0.09;  // looseness from which `outer_top` is right
   const double share = std::clamp((looseness - kFlatTop) / (kRoundTop - kFlatTop), 0.0, 1.0);
   tight.high.z() += share * std::max(0.0, outer_top - tight.high.z());
   return tight;
 }
 
-// The previous cuboid as a box; nullopt when it is turned against `yaw_rad`, so that its faces are other ones.
+// The previous cuboid as a box; nullopt when its yaw differs from `yaw_rad`, so that its faces do not correspond.
 std::optional<UprightBox> AtYaw(const std::optional<Cuboid>& cuboid, const HullRegion& region, double yaw_rad) {
   constexpr double kSameYawRad = 0.03;
   if (!cuboid) return std::nullopt;
@@ -207,19 +214,59 @@ Cuboid InWorld(const UprightBox& box, const HullRegion& region) {
   return cuboid;
 }
 
+bool HasEnoughPoints(const CuboidEvidence& evidence) {
+  return evidence.points.size() >= static_cast<size_t>(evidence.min_points);
+}
+
+// The initial box: the footprint of the hull between heights from the support, the points and the outlines.
+std::optional<UprightBox> FindOuterBox(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
+                                       std::optional<double> support, const std::optional<Cuboid>& previous) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const std::optional<Eigen::Vector3d> unbounded = UnboundedDirection(evidence, silhouettes);
+  const Interval hull = Bounds(evidence.hull_cells, up);
+  const Interval broad = BroadHeights(evidence.hull_cells, evidence.cell_size.z());
+  const bool enough_points = HasEnoughPoints(evidence);
+  const Interval points = enough_points ? TrimmedBounds(evidence.points, up) : broad;
+  // A few points may all be low on the object; many are not.
+  constexpr size_t kManyPoints = 3;  // times the minimum
+  const bool points_reach_top = evidence.points.size() >= kManyPoints * static_cast<size_t>(evidence.min_points);
+  Interval heights{support.value_or(points.low), points_reach_top ? points.high : std::max(points.high, broad.high)};
+  std::optional<double> previous_yaw;
+  if (previous) previous_yaw = YawInGrid(*previous, evidence.region.R_world_grid);
+
+  std::optional<Footprint> footprint;
+  for (int pass = 0; pass < 2; ++pass) {  // the second pass uses the heights of the first one
+    const std::vector<Eigen::Vector3d> cells = ClipCells(evidence, heights, unbounded);
+    footprint = FitFootprint(cells, evidence.cell_size, previous_yaw, evidence.edge_yaw_rad);
+    if (!footprint) return std::nullopt;
+    // A footprint clipped to the points may be too short at its far end, and heights that cover it would be too low.
+    if (unbounded && enough_points) break;
+    const auto covering = CoveringHeights(evidence, silhouettes, *footprint);
+    if (!covering) break;
+    heights.high = std::min(std::max(heights.high, covering->high), hull.high + evidence.cell_size.z());
+    if (!support) heights.low = std::max(std::min(heights.low, covering->low), hull.low - evidence.cell_size.z());
+  }
+  if (!(heights.high > heights.low)) return std::nullopt;
+  return BoxOver(*footprint, heights);
+}
+
 }  // namespace
 
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
   if (evidence.hull_cells.empty()) return std::nullopt;
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const Interval hull = Bounds(evidence.hull_cells, up);
-  const bool enough_points = evidence.points.size() >= static_cast<size_t>(evidence.min_points);
   // A surface above the lowest fifth of the object's own points cannot carry it.
-  const double ceiling = enough_points ? NearestQuantile(Along(evidence.points, up), 0.2)
-                                       : evidence.center.z() + 0.1 * evidence.object_size_mu;
-  const double floor = std::min(hull.low, ceiling) - 0.3 * evidence.object_size_mu;
-  const double layer_mu = 0.05 * evidence.object_size_mu;
-  // What lies under the object hides the table there, and its own points are no background.
+  constexpr double kLowPoints = 0.2;       // quantile
+  constexpr double kMaxAboveCenter = 0.1;  // without points; this and the following in terms of the object's size
+  constexpr double kMaxBelowHull = 0.3;
+  constexpr double kLayer = 0.05;       // thickness of the layer of points of a surface
+  constexpr double kMaxDistance = 1.3;  // horizontal, of such a point from the center
+  const double ceiling = HasEnoughPoints(evidence) ? NearestQuantile(Along(evidence.points, up), kLowPoints)
+                                                   : evidence.center.z() + kMaxAboveCenter * evidence.object_size_mu;
+  const double floor = std::min(hull.low, ceiling) - kMaxBelowHull * evidence.object_size_mu;
+  const double layer_mu = kLayer * evidence.object_size_mu;
+  // An object below this one hides the surface around it, and its own points are not background.
   std::optional<double> carrier;
   for (double top : evidence.carrier_tops) {
     if (top >= floor && top <= ceiling + layer_mu) carrier = std::max(top, carrier.value_or(top));
@@ -227,7 +274,7 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
   if (carrier) return carrier;
   std::vector<double> heights;
   for (const Eigen::Vector3d& p : evidence.background) {
-    if ((p - evidence.center).head<2>().norm() > 1.3 * evidence.object_size_mu) continue;
+    if ((p - evidence.center).head<2>().norm() > kMaxDistance * evidence.object_size_mu) continue;
     if (p.z() >= floor && p.z() <= ceiling + layer_mu) heights.push_back(p.z());
   }
   std::sort(heights.begin(), heights.end());
@@ -239,10 +286,10 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
     best_count = last - first;
     best_height = heights[first + best_count / 2];
   }
-  constexpr size_t kFewestSupportPoints = 6;
-  if (best_count >= kFewestSupportPoints) return best_height;
+  constexpr size_t kMinSupportPoints = 6;
+  if (best_count >= kMinSupportPoints) return best_height;
   std::vector<double> bottoms;
-  for (double bottom : evidence.neighbour_bottoms) {
+  for (double bottom : evidence.neighbor_bottoms) {
     if (bottom >= floor && bottom <= ceiling + layer_mu) bottoms.push_back(bottom);
   }
   if (bottoms.empty()) return std::nullopt;
@@ -252,49 +299,24 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous) {
   if (evidence.hull_cells.empty()) return std::nullopt;
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const std::optional<double> support = FindSupportHeight(evidence);
-  const std::optional<Eigen::Vector3d> unbounded = UnboundedDirection(evidence, silhouettes);
-  const Interval hull = Bounds(evidence.hull_cells, up);
-  const Interval broad = BroadHeights(evidence.hull_cells, evidence.cell_size.z());
-  const bool enough_points = evidence.points.size() >= static_cast<size_t>(evidence.min_points);
-  const Interval points = enough_points ? TrimmedBounds(evidence.points, up) : broad;
-  // A few points may all lie low on the object; many do not.
-  const bool points_reach_top = evidence.points.size() >= 3 * static_cast<size_t>(evidence.min_points);
-  Interval heights{support.value_or(points.low), points_reach_top ? points.high : std::max(points.high, broad.high)};
-
-  std::optional<Footprint> footprint;
-  for (int pass = 0; pass < 2; ++pass) {  // the second pass uses the height that the first one found
-    const std::vector<Eigen::Vector3d> cells = ClipCells(evidence, heights, unbounded);
-    std::optional<double> previous_yaw;
-    if (previous) previous_yaw = YawInGrid(*previous, evidence.region.R_world_grid);
-    footprint = FitFootprint(cells, evidence.cell_size, previous_yaw, evidence.edge_yaw_rad);
-    if (!footprint) return std::nullopt;
-    // A footprint that was cut to the points may be too short at its far end, and a box over it too low to cover.
-    if (unbounded && enough_points) break;
-    const auto covering = CoveringHeights(evidence, silhouettes, *footprint);
-    if (!covering) break;
-    heights.high = std::min(std::max(heights.high, covering->high), hull.high + evidence.cell_size.z());
-    if (!support) heights.low = std::max(std::min(heights.low, covering->low), hull.low - evidence.cell_size.z());
-  }
-  if (!(heights.high > heights.low)) return std::nullopt;
-
+  const auto outer = FindOuterBox(evidence, silhouettes, support, previous);
+  if (!outer) return std::nullopt;
   const BoxSearch search({.region = evidence.region,
                           .center = evidence.center,
                           .object_size_mu = evidence.object_size_mu,
-                          .points = enough_points ? evidence.points : std::vector<Eigen::Vector3d>{},
+                          .points = HasEnoughPoints(evidence) ? evidence.points : std::vector<Eigen::Vector3d>{},
                           .support_height = support,
-                          .previous = AtYaw(previous, evidence.region, footprint->yaw_rad)},
-                         silhouettes, footprint->yaw_rad);
-  constexpr double kFirstStep = 0.1;  // of the size
-  const UprightBox outer = BoxOver(*footprint, heights);
-  const UprightBox tight = search.Refine(outer, kFirstStep * evidence.object_size_mu);
-  const UprightBox box = Loosened(tight, outer.high.z(), search.Looseness(tight));
-  CuboidFit fit{.cuboid = InWorld(box, evidence.region), .reach = InWorld(United(box, outer), evidence.region)};
-  constexpr double kReachMargin = 0.02;  // of the size: borders of masks and of cells err by about so much
-  fit.reach.half_extents.array() += kReachMargin * evidence.object_size_mu;
+                          .previous = AtYaw(previous, evidence.region, outer->yaw_rad)},
+                         silhouettes, outer->yaw_rad);
+  constexpr double kFirstStep = 0.1;  // of the object's size
+  const UprightBox tight = search.Refine(*outer, kFirstStep * evidence.object_size_mu);
+  const UprightBox box = Loosened(tight, outer->high.z(), search.Looseness(tight));
+  CuboidFit fit{.cuboid = InWorld(box, evidence.region), .training_box = InWorld(United(box, *outer), evidence.region)};
+  constexpr double kTrainingMargin = 0.02;  // of the object's size: about the error of mask borders and of cells
+  fit.training_box.half_extents.array() += kTrainingMargin * evidence.object_size_mu;
   fit.cuboid.confidence = search.Agreement(box);
-  const bool usable = fit.reach.half_extents.allFinite() && fit.reach.T_world_object.IsFinite();
+  const bool usable = fit.training_box.half_extents.allFinite() && fit.training_box.T_world_object.IsFinite();
   return usable ? std::optional(fit) : std::nullopt;
 }
 

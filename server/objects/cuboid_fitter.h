@@ -10,39 +10,39 @@
 
 namespace romap::objects {
 
-// All that speaks for the box of one object. Points and cells are in the Grid frame of `region`.
+// The evidence for the cuboid of one object. Points, cells and heights (z) are in the Grid frame of `region`.
 struct CuboidEvidence {
   HullRegion region;
-  std::vector<Eigen::Vector3d> hull_cells;  // centres of the cells the silhouettes leave
+  std::vector<Eigen::Vector3d> hull_cells;  // centers of the cells of the visual hull
   Eigen::Vector3d cell_size = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> points;               // map points on the object, outliers removed
   std::vector<Eigen::Vector3d> background;           // map points that belong to no object
-  std::vector<double> neighbour_bottoms;             // heights of what other objects stand on
-  std::vector<double> carrier_tops;                  // heights of the tops of other objects below its middle
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the masks' middles meet
+  std::vector<double> neighbor_bottoms;              // heights of the bottoms of other objects
+  std::vector<double> carrier_tops;                  // heights of the tops of other objects below its center
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the middles of the masks intersect
   double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
-  std::optional<double> edge_yaw_rad;                // of its straight edges, in the grid; only when they agree
-  int min_points = 8;                                // fewer points do not say how far the object reaches
+  std::optional<double> edge_yaw_rad;                // of its straight edges; only when they agree
+  int min_points = 8;                                // fewer points do not bound the object
 };
 
 struct CuboidFit {
   Cuboid cuboid;
-  // The box of what the evidence leaves for the object: at least as large, with the same axes. A thin part that few
-  // masks show is in it, so fields learn in this one.
-  Cuboid reach;
+  // The space that the evidence leaves for the object: at least as large as the cuboid, with the same axes. It contains
+  // thin parts that only few masks show, so fields train in it.
+  Cuboid training_box;
 };
 
-// The upright box around an object. The hull, the points and the support plane give a first box, BoxSearch the one that
-// agrees best with all of them: a hull is only an outer bound, loose where neighbours hide the object or the cameras
-// stand on one side, and it wears a cone on every flat top. Yaw: the straight edges', else the rectangle of least area
-// around the footprint; `previous` wins over equally good ones and decides which of the four names of the same box is
-// used. The confidence is the share of silhouettes that agree with the box. nullopt when the evidence leaves no volume.
+// Fits the upright cuboid around an object. The hull, the points and the support plane give an initial box, and
+// BoxSearch the box that agrees best with all of them: a hull is only an outer bound, loose where neighbors occlude the
+// object or all cameras are on one side, and cone-shaped above every flat top. The yaw is that of the straight edges,
+// else that of the smallest rectangle around the footprint; `previous` decides between equally good ones and between
+// the four equivalent yaws of a box. The confidence is the share of silhouettes that agree with the cuboid. nullopt
+// when the evidence leaves no volume.
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous);
 
-// Height (Grid z) of the horizontal surface that the object stands on: the top of another object below it, else the
-// densest thin layer of background points around its footprint, else the median bottom of its neighbours. nullopt when
-// none is there.
+// Height of the horizontal surface that the object stands on: the top of another object below it, else the densest thin
+// layer of background points around its footprint, else the median bottom of its neighbors. nullopt without any.
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
 
 }  // namespace romap::objects

@@ -40,10 +40,11 @@ std::map<uint16_t, Extent> MeasureLabels(const cv::Mat& labels) {
   return extents;
 }
 
-// Association costs grow with the square of the masks: a segmenter that labels every patch must not starve the rest.
+// The time of an association grows with the square of the number of masks. This bounds it for detectors that label
+// every patch of the image.
 void KeepLargest(size_t count, uint64_t frame_id, std::vector<Detection>& detections) {
   if (detections.size() <= count) return;
-  spdlog::debug("objects: frame {}: {} masks, the {} largest are used", frame_id, detections.size(), count);
+  spdlog::debug("objects: frame {}: {} masks; only the {} largest are used", frame_id, detections.size(), count);
   std::nth_element(detections.begin(), detections.begin() + static_cast<std::ptrdiff_t>(count), detections.end(),
                    [](const Detection& a, const Detection& b) { return a.area_px > b.area_px; });
   detections.resize(count);
@@ -59,14 +60,15 @@ std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig
   const CameraModel& camera = frame.camera;
   if (frame.labels.type() != CV_16UC1 || frame.labels.cols != camera.width_px ||
       frame.labels.rows != camera.height_px) {
-    spdlog::debug("objects: frame {}: label image {}x{} type {} does not fit the {}x{} camera, ignored", frame.frame_id,
-                  frame.labels.cols, frame.labels.rows, frame.labels.type(), camera.width_px, camera.height_px);
+    spdlog::debug("objects: frame {}: label image of {}x{} px and type {} ignored, the camera has {}x{} px",
+                  frame.frame_id, frame.labels.cols, frame.labels.rows, frame.labels.type(), camera.width_px,
+                  camera.height_px);
     return detections;
   }
   const double max_area_px = config.max_mask_area_share * frame.labels.rows * frame.labels.cols;
   for (const auto& [label, extent] : MeasureLabels(frame.labels)) {
     if (extent.area_px < config.min_mask_area_px || extent.area_px > max_area_px) {
-      spdlog::debug("objects: frame {}: label {} of {} px ignored", frame.frame_id, label, extent.area_px);
+      spdlog::debug("objects: frame {}: label {} ignored, area {} px", frame.frame_id, label, extent.area_px);
       continue;
     }
     Detection detection{

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <cmath>
 #include <cstdint>
 #include <opencv2/core/types.hpp>
 #include <optional>
@@ -23,16 +21,15 @@ struct Detection {
   cv::Rect box_px;    // tight around the mask
   int border_px = 0;  // mask pixels on the border of the image
 
-  Eigen::Vector2d BoxCenter() const {
-    return {box_px.x + (box_px.width - 1) / 2.0, box_px.y + (box_px.height - 1) / 2.0};
+  // The object extends beyond the image, so that its box does not bound it.
+  bool CutByBorder() const {
+    constexpr double kMaxBorderShare = 0.04;  // of the perimeter of the box: touching the border is not a cut
+    return border_px > kMaxBorderShare * 2 * (box_px.width + box_px.height);
   }
-  double BoxDiagonal() const { return std::hypot(box_px.width, box_px.height); }
-  // The object goes on outside the image: its box and centre mean little.
-  bool CutByBorder() const { return border_px > 0.04 * 2 * (box_px.width + box_px.height); }
 };
 
-// The masks of a frame that are neither specks nor cover the image, by label. Empty when there are none or when the
-// label image does not fit the frame.
+// The masks of a frame by label, without very small and very large ones (see ObjectsConfig). Empty when the frame has
+// no masks or its label image has the wrong type or size.
 std::vector<Detection> ExtractDetections(const Frame& frame, const ObjectsConfig& config);
 
 }  // namespace romap::objects

@@ -9,8 +9,8 @@
 
 namespace romap::objects {
 
-// Yaw of the straight edges on an object's masks, modulo a quarter turn, from the x axis of a grid whose z is up; see
-// YawFromLines(). nullopt when they tell nothing.
+// Yaw of the straight edges on an object's masks, modulo a quarter turn, relative to the x axis of a grid whose z axis
+// is up. nullopt when the edges do not determine it, see YawFromLines().
 std::optional<YawEstimate> EdgeYaw(std::span<const Silhouette> silhouettes, const Eigen::Matrix3d& R_world_grid);
 
 }  // namespace romap::objects

@@ -6,26 +6,26 @@
 namespace romap::objects {
 namespace {
 
-double Need(const FitRequest& request) {
-  constexpr double kUnconfirmedWeight = 4;
-  const double news = static_cast<double>(std::max(1, request.news)) / std::max(1, request.silhouettes);
+double Urgency(const FitRequest& request) {
+  constexpr double kUnconfirmedWeight = 4;  // their cuboid decides whether they are confirmed
+  const double changed_share = static_cast<double>(std::max(1, request.changed)) / std::max(1, request.silhouettes);
   const double waiting = static_cast<double>(request.waiting_frames) + 1;
-  return (request.confirmed ? 1 : kUnconfirmedWeight) * news * waiting;
+  return (request.confirmed ? 1 : kUnconfirmedWeight) * changed_share * waiting;
 }
 
 }  // namespace
 
-bool IsWorthAFit(const FitRequest& request) {
-  constexpr int kKnownPerNews = 10;
-  return !request.confirmed || kKnownPerNews * request.news >= request.silhouettes;
+bool IsDueForFit(const FitRequest& request) {
+  constexpr int kSilhouettesPerChanged = 10;  // at least one in ten must have changed
+  return !request.confirmed || kSilhouettesPerChanged * request.changed >= request.silhouettes;
 }
 
-std::vector<LandmarkKey> OrderByNeed(const std::vector<FitRequest>& requests) {
-  std::vector<std::pair<double, LandmarkKey>> by_need;
-  for (const FitRequest& request : requests) by_need.emplace_back(-Need(request), request.key);
-  std::sort(by_need.begin(), by_need.end());
+std::vector<LandmarkKey> OrderByUrgency(const std::vector<FitRequest>& requests) {
+  std::vector<std::pair<double, LandmarkKey>> by_urgency;
+  for (const FitRequest& request : requests) by_urgency.emplace_back(-Urgency(request), request.key);
+  std::sort(by_urgency.begin(), by_urgency.end());
   std::vector<LandmarkKey> keys;
-  for (const auto& [need, key] : by_need) keys.push_back(key);
+  for (const auto& [urgency, key] : by_urgency) keys.push_back(key);
   return keys;
 }
 

@@ -7,20 +7,21 @@
 
 namespace romap::objects {
 
-// A landmark whose box is out of date.
+// A landmark whose cuboid is out of date.
 struct FitRequest {
   LandmarkKey key = 0;
   bool confirmed = false;
-  int silhouettes = 0;          // that it has
-  int news = 0;                 // of these, such as came or were corrected since its last fit
+  int silhouettes = 0;          // number of its silhouettes
+  int changed = 0;              // of these, added or corrected since its last fit
   uint64_t waiting_frames = 0;  // since its last fit
 };
 
-// Whether there is enough news for a fit: the better an object is known, the less one more silhouette changes.
-bool IsWorthAFit(const FitRequest& request);
+// Whether enough silhouettes changed: the more silhouettes an object has, the less each one changes its cuboid.
+bool IsDueForFit(const FitRequest& request);
 
-// Keys by need, the neediest first: by the share of silhouettes that is news, what is not confirmed before what is, and
-// the more the longer it waits, so that everyone's turn comes. Ties go to the older landmark.
-std::vector<LandmarkKey> OrderByNeed(const std::vector<FitRequest>& requests);
+// Keys in order of urgency, the most urgent first. Urgency is the share of changed silhouettes times the waiting time,
+// and higher for unconfirmed landmarks. The waiting time ensures that every landmark is fitted eventually. Of equally
+// urgent landmarks the older one comes first.
+std::vector<LandmarkKey> OrderByUrgency(const std::vector<FitRequest>& requests);
 
 }  // namespace romap::objects

@@ -25,7 +25,7 @@ Footprint RectangleAt(double yaw_rad, const std::vector<cv::Point2f>& outline) {
 
 std::vector<cv::Point2f> OutlineFromAbove(const std::vector<Eigen::Vector3d>& cells) {
   std::vector<cv::Point2f> points;
-  // Of cells in a row, as a grid lists them, only the two ends can be on the outline.
+  // Only the first and the last cell of a row can be on the outline; a grid lists the cells of a row consecutively.
   for (size_t first = 0, next = 0; first < cells.size(); first = next) {
     Eigen::Vector2d ends(cells[first].x(), cells[first].x());
     for (next = first + 1; next < cells.size() && cells[next].y() == cells[first].y(); ++next) {
@@ -42,7 +42,8 @@ std::vector<cv::Point2f> OutlineFromAbove(const std::vector<Eigen::Vector3d>& ce
 
 std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
                                       std::optional<double> previous_yaw_rad, std::optional<double> edge_yaw_rad) {
-  if (cells.size() < 4) return std::nullopt;
+  constexpr size_t kMinCells = 4;
+  if (cells.size() < kMinCells) return std::nullopt;
   const std::vector<cv::Point2f> outline = OutlineFromAbove(cells);
 
   const double pad = (cell_size.x() + cell_size.y()) / 4;
@@ -52,9 +53,9 @@ std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells,
   const double reference_area = area(best);
   double smallest = reference_area;
   double largest = reference_area;
-  constexpr int kSteps = 90;
+  constexpr int kSteps = 90;  // of a quarter turn: one degree
   for (int step = 1; step < kSteps; ++step) {
-    // Searched within 45 degrees of the reference, which picks the nearest of the four names of a rectangle.
+    // Within 45 degrees of the reference, which selects the nearest of the four equivalent yaws.
     const double offset = kQuarterTurn * (static_cast<double>(step) / kSteps - 0.5);
     const Footprint candidate = RectangleAt(reference + offset, outline);
     const double candidate_area = area(candidate);
@@ -66,16 +67,17 @@ std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells,
   if (edge_yaw_rad) {
     const double offset = std::remainder(*edge_yaw_rad - reference, kQuarterTurn);
     const Footprint along_edges = RectangleAt(reference + offset, outline);
-    constexpr double kMostWaste = 1.35;  // more empty space, and the edges are a print's or a shadow's
-    if (area(along_edges) < kMostWaste * smallest) {
+    // Ratio to the smallest area; above it the edges are those of a print or a shadow.
+    constexpr double kMaxAreaRatio = 1.35;
+    if (area(along_edges) < kMaxAreaRatio * smallest) {
       best = along_edges;
       best.half_extents.array() += pad;
       return best;
     }
   }
-  constexpr double kRoundShare = 0.88;   // of the largest rectangle: nothing to choose between
-  constexpr double kNearlyBest = 1.015;  // below the noise of the cells
-  const bool keep = smallest > kRoundShare * largest || (previous_yaw_rad && reference_area < kNearlyBest * smallest);
+  constexpr double kRoundRatio = 0.88;   // of the smallest to the largest area, from which the footprint is round
+  constexpr double kNearlyBest = 1.015;  // ratio to the smallest area, within the discretization error of the cells
+  const bool keep = smallest > kRoundRatio * largest || (previous_yaw_rad && reference_area < kNearlyBest * smallest);
   if (keep) best = RectangleAt(reference, outline);
   best.half_extents.array() += pad;
   return best;

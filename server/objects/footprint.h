@@ -8,18 +8,18 @@
 
 namespace romap::objects {
 
-// The rectangle an upright object covers, in the horizontal plane of a Grid frame (see HullRegion).
+// The rectangle that an upright object covers in the horizontal plane of a Grid frame (see HullRegion).
 struct Footprint {
   double yaw_rad = 0;  // of the rectangle's x axis
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   Eigen::Vector2d half_extents = Eigen::Vector2d::Zero();  // map units, along the rectangle's own axes
 };
 
-// Rectangle of least area around grid cells (by their centres; half a cell is added on each side). `edge_yaw_rad`, the
-// direction of the object's straight edges, is taken instead of the least area's unless the rectangle would be much
-// larger. Without it, a footprint that is nearly as small under `previous_yaw_rad` keeps that yaw, and a round one
-// keeps it or takes 0, so that the box of a cup does not spin. The yaw is the one nearest to the previous yaw (else to
-// 0) among the four of the same rectangle. nullopt for fewer than four cells.
+// The smallest rectangle around grid cells, given by their centers; half a cell is added on each side. With
+// `edge_yaw_rad`, the direction of the object's straight edges, the rectangle has this yaw unless its area is much
+// larger. Otherwise a footprint that is nearly as small at `previous_yaw_rad` keeps that yaw, and a round one keeps it
+// or has yaw 0, so that the cuboid of a cup does not rotate from fit to fit. Of the four equivalent yaws of a rectangle
+// the result is nearest to the previous one (or to 0). nullopt for fewer than four cells.
 std::optional<Footprint> FitFootprint(const std::vector<Eigen::Vector3d>& cells, const Eigen::Vector3d& cell_size,
                                       std::optional<double> previous_yaw_rad,
                                       std::optional<double> edge_yaw_rad = std::nullopt);

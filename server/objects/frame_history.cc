@@ -9,9 +9,9 @@
 namespace romap::objects {
 namespace {
 
-// Ids of stand-ins must not meet those that the camera's map gives, which count from 1.
+// Ids of stand-ins must differ from those of the camera's map, which count from 1.
 constexpr uint64_t kFirstStandIn = uint64_t{1} << 62;
-constexpr int kMaskErosion_px = 2;
+constexpr int kMaskErosion_px = 2;  // a point nearer to the rim of a mask gets no label
 
 }  // namespace
 
@@ -39,8 +39,8 @@ void FrameHistory::AddKeyframe(const KeyframeView& view) {
 }
 
 std::optional<FrameHistory::Masked> FrameHistory::TakeLateMasks(const FrameMasks& masks) {
-  const auto entry = std::find_if(entries_.begin(), entries_.end(),
-                                  [&](const Entry& known) { return known.frame_id == masks.frame_id; });
+  const auto entry =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.frame_id == masks.frame_id; });
   if (entry == entries_.end() || entry->has_masks) return std::nullopt;
   auto frame = std::make_shared<Frame>(*entry->tracked.frame);
   frame->has_masks = true;
@@ -70,8 +70,8 @@ const FrameHistory::Entry* FrameHistory::NearestKeyframe(int64_t timestamp_ns) c
   return nearest;
 }
 
-// Whether a keyframe up to then has no masks; each asks for one stand-in only.
-bool FrameHistory::TakeUnmaskedKeyframes(int64_t until_ns) {
+// Marks the keyframes without masks up to then as replaced; returns whether there were any that were not yet.
+bool FrameHistory::MarkReplaced(int64_t until_ns) {
   bool any = false;
   for (Entry& entry : entries_) {
     if (entry.timestamp_ns > until_ns || !entry.is_keyframe || entry.has_masks || entry.replaced) continue;
@@ -83,7 +83,7 @@ bool FrameHistory::TakeUnmaskedKeyframes(int64_t until_ns) {
 
 std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, const PointRegistry& points) {
   const Frame& frame = *masked.frame;
-  if (!TakeUnmaskedKeyframes(frame.timestamp_ns)) return std::nullopt;
+  if (!MarkReplaced(frame.timestamp_ns)) return std::nullopt;
   KeyframeView view;
   view.id = KeyframeId{kFirstStandIn + ++stand_ins_made_};
   view.frame = masked.frame;
@@ -108,12 +108,12 @@ std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, co
 }
 
 void FrameHistory::Correct(KeyframeCorrections* corrections) {
-  for (auto& [id, place] : stand_ins_) {
-    const auto moved = corrections->find(place.reference);
+  for (auto& [id, pose] : stand_ins_) {
+    const auto moved = corrections->find(pose.reference);
     if (moved == corrections->end()) continue;
     const Sim3<World, World> S_new_old = moved->second.S_new_old;
-    place.T_world_camera = S_new_old.Moved(place.T_world_camera);
-    (*corrections)[id] = {.id = id, .T_world_camera = place.T_world_camera, .S_new_old = S_new_old};
+    pose.T_world_camera = S_new_old.Moved(pose.T_world_camera);
+    (*corrections)[id] = {.id = id, .T_world_camera = pose.T_world_camera, .S_new_old = S_new_old};
   }
   for (Entry& entry : entries_) {
     const auto moved = corrections->find(entry.is_keyframe ? entry.keyframe : entry.tracked.reference);

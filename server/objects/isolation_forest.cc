@@ -11,13 +11,14 @@
 namespace romap::objects {
 namespace {
 
-// Random numbers by counter: splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+// Counter-based random numbers: splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators",
+// 2014).
 class RandomStream {
  public:
   RandomStream(uint64_t seed, uint64_t stream) : state_(Mix(Mix(seed) + stream)) {}
   uint64_t Bits() { return Mix(state_ += kStep); }
   float Uniform() { return static_cast<float>(Bits() >> 40) * (1.0f / 16777216.0f); }
-  // 0..n-1. The high half of a product is as good as a remainder, and needs no division.
+  // 0..n-1, from the high half of a product, which needs no division.
   uint32_t Below(uint32_t n) { return static_cast<uint32_t>(((Bits() >> 32) * n) >> 32); }
   Eigen::Vector3f InCube() {
     const float x = Uniform(), y = Uniform(), z = Uniform();
@@ -34,21 +35,21 @@ class RandomStream {
   uint64_t state_;
 };
 
-// Uniform among the directions of space, or of a random plane or line of the axes when the level is lower.
-Eigen::Vector3f DrawSlope(RandomStream& random, int extension_level) {
-  Eigen::Vector3f slope;
+// A normal with uniform direction in space, or in a random coordinate plane or axis for lower extension levels.
+Eigen::Vector3f DrawNormal(RandomStream& random, int extension_level) {
+  Eigen::Vector3f normal;
   do {
-    slope = 2.0f * random.InCube() - Eigen::Vector3f::Ones();
+    normal = 2.0f * random.InCube() - Eigen::Vector3f::Ones();
     std::array<int, 3> axes = {0, 1, 2};
     for (uint32_t left = 3; left > static_cast<uint32_t>(extension_level) + 1; --left) {
       std::swap(axes[random.Below(left)], axes[left - 1]);
-      slope[axes[left - 1]] = 0;
+      normal[axes[left - 1]] = 0;
     }
-  } while (slope.squaredNorm() > 1 || slope.squaredNorm() < 1e-6f);
-  return slope;
+  } while (normal.squaredNorm() > 1 || normal.squaredNorm() < 1e-6f);
+  return normal;
 }
 
-// Grows one tree into nodes of its own.
+// Grows one tree into the given nodes.
 class TreeGrower {
  public:
   TreeGrower(std::span<IsolationForest::Node> nodes, uint32_t first, int extension_level, RandomStream random)
@@ -67,7 +68,7 @@ class TreeGrower {
               .path_length = static_cast<float>(depth + MeanPathLength(points.size()))};
       return;
     }
-    node.normal = DrawSlope(random_, extension_level_);
+    node.normal = DrawNormal(random_, extension_level_);
     node.offset = node.normal.dot(low + random_.InCube().cwiseProduct(high - low));
     const auto middle = std::partition(points.begin(), points.end(),
                                        [&](const Eigen::Vector3f& p) { return node.normal.dot(p) < node.offset; });
@@ -87,12 +88,12 @@ class TreeGrower {
   RandomStream random_;
 };
 
-// Calls `body(i)` for each i < count, on several threads where there is work for more than about a millisecond; less
-// is done before other threads have woken up.
+// Calls `body(i)` for each i < count, on several threads if there is work for more than about a millisecond: less is
+// done before other threads have started.
 template <class Body>
 void ForEach(size_t count, size_t point_steps, const Body& body) {
-  constexpr size_t kWorthThreads = 1'000'000;
-  if (point_steps < kWorthThreads) {
+  constexpr size_t kMinStepsForThreads = 1'000'000;
+  if (point_steps < kMinStepsForThreads) {
     for (size_t i = 0; i < count; ++i) body(i);
   } else {
     oneapi::tbb::parallel_for(size_t{0}, count, body);
@@ -103,7 +104,7 @@ void ForEach(size_t count, size_t point_steps, const Body& body) {
 
 double MeanPathLength(size_t n) {
   if (n <= 1) return 0;
-  if (n == 2) return 1;  // the formula's harmonic number is approximate
+  if (n == 2) return 1;  // the formula approximates the harmonic number
   const auto count = static_cast<double>(n);
   constexpr double kEulerGamma = 0.57721566490153286;
   return 2 * (std::log(count - 1) + kEulerGamma) - 2 * (count - 1) / count;
@@ -119,28 +120,24 @@ IsolationForest::IsolationForest(std::span<const Eigen::Vector3d> points, const 
   std::vector<Eigen::Vector3f> centered(points.size());
   for (size_t i = 0; i < points.size(); ++i) centered[i] = (points[i] - center_).cast<float>();
 
-  // An empty side of a cut is a leaf too, so a tree is bounded by its depth and not only by its points.
-  const size_t room =
+  // An empty side of a cut is a leaf too, so the depth bounds the number of nodes, and not the points alone.
+  const size_t max_nodes =
       std::min((size_t{2} << depth_limit_) - 1, 2 * sample_size_ * static_cast<size_t>(depth_limit_) + 1);
-  nodes_.resize(trees * room);
+  nodes_.resize(trees * max_nodes);
   roots_.resize(trees);
   const int level = std::clamp(options.extension_level, 0, 2);
   ForEach(trees, trees * sample_size_ * static_cast<size_t>(depth_limit_ + 1), [&](size_t tree) {
-    roots_[tree] = static_cast<uint32_t>(tree * room);
+    roots_[tree] = static_cast<uint32_t>(tree * max_nodes);
     RandomStream random(options.seed, tree);
     std::vector<Eigen::Vector3f> sample = centered;
     for (size_t i = 0; i < sample_size_; ++i) {
       std::swap(sample[i], sample[i + random.Below(static_cast<uint32_t>(sample.size() - i))]);
     }
-    const std::span<Node> tree_nodes = std::span<Node>(nodes_).subspan(tree * room, room);
+    const std::span<Node> tree_nodes = std::span<Node>(nodes_).subspan(tree * max_nodes, max_nodes);
     TreeGrower grower(tree_nodes, roots_[tree], level, random);
     grower.Grow(std::span<Eigen::Vector3f>(sample).first(sample_size_), 0, 0, depth_limit_);
   });
 }
-
-IsolationForest::IsolationForest(std::vector<Node> nodes, std::vector<uint32_t> roots, int depth_limit,
-                                 size_t sample_size)
-    : nodes_(std::move(nodes)), roots_(std::move(roots)), depth_limit_(depth_limit), sample_size_(sample_size) {}
 
 void IsolationForest::AddPaths(std::span<const Eigen::Vector3f> points, std::span<float> path_sums) const {
   constexpr size_t kBlock = 32;
@@ -174,11 +171,6 @@ std::vector<double> IsolationForest::Scores(std::span<const Eigen::Vector3d> poi
     }
   });
   return scores;
-}
-
-std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options) {
-  if (points.size() < 4) return std::vector<double>(points.size(), 0.5);
-  return IsolationForest(points, options).Scores(points);
 }
 
 }  // namespace romap::objects

@@ -7,55 +7,48 @@
 
 namespace romap::objects {
 
-// Extended Isolation Forest: finds lonely points by how few random cuts part them from all others. Source: S. Hariri,
-// M. Carrasco Kind, R. J. Brunner, "Extended Isolation Forest", IEEE TKDE 2021, on F. T. Liu, K. M. Ting, Z.-H. Zhou,
-// "Isolation Forest", ICDM 2008; the RO-MAP paper cleans the points of an object with it.
+// Extended Isolation Forest: finds outliers as points that few random cuts separate from all others. Source: S. Hariri,
+// M. Carrasco Kind, R. J. Brunner, "Extended Isolation Forest", IEEE TKDE 2021, which extends F. T. Liu, K. M. Ting,
+// Z.-H. Zhou, "Isolation Forest", ICDM 2008. The RO-MAP paper removes outliers from the points of an object with it.
 
 struct IsolationForestOptions {
   int trees = 50;
-  // Points that grow one tree, drawn without repetition (psi in the papers). Trees are cut off at a depth of
-  // ceil(log2(psi)): who is still among others then is not lonely.
+  // Points per tree, drawn without replacement (psi in the papers). The depth of a tree is limited to ceil(log2(psi)):
+  // a point that is not isolated there is no outlier.
   int sample_size = 64;
-  // How many axes a cut may lean to besides one: 0 = cuts across one axis as in Liu et al., whose scores have ghosts
-  // beside diagonal or several clusters; 2 = cuts of any slope, which have none.
+  // Axes in addition to the first one that the normal of a cut may have components of. 0: axis-aligned cuts as in Liu
+  // et al., which give low scores to empty regions beside diagonal or multiple clusters. 2: cuts of any orientation,
+  // which do not.
   int extension_level = 2;
   uint64_t seed = 1;
 };
 
-// A score above this is an anomaly. Of planted sets (a box's surface, and outliers off it by more than half its width)
-// less than 3 % of the surface and more than 70 % of the outliers score higher.
-inline constexpr double kAnomalyScore = 0.6;
-
-// c(n), the mean depth at which a search in a binary tree of `n` random keys fails; paths are measured by it.
+// c(n), the mean path length of an unsuccessful search in a binary search tree of `n` random keys; normalizes paths.
 double MeanPathLength(size_t n);
 
-// The trees, in one array of nodes. Immutable once grown.
+// The trees, in one array of nodes. Immutable.
 class IsolationForest {
  public:
-  // A cut or a leaf of a tree. The children of a cut are neighbours: `child` holds the points with
-  // normal . p < offset, child + 1 the others. A leaf is its own child and has an endless offset, so that a walk of
-  // `depth_limit` steps ends in it whenever it gets there.
+  // A cut or a leaf of a tree. Child `child` of a cut has the points with normal . p < offset, child + 1 the others. A
+  // leaf is its own child and has an infinite offset, so that a traversal of `depth_limit` steps ends in it.
   struct Node {
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     float offset = 0;
     uint32_t child = 0;
-    float path_length = 0;  // leaves: their depth, and the mean path among the points that they still hold together
+    float path_length = 0;  // of a leaf: its depth plus c(number of its points)
   };
 
-  // Grows trees on `points` (finite, any unit). Every tree draws from a random stream of its own, so that equal input
-  // gives the same forest whatever the number of threads.
+  // Grows trees on `points` (finite, any unit). Every tree has its own random stream, so that equal input gives the
+  // same forest with any number of threads.
   IsolationForest(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options);
 
-  // A forest of trees made elsewhere. `roots`: the index of each tree's first node; `depth_limit`: of the deepest leaf;
-  // `sample_size`: points that grew each tree.
-  IsolationForest(std::vector<Node> nodes, std::vector<uint32_t> roots, int depth_limit, size_t sample_size);
-
-  // Anomaly score of each point: 2^(-mean path / c(sample size)), 0..1. About 0.5 for a point like the others, near 1
-  // for one that a cut or two isolate.
+  // Anomaly score of each point: 2^(-mean path length / c(sample size)), 0..1. About 0.5 for an ordinary point, near 1
+  // for a point that one or two cuts isolate. 0.5 for all points of a forest of fewer than two.
   std::vector<double> Scores(std::span<const Eigen::Vector3d> points) const;
 
  private:
-  // Sum over the trees; points of up to a block side by side, since a single walk waits for memory at every step.
+  // Adds the path lengths in all trees. Up to a block of points at once: traversing for one point would wait for memory
+  // at every step.
   void AddPaths(std::span<const Eigen::Vector3f> points, std::span<float> path_sums) const;
 
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();  // nodes are in single precision, relative to it
@@ -64,9 +57,5 @@ class IsolationForest {
   int depth_limit_ = 0;
   size_t sample_size_ = 0;
 };
-
-// Scores of points by the forest grown on themselves; 0.5 for all when there are fewer than four. Equal input gives
-// equal output; the order of the points matters to the random draw only.
-std::vector<double> IsolationScores(std::span<const Eigen::Vector3d> points, const IsolationForestOptions& options);
 
 }  // namespace romap::objects

@@ -11,7 +11,7 @@ Eigen::Vector2d ExtentDirection(int k) {
 }
 
 MaskExtents MeasureExtents(const cv::Mat& labels, const Detection& detection) {
-  constexpr float kHalfPixel = 0.4F;  // less than 0.5, for the outermost of many pixels is the luckiest
+  constexpr float kHalfPixel = 0.4F;  // less than 0.5: the maximum over many pixels is biased outward
   std::array<Eigen::Vector2f, kExtentDirections> directions;
   for (int k = 0; k < kExtentDirections; ++k) {
     directions[static_cast<size_t>(k)] = ExtentDirection(k).cast<float>();

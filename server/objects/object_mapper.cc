@@ -3,56 +3,120 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "common/statistics.h"
+#include "server/objects/angles.h"
+#include "server/objects/landmark_decisions.h"
 
 namespace romap::objects {
 namespace {
+
+using When = ObjectPublisher::When;
 
 bool HasUsablePose(TrackingState state, const SE3<World, Camera>& T_world_camera) {
   const bool tracked = state == TrackingState::kTracking || state == TrackingState::kRelocalized;
   return tracked && T_world_camera.IsFinite();
 }
 
-std::vector<LandmarkKey> SortedUnique(std::vector<LandmarkKey> keys) {
+// The landmarks to look at after a keyframe, in the order of their keys.
+std::vector<LandmarkKey> ChangedLandmarks(std::vector<LandmarkKey> fitted, const FrameDetections& frame) {
+  std::vector<LandmarkKey> keys = std::move(fitted);
+  keys.insert(keys.end(), frame.keys.begin(), frame.keys.end());
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  std::erase(keys, kNoLandmark);
   return keys;
+}
+
+KeyframeCorrections UsableCorrections(const MapCorrection& correction) {
+  KeyframeCorrections keyframes;
+  for (const KeyframeCorrection& keyframe : correction.keyframes) {
+    if (keyframe.T_world_camera.IsFinite() && keyframe.S_new_old.IsFinite()) keyframes[keyframe.id] = keyframe;
+  }
+  return keyframes;
 }
 
 }  // namespace
 
-Landmark* ObjectMapper::FindLandmark(LandmarkKey key) {
-  const auto found =
-      std::find_if(landmarks_.begin(), landmarks_.end(), [&](const auto& landmark) { return landmark->key == key; });
-  return found == landmarks_.end() ? nullptr : found->get();
-}
+ObjectMapper::ObjectMapper(const ObjectsConfig& config)
+    : config_(config), store_(config), publisher_(config), fitter_(config), history_(config.max_mask_delay_s) {}
 
 ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
-  ObjectOutput output;
   current_ = {};
-  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
+  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return {};
   history_.Add(tracked);
-  // A frame on which no detector ran says nothing about what is or is not there.
-  if (!tracked.frame->has_masks) return output;
-  output = ObserveMaskedFrame(tracked);
+  // A frame on which no detector ran is no evidence that objects are missing.
+  if (!tracked.frame->has_masks) return {};
+  ObjectOutput output = ObserveMaskedFrame(tracked);
   if (tracked.is_keyframe) return output;
-  if (const auto stand_in = history_.StandIn(tracked, registry_)) output.Append(ObserveMaskedKeyframe(*stand_in));
+  const auto stand_in = history_.StandIn(tracked, store_.points());
+  if (stand_in) output.Append(ObserveMaskedKeyframe(*stand_in));
   return output;
+}
+
+ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
+  store_.UpdatePoints(view);
+  if (!view.frame || !view.T_world_camera.IsFinite()) return {};
+  history_.AddKeyframe(view);
+  // Not from late masks: a correction may have changed up since their frame.
+  store_.SetUp(view.up_world);
+  if (!current_.usable || view.frame->frame_id != current_.frame_id) return {};
+  return ObserveMaskedKeyframe(view);
 }
 
 ObjectOutput ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
   current_ = {};
   auto masked = history_.TakeLateMasks(masks);
   if (!masked) {
-    spdlog::debug("objects: late masks of frame {} are passed over", masks.frame_id);
+    spdlog::debug("objects: late masks of frame {} ignored", masks.frame_id);
     return {};
   }
   ObjectOutput output = ObserveMaskedFrame(masked->tracked);
-  if (!masked->view) masked->view = history_.StandIn(masked->tracked, registry_);
+  if (!masked->view) masked->view = history_.StandIn(masked->tracked, store_.points());
   if (masked->view) output.Append(ObserveMaskedKeyframe(*masked->view));
+  return output;
+}
+
+ObjectOutput ObjectMapper::Correct(const MapCorrection& correction) {
+  ObjectOutput output;
+  store_.MovePoints(correction.points);
+  store_.SetUp(correction.up_world);
+  KeyframeCorrections keyframes = UsableCorrections(correction);
+  history_.Correct(&keyframes);
+  scene_depth_.Correct(keyframes);
+  for (const auto& landmark : store_.landmarks()) {
+    const auto S_new_old = store_.Correct(*landmark, keyframes);
+    if (S_new_old) publisher_.Correct(landmark->key, *S_new_old, keyframes);
+  }
+  for (const auto& landmark : store_.landmarks()) {
+    if (publisher_.IsPublished(landmark->key)) publisher_.Publish(*landmark, When::kChanged, store_, &output);
+  }
+  return output;
+}
+
+ObjectOutput ObjectMapper::Reset() {
+  ObjectOutput output;
+  for (LandmarkKey key : store_.Keys()) publisher_.Remove(key, "map was reset", &output);
+  store_.Clear();
+  history_.Clear();
+  current_ = {};
+  scene_depth_ = {};
+  return output;
+}
+
+ObjectOutput ObjectMapper::Finish() {
+  ObjectOutput output;
+  const std::vector<LandmarkKey> keys = store_.Keys();
+  fitter_.FitAll(frame_index_, publisher_.ConfirmedCuboids(store_), &store_);
+  Confirm(keys);
+  MergeDuplicates(&output);
+  Prune([](const Landmark& landmark) { return DecidePruningAtFinish(landmark.state); }, &output);
+  PublishChanges(keys, &output);
+  for (const auto& landmark : store_.landmarks()) {
+    if (publisher_.HasUnpublishedCorrection(landmark->key)) {
+      publisher_.Publish(*landmark, When::kAlways, store_, &output);
+    }
+  }
   return output;
 }
 
@@ -60,200 +124,173 @@ ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
   ObjectOutput output;
   current_.usable = true;
   current_.frame_id = tracked.frame->frame_id;
-  ++frame_index_;
   current_.detections = ExtractDetections(*tracked.frame, config_);
+  ++frame_index_;
   const Association association =
-      Associate(tracked, current_.detections, landmarks_, frame_index_, scene_depth_mu_, config_);
-  const size_t landmarks_before = landmarks_.size();
-  UpdateLost(association, &output);
-  for (size_t d = 0; d < current_.detections.size(); ++d) {
-    const Match& match = association.matches[d];
-    current_.certain.push_back(match.doubt == nullptr);
-    if (match.landmark < 0 && match.doubt != nullptr) {
-      current_.keys.push_back(kNobody);
-      continue;
-    }
-    if (match.landmark < 0) {
-      landmarks_.push_back(std::make_unique<Landmark>(++last_key_, config_));
-      spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id,
-                    current_.detections[d].label, current_.detections[d].class_name, last_key_);
-    }
-    Landmark& landmark = match.landmark < 0 ? *landmarks_.back() : *landmarks_[static_cast<size_t>(match.landmark)];
-    current_.keys.push_back(landmark.key);
-    if (match.agreement) {
-      landmark.agreement_sum += *match.agreement;
-      ++landmark.agreement_count;
-    }
-    RecordSighting(landmark, current_.detections[d], tracked);
-    if (landmark.state == ObjectState::kLost) {
-      landmark.state = ObjectState::kConfirmed;
-      Publish(landmark, /*force=*/true, &output);
-    }
-  }
-  RecordCompany(association, landmarks_before);
-  BuryGhosts(&output);
+      Associate(tracked, current_.detections, store_.landmarks(), frame_index_, scene_depth_.value_mu(), config_);
+  UpdateMissed(association, &output);
+  RecordObservations(association, tracked, &output);
+  store_.CountCoVisibility(current_, association.covered_by);
+  PruneFalseLandmarks(&output);
   return output;
 }
 
-void ObjectMapper::RecordSighting(Landmark& landmark, const Detection& detection, const TrackedFrame& tracked) {
-  landmark.last_frame = frame_index_;
-  landmark.missed_in_view = 0;
-  ++landmark.sightings;
-  ++landmark.expected;
-  landmark.last_box_px = detection.box_px;
-  landmark.last_T_world_camera = tracked.T_world_camera;
-  landmark.last_track_id = detection.track_id;
-  landmark.class_evidence[detection.class_name] += detection.score;
-}
-
-void ObjectMapper::RecordCompany(const Association& association, size_t landmarks_before) {
-  for (size_t i = 0; i < current_.keys.size(); ++i) {
-    if (current_.keys[i] == kNobody) continue;
-    Landmark& landmark = *FindLandmark(current_.keys[i]);
-    for (size_t j = 0; j < current_.keys.size(); ++j) {
-      if (i != j && current_.keys[j] != kNobody) ++landmark.seen_beside[current_.keys[j]];
-    }
-  }
-  for (size_t l = 0; l < landmarks_before; ++l) {
-    const int cover = association.covered_by[l];
-    if (cover >= 0) ++landmarks_[l]->covered_by[landmarks_[static_cast<size_t>(cover)]->key];
-  }
-}
-
-void ObjectMapper::UpdateLost(const Association& association, ObjectOutput* output) {
-  constexpr double kPlainlyVisible = 0.6;
-  std::vector<bool> matched(landmarks_.size(), false);
+void ObjectMapper::UpdateMissed(const Association& association, ObjectOutput* output) {
+  constexpr double kMinVisibleShare = 0.6;  // of the body, unoccluded in the image: it should have been detected
+  const LandmarkStore::Landmarks& landmarks = store_.landmarks();
+  std::vector<bool> matched(landmarks.size(), false);
   for (const Match& match : association.matches) {
     if (match.landmark >= 0) matched[static_cast<size_t>(match.landmark)] = true;
   }
-  for (size_t l = 0; l < landmarks_.size(); ++l) {
-    Landmark& landmark = *landmarks_[l];
-    if (matched[l] || association.visible_share[l] < kPlainlyVisible) continue;
-    ++landmark.expected;
-    ++landmark.missed_in_view;
-    if (landmark.state != ObjectState::kConfirmed || landmark.missed_in_view < config_.lost_after_frames) continue;
+  for (size_t l = 0; l < landmarks.size(); ++l) {
+    Landmark& landmark = *landmarks[l];
+    if (matched[l] || association.visible_share[l] < kMinVisibleShare) continue;
+    ++landmark.evidence.expected;
+    ++landmark.evidence.missed_in_view;
+    const Decision lost = DecideLoss(landmark.state, landmark.evidence, config_);
+    if (!lost.yes) continue;
     landmark.state = ObjectState::kLost;
-    spdlog::debug("objects: {} is lost: missed {} times in plain view", landmark.id.ToString(),
-                  landmark.missed_in_view);
-    Publish(landmark, /*force=*/true, output);
+    spdlog::debug("objects: landmark {} is lost: {} in {} frames", landmark.key, lost.reason,
+                  landmark.evidence.missed_in_view);
+    publisher_.Publish(landmark, When::kAlways, store_, output);
   }
 }
 
-void ObjectMapper::BuryGhosts(ObjectOutput* output) {
-  Bury([&](const Landmark& landmark) { return WhyGhost(landmark); }, output);
+void ObjectMapper::RecordObservations(const Association& association, const TrackedFrame& tracked,
+                                      ObjectOutput* output) {
+  for (size_t d = 0; d < current_.detections.size(); ++d) {
+    const Match& match = association.matches[d];
+    current_.unambiguous.push_back(match.doubt == nullptr);
+    if (match.landmark < 0 && match.doubt != nullptr) {
+      current_.keys.push_back(kNoLandmark);
+    } else {
+      RecordObservation(match, current_.detections[d], tracked, output);
+    }
+  }
 }
 
-void ObjectMapper::Bury(const std::function<const char*(const Landmark&)>& why, ObjectOutput* output) {
-  std::erase_if(landmarks_, [&](const auto& landmark) {
-    const char* reason = why(*landmark);
-    if (reason == nullptr) return false;
-    spdlog::debug("objects: landmark {} goes: {} ({} sightings, {} expected)", landmark->key, reason,
-                  landmark->sightings, landmark->expected);
-    if (landmark->published) {
-      output->events.emplace_back(ObjectRemoved{.id = landmark->id, .reason = reason});
-    }
+void ObjectMapper::RecordObservation(const Match& match, const Detection& detection, const TrackedFrame& tracked,
+                                     ObjectOutput* output) {
+  const bool is_new = match.landmark < 0;
+  Landmark& landmark = is_new ? store_.Create() : *store_.landmarks()[static_cast<size_t>(match.landmark)];
+  if (is_new) {
+    spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id, detection.label,
+                  detection.class_name, landmark.key);
+  }
+  current_.keys.push_back(landmark.key);
+  LandmarkEvidence& evidence = landmark.evidence;
+  if (match.agreement) {
+    evidence.agreement_sum += *match.agreement;
+    ++evidence.agreement_count;
+  }
+  evidence.last_frame = frame_index_;
+  evidence.missed_in_view = 0;
+  ++evidence.observations;
+  ++evidence.expected;
+  evidence.class_evidence[detection.class_name] += detection.score;
+  landmark.last_box_px = detection.box_px;
+  landmark.last_T_world_camera = tracked.T_world_camera;
+  landmark.last_track_id = detection.track_id;
+  if (landmark.state != ObjectState::kLost) return;
+  landmark.state = ObjectState::kConfirmed;
+  publisher_.Publish(landmark, When::kAlways, store_, output);
+}
+
+void ObjectMapper::PruneFalseLandmarks(ObjectOutput* output) {
+  Prune(
+      [&](const Landmark& landmark) {
+        return DecidePruning(landmark.state, landmark.evidence, landmark.geometry.cuboid.has_value(), frame_index_,
+                             config_);
+      },
+      output);
+  for (size_t d = 0; d < current_.keys.size(); ++d) {
+    if (store_.Find(current_.keys[d]) != nullptr) continue;
+    current_.keys[d] = kNoLandmark;
+    current_.unambiguous[d] = false;
+  }
+}
+
+template <class DecisionFunction>
+void ObjectMapper::Prune(const DecisionFunction& decide, ObjectOutput* output) {
+  store_.RemoveIf([&](const Landmark& landmark) {
+    const Decision pruned = decide(landmark);
+    if (!pruned.yes) return false;
+    spdlog::debug("objects: landmark {} removed: {} ({} observations, {} expected)", landmark.key, pruned.reason,
+                  landmark.evidence.observations, landmark.evidence.expected);
+    publisher_.Remove(landmark.key, pruned.reason, output);
     return true;
   });
 }
 
-// Why a landmark is no thing; nullptr: it may be one.
-const char* ObjectMapper::WhyGhost(const Landmark& landmark) const {
-  if (landmark.state == ObjectState::kLost) {
-    return static_cast<double>(landmark.sightings) < config_.confirm_seen_share * static_cast<double>(landmark.expected)
-               ? "it was seen too seldom where it ought to be"
-               : nullptr;
-  }
-  if (landmark.state != ObjectState::kProvisional) return nullptr;
-  constexpr uint64_t kMostlyCovered = 3;
-  for (const auto& [key, count] : landmark.covered_by) {
-    if (count > kMostlyCovered * std::max<uint64_t>(landmark.sightings, 3)) return "it is a piece of another thing";
-  }
-  // What was seen often and then left the view may come back; what was seen twice will not.
-  const uint64_t unseen = frame_index_ - landmark.last_frame;
-  constexpr int kPatienceFrames = 40;
-  constexpr uint64_t patience = kPatienceFrames;
-  if (landmark.missed_in_view >= kPatienceFrames) return "it is not where it was seen";
-  return unseen > (landmark.cuboid ? 10 * patience : patience) ? "it was not seen again" : nullptr;
-}
-
-ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
-  ObjectOutput output;
-  registry_.UpdatePositions(view);
-  if (!view.frame || !view.T_world_camera.IsFinite()) return output;
-  history_.AddKeyframe(view);
-  // Not from late views: what they say of up may have been corrected since.
-  if (view.up_world.allFinite() && view.up_world.norm() > 0.5) up_world_ = view.up_world.normalized();
-  if (!current_.usable || view.frame->frame_id != current_.frame_id) return output;
-  return ObserveMaskedKeyframe(view);
-}
-
 ObjectOutput ObjectMapper::ObserveMaskedKeyframe(const KeyframeView& view) {
   ObjectOutput output;
-  CountPointVotes(view);
-  UpdateSceneDepth(view);
-  CollectSilhouettes(view);
-  OfferViews(view);
-  std::vector<LandmarkKey> changed = FitNeediest();
-  changed.insert(changed.end(), current_.keys.begin(), current_.keys.end());
-  changed = SortedUnique(std::move(changed));
-  std::erase(changed, kNobody);
-  ConfirmProven(changed);
+  store_.CountPointVotes(view, current_);
+  scene_depth_.Update(view);
+  const ShapeFitter::Cuboids cuboids = publisher_.ConfirmedCuboids(store_);
+  fitter_.AddSilhouettes(view, current_, cuboids, &store_);
+  publisher_.OfferViews(view, current_);
+  const std::vector<LandmarkKey> changed =
+      ChangedLandmarks(fitter_.FitMostUrgent(frame_index_, cuboids, &store_), current_);
+  Confirm(changed);
   MergeDuplicates(&output);
-  PublishAll(changed, &output);
+  PublishChanges(changed, &output);
   return output;
 }
 
-ObjectOutput ObjectMapper::Finish() {
-  ObjectOutput output;
-  std::vector<LandmarkKey> keys;
-  for (const auto& landmark : landmarks_) keys.push_back(landmark->key);
-  FitAll();
-  ConfirmProven(keys);
-  MergeDuplicates(&output);
-  Bury(
-      [](const Landmark& landmark) {
-        return landmark.state == ObjectState::kProvisional ? "it never got sure" : nullptr;
-      },
-      &output);
-  ObjectOutput last;
-  PublishAll(keys, &last);
-  for (const auto& landmark : landmarks_) {
-    // Small corrections that waited for more.
-    if (landmark->published && landmark->S_now_told) Publish(*landmark, /*force=*/true, &last);
+void ObjectMapper::Confirm(const std::vector<LandmarkKey>& keys) {
+  const LandmarkStore::Landmarks& landmarks = store_.landmarks();
+  for (LandmarkKey key : keys) {
+    Landmark& landmark = *store_.Find(key);
+    if (landmark.state != ObjectState::kProvisional) continue;
+    if (!DecideConfirmation(landmark.evidence, landmark.geometry, config_).yes) continue;
+    // A duplicate of an object is merged before it would be confirmed.
+    const bool is_duplicate = std::any_of(landmarks.begin(), landmarks.end(), [&](const auto& other) {
+      return other->key != key && other->state != ObjectState::kProvisional &&
+             DecideMerge(landmark, *other, store_.points()).yes;
+    });
+    if (is_duplicate) continue;
+    landmark.state = ObjectState::kConfirmed;
+    const ObjectId id = publisher_.AssignId(key);
+    spdlog::debug("objects: landmark {} confirmed as {} ({}): {} observations, {} points, parallax {:.0f} deg", key,
+                  id.ToString(), landmark.evidence.BestClass().first, landmark.evidence.observations,
+                  landmark.geometry.points.size(), landmark.geometry.parallax_rad / kRadPerDeg);
   }
-  output.Append(std::move(last));
-  return output;
 }
 
-void ObjectMapper::CountPointVotes(const KeyframeView& view) {
-  std::map<uint16_t, LandmarkKey> key_of_label{{0, kBackgroundKey}};
-  for (size_t d = 0; d < current_.detections.size(); ++d) {
-    if (current_.certain[d]) key_of_label[current_.detections[d].label] = current_.keys[d];
-  }
-  const CameraModel& camera = view.frame->camera;
-  const cv::Mat& labels = view.frame->labels;
-  for (const PointObservation& observation : view.observations) {
-    // A label of 0 may also mean "too close to the border of a mask to tell": no evidence for the background.
-    if (observation.label == 0 && !labels.empty()) {
-      const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
-      const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);
-      if (labels.at<uint16_t>(v, u) != 0) continue;
+void ObjectMapper::MergeDuplicates(ObjectOutput* output) {
+  const LandmarkStore::Landmarks& landmarks = store_.landmarks();
+  for (size_t i = 0; i < landmarks.size(); ++i) {
+    for (size_t j = i + 1; j < landmarks.size();) {
+      Landmark& first = *landmarks[i];
+      Landmark& second = *landmarks[j];
+      const Decision merged = DecideMerge(first, second, store_.points());
+      if (!merged.yes) {
+        ++j;
+        continue;
+      }
+      const bool keep_second = publisher_.MergeRank(second) < publisher_.MergeRank(first);
+      spdlog::debug("objects: landmarks {} and {} merge: {}", first.key, second.key, merged.reason);
+      keep_second ? Merge(first, second, output) : Merge(second, first, output);
     }
-    const auto key = key_of_label.find(observation.label);
-    if (key != key_of_label.end()) registry_.Vote(observation.point, key->second);
   }
 }
 
-void ObjectMapper::UpdateSceneDepth(const KeyframeView& view) {
-  const SE3<Camera, World> T_camera_world = view.T_world_camera.Inverse();
-  std::vector<double> depths;
-  for (const MapPoint& point : view.points) {
-    const double z_mu = (T_camera_world * point.position_world).z();
-    if (z_mu > 0) depths.push_back(z_mu);
+void ObjectMapper::Merge(Landmark& from, Landmark& into, ObjectOutput* output) {
+  // Landmarks that were detected together are parts of one object, and a part does not show the object's outline.
+  const bool from_is_part = CountCoVisibility(from, into).together > 0;
+  store_.Merge(from, into, /*adopt_silhouettes=*/!from_is_part);
+  std::replace(current_.keys.begin(), current_.keys.end(), from.key, into.key);
+  publisher_.Merge(from, into, /*adopt_views=*/!from_is_part, store_, output);
+  store_.RemoveMerged(from.key, into.key);
+}
+
+void ObjectMapper::PublishChanges(const std::vector<LandmarkKey>& keys, ObjectOutput* output) {
+  for (LandmarkKey key : keys) {
+    const Landmark* landmark = store_.Find(key);
+    if (landmark == nullptr) continue;  // merged into another one
+    if (DecideAnnouncement(landmark->evidence, landmark->geometry).yes) publisher_.AssignId(key);
+    if (publisher_.HasId(key)) publisher_.Publish(*landmark, When::kChanged, store_, output);
   }
-  if (depths.empty()) return;
-  last_keyframe_ = view.id;
-  scene_depth_mu_ = Median(std::move(depths));
 }
 
 }  // namespace romap::objects

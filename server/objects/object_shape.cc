@@ -8,7 +8,6 @@
 
 #include "common/statistics.h"
 #include "server/objects/angles.h"
-#include "server/objects/cuboid_fitter.h"
 #include "server/objects/edge_yaw.h"
 #include "server/objects/point_cuboid.h"
 #include "server/objects/projection.h"
@@ -29,14 +28,43 @@ Eigen::Vector3d MedianOf(std::span<const Eigen::Vector3d> points) {
 std::optional<CuboidFit> FitToPoints(const CuboidEvidence& evidence) {
   const auto cuboid = CuboidOfPoints(evidence.region, evidence.points, evidence.edge_yaw_rad);
   if (!cuboid) return std::nullopt;
-  return CuboidFit{.cuboid = *cuboid, .reach = *cuboid};
+  return CuboidFit{.cuboid = *cuboid, .training_box = *cuboid};
 }
 
-// Without a centre, the optical axis stands for the direction to the object: good enough to compare cameras.
+// Ray through the middle of the mask's box. It needs no object center, and is accurate enough to compare cameras.
 Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
   const double u_px = silhouette.box_px.x + silhouette.box_px.width / 2.0;
   const double v_px = silhouette.box_px.y + silhouette.box_px.height / 2.0;
   return silhouette.T_world_camera.rotation() * silhouette.camera.Unproject(u_px, v_px);
+}
+
+// How many silhouettes must contain a cell: it is in the image of fewer where others or the image's border cut it off.
+int MinInside(int silhouettes) { return std::max(1, silhouettes * 3 / 10); }
+
+// A few wrong masks must not remove part of the object, but each silhouette that may be wrong makes the hull wider.
+HullVotes StrictVotes(size_t silhouettes) {
+  constexpr int kAllRightBelow = 8;  // silhouettes; with fewer the hull is too wide if any may be wrong
+  constexpr int kPerWrongOne = 20;   // silhouettes, of which one may be wrong
+  const auto count = static_cast<int>(silhouettes);
+  return {.max_outside = count < kAllRightBelow ? 0 : std::max(1, count / kPerWrongOne),
+          .min_inside = MinInside(count)};
+}
+
+HullVotes LenientVotes(size_t silhouettes) {
+  constexpr int kPerWrongOne = 4;
+  const auto count = static_cast<int>(silhouettes);
+  return {.max_outside = std::max(1, count / kPerWrongOne), .min_inside = MinInside(count)};
+}
+
+// How well the evidence determines a cuboid, 0..1.
+double EvidenceConfidence(double parallax_rad, size_t silhouettes, size_t points) {
+  constexpr double kFullParallaxRad = 60 * kRadPerDeg;
+  constexpr double kFullSilhouettes = 10;
+  constexpr double kFullPoints = 50;
+  const double by_parallax = std::min(1.0, parallax_rad / kFullParallaxRad);
+  const double by_silhouettes = std::min(1.0, static_cast<double>(silhouettes) / kFullSilhouettes);
+  const double by_points = std::min(1.0, static_cast<double>(points) / kFullPoints);
+  return 0.4 * by_parallax + 0.3 * by_silhouettes + 0.3 * by_points;
 }
 
 }  // namespace
@@ -50,10 +78,11 @@ bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
 }
 
 bool ObjectShape::WantsSegments(const Silhouette& silhouette) const {
-  constexpr double kSureConfidence = 0.5;
-  constexpr size_t kSureViews = 8;
-  if (edge_yaw_confidence_ > kSureConfidence && SegmentViews() >= kSureViews) return false;
-  const double limit = 1.5 * config_.silhouette_angle_deg * kRadPerDeg;
+  constexpr double kCertainConfidence = 0.5;  // of the yaw, see YawEstimate
+  constexpr size_t kCertainViews = 8;
+  constexpr double kAngleFactor = 1.5;  // edges need fewer directions than silhouettes
+  if (edge_yaw_confidence_ > kCertainConfidence && SegmentViews() >= kCertainViews) return false;
+  const double limit = kAngleFactor * config_.silhouette_angle_deg * kRadPerDeg;
   const Eigen::Vector3d direction = ViewDirection(silhouette);
   return std::none_of(silhouettes_.begin(), silhouettes_.end(), [&](const Silhouette& other) {
     return other.has_segments && AngleBetween(ViewDirection(other), direction) < limit;
@@ -69,36 +98,36 @@ bool ObjectShape::AddSilhouette(Silhouette silhouette) {
   if (IsRedundant(silhouette)) return false;
   silhouettes_.push_back(std::move(silhouette));
   has_voted_.push_back(false);
-  ++news_;
-  if (silhouettes_.size() > static_cast<size_t>(config_.max_silhouettes)) MakeRoom();
+  ++changed_silhouettes_;
+  if (silhouettes_.size() > static_cast<size_t>(config_.max_silhouettes)) DropMostRedundant();
   return true;
 }
 
-// Drops the silhouette whose direction is nearest to another one's: it says least that the others do not.
-void ObjectShape::MakeRoom() {
+// Of the two silhouettes with the most similar directions drops the later one, or the earlier if that is cut off.
+void ObjectShape::DropMostRedundant() {
   std::vector<Eigen::Vector3d> directions;
   for (const Silhouette& silhouette : silhouettes_) directions.push_back(ViewDirection(silhouette).normalized());
-  size_t worst = 0;
+  size_t dropped = 0;
   double highest_cosine = -2;
   for (size_t i = 0; i < directions.size(); ++i) {
     for (size_t j = i + 1; j < directions.size(); ++j) {
       const double cosine = directions[i].dot(directions[j]);
       if (cosine <= highest_cosine) continue;
       highest_cosine = cosine;
-      worst = silhouettes_[i].cut_by_border ? i : j;
+      dropped = silhouettes_[i].cut_by_border ? i : j;
     }
   }
-  Unvote(worst);
-  silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(worst));
-  has_voted_.erase(has_voted_.begin() + static_cast<std::ptrdiff_t>(worst));
+  RemoveVote(dropped);
+  silhouettes_.erase(silhouettes_.begin() + static_cast<std::ptrdiff_t>(dropped));
+  has_voted_.erase(has_voted_.begin() + static_cast<std::ptrdiff_t>(dropped));
 }
 
-void ObjectShape::Unvote(size_t i) {
+void ObjectShape::RemoveVote(size_t i) {
   if (has_voted_[i]) hull_.Remove(silhouettes_[i]);
   has_voted_[i] = false;
 }
 
-void ObjectShape::VoteForNews() {
+void ObjectShape::AddMissingVotes() {
   for (size_t i = 0; i < silhouettes_.size(); ++i) {
     if (!has_voted_[i]) hull_.Add(silhouettes_[i]);
     has_voted_[i] = true;
@@ -107,7 +136,7 @@ void ObjectShape::VoteForNews() {
 
 bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes,
                           const std::optional<Cuboid>& cuboid) {
-  constexpr double kLeastShift_px = 0.5;  // masks are not exact to less
+  constexpr double kMinShift_px = 0.5;  // masks are less accurate
   bool changed = false;
   hull_.Move(S_new_old);
   for (size_t i = 0; i < silhouettes_.size(); ++i) {
@@ -116,21 +145,21 @@ bool ObjectShape::Correct(const Sim3<World, World>& S_new_old, const KeyframeCor
     const auto corrected = keyframes.find(silhouette.keyframe);
     if (corrected != keyframes.end()) silhouette.corrected_T_world_camera = corrected->second.T_world_camera;
     if (cuboid && LargestShift_px(*cuboid, silhouette.camera, silhouette.T_world_camera,
-                                  silhouette.corrected_T_world_camera) < kLeastShift_px) {
+                                  silhouette.corrected_T_world_camera) < kMinShift_px) {
       continue;
     }
-    Unvote(i);
+    RemoveVote(i);
     ApplyCorrectedPose(&silhouette);
-    ++news_;
+    ++changed_silhouettes_;
     changed = true;
   }
   return changed;
 }
 
 std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surroundings& surroundings) const {
-  constexpr double kGoodParallaxRad = 15 * kRadPerDeg;
-  constexpr double kLeastParallaxRad = 5 * kRadPerDeg;
-  const auto ray_center = IntersectCenterRays(silhouettes_, kLeastParallaxRad);
+  constexpr double kGoodParallaxRad = 15 * kRadPerDeg;  // with less, map points locate the object better than masks
+  constexpr double kMinParallaxRad = 5 * kRadPerDeg;
+  const auto ray_center = IntersectCenterRays(silhouettes_, kMinParallaxRad);
   const bool enough_points = surroundings.points.size() >= static_cast<size_t>(config_.min_object_points);
   if (!ray_center && !enough_points) return std::nullopt;
   Extent extent;
@@ -147,94 +176,91 @@ std::optional<ObjectShape::Extent> ObjectShape::EstimateExtent(const Surrounding
   return extent;
 }
 
-// Carving anew is also when the silhouettes learn where the other things in their pictures stand by now.
+// Carves the hull from scratch, with the newest cuboids of the neighbors in the silhouettes.
 void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundings) {
   constexpr int kHullCells = 20;  // along each side of the grid
   hull_.Reset(region, kHullCells);
   forest_.reset();
   silhouettes_when_carved_ = silhouettes_.size();
-  for (Silhouette& silhouette : silhouettes_) UpdateNeighbours(*surroundings.neighbours, &silhouette);
+  for (Silhouette& silhouette : silhouettes_) UpdateNeighbors(*surroundings.neighbors, &silhouette);
   has_voted_.assign(silhouettes_.size(), false);
-  VoteForNews();
+  AddMissingVotes();
 }
 
-// Corrections turn the grid with its object; a fit needs it upright.
+// Corrections of the map tilt the grid with its object, but a fit needs it upright.
 void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
-  constexpr double kMostTiltRad = 0.3 * kRadPerDeg;
+  constexpr double kMaxTiltRad = 0.3 * kRadPerDeg;
   HullRegion region = hull_.region();
   const Eigen::Vector3d z = region.R_world_grid.col(2);
-  if (AngleBetween(z, surroundings.up_world) < kMostTiltRad) return;
+  if (AngleBetween(z, surroundings.up_world) < kMaxTiltRad) return;
   region.R_world_grid = ShortestRotation(z, surroundings.up_world) * region.R_world_grid;
   Carve(region, surroundings);
 }
 
-// A bad mask must not eat the object, but every silhouette that may err makes the hull wider.
-HullVotes ObjectShape::StrictVotes() const {
-  const auto count = static_cast<int>(silhouettes_.size());
-  return {.max_outside = count < 8 ? 0 : std::max(1, count / 20), .min_inside = std::max(1, count * 3 / 10)};
-}
-
-HullVotes ObjectShape::LenientVotes() const {
-  const auto count = static_cast<int>(silhouettes_.size());
-  return {.max_outside = std::max(1, count / 4), .min_inside = std::max(1, count * 3 / 10)};
-}
-
-// Moves the grid to where the hull is when it reaches the grid's border, or when there are many more silhouettes than
-// at the last time: then it fills little of the grid.
+// Moves the grid to the hull when the hull reaches the grid's border, or when many silhouettes were added since it was
+// carved: then the hull fills only little of the grid.
 void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surroundings) {
-  const Eigen::AlignedBox3d hull = hull_.Bounds(StrictVotes());
+  constexpr double kMaxHalfExtent = 1.3;    // of the grid, in terms of the object's size
+  constexpr double kBorder = 0.97;          // share of the grid's half extent from which the hull touches the border
+  constexpr double kGrowthAtBorder = 1.6;   // of the hull's half extent, where it is cut off
+  constexpr double kGrowth = 1.25;          // of the hull's half extent elsewhere
+  constexpr double kManySilhouettes = 2.0;  // times as many as when the hull was carved
+  constexpr double kAtMaximum = 0.99;       // share of the largest half extent: no growth left
+  const Eigen::AlignedBox3d hull = hull_.Bounds(StrictVotes(silhouettes_.size()));
   if (hull.isEmpty()) return;
   const Eigen::Vector3d& low = hull.min();
   const Eigen::Vector3d& high = hull.max();
   const HullRegion& region = hull_.region();
-  const Eigen::Vector3d reach = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
-  const double most_mu = 1.3 * extent.size_mu;
-  const bool may_grow = (region.half_extents.array() < 0.99 * most_mu).any() && reach.maxCoeff() > 0.97;
-  const bool much_news = silhouettes_.size() > 2.0 * static_cast<double>(silhouettes_when_carved_);
-  const bool any_news = silhouettes_.size() != silhouettes_when_carved_;
-  if (!much_news && !(may_grow && any_news)) return;
+  const Eigen::Vector3d extent_share = high.cwiseMax(-low).cwiseQuotient(region.half_extents);
+  const double max_mu = kMaxHalfExtent * extent.size_mu;
+  const bool may_grow = (region.half_extents.array() < kAtMaximum * max_mu).any() && extent_share.maxCoeff() > kBorder;
+  const bool many_added = silhouettes_.size() > kManySilhouettes * static_cast<double>(silhouettes_when_carved_);
+  const bool any_added = silhouettes_.size() != silhouettes_when_carved_;
+  if (!many_added && !(may_grow && any_added)) return;
   HullRegion next = region;
   next.center_world = region.ToWorld((low + high) / 2);
   for (int axis = 0; axis < 3; ++axis) {
-    const double growth = reach[axis] > 0.97 ? 1.6 : 1.25;
-    next.half_extents[axis] = std::min(most_mu, growth * (high[axis] - low[axis]) / 2);
+    const double growth = extent_share[axis] > kBorder ? kGrowthAtBorder : kGrowth;
+    next.half_extents[axis] = std::min(max_mu, growth * (high[axis] - low[axis]) / 2);
   }
   Carve(next, surroundings);
 }
 
-// Growing trees costs more than asking them, so they are kept while the points are nearly the same.
-std::vector<double> ObjectShape::Loneliness(const std::vector<Eigen::Vector3d>& points_grid) {
-  constexpr size_t kFewestPoints = 4;
-  constexpr double kMostChange = 0.1;
-  if (points_grid.size() < kFewestPoints) return std::vector<double>(points_grid.size(), 0.5);
+// Growing the forest takes longer than evaluating it, so it is kept while the number of points is about the same.
+std::vector<double> ObjectShape::AnomalyScores(const std::vector<Eigen::Vector3d>& points_grid) {
+  constexpr size_t kMinPoints = 4;
+  constexpr double kMaxChange = 0.1;  // of the number of points
+  if (points_grid.size() < kMinPoints) return std::vector<double>(points_grid.size(), 0.5);
   std::vector<Eigen::Vector3d> scaled;
   for (const Eigen::Vector3d& p : points_grid) scaled.emplace_back(p / hull_.region().half_extents.x());
   const double change = std::abs(static_cast<double>(scaled.size()) - static_cast<double>(points_when_grown_));
-  if (!forest_ || change > kMostChange * static_cast<double>(points_when_grown_)) {
+  if (!forest_ || change > kMaxChange * static_cast<double>(points_when_grown_)) {
     forest_.emplace(scaled, IsolationForestOptions{});
     points_when_grown_ = scaled.size();
   }
   return forest_->Scores(scaled);
 }
 
-std::vector<bool> ObjectShape::JudgePoints(std::span<const Eigen::Vector3d> points_world) {
+std::vector<bool> ObjectShape::FindInliers(std::span<const Eigen::Vector3d> points_world) {
   if (config_.outlier_removal == "none") return std::vector<bool>(points_world.size(), true);
   const bool use_hull = config_.outlier_removal == "hull_and_forest";
   std::vector<Eigen::Vector3d> inside;
   std::vector<size_t> inside_index;
   for (size_t i = 0; i < points_world.size(); ++i) {
     const Eigen::Vector3d p_grid = hull_.region().ToGrid(points_world[i]);
-    if (use_hull && !hull_.Contains(p_grid, LenientVotes())) continue;
+    if (use_hull && !hull_.Contains(p_grid, LenientVotes(silhouettes_.size()))) continue;
     inside.push_back(p_grid);
     inside_index.push_back(i);
   }
-  constexpr double kLonelyScore = 0.65;
-  const std::vector<double> scores = Loneliness(inside);
+  // Of the anomaly score, 0..1. Higher than the usual 0.6, because a cuboid needs its outermost points.
+  constexpr double kOutlierScore = 0.65;
+  const std::vector<double> scores = AnomalyScores(inside);
   std::vector<bool> is_inlier(points_world.size(), false);
-  for (size_t i = 0; i < inside.size(); ++i) is_inlier[inside_index[i]] = scores[i] < kLonelyScore;
+  for (size_t i = 0; i < inside.size(); ++i) is_inlier[inside_index[i]] = scores[i] < kOutlierScore;
   return is_inlier;
 }
 
+// Some hull cells and map points inside the cuboid, spread evenly over both lists.
 std::vector<Eigen::Vector3d> ObjectShape::SampleBody(const Cuboid& cuboid, std::span<const Eigen::Vector3d> cells_grid,
                                                      std::span<const Eigen::Vector3d> points_world,
                                                      const std::vector<bool>& is_inlier) const {
@@ -261,66 +287,72 @@ std::vector<Eigen::Vector3d> ObjectShape::SampleBody(const Cuboid& cuboid, std::
   return body;
 }
 
+CuboidEvidence ObjectShape::CollectEvidence(const Extent& extent, const Surroundings& surroundings,
+                                            std::vector<Eigen::Vector3d> hull_cells,
+                                            const std::vector<bool>& point_is_inlier) {
+  constexpr double kBackgroundRadius = 2;  // in terms of the object's size
+  CuboidEvidence evidence;
+  evidence.region = hull_.region();
+  evidence.hull_cells = std::move(hull_cells);
+  evidence.cell_size = hull_.CellSize();
+  for (size_t i = 0; i < surroundings.points.size(); ++i) {
+    if (point_is_inlier[i]) evidence.points.push_back(evidence.region.ToGrid(surroundings.points[i]));
+  }
+  for (const Eigen::Vector3d& p : surroundings.background) {
+    if ((p - extent.center_world).norm() < kBackgroundRadius * extent.size_mu) {
+      evidence.background.push_back(evidence.region.ToGrid(p));
+    }
+  }
+  const double center_height = surroundings.up_world.dot(evidence.region.center_world);
+  for (const auto& [key, cuboid] : *surroundings.neighbors) {
+    const double bottom = surroundings.up_world.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z();
+    evidence.neighbor_bottoms.push_back(bottom - center_height);
+    const Eigen::Vector3d center = cuboid.T_world_object.Inverse() * extent.center_world;
+    const bool is_below = (center.head<2>().cwiseAbs().array() <= cuboid.half_extents.head<2>().array()).all();
+    if (is_below) evidence.carrier_tops.push_back(evidence.neighbor_bottoms.back() + 2 * cuboid.half_extents.z());
+  }
+  evidence.center = evidence.region.ToGrid(extent.center_world);
+  const auto edge_yaw = EdgeYaw(silhouettes_, evidence.region.R_world_grid);
+  edge_yaw_confidence_ = edge_yaw ? edge_yaw->confidence : 0;
+  if (edge_yaw_confidence_ > config_.edge_yaw_min_confidence) evidence.edge_yaw_rad = edge_yaw->yaw_rad;
+  evidence.object_size_mu = extent.size_mu;
+  evidence.min_points = config_.min_object_points;
+  return evidence;
+}
+
 std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surroundings,
                                                     const std::optional<Cuboid>& previous) {
   const auto extent = EstimateExtent(surroundings);
   if (!extent) return std::nullopt;
-  const auto start_over = [&] {
+  constexpr double kFirstHalfExtent = 0.85;  // of the grid, in terms of the object's size
+  const auto carve_from_scratch = [&] {
     Carve({RotationFromZTo(surroundings.up_world).toRotationMatrix(), extent->center_world,
-           Eigen::Vector3d::Constant(0.85 * extent->size_mu)},
+           Eigen::Vector3d::Constant(kFirstHalfExtent * extent->size_mu)},
           surroundings);
   };
-  news_ = 0;
-  if (hull_.empty()) start_over();
-  VoteForNews();
+  changed_silhouettes_ = 0;
+  if (hull_.empty()) carve_from_scratch();
+  AddMissingVotes();
   StraightenRegion(surroundings);
   RefocusRegion(*extent, surroundings);
-
-  CuboidEvidence evidence;
-  evidence.region = hull_.region();
-  evidence.hull_cells = hull_.Cells(StrictVotes());
-  if (evidence.hull_cells.empty()) evidence.hull_cells = hull_.Cells(LenientVotes());
-  if (evidence.hull_cells.empty()) {
-    spdlog::debug("objects: no space is left by {} silhouettes, carving anew", silhouettes_.size());
-    start_over();
+  std::vector<Eigen::Vector3d> hull_cells = hull_.Cells(StrictVotes(silhouettes_.size()));
+  if (hull_cells.empty()) hull_cells = hull_.Cells(LenientVotes(silhouettes_.size()));
+  if (hull_cells.empty()) {
+    spdlog::debug("objects: the visual hull of {} silhouettes is empty; carving from scratch", silhouettes_.size());
+    carve_from_scratch();
     return std::nullopt;
   }
   Fit fit;
-  fit.point_is_inlier = JudgePoints(surroundings.points);
-  evidence.cell_size = hull_.CellSize();
-  for (size_t i = 0; i < surroundings.points.size(); ++i) {
-    if (fit.point_is_inlier[i]) evidence.points.push_back(evidence.region.ToGrid(surroundings.points[i]));
-  }
-  for (const Eigen::Vector3d& p : surroundings.background) {
-    if ((p - extent->center_world).norm() < 2 * extent->size_mu)
-      evidence.background.push_back(evidence.region.ToGrid(p));
-  }
-  const double center_height = surroundings.up_world.dot(evidence.region.center_world);
-  for (const auto& [key, cuboid] : *surroundings.neighbours) {
-    const double bottom = surroundings.up_world.dot(cuboid.T_world_object.translation()) - cuboid.half_extents.z();
-    evidence.neighbour_bottoms.push_back(bottom - center_height);
-    const Eigen::Vector3d center = cuboid.T_world_object.Inverse() * extent->center_world;
-    const bool is_below = (center.head<2>().cwiseAbs().array() <= cuboid.half_extents.head<2>().array()).all();
-    if (is_below) evidence.carrier_tops.push_back(evidence.neighbour_bottoms.back() + 2 * cuboid.half_extents.z());
-  }
-  evidence.center = evidence.region.ToGrid(extent->center_world);
-  const auto edge_yaw = EdgeYaw(silhouettes_, evidence.region.R_world_grid);
-  edge_yaw_confidence_ = edge_yaw ? edge_yaw->confidence : 0;
-  if (edge_yaw_confidence_ > config_.edge_yaw_min_confidence) evidence.edge_yaw_rad = edge_yaw->yaw_rad;
-  evidence.object_size_mu = extent->size_mu;
-  evidence.min_points = config_.min_object_points;
+  fit.point_is_inlier = FindInliers(surroundings.points);
+  const CuboidEvidence evidence = CollectEvidence(*extent, surroundings, std::move(hull_cells), fit.point_is_inlier);
   const auto fitted =
       config_.cuboid_from == "points" ? FitToPoints(evidence) : FitCuboid(evidence, silhouettes_, previous);
   if (!fitted) return std::nullopt;
-  const Cuboid* cuboid = &fitted->cuboid;
   fit.cuboid = fitted->cuboid;
-  fit.reach = fitted->reach;
-  fit.body_world = SampleBody(*cuboid, evidence.hull_cells, surroundings.points, fit.point_is_inlier);
-  fit.parallax_rad = ParallaxRad(silhouettes_, cuboid->T_world_object.translation());
-  const double seen_around = std::min(1.0, fit.parallax_rad / (60 * kRadPerDeg));
-  const double seen_often = std::min(1.0, static_cast<double>(silhouettes_.size()) / 10);
-  const double known_points = std::min(1.0, static_cast<double>(evidence.points.size()) / 50);
-  fit.cuboid.confidence = cuboid->confidence * (0.4 * seen_around + 0.3 * seen_often + 0.3 * known_points);
+  fit.training_box = fitted->training_box;
+  fit.body_world = SampleBody(fitted->cuboid, evidence.hull_cells, surroundings.points, fit.point_is_inlier);
+  fit.parallax_rad = ParallaxRad(silhouettes_, fitted->cuboid.T_world_object.translation());
+  fit.cuboid.confidence *= EvidenceConfidence(fit.parallax_rad, silhouettes_.size(), evidence.points.size());
   return fit;
 }
 

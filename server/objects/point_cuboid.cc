@@ -8,7 +8,8 @@ namespace romap::objects {
 
 std::optional<Cuboid> CuboidOfPoints(const HullRegion& region, std::span<const Eigen::Vector3d> points,
                                      std::optional<double> edge_yaw_rad) {
-  if (points.size() < 3) return std::nullopt;
+  constexpr size_t kMinPoints = 3;
+  if (points.size() < kMinPoints) return std::nullopt;
   const double yaw_rad = edge_yaw_rad ? *edge_yaw_rad : PcaYaw(points).value_or(0);
   const Eigen::Matrix3d R_grid_object = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   Eigen::AlignedBox3d bounds;

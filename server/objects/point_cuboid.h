@@ -9,9 +9,10 @@
 
 namespace romap::objects {
 
-// The paper's box, from an object's map points alone: its sides are the extreme points (equations (1) and (4)), its yaw
-// that of the straight edges where given, else of the points' main axis as seen from above. It is what our own fit is
-// compared with. `points` in the Grid frame of `region`; nullopt for fewer than three, or when they span no volume.
+// The cuboid of the paper, from an object's map points alone: the extreme points bound it (equations (1) and (4)), and
+// its yaw is that of the straight edges if given, else that of the main axis of the points as seen from above. A
+// baseline to compare FitCuboid() with. `points`: in the Grid frame of `region`; nullopt for fewer than three, or when
+// they span no volume.
 std::optional<Cuboid> CuboidOfPoints(const HullRegion& region, std::span<const Eigen::Vector3d> points,
                                      std::optional<double> edge_yaw_rad);
 

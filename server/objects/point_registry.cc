@@ -13,22 +13,22 @@ size_t PointRegistry::IndexOf(MapPointId point) const {
 }
 
 void PointRegistry::UpdatePositions(const KeyframeView& view) {
-  std::set<MapPointId> gone(view.removed_points.begin(), view.removed_points.end());
+  std::set<MapPointId> removed(view.removed_points.begin(), view.removed_points.end());
   std::map<MapPointId, Eigen::Vector3d> added;
   for (const MapPoint& point : view.points) {
     if (!point.position_world.allFinite()) {
-      gone.insert(point.id);
+      removed.insert(point.id);
       added.erase(point.id);
       continue;
     }
-    const size_t index = gone.contains(point.id) ? points_.size() : IndexOf(point.id);
+    const size_t index = removed.contains(point.id) ? points_.size() : IndexOf(point.id);
     if (index < points_.size()) {
       points_[index].position_world = point.position_world;
     } else {
       added[point.id] = point.position_world;
     }
   }
-  if (!gone.empty()) std::erase_if(points_, [&](const Entry& entry) { return gone.contains(entry.id); });
+  if (!removed.empty()) std::erase_if(points_, [&](const Entry& entry) { return removed.contains(entry.id); });
   const auto old_count = static_cast<std::ptrdiff_t>(points_.size());
   for (const auto& [id, position_world] : added) {
     points_.push_back({.id = id, .position_world = position_world, .votes = {}, .owner = {}});
@@ -46,8 +46,8 @@ void PointRegistry::MovePoints(const std::vector<MapPoint>& points) {
   }
 }
 
-void PointRegistry::JudgeOwner(Entry* entry) {
-  constexpr double kClearMajority = 0.6;
+void PointRegistry::UpdateOwner(Entry* entry) {
+  constexpr double kClearMajority = 0.6;  // share of the votes
   int total = 0;
   std::pair<LandmarkKey, int> best{kBackgroundKey, 0};
   for (const auto& vote : entry->votes) {
@@ -65,12 +65,12 @@ void PointRegistry::Vote(MapPointId point, LandmarkKey key) {
   auto vote = std::find_if(votes.begin(), votes.end(), [&](const auto& v) { return v.first == key; });
   if (vote == votes.end()) vote = votes.insert(votes.end(), {key, 0});
   ++vote->second;
-  // Old votes fade, so that an early mix-up does not rule for ever.
-  constexpr int kFullVotes = 24;
-  if (vote->second >= kFullVotes) {
+  // Halving old votes lets a point recover from early wrong ones.
+  constexpr int kMaxVotes = 24;  // per owner
+  if (vote->second >= kMaxVotes) {
     for (auto& [owner, count] : votes) count /= 2;
   }
-  JudgeOwner(&points_[index]);
+  UpdateOwner(&points_[index]);
 }
 
 void PointRegistry::Merge(LandmarkKey from, LandmarkKey into) {
@@ -87,7 +87,7 @@ void PointRegistry::Merge(LandmarkKey from, LandmarkKey into) {
     } else {
       target->second += count;
     }
-    JudgeOwner(&entry);
+    UpdateOwner(&entry);
   }
 }
 

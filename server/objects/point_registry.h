@@ -11,30 +11,32 @@
 
 namespace romap::objects {
 
-// Key of a landmark inside the object mapper. 0 is the background.
+// Key of a landmark inside the object mapper.
 using LandmarkKey = uint32_t;
 inline constexpr LandmarkKey kBackgroundKey = 0;
+inline constexpr LandmarkKey kNoLandmark = ~LandmarkKey{0};
 
-// The map points by the landmark they belong to. Every sight of a point in a keyframe is a vote: masks err at their
-// rims and labels get mixed up, but not for the same point in most keyframes.
+// Assigns map points to landmarks. Every observation of a point in a keyframe is a vote: masks are wrong near their
+// rims and labels are swapped at times, but rarely for the same point in most keyframes.
 class PointRegistry {
  public:
-  // Takes over positions and removals of a keyframe. Points without a finite position are forgotten.
+  // Applies the new positions and removals of a keyframe. Points without a finite position are removed.
   void UpdatePositions(const KeyframeView& view);
-  // New positions of points after a correction. Points that are not known (any more) are passed over.
+  // New positions after a correction. Unknown points and positions that are not finite are ignored.
   void MovePoints(const std::vector<MapPoint>& points);
-  // The point was seen under the mask of landmark `key`, or under none (kBackgroundKey).
+  // The point was observed under the mask of landmark `key`, or under none (kBackgroundKey).
   void Vote(MapPointId point, LandmarkKey key);
-  // Votes for `from` count for `into` from now on.
+  // Moves all votes for `from` to `into`.
   void Merge(LandmarkKey from, LandmarkKey into);
 
+  // Position of a point; nullptr if unknown.
   const Eigen::Vector3d* Find(MapPointId point) const;
 
   struct Member {
     MapPointId id;
     Eigen::Vector3d position_world;
   };
-  // All points that clearly belong to one landmark or to the background, in the order of their ids.
+  // All points with a clear owner, a landmark or the background, ordered by id.
   std::map<LandmarkKey, std::vector<Member>> GroupByOwner() const;
 
  private:
@@ -42,14 +44,14 @@ class PointRegistry {
     MapPointId id;
     Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
     std::vector<std::pair<LandmarkKey, int>> votes;
-    std::optional<LandmarkKey> owner;  // to whom it clearly belongs
+    std::optional<LandmarkKey> owner;  // with a clear majority of the votes
   };
 
-  // Place in `points_`; its size for a point that is not known.
+  // Index into `points_`; its size for an unknown point.
   size_t IndexOf(MapPointId point) const;
-  static void JudgeOwner(Entry* entry);
+  static void UpdateOwner(Entry* entry);
 
-  std::vector<Entry> points_;  // by id: all of them are looked through at every keyframe
+  std::vector<Entry> points_;  // ordered by id; a vector, because every keyframe iterates over all of them
 };
 
 }  // namespace romap::objects

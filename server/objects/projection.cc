@@ -1,12 +1,18 @@
 #include "server/objects/projection.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace romap::objects {
+namespace {
+
+constexpr double kMinDepth_mu = 1e-9;  // in front of the camera, and no division by zero
+
+}  // namespace
 
 std::optional<cv::Point> ProjectToPixel(const Eigen::Vector3d& p_camera, const CameraModel& camera) {
-  if (!(p_camera.z() > 1e-9)) return std::nullopt;
+  if (!(p_camera.z() > kMinDepth_mu)) return std::nullopt;
   const Eigen::Vector2d pixel = camera.Project(p_camera).array() + 0.5;
   if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width_px && pixel.y() < camera.height_px)) {
     return std::nullopt;
@@ -14,31 +20,22 @@ std::optional<cv::Point> ProjectToPixel(const Eigen::Vector3d& p_camera, const C
   return cv::Point(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
 }
 
-cv::Rect BoundProjections(const std::vector<Eigen::Vector3d>& points_camera, const CameraModel& camera) {
+cv::Rect BoundProjections(std::span<const Eigen::Vector3d> points_camera, const CameraModel& camera) {
   Eigen::Vector2d low(camera.width_px, camera.height_px);
   Eigen::Vector2d high(-1, -1);
   for (const Eigen::Vector3d& p : points_camera) {
-    if (!(p.z() > 1e-9)) return {};
+    if (!(p.z() > kMinDepth_mu)) return {};
     const Eigen::Vector2d pixel = camera.Project(p);
     low = low.cwiseMin(pixel);
     high = high.cwiseMax(pixel);
   }
-  // Clipped before rounding, because a corner near the camera plane may be beyond the range of int.
+  // Clip before rounding, because a corner near the camera plane may exceed the range of int.
   low = low.cwiseMax(Eigen::Vector2d::Zero());
   high = high.cwiseMin(Eigen::Vector2d(camera.width_px - 1, camera.height_px - 1));
   if (!(low.x() <= high.x() && low.y() <= high.y())) return {};
   const cv::Point first(static_cast<int>(std::floor(low.x())), static_cast<int>(std::floor(low.y())));
   const cv::Point last(static_cast<int>(std::ceil(high.x())), static_cast<int>(std::ceil(high.y())));
   return {first, last + cv::Point(1, 1)};
-}
-
-std::vector<Eigen::Vector3d> CuboidCorners(const Cuboid& cuboid, double enlargement) {
-  std::vector<Eigen::Vector3d> corners;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d sign((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
-    corners.push_back(cuboid.T_world_object * (enlargement * sign.cwiseProduct(cuboid.half_extents)));
-  }
-  return corners;
 }
 
 std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, World>& T_camera_world) {
@@ -52,7 +49,7 @@ std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, Wor
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,
                        const SE3<World, Camera>& T_world_camera) {
   const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();
-  std::vector<Eigen::Vector3d> corners = CuboidCorners(cuboid, enlargement);
+  std::array<Eigen::Vector3d, 8> corners = CuboidCorners(cuboid, enlargement);
   for (Eigen::Vector3d& corner : corners) corner = T_camera_world * corner;
   return BoundProjections(corners, camera);
 }

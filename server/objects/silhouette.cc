@@ -9,10 +9,10 @@
 namespace romap::objects {
 namespace {
 
-constexpr int kThinnedColumns = 320;
+constexpr int kMaxColumns = 320;  // of subsampled masks, about
 constexpr size_t kMaxOutlineRays = 160;
 
-// Directions through the first and last pixel of the mask in each row and column of its box.
+// Unit directions through the first and last pixel of the mask in each row and column of its box.
 std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
   const int stride = silhouette.masks->stride_px;
   const cv::Mat& masks = silhouette.masks->index;
@@ -66,7 +66,7 @@ Eigen::Matrix<double, 3, 4> ProjectionOf(const Silhouette& silhouette) {
 std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
                                                const std::vector<LandmarkKey>& keys) {
   auto masks = std::make_shared<KeyframeMasks>();
-  masks->stride_px = std::max(1, labels.cols / kThinnedColumns);
+  masks->stride_px = std::max(1, labels.cols / kMaxColumns);
   masks->keys = keys;
   std::vector<uint8_t> index_of_label(1 << 16, kOtherMask);
   index_of_label[0] = 0;
@@ -95,7 +95,7 @@ Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const Keyfra
                         .P_image_world = {},
                         .masks = std::move(masks),
                         .index = static_cast<uint8_t>(std::min<size_t>(detection_index + 1, kOtherMask)),
-                        .neighbours = {},
+                        .neighbors = {},
                         .box_px = detection.box_px,
                         .cut_by_border = detection.CutByBorder(),
                         .outline_rays_world = {},
@@ -112,10 +112,10 @@ void Move(const Sim3<World, World>& S_new_old, Silhouette* silhouette) {
   auto& P = silhouette->P_image_world;
   P.col(3) += P.leftCols<3>() * S_old_new.translation();
   P.leftCols<3>() *= turn_and_scale;
-  for (auto& neighbour : silhouette->neighbours) {
-    if (!neighbour) continue;
-    neighbour->offset += neighbour->M * S_old_new.translation();
-    neighbour->M *= turn_and_scale;
+  for (auto& neighbor : silhouette->neighbors) {
+    if (!neighbor) continue;
+    neighbor->offset += neighbor->M * S_old_new.translation();
+    neighbor->M *= turn_and_scale;
   }
   silhouette->T_world_camera = S_new_old.Moved(silhouette->T_world_camera);
   for (Eigen::Vector3d& ray : silhouette->outline_rays_world) ray = S_new_old.rotation() * ray;
@@ -129,24 +129,23 @@ void ApplyCorrectedPose(Silhouette* silhouette) {
   for (Eigen::Vector3d& ray : silhouette->outline_rays_world) ray = turn * ray;
 }
 
-void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette) {
-  silhouette->neighbours.assign(silhouette->masks->keys.size(), std::nullopt);
-  for (size_t i = 0; i < silhouette->neighbours.size(); ++i) {
+void UpdateNeighbors(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette) {
+  silhouette->neighbors.assign(silhouette->masks->keys.size(), std::nullopt);
+  for (size_t i = 0; i < silhouette->neighbors.size(); ++i) {
     const auto found = cuboids.find(silhouette->masks->keys[i]);
     if (found == cuboids.end()) continue;
     const SE3<Object, World> T_object_world = found->second.T_world_object.Inverse();
     const Eigen::Matrix3d shrink = found->second.half_extents.cwiseInverse().asDiagonal();
-    silhouette->neighbours[i] =
-        UnitBox{shrink * T_object_world.RotationMatrix(), shrink * T_object_world.translation()};
+    silhouette->neighbors[i] = UnitBox{shrink * T_object_world.RotationMatrix(), shrink * T_object_world.translation()};
   }
 }
 
-bool Silhouette::MayHide(int seen, const Eigen::Vector3d& p_world) const {
-  const auto neighbour = static_cast<size_t>(seen) - 1;
-  if (neighbour >= neighbours.size() || !neighbours[neighbour]) return true;
-  // The sight line from the camera (parameter 0) to the point (1) meets the box.
-  const Eigen::Vector3d from = *neighbours[neighbour] * CameraCenter();
-  const Eigen::Vector3d step = *neighbours[neighbour] * p_world - from;
+bool Silhouette::MayOcclude(int mask_index, const Eigen::Vector3d& p_world) const {
+  const auto neighbor = static_cast<size_t>(mask_index) - 1;
+  if (neighbor >= neighbors.size() || !neighbors[neighbor]) return true;
+  // Whether the line from the camera (parameter 0) to the point (parameter 1) intersects the box.
+  const Eigen::Vector3d from = *neighbors[neighbor] * CameraCenter();
+  const Eigen::Vector3d step = *neighbors[neighbor] * p_world - from;
   const Eigen::Array3d t0 = (-1 - from.array()) / step.array();
   const Eigen::Array3d t1 = (1 - from.array()) / step.array();
   const double near = t0.min(t1).maxCoeff();
@@ -154,21 +153,21 @@ bool Silhouette::MayHide(int seen, const Eigen::Vector3d& p_world) const {
   return near <= far && far >= 0 && near <= 1;
 }
 
-bool Silhouette::EndsFreely(int k, const Eigen::Vector3d& center_world) const {
+bool Silhouette::IsFreeExtent(int k, const Eigen::Vector3d& center_world) const {
   const Eigen::Vector2f tip_px = extents.tip_px[static_cast<size_t>(k)];
   const Eigen::Vector2d outward = ExtentDirection(k);
-  // A ray through the tip, as far as the object.
+  // The point at the object's distance on the ray through the tip.
   const Eigen::Vector3d direction = T_world_camera.rotation() * camera.Unproject(tip_px.x(), tip_px.y());
   const Eigen::Vector3d to_center = center_world - CameraCenter();
   const Eigen::Vector3d tip_world = CameraCenter() + direction * (to_center.dot(direction) / direction.squaredNorm());
-  constexpr int kGap_px = 6;  // masks of things that touch in the image may be that far apart
-  for (int step_px = 1; step_px <= kGap_px; ++step_px) {
+  constexpr int kMaxGap_px = 6;  // between masks of objects that touch in the image
+  for (int step_px = 1; step_px <= kMaxGap_px; ++step_px) {
     const Eigen::Vector2d pixel = tip_px.cast<double>() + step_px * outward;
     const auto u = static_cast<int>(std::lround(pixel.x() / masks->stride_px));
     const auto v = static_cast<int>(std::lround(pixel.y() / masks->stride_px));
     if (u < 0 || v < 0 || u >= masks->index.cols || v >= masks->index.rows) return false;
-    const int seen = masks->index.at<uint8_t>(v, u);
-    if (seen != 0 && seen != index && MayHide(seen, tip_world)) return false;
+    const int mask_index = masks->index.at<uint8_t>(v, u);
+    if (mask_index != 0 && mask_index != index && MayOcclude(mask_index, tip_world)) return false;
   }
   return true;
 }
@@ -209,7 +208,7 @@ double ParallaxRad(const std::vector<Silhouette>& silhouettes, const Eigen::Vect
   for (const Silhouette& silhouette : silhouettes) {
     directions.push_back((silhouette.CameraCenter() - p_world).normalized());
   }
-  // By cosines, for there are many pairs and an angle is dear.
+  // Compares cosines, because there are many pairs and an angle is expensive.
   double least_cosine = 1;
   double largest = 0;
   for (size_t i = 0; i < directions.size(); ++i) {

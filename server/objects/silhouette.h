@@ -16,23 +16,22 @@
 
 namespace romap::objects {
 
-// A keyframe's masks, thinned: they serve all objects of the keyframe and are kept long after the frame is gone.
+// The masks of a keyframe, subsampled to save memory: shared by all its silhouettes and kept longer than the frame.
 struct KeyframeMasks {
-  cv::Mat index;  // CV_8UC1, every stride_px-th pixel: 0 nothing, i + 1 the keyframe's detection i, kOtherMask the rest
-  cv::Mat framed;  // the same with a border of one pixel of kOtherMask; `index` is the inner part of it
+  // CV_8UC1, every stride_px-th pixel: 0 background, i + 1 detection i of the keyframe, kOtherMask other masks.
+  cv::Mat index;
+  cv::Mat framed;  // `index` with a border of one pixel of kOtherMask; shares its memory
   int stride_px = 1;
   std::vector<LandmarkKey> keys;  // landmark of each detection
 };
 inline constexpr uint8_t kOtherMask = 255;
 
-// Thins so that at most about 320 columns stay: a box then is within a pixel or two of the full resolution's. `keys`
-// are the landmarks of `detections`; beyond 254 of them are kOtherMask.
+// Subsamples to at most about 320 columns, which changes a mask's box by a pixel or two. `keys`: the landmarks of
+// `detections`. Detections beyond the first 254 are kOtherMask.
 std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
                                                const std::vector<LandmarkKey>& keys);
 
-enum class MaskHit { kUnknown /* outside the image or behind something else */, kInside, kOutside };
-
-// A cuboid as the map of its inside to the cube [-1, 1]^3.
+// A cuboid as the affine map from the world that takes its inside to the cube [-1, 1]^3.
 struct UnitBox {
   Eigen::Matrix3d M;
   Eigen::Vector3d offset;
@@ -44,29 +43,25 @@ struct UnitBox {
 struct Silhouette {
   KeyframeId keyframe;
   CameraModel camera;
-  // All that follows is made with this pose. Corrections that change it against the object are collected apart until
-  // they are worth the work.
+  // Projection and rays below are for this pose. Corrections relative to the object are collected in the second one
+  // until they are large enough to recompute them, see ApplyCorrectedPose().
   SE3<World, Camera> T_world_camera;
   SE3<World, Camera> corrected_T_world_camera;
-  Eigen::Matrix<double, 3, 4> P_image_world;  // projection to homogeneous thinned pixels
+  Eigen::Matrix<double, 3, 4> P_image_world;  // projection to homogeneous pixels of `masks`
   std::shared_ptr<const KeyframeMasks> masks;
   uint8_t index = 0;  // of the object in `masks`
-  // By index in `masks` - 1: the cuboid of that thing, as far as known. It tells what the thing hides from what it
-  // stands behind.
-  std::vector<std::optional<UnitBox>> neighbours;
+  // By index in `masks` - 1: the cuboid of that object, if known. It separates points that the object may occlude from
+  // points in front of it.
+  std::vector<std::optional<UnitBox>> neighbors;
   cv::Rect box_px;
   bool cut_by_border = false;
-  std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's rim
+  std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels of the mask's rim
   MaskExtents extents;
-  bool has_segments = false;  // someone looked for straight edges
+  bool has_segments = false;  // straight edges were detected; there may be none
   std::vector<LineSegment> segments;
 
-  // What lies under a point of the world.
-  MaskHit Look(const Eigen::Vector3d& p_world) const {
-    return Judge(SeenAt(P_image_world.leftCols<3>() * p_world + P_image_world.col(3)), [&] { return p_world; });
-  }
-  // Value of masks->index under a projected point; -1 outside the image.
-  int SeenAt(const Eigen::Vector3d& q) const {
+  // Value of masks->index at a projected point; -1 outside the image.
+  int IndexAt(const Eigen::Vector3d& q) const {
     if (!(q.z() > 1e-9)) return -1;
     const double scale = 1 / q.z();
     const double u = q.x() * scale + 0.5;
@@ -75,37 +70,29 @@ struct Silhouette {
     if (!(u >= 0 && v >= 0 && u < image.cols && v < image.rows)) return -1;
     return image.ptr<uint8_t>(static_cast<int>(v))[static_cast<int>(u)];
   }
-  // `p_world()` gives the point that was projected; it is asked for only where another thing is seen.
-  template <class PointFunction>
-  MaskHit Judge(int seen, const PointFunction& p_world) const {
-    if (seen == index) return MaskHit::kInside;
-    if (seen == 0) return MaskHit::kOutside;
-    return seen < 0 || MayHide(seen, p_world()) ? MaskHit::kUnknown : MaskHit::kOutside;
-  }
-  // Whether the thing with this index may stand between the camera and the point.
-  bool MayHide(int seen, const Eigen::Vector3d& p_world) const;
-  // Whether the object itself ends the mask in direction k (see ExtentDirection), and not the image or something that
-  // may stand before the object, which is at about `center_world`.
-  bool EndsFreely(int k, const Eigen::Vector3d& center_world) const;
+  // Whether the object with this index may be between the camera and the point.
+  bool MayOcclude(int mask_index, const Eigen::Vector3d& p_world) const;
+  // Whether the mask ends in direction k (see ExtentDirection) where the object ends, and is not cut off by the image
+  // or by something that may occlude the object, which is at about `center_world`.
+  bool IsFreeExtent(int k, const Eigen::Vector3d& center_world) const;
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };
 
-// `detection_index` is the object's place among the detections that `masks` was made of.
-// Its neighbours are unknown yet.
+// `detection_index`: of `detection` among those that `masks` was made of. Its neighbors are unknown at first.
 Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
                           const Detection& detection, size_t detection_index);
 
-// The silhouette goes along with its object: it still sees the same in every place.
+// Moves the silhouette with the space around its object: every point, moved likewise, projects to the same pixel.
 void Move(const Sim3<World, World>& S_new_old, Silhouette* silhouette);
 
-// Takes over the corrected pose.
+// Uses the corrected pose from now on.
 void ApplyCorrectedPose(Silhouette* silhouette);
 
-// Tells a silhouette where the other things of its picture stand, as far as their cuboids are known.
-void UpdateNeighbours(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette);
+// Updates the neighbors of the silhouette from the known cuboids.
+void UpdateNeighbors(const std::map<LandmarkKey, Cuboid>& cuboids, Silhouette* silhouette);
 
-// The point nearest to all rays through the middles of the silhouettes' boxes (least squares); nullopt when fewer than
-// two uncut silhouettes differ by at least `min_parallax_rad`.
+// The point nearest to all rays through the middles of the silhouettes' boxes (least squares). Uses only silhouettes
+// not cut off by the border; nullopt when these have less parallax than `min_parallax_rad`.
 std::optional<Eigen::Vector3d> IntersectCenterRays(const std::vector<Silhouette>& silhouettes, double min_parallax_rad);
 
 // Largest angle between the directions from `p_world` to the cameras of the silhouettes.

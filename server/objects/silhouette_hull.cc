@@ -19,8 +19,8 @@ class GridLook {
         step_(M_.col(0) * (2.0 / cells * region.half_extents.x())),
         ramp_(Eigen::ArrayXf::LinSpaced(cells, 0, static_cast<float>(cells - 1))),
         seen_(static_cast<size_t>(cells)) {
-    hiders_.reserve(silhouette.neighbours.size());
-    for (const auto& neighbour : silhouette.neighbours) {
+    hiders_.reserve(silhouette.neighbors.size());
+    for (const auto& neighbour : silhouette.neighbors) {
       hiders_.emplace_back();
       if (!neighbour) continue;
       const Eigen::Vector3d from = *neighbour * silhouette.CameraCenter();
@@ -74,7 +74,7 @@ class GridLook {
 
   void LookCellByCell(Eigen::Vector3d q) {
     for (uint8_t& seen : seen_) {
-      const int value = silhouette_.SeenAt(q);
+      const int value = silhouette_.IndexAt(q);
       seen = value < 0 ? kOtherMask : static_cast<uint8_t>(value);
       q += step_;
     }

@@ -15,81 +15,82 @@
 
 namespace romap::objects {
 
-// A keyframe in which an object was seen, before it is decided whether the field of the object trains on it.
+// A keyframe with a mask of an object: a training view of the object's field, if it is picked.
 struct ViewCandidate {
   KeyframeId keyframe;
   std::shared_ptr<const Frame> frame;
   SE3<World, Camera> T_world_camera;
   uint16_t label = 0;                      // of the object in this frame
   cv::Rect box_px;                         // of its mask
-  std::vector<MapPointId> points;          // map points seen under the mask
-  std::vector<Eigen::Vector2f> pixels_px;  // where, as long as `points`
-  std::vector<LandmarkKey> detected;       // landmarks that have a mask in this frame
-  std::vector<uint16_t> detected_labels;   // their labels, as long as `detected`
+  std::vector<MapPointId> points;          // map points observed under the mask
+  std::vector<Eigen::Vector2f> pixels_px;  // pixel of each of `points`
+  std::vector<LandmarkKey> detected;       // landmarks with a mask in this frame
+  std::vector<uint16_t> detected_labels;   // label of each of `detected`
 };
 
-// What is known of the object and its neighbours when views are picked.
+// The object and its neighbors when views are picked.
 struct ViewContext {
   ObjectId object;
-  Cuboid cuboid;
+  Cuboid cuboid;                                // the box the field trains in
   std::span<const Eigen::Vector3d> body_world;  // points spread over the object's volume
   std::span<const MapPointId> object_points;    // its map points without outliers, ascending
   const PointRegistry* registry = nullptr;
-  struct Neighbour {
+  struct Neighbor {
     LandmarkKey key;
     Cuboid cuboid;
   };
-  std::span<const Neighbour> neighbours;  // the other objects that have a cuboid
+  std::span<const Neighbor> neighbors;  // the other confirmed objects
 };
 
-// Variance of the Laplacian of the grey image inside `box_px`: small for blurred pictures. Source: J. L. Pech-Pacheco
-// et al., "Diatom autofocusing in brightfield microscopy", ICPR 2000.
+// Variance of the Laplacian of the gray image inside `box_px`: small for blurred images. Source: J. L. Pech-Pacheco et
+// al., "Diatom autofocusing in brightfield microscopy", ICPR 2000.
 double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px);
 
-// Picks the training views of one object out of its keyframes. The paper takes a keyframe when its direction differs by
-// 25 degrees from the last view's; here it must differ by `view_angle_deg` from every view (or stand at a quite
-// different distance), so that a camera that comes back adds nothing, and a smaller angle is affordable. The first few
-// come closer together, so that a slow camera need not go far before there is a first shape. Left out: keyframes whose
-// mask contradicts the object's shape, those that show too little of it, and blurred ones as long as a sharper one may
-// still come. At `max_views` the picker is done: views were already sent and cannot be taken back.
+// Picks the training views of one object from its keyframes. The paper picks a keyframe whose direction differs by 25
+// degrees from that of the last view. Here it must differ by ObjectsConfig::view_angle_deg from every view, or be at a
+// clearly different distance: a camera that returns adds nothing, so a smaller angle is affordable. The first few views
+// may be closer together, so that a slow camera soon gives a first shape. Keyframes are rejected if their mask
+// contradicts the object's shape, if they show too little of it, and if they are blurred while a sharper one may still
+// come. No views are picked beyond ObjectsConfig::max_views, because sent views cannot be withdrawn.
 class ViewPicker {
  public:
   explicit ViewPicker(const ObjectsConfig& config) : config_(config) {}
 
-  // Keeps the candidate until the next Take(). When too many wait, every second is dropped, which keeps their spread.
+  // Keeps the candidate until the next Take(). Every second one is dropped when too many wait, which keeps their
+  // spread.
   void Offer(ViewCandidate candidate);
-  // Views among the waiting candidates, oldest first; none are left waiting.
+  // Picks views from the waiting candidates, oldest first, and drops the others.
   std::vector<ObjectView> Take(const ViewContext& context);
-  // Takes over the views of an object that turned out to be this one; returns those that were new to this one, renamed.
+  // Adds the views and candidates of an object that was merged into this one. Returns the views that were added, as
+  // views of `object`.
   std::vector<ObjectView> Adopt(ViewPicker&& other, ObjectId object, const Eigen::Vector3d& center_world);
 
-  // The map was corrected: `S_new_old` happened to the object's space, and keyframes have new poses.
+  // The map was corrected: the space around the object moved by `S_new_old`, and keyframes have new poses.
   void Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes);
-  // The views that stand noticeably elsewhere against the object, a `cuboid` of the present, than was told; smaller
-  // changes wait until they have added up. The answer counts as told.
+  // The views whose pose relative to the object (`cuboid`, corrected) changed noticeably since it was last returned
+  // here or by Take(). Smaller changes add up.
   std::vector<ViewPose> TakeCorrectedPoses(const Cuboid& cuboid);
 
-  // Landmark `from` is called `into` from now on.
-  void RenameNeighbour(LandmarkKey from, LandmarkKey into);
-
-  size_t count() const { return taken_.size(); }
+  // Landmark `from` was merged into `into`.
+  void RenameNeighbor(LandmarkKey from, LandmarkKey into);
 
  private:
-  struct Taken {
-    ObjectView view;  // pixels are shared with what was sent
-    // Its pose as the receiver has it, once it has moved the view along with the object.
-    SE3<World, Camera> told_T_world_camera;
+  struct Picked {
+    ObjectView view;  // shares its pixels with the view that was sent
+    // The pose the receiver has after it moved the view with the object.
+    SE3<World, Camera> sent_T_world_camera;
   };
 
   bool IsNewDirection(const Eigen::Vector3d& camera_center, const Eigen::Vector3d& object_center,
                       double angle_rad) const;
-  // Against those that were asked about before; measured only when it matters, since it takes all the mask's pixels.
+  // Compared with the candidates measured before. Called only for new directions, because it reads all pixels of the
+  // box.
   bool IsSharp(const ViewCandidate& candidate);
 
   ObjectsConfig config_;
   std::vector<ViewCandidate> waiting_;
   std::vector<double> sharpness_history_;
-  std::vector<Taken> taken_;
+  std::vector<Picked> picked_;
 };
 
 }  // namespace romap::objects

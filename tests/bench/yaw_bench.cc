@@ -51,9 +51,10 @@ void Look(const KeyframeView& view, const objects::ObjectsConfig& config, Run& r
   }
   for (const objects::Detection& detection : objects::ExtractDetections(frame, config)) {
     Seen& seen = run.objects[detection.label];
-    const Eigen::Vector2d middle_px = detection.BoxCenter();
+    const cv::Rect& box_px = detection.box_px;
     const Eigen::Vector3d direction =
-        view.T_world_camera.rotation() * frame.camera.Unproject(middle_px.x(), middle_px.y());
+        view.T_world_camera.rotation() *
+        frame.camera.Unproject(box_px.x + (box_px.width - 1) / 2.0, box_px.y + (box_px.height - 1) / 2.0);
     const bool redundant = std::any_of(seen.directions.begin(), seen.directions.end(), [&](const auto& other) {
       return objects::AngleBetween(other, direction) < config.silhouette_angle_deg * objects::kRadPerDeg;
     });

@@ -284,7 +284,7 @@ double CuboidIou(const Cuboid& a, const Cuboid& b) {
   return intersection / (volume_a + volume_b - intersection);
 }
 
-double ContainedShare(const Cuboid& cuboid, const std::vector<Eigen::Vector3d>& points_world, double enlargement) {
+double ContainedShare(const Cuboid& cuboid, std::span<const Eigen::Vector3d> points_world, double enlargement) {
   const SE3<Object, World> T_object_world = cuboid.T_world_object.Inverse();
   const Eigen::Vector3d half_extents = enlargement * cuboid.half_extents;
   const auto inside = std::count_if(points_world.begin(), points_world.end(), [&](const Eigen::Vector3d& p) {

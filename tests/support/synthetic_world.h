@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -109,6 +110,6 @@ class SyntheticWorld {
 double CuboidIou(const Cuboid& a, const Cuboid& b);
 
 // Share of `points_world` inside the cuboid whose half extents are multiplied by `enlargement`.
-double ContainedShare(const Cuboid& cuboid, const std::vector<Eigen::Vector3d>& points_world, double enlargement);
+double ContainedShare(const Cuboid& cuboid, std::span<const Eigen::Vector3d> points_world, double enlargement);
 
 }  // namespace romap

@@ -8,25 +8,25 @@
 namespace romap::objects {
 namespace {
 
-// The detector smooths and leaves out the outermost pixels of an image.
+// The detector smooths, and ignores the outermost pixels of an image.
 constexpr int kDetectorBorder_px = 4;
 
-std::vector<cv::Vec4f> DetectLines(const cv::Mat& grey, double min_length_px) {
-  // A new detector for each crop: one that is used again remembers tables of the last picture, and results would depend
-  // on what was seen before.
+std::vector<cv::Vec4f> DetectLines(const cv::Mat& gray, double min_length_px) {
+  // A new detector for each crop: a reused one keeps tables of the last image, so that results would depend on earlier
+  // images.
   const cv::Ptr<cv::ximgproc::EdgeDrawing> detector = cv::ximgproc::createEdgeDrawing();
   detector->params.EdgeDetectionOperator = cv::ximgproc::EdgeDrawing::SOBEL;
   detector->params.GradientThresholdValue = 20;
   detector->params.MinLineLength = static_cast<int>(min_length_px);
-  // The validation changes nothing for segments as long as ours, and OpenCV 4.6 leaks its tables.
+  // The validation never rejects segments of our minimum length, and OpenCV 4.6 leaks its tables.
   detector->params.NFAValidation = false;
-  detector->detectEdges(grey);
+  detector->detectEdges(gray);
   std::vector<cv::Vec4f> lines;
   detector->detectLines(lines);
   return lines;
 }
 
-// Share of a segment that lies where `mask` is set, both in pixels of the crop.
+// Share of a segment's length where `mask` is set, both in pixels of the crop.
 double InsideShare(const cv::Mat& mask, const LineSegment& segment) {
   const int steps = std::max(1, static_cast<int>(std::ceil(segment.Length_px() / 2)));
   int inside = 0;
@@ -39,18 +39,18 @@ double InsideShare(const cv::Mat& mask, const LineSegment& segment) {
   return static_cast<double>(inside) / (steps + 1);
 }
 
-// Lines of a crop in its own pixels, found in a smaller picture of it when it is large.
+// Lines of a crop in pixels of the crop, detected in a downscaled image if it is large.
 std::vector<LineSegment> SegmentsOf(const cv::Mat& crop_bgr, double min_length_px, double max_crop_px2) {
-  cv::Mat grey;
-  cv::cvtColor(crop_bgr, grey, cv::COLOR_BGR2GRAY);
-  const double shrink = std::sqrt(std::min(1.0, max_crop_px2 / static_cast<double>(grey.total())));
-  if (shrink < 1) cv::resize(grey, grey, {}, shrink, shrink, cv::INTER_AREA);
-  // Per axis, because the size of the small picture is rounded.
-  const Eigen::Array2d grow(static_cast<double>(crop_bgr.cols) / grey.cols,
-                            static_cast<double>(crop_bgr.rows) / grey.rows);
+  cv::Mat gray;
+  cv::cvtColor(crop_bgr, gray, cv::COLOR_BGR2GRAY);
+  const double shrink = std::sqrt(std::min(1.0, max_crop_px2 / static_cast<double>(gray.total())));
+  if (shrink < 1) cv::resize(gray, gray, {}, shrink, shrink, cv::INTER_AREA);
+  // Per axis, because the size of the downscaled image is rounded.
+  const Eigen::Array2d grow(static_cast<double>(crop_bgr.cols) / gray.cols,
+                            static_cast<double>(crop_bgr.rows) / gray.rows);
   const auto to_crop = [&](float u, float v) -> Eigen::Vector2d { return (Eigen::Array2d(u, v) + 0.5) * grow - 0.5; };
   std::vector<LineSegment> segments;
-  for (const cv::Vec4f& line : DetectLines(grey, min_length_px * shrink)) {
+  for (const cv::Vec4f& line : DetectLines(gray, min_length_px * shrink)) {
     segments.push_back({to_crop(line[0], line[1]), to_crop(line[2], line[3])});
   }
   return segments;

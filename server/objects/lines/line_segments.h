@@ -17,16 +17,16 @@ struct LineSegment {
 };
 
 struct LineSegmentOptions {
-  double min_length_px = 12;      // shorter ones have no direction to speak of
-  double min_length_share = 0.1;  // of the diagonal of the mask's box: shorter ones are texture
-  int rim_px = 3;                 // masks are not exact: an edge may lie so far outside
+  double min_length_px = 12;      // the direction of a shorter segment is too uncertain
+  double min_length_share = 0.1;  // of the diagonal of the mask's box; shorter segments are texture
+  int rim_px = 3;                 // how far an edge may be outside of the mask, because masks are not exact
   double min_inside_share = 0.9;  // of a segment's length, on the mask or its rim
-  size_t max_segments = 24;       // of more the longest are kept
-  double max_crop_px2 = 3e4;      // larger crops are shrunk to this area, so that the time stays bounded
+  size_t max_segments = 24;       // the longest ones are kept
+  double max_crop_px2 = 3e4;      // larger crops are downscaled to this area to bound the time
 };
 
 // The straight edges on one mask and its rim, longest first. `image_bgr` CV_8UC3, `labels` CV_16UC1 of the same size;
-// `box_px` tight around the pixels of `label`. Only the crop around the box is looked at.
+// `box_px` tight around the pixels of `label`. Searches only a crop around the box.
 // Source: C. Akinlar, C. Topal, "EDLines: a real-time line segment detector with a false detection control", PRL 2011.
 std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Mat& labels, uint16_t label,
                                           const cv::Rect& box_px, const LineSegmentOptions& options = {});

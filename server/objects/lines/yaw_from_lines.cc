@@ -13,15 +13,15 @@ namespace {
 constexpr double kQuarterTurn = std::numbers::pi / 2;
 constexpr int kSamples = 45;  // of a quarter turn: finer than the narrowest kernel
 constexpr double kSample_rad = kQuarterTurn / kSamples;
-constexpr double kReach = 3;  // of the kernel, in standard deviations
+constexpr double kReach = 3;  // half width of the kernel, in standard deviations
 
 // Score at each sampled yaw; sample i is yaw i * kSample_rad.
 using Curve = std::array<double, kSamples>;
 
-// To [-pi/4, pi/4].
+// Wraps an angle to [-pi/4, pi/4].
 double WrapQuarter(double angle_rad) { return angle_rad - kQuarterTurn * std::round(angle_rad / kQuarterTurn); }
 
-// What one segment says about yaw.
+// The yaw of one segment.
 struct Vote {
   double yaw_rad;
   double sigma_rad;
@@ -30,11 +30,11 @@ struct Vote {
 
 struct Ballot {
   std::vector<Vote> votes;
-  std::vector<double> view_azimuths_rad;  // of the view that each vote comes from
+  std::vector<double> view_azimuths_rad;  // of the view of each vote
 };
 
-// What a segment between two unit rays says, all in the reference frame; nullopt when it may be a vertical edge or its
-// plane is horizontal.
+// The vote of a segment between two unit rays, all in the reference frame. nullopt when it may be a vertical edge or
+// its plane is horizontal.
 std::optional<Vote> VoteOf(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double noise_rad,
                            const LineYawOptions& options) {
   const Eigen::Vector3d cross = from.cross(to);
@@ -42,14 +42,14 @@ std::optional<Vote> VoteOf(const Eigen::Vector3d& from, const Eigen::Vector3d& t
   if (!(length_rad > 1e-6)) return std::nullopt;
   const Eigen::Vector3d normal = cross / length_rad;
   const Eigen::Vector3d middle = (from + to).normalized();
-  // Sine of the angle, as the camera sees it, between the segment and the vertical through its middle.
+  // Sine of the angle in the image between the segment and the vertical through its middle.
   const double vertical_sin = std::abs(normal.z()) / std::hypot(middle.x(), middle.y());
   if (!(vertical_sin > std::sin(options.vertical_rad))) return std::nullopt;
-  constexpr double kLeastSteepness = 0.05;
+  constexpr double kMinSteepness = 0.05;  // sine of the angle between the plane and the horizontal
   const double steepness = std::hypot(normal.x(), normal.y());
-  if (steepness < kLeastSteepness) return std::nullopt;
+  if (steepness < kMinSteepness) return std::nullopt;
   const Eigen::Vector3d horizontal = Eigen::Vector3d(normal.y(), -normal.x(), 0) / steepness;
-  // Propagated through normal . direction(yaw) = 0: the segment's own turn, seen foreshortened, and a tilted `up`.
+  // Errors propagated through normal . direction(yaw) = 0: rotation of the foreshortened segment, and tilt of `up`.
   const double turn_rad = std::numbers::sqrt2 * noise_rad / length_rad * horizontal.cross(middle).norm();
   const double tilt_rad = options.tilt_rad * normal.z();
   const double measured_rad = std::hypot(turn_rad, tilt_rad) / steepness;
@@ -90,25 +90,25 @@ void AddKernel(double yaw_rad, double sigma_rad, double weight, Curve* curve) {
   }
 }
 
-// Newton's method with the weights of the biweight: settles where the derivative of the summed kernels is zero.
+// Newton's method with the weights of the biweight: converges to a zero of the derivative of the summed kernels.
 double Refine(double yaw_rad, const std::vector<Vote>& votes) {
   constexpr int kIterations = 10;
-  constexpr double kSettled_rad = 1e-6;
+  constexpr double kConverged_rad = 1e-6;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    double pull = 0;
+    double gradient = 0;
     double stiffness = 0;
     for (const Vote& vote : votes) {
       const double difference_rad = WrapQuarter(vote.yaw_rad - yaw_rad);
       const double x = difference_rad / (kReach * vote.sigma_rad);
       if (std::abs(x) >= 1) continue;
       const double weight = vote.weight / (vote.sigma_rad * vote.sigma_rad) * (1 - x * x);
-      pull += weight * difference_rad;
+      gradient += weight * difference_rad;
       stiffness += weight;
     }
     if (!(stiffness > 0)) break;
-    const double step_rad = pull / stiffness;
+    const double step_rad = gradient / stiffness;
     yaw_rad += step_rad;
-    if (std::abs(step_rad) < kSettled_rad) break;
+    if (std::abs(step_rad) < kConverged_rad) break;
   }
   return WrapQuarter(yaw_rad);
 }
@@ -123,9 +123,9 @@ double ScoreAt(double yaw_rad, const std::vector<Vote>& votes) {
   return score;
 }
 
-// The highest score that is clearly of another yaw than sample `best`.
+// The highest score of a clearly different yaw than that of sample `best`.
 double BestOther(const Curve& curve, int best) {
-  constexpr int kNear = 6;
+  constexpr int kNear = 6;  // samples on either side of `best` with about the same yaw
   double highest = 0;
   for (int i = kNear; i <= kSamples - kNear; ++i) {
     highest = std::max(highest, curve[static_cast<size_t>((best + i) % kSamples)]);
@@ -133,7 +133,7 @@ double BestOther(const Curve& curve, int best) {
   return highest;
 }
 
-// The highest score that both sides of 0 share.
+// The highest score that occurs on both sides of 0, at the same distance.
 double BestMirrored(const Curve& curve) {
   double highest = 0;
   for (size_t i = 0; i < kSamples; ++i)
@@ -168,7 +168,8 @@ std::optional<YawEstimate> YawFromLines(const Eigen::Matrix3d& R_world_reference
   estimate.edges = static_cast<int>(ballot.votes.size());
   const double rival = std::max(BestOther(by_yaw, best), BestMirrored(by_yaw_in_view));
   const double effective_edges = total * total / total_squared;
-  estimate.confidence = std::max(0.0, estimate.share - rival) * effective_edges / (effective_edges + options.few_edges);
+  estimate.confidence =
+      std::max(0.0, estimate.share - rival) * effective_edges / (effective_edges + options.half_edges);
   return estimate;
 }
 

@@ -1,4 +1,4 @@
-// What corrections of the map do to objects: they go along with the keyframes that saw them.
+// Corrections of the map: objects move with the keyframes that observed them.
 
 #include "server/objects/correction.h"
 
@@ -31,12 +31,12 @@ SyntheticWorldOptions SmallWorld() {
   return options;
 }
 
-// A mapper with what it was told and what it told.
+// A mapper with its input and what it published.
 class CorrectedMapping {
  public:
   explicit CorrectedMapping(const SyntheticWorldOptions& options) : world(options) {}
 
-  // Maps frames [first, last) in a world that underwent `S`.
+  // Maps frames [first, last) in a world that was moved by `S`.
   void Map(int first, int last, const Sim3<World, World>& S = {}) {
     for (int i = first; i < last; ++i) {
       TrackedFrame frame = world.MakeFrame(i);
@@ -56,8 +56,8 @@ class CorrectedMapping {
     }
   }
 
-  // A correction of all that was mapped.
-  MapCorrection Everything(const Sim3<World, World>& S) {
+  // A correction of all keyframes and points.
+  MapCorrection CorrectionOfAll(const Sim3<World, World>& S) {
     MapCorrection correction;
     for (auto& [id, T_world_camera] : poses) {
       T_world_camera = S.Moved(T_world_camera);
@@ -81,9 +81,9 @@ class CorrectedMapping {
       }
       if (const auto* merged = std::get_if<ObjectMerged>(&event)) objects.erase(merged->from);
     }
-    for (const ObjectViews& told : output.views) {
-      if (told.S_new_old) S_told[told.object] = *told.S_new_old * S_told[told.object];
-      for (const ObjectView& view : told.new_views) views[told.object].push_back(view.keyframe);
+    for (const ObjectViews& published : output.views) {
+      if (published.S_new_old) S_published[published.object] = *published.S_new_old * S_published[published.object];
+      for (const ObjectView& view : published.new_views) views[published.object].push_back(view.keyframe);
     }
   }
 
@@ -95,7 +95,7 @@ class CorrectedMapping {
   ObjectOutput last;
   std::map<ObjectId, ObjectUpdate> objects;
   std::map<ObjectId, std::vector<KeyframeId>> views;
-  std::map<ObjectId, Sim3<World, World>> S_told;  // all of it together
+  std::map<ObjectId, Sim3<World, World>> S_published;  // product of all motions
   int updates = 0;
 };
 
@@ -115,59 +115,60 @@ Sim3<World, World> LoopClosure() {
   return {1.3, Eigen::Quaterniond(Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitZ())), {2, -1, 0.5}};
 }
 
-TEST(ObjectCorrection, AClosedLoopMovesEveryObjectAsAWhole) {
+TEST(ObjectCorrection, ALoopClosureMovesEveryObject) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 30);
   ASSERT_THAT(run.objects, SizeIs(4));
   const std::map<ObjectId, ObjectUpdate> before = run.objects;
-  run.Take(run.mapper.Correct(run.Everything(LoopClosure())));
+  run.Take(run.mapper.Correct(run.CorrectionOfAll(LoopClosure())));
   EXPECT_THAT(run.last.events, SizeIs(4));
   ASSERT_THAT(run.last.views, SizeIs(4));
   for (const auto& [id, object] : before) {
     ExpectSame(run.objects.at(id).cuboid, Moved(LoopClosure(), object.cuboid));
   }
-  for (const ObjectViews& told : run.last.views) {
-    ASSERT_TRUE(told.S_new_old.has_value());
-    ExpectSame(*told.S_new_old, LoopClosure(), before.at(told.object).cuboid.T_world_object.translation(), 1e-6);
-    EXPECT_THAT(told.new_views, IsEmpty()) << "what was sent is not sent again";
-    EXPECT_THAT(told.corrected_views, IsEmpty()) << "the views moved with the object";
-    // Fields learn in a box that holds the told one.
-    EXPECT_EQ(ContainedShare(told.cuboid, CuboidCorners(run.objects.at(told.object).cuboid, 1), 1.001), 1);
+  for (const ObjectViews& published : run.last.views) {
+    ASSERT_TRUE(published.S_new_old.has_value());
+    ExpectSame(*published.S_new_old, LoopClosure(), before.at(published.object).cuboid.T_world_object.translation(),
+               1e-6);
+    EXPECT_THAT(published.new_views, IsEmpty()) << "sent views are not sent again";
+    EXPECT_THAT(published.corrected_views, IsEmpty()) << "the views moved with the object";
+    // The training box contains the published cuboid.
+    EXPECT_EQ(ContainedShare(published.cuboid, CuboidCorners(run.objects.at(published.object).cuboid), 1.001), 1);
   }
 }
 
-TEST(ObjectCorrection, MappingGoesOnInTheCorrectedWorld) {
+TEST(ObjectCorrection, MappingContinuesInTheCorrectedWorld) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 30);
-  run.Take(run.mapper.Correct(run.Everything(LoopClosure())));
+  run.Take(run.mapper.Correct(run.CorrectionOfAll(LoopClosure())));
   run.Map(30, 60, LoopClosure());
   run.Take(run.mapper.Finish());
-  CorrectedMapping still(SmallWorld());
-  still.Map(0, 60);
-  still.Take(still.mapper.Finish());
+  CorrectedMapping uncorrected(SmallWorld());
+  uncorrected.Map(0, 60);
+  uncorrected.Take(uncorrected.mapper.Finish());
   ASSERT_THAT(run.objects, SizeIs(4));
   for (const auto& [id, object] : run.objects) {
-    EXPECT_GT(CuboidIou(object.cuboid, Moved(LoopClosure(), still.objects.at(id).cuboid)), 0.95) << id;
-    EXPECT_EQ(run.views.at(id), still.views.at(id)) << "the same views were picked";
+    EXPECT_GT(CuboidIou(object.cuboid, Moved(LoopClosure(), uncorrected.objects.at(id).cuboid)), 0.95) << id;
+    EXPECT_EQ(run.views.at(id), uncorrected.views.at(id)) << "the same views were picked";
     const std::set<KeyframeId> distinct(run.views.at(id).begin(), run.views.at(id).end());
     EXPECT_EQ(distinct.size(), run.views.at(id).size());
   }
 }
 
-TEST(ObjectCorrection, GravityTurnsTheWorldAndObjectsStayUpright) {
+TEST(ObjectCorrection, ObjectsStayUprightWhenTheWorldIsAlignedWithGravity) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 30);
   const std::map<ObjectId, ObjectUpdate> before = run.objects;
   const Sim3<World, World> S(1, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 0).normalized())),
                              {0, 0, 0});
-  run.Take(run.mapper.Correct(run.Everything(S)));
+  run.Take(run.mapper.Correct(run.CorrectionOfAll(S)));
   for (const auto& [id, object] : before) ExpectSame(run.objects.at(id).cuboid, Moved(S, object.cuboid));
   run.Map(30, 44, S);
   for (const auto& [id, object] : run.objects) {
     EXPECT_GT(object.cuboid.T_world_object.RotationMatrix().col(2).dot(run.up_world), 0.999999) << id;
   }
 
-  // Up alone changes: nothing moves, but the cuboids straighten up.
+  // Only up changes: cuboids rotate upright but do not move.
   MapCorrection tilt;
   tilt.up_world = Eigen::Quaterniond(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitX())) * run.up_world;
   run.Take(run.mapper.Correct(tilt));
@@ -176,7 +177,7 @@ TEST(ObjectCorrection, GravityTurnsTheWorldAndObjectsStayUpright) {
   }
 }
 
-TEST(ObjectCorrection, SmallCorrectionsAddUpUntilTheyAreWorthTelling) {
+TEST(ObjectCorrection, SmallCorrectionsAddUpUntilTheyArePublished) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 30);
   const std::map<ObjectId, ObjectUpdate> before = run.objects;
@@ -185,7 +186,7 @@ TEST(ObjectCorrection, SmallCorrectionsAddUpUntilTheyAreWorthTelling) {
   const Sim3<World, World> little(1.0001, Eigen::Quaterniond::Identity(), {0.0001, 0, 0});
   Sim3<World, World> total;
   for (int i = 0; i < 40; ++i) {
-    run.Take(run.mapper.Correct(run.Everything(little)));
+    run.Take(run.mapper.Correct(run.CorrectionOfAll(little)));
     total = little * total;
   }
   EXPECT_GT(run.updates, 4);
@@ -199,11 +200,11 @@ TEST(ObjectCorrection, SmallCorrectionsAddUpUntilTheyAreWorthTelling) {
   }
   run.Take(run.mapper.Finish());
   for (const auto& [id, object] : before) {
-    ExpectSame(run.S_told.at(id), total, object.cuboid.T_world_object.translation(), 1e-9);
+    ExpectSame(run.S_published.at(id), total, object.cuboid.T_world_object.translation(), 1e-9);
   }
 }
 
-TEST(ObjectCorrection, OnlyTheViewThatMovedAgainstTheObjectIsCorrected) {
+TEST(ObjectCorrection, OnlyTheViewThatMovedRelativeToTheObjectIsCorrected) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 60);
   ASSERT_THAT(run.objects, SizeIs(4));
@@ -216,22 +217,22 @@ TEST(ObjectCorrection, OnlyTheViewThatMovedAgainstTheObjectIsCorrected) {
   correction.keyframes.push_back({wrong, T_new, Sim3<World, World>(T_new * T_old.Inverse())});
   run.Take(run.mapper.Correct(correction));
   size_t corrected = 0;
-  for (const ObjectViews& told : run.last.views) {
-    for (const ViewPose& pose : told.corrected_views) {
+  for (const ObjectViews& published : run.last.views) {
+    for (const ViewPose& pose : published.corrected_views) {
       EXPECT_EQ(pose.keyframe, wrong);
       EXPECT_TRUE(pose.T_world_camera.Matrix().isApprox(T_new.Matrix(), 1e-12));
       ++corrected;
     }
-    EXPECT_THAT(told.new_views, IsEmpty());
+    EXPECT_THAT(published.new_views, IsEmpty());
   }
   EXPECT_GE(corrected, 1u);
-  // Told once; nothing is left to tell.
+  // Published once; no change is left.
   correction.keyframes[0].S_new_old = {};
   run.Take(run.mapper.Correct(correction));
   EXPECT_THAT(run.last.views, IsEmpty());
 }
 
-TEST(ObjectCorrection, NonsenseCorrectionsArePassedOver) {
+TEST(ObjectCorrection, IgnoresCorrectionsThatAreNotFinite) {
   CorrectedMapping run(SmallWorld());
   run.Map(0, 20);
   MapCorrection correction;
@@ -247,7 +248,7 @@ TEST(ObjectCorrection, NonsenseCorrectionsArePassedOver) {
   EXPECT_THAT(run.last.views, IsEmpty());
 }
 
-TEST(MeanMotion, IsTheMeanAtTheCentre) {
+TEST(MeanMotion, AveragesTheMotionsAtTheCenter) {
   const KeyframeId a{1}, b{2}, other{3};
   const Eigen::Vector3d center(1, 2, 3);
   const Sim3<World, World> S(4, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), {7, 0, 0});

@@ -13,7 +13,7 @@ namespace {
 constexpr double kYaw_rad = 0.3;
 
 // Views of a flat square on the ground from a half circle around it.
-std::vector<Silhouette> SeeSquare() {
+std::vector<Silhouette> ObserveSquare() {
   std::vector<Silhouette> silhouettes;
   for (int i = 0; i < 8; ++i) {
     const double azimuth = std::numbers::pi * i / 8;
@@ -38,18 +38,18 @@ std::vector<Silhouette> SeeSquare() {
   return silhouettes;
 }
 
-TEST(EdgeYawTest, IsThatOfTheEdgesInTheGrid) {
-  const auto estimate = EdgeYaw(SeeSquare(), Eigen::Matrix3d::Identity());
+TEST(EdgeYawTest, IsRelativeToTheGrid) {
+  const auto estimate = EdgeYaw(ObserveSquare(), Eigen::Matrix3d::Identity());
   ASSERT_TRUE(estimate.has_value());
   EXPECT_NEAR(estimate->yaw_rad, kYaw_rad, 1e-6);
   EXPECT_GT(estimate->confidence, 0.25);
   const Eigen::Matrix3d turned = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  EXPECT_NEAR(EdgeYaw(SeeSquare(), turned).value_or(YawEstimate{}).yaw_rad, kYaw_rad - 0.2, 1e-6);
+  EXPECT_NEAR(EdgeYaw(ObserveSquare(), turned).value_or(YawEstimate{}).yaw_rad, kYaw_rad - 0.2, 1e-6);
 }
 
-// Where the map turns, silhouettes and their edges go along.
+// Silhouettes and their edges rotate with a correction of the map.
 TEST(EdgeYawTest, FollowsCorrections) {
-  std::vector<Silhouette> silhouettes = SeeSquare();
+  std::vector<Silhouette> silhouettes = ObserveSquare();
   const Sim3<World, World> S_new_old(1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ())),
                                      {1, 2, 3});
   for (Silhouette& silhouette : silhouettes) Move(S_new_old, &silhouette);
@@ -58,9 +58,9 @@ TEST(EdgeYawTest, FollowsCorrections) {
   EXPECT_NEAR(estimate->yaw_rad, kYaw_rad + 0.1, 1e-6);
 }
 
-TEST(EdgeYawTest, IsNotToldWithoutEdges) {
+TEST(EdgeYawTest, ReturnsNothingWithoutEdges) {
   EXPECT_FALSE(EdgeYaw({}, Eigen::Matrix3d::Identity()).has_value());
-  std::vector<Silhouette> plain = SeeSquare();
+  std::vector<Silhouette> plain = ObserveSquare();
   for (Silhouette& silhouette : plain) silhouette.segments.clear();
   EXPECT_FALSE(EdgeYaw(plain, Eigen::Matrix3d::Identity()).has_value());
 }

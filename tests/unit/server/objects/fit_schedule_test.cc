@@ -17,27 +17,27 @@ namespace {
 
 using ::testing::ElementsAre;
 
-TEST(FitScheduleTest, TheNeediestComeFirst) {
-  const FitRequest known{.key = 1, .confirmed = true, .silhouettes = 30, .news = 1, .waiting_frames = 5};
-  const FitRequest little_known{.key = 2, .confirmed = true, .silhouettes = 4, .news = 1, .waiting_frames = 5};
-  const FitRequest unconfirmed{.key = 3, .confirmed = false, .silhouettes = 4, .news = 1, .waiting_frames = 5};
-  const FitRequest long_waiting{.key = 4, .confirmed = true, .silhouettes = 30, .news = 1, .waiting_frames = 500};
-  EXPECT_THAT(OrderByNeed({known, little_known, unconfirmed, long_waiting}), ElementsAre(4, 3, 2, 1));
+TEST(FitScheduleTest, OrdersByUrgency) {
+  const FitRequest well_known{.key = 1, .confirmed = true, .silhouettes = 30, .changed = 1, .waiting_frames = 5};
+  const FitRequest little_known{.key = 2, .confirmed = true, .silhouettes = 4, .changed = 1, .waiting_frames = 5};
+  const FitRequest unconfirmed{.key = 3, .confirmed = false, .silhouettes = 4, .changed = 1, .waiting_frames = 5};
+  const FitRequest long_waiting{.key = 4, .confirmed = true, .silhouettes = 30, .changed = 1, .waiting_frames = 500};
+  EXPECT_THAT(OrderByUrgency({well_known, little_known, unconfirmed, long_waiting}), ElementsAre(4, 3, 2, 1));
 }
 
-TEST(FitScheduleTest, TiesGoToTheOlder) {
-  EXPECT_THAT(OrderByNeed({{.key = 9, .silhouettes = 3, .news = 1}, {.key = 4, .silhouettes = 3, .news = 1}}),
+TEST(FitScheduleTest, OlderLandmarkFirstWhenEquallyUrgent) {
+  EXPECT_THAT(OrderByUrgency({{.key = 9, .silhouettes = 3, .changed = 1}, {.key = 4, .silhouettes = 3, .changed = 1}}),
               ElementsAre(4, 9));
 }
 
-TEST(FitScheduleTest, TheWellKnownWaitForMoreNews) {
-  EXPECT_FALSE(IsWorthAFit({.key = 1, .confirmed = true, .silhouettes = 36, .news = 1}));
-  EXPECT_TRUE(IsWorthAFit({.key = 1, .confirmed = true, .silhouettes = 36, .news = 4}));
-  EXPECT_TRUE(IsWorthAFit({.key = 1, .confirmed = true, .silhouettes = 6, .news = 1}));
+TEST(FitScheduleTest, WellKnownLandmarksNeedMoreChanges) {
+  EXPECT_FALSE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 36, .changed = 1}));
+  EXPECT_TRUE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 36, .changed = 4}));
+  EXPECT_TRUE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 6, .changed = 1}));
 }
 
-// News comes for all at every keyframe, and for the unconfirmed ones it is always most of what they have.
-TEST(FitScheduleTest, EveryonesTurnComes) {
+// Every landmark gets a silhouette at every keyframe, which for unconfirmed ones is a large share of all they have.
+TEST(FitScheduleTest, EveryLandmarkIsFittedEventually) {
   constexpr int kObjects = 12;
   constexpr int kFitsPerKeyframe = 2;
   std::map<LandmarkKey, FitRequest> requests;
@@ -46,16 +46,16 @@ TEST(FitScheduleTest, EveryonesTurnComes) {
   }
   std::map<LandmarkKey, int> fits;
   for (int keyframe = 0; keyframe < 300; ++keyframe) {
-    std::vector<FitRequest> worth;
+    std::vector<FitRequest> due;
     for (auto& [key, request] : requests) {
-      ++request.news;
+      ++request.changed;
       ++request.waiting_frames;
-      if (IsWorthAFit(request)) worth.push_back(request);
+      if (IsDueForFit(request)) due.push_back(request);
     }
-    const std::vector<LandmarkKey> order = OrderByNeed(worth);
+    const std::vector<LandmarkKey> order = OrderByUrgency(due);
     for (size_t i = 0; i < std::min<size_t>(kFitsPerKeyframe, order.size()); ++i) {
       ++fits[order[i]];
-      requests[order[i]].news = 0;
+      requests[order[i]].changed = 0;
       requests[order[i]].waiting_frames = 0;
     }
   }
@@ -89,8 +89,8 @@ Boxes Map(const SyntheticWorld& world, int cuboid_fits_per_keyframe) {
   return boxes;
 }
 
-// So short a sequence that one fit at a keyframe does not get far: the rest is made up for at the end.
-TEST(FitScheduleTest, TheEndLeavesNoneBehind) {
+// In a short sequence one fit per keyframe does not reach every landmark.
+TEST(FitScheduleTest, FinishFitsAllRemainingLandmarks) {
   SyntheticWorldOptions options;
   options.frames = 18;
   options.sweep_deg = 90;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kCell = 0.01;
 
-// Centres of the cells of a regular grid that lie in a turned rectangle.
+// Centers of the cells of a regular grid inside a rotated rectangle.
 std::vector<Eigen::Vector3d> FillRectangle(double yaw_rad, const Eigen::Vector2d& half_extents) {
   const Eigen::Rotation2Dd to_rectangle(-yaw_rad);
   std::vector<Eigen::Vector3d> cells;
@@ -31,7 +31,7 @@ std::optional<Footprint> Fit(const std::vector<Eigen::Vector3d>& cells, std::opt
   return FitFootprint(cells, Eigen::Vector3d::Constant(kCell), previous_yaw_rad, edge_yaw_rad);
 }
 
-TEST(FootprintTest, FindsTheRectangleOfLeastArea) {
+TEST(FootprintTest, FindsTheSmallestRectangle) {
   const auto footprint = Fit(FillRectangle(0.4, {0.4, 0.2}), {}, {});
   ASSERT_TRUE(footprint.has_value());
   EXPECT_NEAR(footprint->yaw_rad, 0.4, 0.04);
@@ -39,7 +39,7 @@ TEST(FootprintTest, FindsTheRectangleOfLeastArea) {
   EXPECT_NEAR(footprint->half_extents.y(), 0.2, 0.02);
 }
 
-TEST(FootprintTest, FollowsTheEdgesToTheNameNearestToThePreviousYaw) {
+TEST(FootprintTest, HasTheEdgeYawNearestToThePreviousYaw) {
   const std::vector<Eigen::Vector3d> cells = FillRectangle(0.4, {0.4, 0.2});
   const double edge_yaw_rad = 0.45;
   const auto first = Fit(cells, {}, edge_yaw_rad);
@@ -52,7 +52,7 @@ TEST(FootprintTest, FollowsTheEdgesToTheNameNearestToThePreviousYaw) {
   EXPECT_NEAR(next->half_extents.y(), first->half_extents.x(), 1e-9);
 }
 
-TEST(FootprintTest, EdgesTurnARoundOneThatWouldKeepItsYaw) {
+TEST(FootprintTest, EdgesDecideTheYawOfARoundFootprint) {
   const std::vector<Eigen::Vector3d> square = FillRectangle(0, {0.3, 0.3});
   std::vector<Eigen::Vector3d> disc;
   for (const Eigen::Vector3d& cell : square) {
@@ -65,13 +65,15 @@ TEST(FootprintTest, EdgesTurnARoundOneThatWouldKeepItsYaw) {
   EXPECT_NEAR(turned->yaw_rad, 0.7, 1e-9);
 }
 
-TEST(FootprintTest, DistrustsEdgesThatWasteSpace) {
+TEST(FootprintTest, IgnoresEdgesThatMakeTheRectangleMuchLarger) {
   const auto footprint = Fit(FillRectangle(0.1, {0.5, 0.1}), {}, 0.1 + std::numbers::pi / 4);
   ASSERT_TRUE(footprint.has_value());
   EXPECT_NEAR(footprint->yaw_rad, 0.1, 0.04);
 }
 
-TEST(FootprintTest, NeedsCells) { EXPECT_FALSE(Fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, 0.3).has_value()); }
+TEST(FootprintTest, ReturnsNothingForThreeCells) {
+  EXPECT_FALSE(Fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, 0.3).has_value());
+}
 
 }  // namespace
 }  // namespace romap::objects

@@ -7,7 +7,7 @@ namespace {
 
 constexpr int64_t kFramePeriod_ns = 40'000'000;
 
-// Frame `id` of a camera that moves along x past a wall at depth 2, with one point in front of it.
+// Frame `id` of a camera that moves along x and looks along z.
 TrackedFrame MakeTracked(uint64_t id, bool has_masks, KeyframeId reference) {
   auto frame = std::make_shared<Frame>();
   frame->frame_id = id;
@@ -38,23 +38,23 @@ FrameMasks MakeMasks(uint64_t id) {
           .instances = {{.label = 5, .class_name = "mug", .track_id = {}}}};
 }
 
-TEST(FrameHistory, LateMasksFindTheirFrameOnceAndWithinPatience) {
+TEST(FrameHistory, LateMasksAreAcceptedOnceAndWithinTheMaximumDelay) {
   FrameHistory history(0.5);
   for (uint64_t id = 1; id <= 20; ++id) history.Add(MakeTracked(id, id == 19, {}));
   EXPECT_FALSE(history.TakeLateMasks(MakeMasks(3))) << "640 ms old";
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(19))) << "had masks";
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(21))) << "never seen";
+  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(19))) << "has masks";
+  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(21))) << "unknown frame";
   const auto masked = history.TakeLateMasks(MakeMasks(12));
   ASSERT_TRUE(masked);
   EXPECT_EQ(masked->tracked.frame->frame_id, 12u);
   EXPECT_TRUE(masked->tracked.frame->has_masks);
   EXPECT_EQ(masked->tracked.frame->labels.at<uint16_t>(3, 3), 5);
   ASSERT_EQ(masked->tracked.frame->instances.size(), 1u);
-  EXPECT_FALSE(masked->view) << "no keyframe";
+  EXPECT_FALSE(masked->view) << "not a keyframe";
   EXPECT_FALSE(history.TakeLateMasks(MakeMasks(12))) << "twice";
 }
 
-TEST(FrameHistory, ALateMaskedKeyframeSeesItsPointsUnderTheirLabels) {
+TEST(FrameHistory, LateMasksLabelTheObservationsOfTheirKeyframe) {
   FrameHistory history(1);
   const TrackedFrame tracked = MakeTracked(1, false, {});
   history.Add(tracked);
@@ -83,9 +83,9 @@ TEST(FrameHistory, AMaskedFrameStandsInForAKeyframeWithoutMasks) {
   ASSERT_EQ(stand_in->observations.size(), 1u);
   EXPECT_EQ(stand_in->observations[0].label, 9);
   EXPECT_NEAR(stand_in->observations[0].pixel_px.x(), 32 + 50 * (0.1 - 0.04) / 2, 1e-4);
-  EXPECT_FALSE(history.StandIn(masked, points)) << "one is enough";
+  EXPECT_FALSE(history.StandIn(masked, points)) << "one stand-in per keyframe";
 
-  // It goes where its keyframe goes.
+  // It moves with its keyframe.
   const Sim3<World, World> S(2, Eigen::Quaterniond::Identity(), {0, 1, 0});
   KeyframeCorrections corrections;
   corrections[KeyframeId{7}] = {.id = KeyframeId{7}, .T_world_camera = S.Moved(view.T_world_camera), .S_new_old = S};
@@ -95,7 +95,7 @@ TEST(FrameHistory, AMaskedFrameStandsInForAKeyframeWithoutMasks) {
   EXPECT_NEAR((center - Eigen::Vector3d(0.08, 1, 0)).norm(), 0, 1e-12);
 }
 
-TEST(FrameHistory, NobodyStandsInForAKeyframeWithMasks) {
+TEST(FrameHistory, AKeyframeWithMasksNeedsNoStandIn) {
   FrameHistory history(1);
   const TrackedFrame first = MakeTracked(1, true, {});
   history.Add(first);
@@ -105,7 +105,7 @@ TEST(FrameHistory, NobodyStandsInForAKeyframeWithMasks) {
   EXPECT_FALSE(history.StandIn(masked, {}));
 }
 
-TEST(FrameHistory, WaitingFramesFollowCorrections) {
+TEST(FrameHistory, FramesWithoutMasksFollowCorrections) {
   FrameHistory history(1);
   const TrackedFrame first = MakeTracked(1, false, {});
   history.Add(first);

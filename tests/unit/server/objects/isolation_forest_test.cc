@@ -5,15 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 namespace romap::objects {
 namespace {
 
-constexpr float kEndless = std::numeric_limits<float>::infinity();
+constexpr double kThreshold = 0.6;  // a score above it is an anomaly
 
-// Points of the surface of a box with sides 2, 1 and 0.6, and behind them `outliers` in a shell around it.
+// `count` points on the surface of a box with sides 2, 1 and 0.6, then `outliers` in a shell around it.
 std::vector<Eigen::Vector3d> BoxWithOutliers(int count, int outliers, uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -36,7 +35,11 @@ std::vector<Eigen::Vector3d> BoxWithOutliers(int count, int outliers, uint64_t s
   return points;
 }
 
-// Chance that an outlier scores above an inlier; the outliers are the last ones.
+std::vector<double> Scores(const std::vector<Eigen::Vector3d>& points, const IsolationForestOptions& options = {}) {
+  return IsolationForest(points, options).Scores(points);
+}
+
+// Probability that an outlier scores above an inlier. The outliers are the last points.
 double AreaUnderCurve(const std::vector<double>& scores, size_t inliers) {
   double wins = 0;
   for (size_t o = inliers; o < scores.size(); ++o) {
@@ -45,7 +48,7 @@ double AreaUnderCurve(const std::vector<double>& scores, size_t inliers) {
   return wins / static_cast<double>(inliers * (scores.size() - inliers));
 }
 
-TEST(IsolationForestTest, MeanPathLengthIsThatOfTheFormula) {
+TEST(IsolationForestTest, MeanPathLengthAgreesWithTheFormula) {
   EXPECT_EQ(MeanPathLength(0), 0);
   EXPECT_EQ(MeanPathLength(1), 0);
   EXPECT_EQ(MeanPathLength(2), 1);
@@ -58,35 +61,27 @@ TEST(IsolationForestTest, MeanPathLengthIsThatOfTheFormula) {
   }
 }
 
-// One tree: x < 0 is a leaf of depth 1 that holds one point; else y < 2 parts a leaf with four points from one.
-TEST(IsolationForestTest, ScoresFollowFromThePathsOfATree) {
-  const auto leaf = [](uint32_t self, double length) {
-    return IsolationForest::Node{.offset = kEndless, .child = self, .path_length = static_cast<float>(length)};
-  };
-  std::vector<IsolationForest::Node> nodes(5);
-  nodes[0] = {.normal = {1, 0, 0}, .offset = 0, .child = 1};
-  nodes[1] = leaf(1, 1);
-  nodes[2] = {.normal = {0, 1, 0}, .offset = 2, .child = 3};
-  nodes[3] = leaf(3, 2 + MeanPathLength(4));
-  nodes[4] = leaf(4, 2);
-  const std::vector<Eigen::Vector3d> points = {{-1, 0, 0}, {1, 0, 0}, {1, 3, 0}};
-  const IsolationForest tree(nodes, {0}, 2, 6);
-  const std::vector<double> scores = tree.Scores(points);
-  const double c = MeanPathLength(6);
-  EXPECT_NEAR(scores[0], std::exp2(-1 / c), 1e-6);
-  EXPECT_NEAR(scores[1], std::exp2(-(2 + MeanPathLength(4)) / c), 1e-6);
-  EXPECT_NEAR(scores[2], std::exp2(-2 / c), 1e-6);
-  // A second tree of one leaf: paths are averaged, not scores.
-  nodes.push_back(leaf(5, 3));
-  EXPECT_NEAR(IsolationForest(nodes, {0, 5}, 2, 6).Scores(points)[0], std::exp2(-2 / c), 1e-6);
+// Any cut between two points on an axis isolates both: path length 1, and c(2) = 1.
+TEST(IsolationForestTest, ScoresOfTwoPointsFollowFromTheFormula) {
+  const std::vector<Eigen::Vector3d> points = {{-1, 0, 0}, {1, 0, 0}};
+  for (const double score : Scores(points)) EXPECT_NEAR(score, 0.5, 1e-6);
 }
 
-TEST(IsolationForestTest, FindsPlantedOutliersBetterThanDistanceFromTheMean) {
+// Nearly every tree isolates the distant point with its first cut, and the other two with the second one.
+TEST(IsolationForestTest, ThePointThatIsIsolatedFirstScoresHighest) {
+  const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {0.1, 0, 0}, {50, 0, 0}};
+  const std::vector<double> scores = Scores(points, {.trees = 200});
+  EXPECT_NEAR(scores[2], std::exp2(-1 / MeanPathLength(3)), 0.02);
+  EXPECT_NEAR(scores[0], std::exp2(-2 / MeanPathLength(3)), 0.02);
+  EXPECT_NEAR(scores[1], scores[0], 0.02);
+}
+
+TEST(IsolationForestTest, FindsOutliersBetterThanDistanceFromTheMean) {
   double forest_sum = 0, distance_sum = 0;
   constexpr int kSets = 10;
   for (int set = 0; set < kSets; ++set) {
     const std::vector<Eigen::Vector3d> points = BoxWithOutliers(150, 15, static_cast<uint64_t>(set));
-    const std::vector<double> scores = IsolationScores(points, {});
+    const std::vector<double> scores = Scores(points);
     Eigen::Vector3d mean(0, 0, 0);
     for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
     std::vector<double> distances;
@@ -98,22 +93,23 @@ TEST(IsolationForestTest, FindsPlantedOutliersBetterThanDistanceFromTheMean) {
   EXPECT_GT(forest_sum, distance_sum);
 }
 
-TEST(IsolationForestTest, TheThresholdPartsPlantedOutliers) {
+TEST(IsolationForestTest, TheThresholdSeparatesOutliers) {
   int kept = 0, found = 0;
   constexpr int kSets = 10;
   for (int set = 0; set < kSets; ++set) {
-    const std::vector<double> scores = IsolationScores(BoxWithOutliers(150, 8, 100 + static_cast<uint64_t>(set)), {});
+    const std::vector<double> scores = Scores(BoxWithOutliers(150, 8, 100 + static_cast<uint64_t>(set)));
     kept += static_cast<int>(
-        std::count_if(scores.begin(), scores.begin() + 150, [](double score) { return score <= kAnomalyScore; }));
+        std::count_if(scores.begin(), scores.begin() + 150, [](double score) { return score <= kThreshold; }));
     found += static_cast<int>(
-        std::count_if(scores.begin() + 150, scores.end(), [](double score) { return score > kAnomalyScore; }));
+        std::count_if(scores.begin() + 150, scores.end(), [](double score) { return score > kThreshold; }));
   }
   EXPECT_GT(kept, 0.97 * kSets * 150);
   EXPECT_GT(found, 0.7 * kSets * 8);
 }
 
-// Hariri's example: two clusters on a diagonal. Cuts across the axes leave ghosts of them on the other diagonal.
-TEST(IsolationForestTest, SlopingCutsLeaveNoGhosts) {
+// Example of Hariri et al.: two clusters on a diagonal. Axis-aligned cuts give low scores to the empty regions on the
+// other diagonal.
+TEST(IsolationForestTest, ObliqueCutsFindAnomaliesBesideDiagonalClusters) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal(0, 0.5);
   std::vector<Eigen::Vector3d> points;
@@ -122,41 +118,40 @@ TEST(IsolationForestTest, SlopingCutsLeaveNoGhosts) {
     const double x = normal(random), y = normal(random), z = normal(random);
     points.emplace_back(side + x, side + y, z);
   }
-  const std::vector<Eigen::Vector3d> ghosts = {{-5, 5, 0}, {5, -5, 0}};
-  const auto ghost_score = [&](int level) {
+  const std::vector<Eigen::Vector3d> empty_regions = {{-5, 5, 0}, {5, -5, 0}};
+  const auto empty_score = [&](int level) {
     const IsolationForest forest(points, {.trees = 300, .sample_size = 256, .extension_level = level});
-    const std::vector<double> scores = forest.Scores(ghosts);
+    const std::vector<double> scores = forest.Scores(empty_regions);
     return 0.5 * (scores[0] + scores[1]);
   };
-  EXPECT_GT(ghost_score(2), ghost_score(0) + 0.02);
-  EXPECT_GT(ghost_score(2), kAnomalyScore);
+  EXPECT_GT(empty_score(2), empty_score(0) + 0.02);
+  EXPECT_GT(empty_score(2), kThreshold);
 }
 
-TEST(IsolationForestTest, PlaceAndUnitOfTheMapDoNotMatter) {
+TEST(IsolationForestTest, IsInvariantToTranslationAndScale) {
   const std::vector<Eigen::Vector3d> points = BoxWithOutliers(100, 5, 1);
   std::vector<Eigen::Vector3d> elsewhere;
   for (const Eigen::Vector3d& p : points) elsewhere.push_back(1e-3 * p + Eigen::Vector3d(40, -70, 3));
-  const std::vector<double> scores = IsolationScores(points, {}), others = IsolationScores(elsewhere, {});
+  const std::vector<double> scores = Scores(points), others = Scores(elsewhere);
   for (size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(scores[i], others[i], 0.01) << i;
 }
 
-TEST(IsolationForestTest, EqualInputGivesEqualScoresOnAnyNumberOfThreads) {
+TEST(IsolationForestTest, ScoresDoNotDependOnTheNumberOfThreads) {
   const std::vector<Eigen::Vector3d> points = BoxWithOutliers(5000, 50, 2);  // enough for several threads
   const auto scores = [&](size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
-    return IsolationScores(points, {.trees = 200, .sample_size = 256});
+    return Scores(points, {.trees = 200, .sample_size = 256});
   };
   const std::vector<double> one = scores(1);
   EXPECT_EQ(one, scores(4));
-  EXPECT_NE(one, IsolationScores(points, {.trees = 200, .sample_size = 256, .seed = 2}));
+  EXPECT_NE(one, Scores(points, {.trees = 200, .sample_size = 256, .seed = 2}));
 }
 
-TEST(IsolationForestTest, FewOrEqualPointsAreNoAnomalies) {
-  EXPECT_TRUE(IsolationScores({}, {}).empty());
-  const std::vector<Eigen::Vector3d> three = {{0, 0, 0}, {1, 0, 0}, {99, 0, 0}};
-  EXPECT_EQ(IsolationScores(three, {}), std::vector<double>(3, 0.5));
+TEST(IsolationForestTest, EqualPointsAreNotAnomalies) {
+  EXPECT_TRUE(Scores({}).empty());
+  EXPECT_EQ(Scores({{1, 2, 3}}), std::vector<double>(1, 0.5));
   const std::vector<Eigen::Vector3d> equal(20, Eigen::Vector3d(1, 2, 3));
-  for (const double score : IsolationScores(equal, {})) EXPECT_NEAR(score, 0.5, 1e-6);
+  for (const double score : Scores(equal)) EXPECT_NEAR(score, 0.5, 1e-6);
 }
 
 }  // namespace

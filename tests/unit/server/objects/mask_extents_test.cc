@@ -7,13 +7,13 @@
 namespace romap::objects {
 namespace {
 
-constexpr double kBorder_px = 0.5;  // between a mask's last pixel's centre and its border
+constexpr double kBorder_px = 0.5;  // from the center of a mask's last pixel to its border
 
 Detection LabelThree(const cv::Rect& box_px) {
   return {.label = 3, .class_name = "", .track_id = {}, .box_px = box_px};
 }
 
-TEST(MaskExtentsTest, DirectionsAreUnitVectorsAndOppositeOnesHalfTheCountApart) {
+TEST(MaskExtentsTest, DirectionsAreUnitVectorsInOppositePairs) {
   EXPECT_NEAR((ExtentDirection(0) - Eigen::Vector2d(1, 0)).norm(), 0, 1e-12);
   EXPECT_NEAR((ExtentDirection(kExtentDirections / 4) - Eigen::Vector2d(0, 1)).norm(), 0, 1e-12);
   for (int k = 0; k < kExtentDirections / 2; ++k) {
@@ -22,7 +22,7 @@ TEST(MaskExtentsTest, DirectionsAreUnitVectorsAndOppositeOnesHalfTheCountApart) 
   }
 }
 
-TEST(MaskExtentsTest, AreTheSupportFunctionOfARectangle) {
+TEST(MaskExtentsTest, EqualTheSupportFunctionOfARectangle) {
   cv::Mat labels = cv::Mat::zeros(100, 120, CV_16UC1);
   const cv::Rect rectangle(20, 30, 41, 21);  // columns 20..60, rows 30..50
   labels(rectangle).setTo(3);
@@ -36,8 +36,8 @@ TEST(MaskExtentsTest, AreTheSupportFunctionOfARectangle) {
   }
 }
 
-// Other masks in the same box are not the object's, whether beside it in a row or in rows of their own.
-TEST(MaskExtentsTest, LookAtOneLabelOnly) {
+// Another mask in the same box must not count, neither in the same rows nor in other rows.
+TEST(MaskExtentsTest, IgnoreOtherLabels) {
   cv::Mat labels = cv::Mat::zeros(100, 120, CV_16UC1);
   labels(cv::Rect(20, 30, 30, 10)).setTo(3);
   labels(cv::Rect(20, 40, 1, 10)).setTo(3);
@@ -46,7 +46,7 @@ TEST(MaskExtentsTest, LookAtOneLabelOnly) {
   labels(cv::Rect(30, 40, 20, 10)).setTo(7);
   const MaskExtents beside = MeasureExtents(labels, LabelThree(tight));
   EXPECT_EQ(alone.reach_px, beside.reach_px);
-  EXPECT_LT(alone.reach_px[2], std::numbers::sqrt2 / 2 * (49 + 49));  // the corner that the other one fills
+  EXPECT_LT(alone.reach_px[2], std::numbers::sqrt2 / 2 * (49 + 49));  // the corner filled by the other mask
 }
 
 }  // namespace

@@ -18,69 +18,69 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// What a client knows after a run.
-struct Told {
+// Everything the mapper published in a run.
+struct Published {
   std::map<ObjectId, ObjectUpdate> objects;
   std::map<ObjectId, std::vector<ObjectView>> views;
   std::map<ObjectId, Cuboid> training_cuboid;
-  std::map<ObjectId, int> first_told_at;  // frame
-  std::vector<std::string> log;           // one line per event
-  std::map<ObjectId, int> updates;        // how many
-  std::set<ObjectId> gone;
+  std::map<ObjectId, int> first_frame;  // frame
+  std::vector<std::string> log;         // one line per event
+  std::map<ObjectId, int> updates;      // how many
+  std::set<ObjectId> removed_ids;
   int merged = 0;
   int lost = 0;
 };
 
-void Take(const ObjectOutput& output, int frame, Told* told) {
+void Take(const ObjectOutput& output, int frame, Published* published) {
   for (const MapEvent& event : output.events) {
     if (const auto* update = std::get_if<ObjectUpdate>(&event)) {
       EXPECT_EQ(update->revision, 0u) << "the session's map counts revisions";
-      EXPECT_FALSE(told->gone.contains(update->id)) << update->id << " comes back from the dead";
-      told->objects[update->id] = *update;
-      told->first_told_at.try_emplace(update->id, frame);
-      told->lost += update->state == ObjectState::kLost ? 1 : 0;
+      EXPECT_FALSE(published->removed_ids.contains(update->id)) << update->id << " was removed before";
+      published->objects[update->id] = *update;
+      published->first_frame.try_emplace(update->id, frame);
+      published->lost += update->state == ObjectState::kLost ? 1 : 0;
       const Eigen::Vector3d& p = update->cuboid.T_world_object.translation();
-      told->log.push_back(fmt::format("{} {} {} {:.9f} {:.9f} {:.9f}", update->id.ToString(),
-                                      ++told->updates[update->id], update->class_name, p.x(), p.y(), p.z()));
+      published->log.push_back(fmt::format("{} {} {} {:.9f} {:.9f} {:.9f}", update->id.ToString(),
+                                           ++published->updates[update->id], update->class_name, p.x(), p.y(), p.z()));
     } else if (const auto* merge = std::get_if<ObjectMerged>(&event)) {
-      EXPECT_EQ(told->objects.erase(merge->from), 1u) << merge->from << " was never told";
-      EXPECT_TRUE(told->objects.contains(merge->into)) << merge->into;
-      told->gone.insert(merge->from);
-      ++told->merged;
+      EXPECT_EQ(published->objects.erase(merge->from), 1u) << merge->from << " was not published";
+      EXPECT_TRUE(published->objects.contains(merge->into)) << merge->into;
+      published->removed_ids.insert(merge->from);
+      ++published->merged;
     } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
-      EXPECT_EQ(told->objects.erase(removed->id), 1u) << removed->id << " was never told";
-      told->gone.insert(removed->id);
+      EXPECT_EQ(published->objects.erase(removed->id), 1u) << removed->id << " was not published";
+      published->removed_ids.insert(removed->id);
     }
   }
   for (const ObjectViews& views : output.views) {
-    auto& known = told->views[views.object];
+    auto& known = published->views[views.object];
     known.insert(known.end(), views.new_views.begin(), views.new_views.end());
-    told->training_cuboid[views.object] = views.cuboid;
+    published->training_cuboid[views.object] = views.cuboid;
   }
 }
 
-Told MapWorld(const SyntheticWorld& world, ObjectsConfig config = {}) {
+Published MapWorld(const SyntheticWorld& world, ObjectsConfig config = {}) {
   ObjectMapper mapper(config);
-  Told told;
+  Published published;
   for (int i = 0; i < world.frame_count(); ++i) {
     const TrackedFrame frame = world.MakeFrame(i);
-    Take(mapper.ObserveFrame(frame), i, &told);
-    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)), i, &told);
+    Take(mapper.ObserveFrame(frame), i, &published);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)), i, &published);
   }
-  Take(mapper.Finish(), world.frame_count(), &told);
-  return told;
+  Take(mapper.Finish(), world.frame_count(), &published);
+  return published;
 }
 
-// Finds for each true object the one told object nearest to it and checks class, overlap and containment. Returns the
-// mean intersection over union; none may be below `least_iou`.
-double ExpectFound(const SyntheticWorld& world, const Told& told, double least_iou = 0.45) {
-  EXPECT_EQ(told.objects.size(), world.objects().size());
+// Finds the nearest published object of each true one and checks class, overlap and containment. Returns the mean
+// intersection over union; none may be below `min_iou`.
+double ExpectFound(const SyntheticWorld& world, const Published& published, double min_iou = 0.45) {
+  EXPECT_EQ(published.objects.size(), world.objects().size());
   double iou_sum = 0;
   std::set<ObjectId> used;
   for (int i = 0; i < static_cast<int>(world.objects().size()); ++i) {
     const Cuboid truth = world.TrueCuboid(i);
     const ObjectUpdate* best = nullptr;
-    for (const auto& [id, object] : told.objects) {
+    for (const auto& [id, object] : published.objects) {
       const auto distance = [&](const ObjectUpdate& o) {
         return (o.cuboid.T_world_object.translation() - truth.T_world_object.translation()).norm();
       };
@@ -90,10 +90,10 @@ double ExpectFound(const SyntheticWorld& world, const Told& told, double least_i
     EXPECT_TRUE(used.insert(best->id).second) << best->id << " is nearest to two objects";
     EXPECT_EQ(best->class_name, world.objects()[static_cast<size_t>(i)].class_name);
     const double iou = CuboidIou(best->cuboid, truth);
-    EXPECT_GT(iou, least_iou) << world.objects()[static_cast<size_t>(i)].class_name << " half extents "
-                              << best->cuboid.half_extents.transpose() << " instead of "
-                              << truth.half_extents.transpose();
-    EXPECT_GT(ContainedShare(told.training_cuboid.at(best->id), world.SurfacePoints(i, 2000), 1.1), 0.98)
+    EXPECT_GT(iou, min_iou) << world.objects()[static_cast<size_t>(i)].class_name << " half extents "
+                            << best->cuboid.half_extents.transpose() << " instead of "
+                            << truth.half_extents.transpose();
+    EXPECT_GT(ContainedShare(published.training_cuboid.at(best->id), world.SurfacePoints(i, 2000), 1.1), 0.98)
         << world.objects()[static_cast<size_t>(i)].class_name << " half extents "
         << best->cuboid.half_extents.transpose() << " instead of " << truth.half_extents.transpose();
     iou_sum += iou;
@@ -101,23 +101,23 @@ double ExpectFound(const SyntheticWorld& world, const Told& told, double least_i
   return iou_sum / static_cast<double>(world.objects().size());
 }
 
-TEST(ObjectMapper, FindsEveryObjectOnceWithItsBox) {
+TEST(ObjectMapper, FindsEveryObjectOnceWithItsCuboid) {
   const SyntheticWorld world({});
-  const Told told = MapWorld(world);
-  EXPECT_GT(ExpectFound(world, told), 0.6);
-  EXPECT_EQ(told.merged, 0);
+  const Published published = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, published), 0.6);
+  EXPECT_EQ(published.merged, 0);
 }
 
-TEST(ObjectMapper, SendsTheFirstCuboidAfterAFewDegrees) {
+TEST(ObjectMapper, PublishesTheFirstCuboidAfterAFewDegrees) {
   SyntheticWorldOptions options;
   options.frames = 15;
   options.sweep_deg = 45;
-  const Told told = MapWorld(SyntheticWorld(options));
-  ASSERT_EQ(told.first_told_at.size(), 4u);
-  for (const auto& [id, frame] : told.first_told_at) EXPECT_LE(frame, 9) << id;
+  const Published published = MapWorld(SyntheticWorld(options));
+  ASSERT_EQ(published.first_frame.size(), 4u);
+  for (const auto& [id, frame] : published.first_frame) EXPECT_LE(frame, 9) << id;
 }
 
-TEST(ObjectMapper, SurvivesNoiseAndOutliers) {
+TEST(ObjectMapper, IsRobustToNoiseAndOutliers) {
   SyntheticWorldOptions options;
   options.pixel_noise_px = 0.7;
   options.point_noise_mu = 0.003;
@@ -127,7 +127,7 @@ TEST(ObjectMapper, SurvivesNoiseAndOutliers) {
   EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
 }
 
-TEST(ObjectMapper, LivesWithMissingMasksAndWrongClasses) {
+TEST(ObjectMapper, IsRobustToMissingMasksAndWrongClasses) {
   SyntheticWorldOptions options;
   options.dropped_mask_share = 0.3;
   options.wrong_class_share = 0.3;
@@ -135,15 +135,15 @@ TEST(ObjectMapper, LivesWithMissingMasksAndWrongClasses) {
   EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
 }
 
-TEST(ObjectMapper, MasksCarryTexturelessObjects) {
+TEST(ObjectMapper, MapsTexturelessObjectsFromMasksAlone) {
   SyntheticWorldOptions options;
   options.textureless = {0, 1, 2, 3};
   const SyntheticWorld world(options);
-  // Nothing but the cameras' elevation bounds a flat top: the book comes out twice as thick.
+  // Only the elevation of the cameras bounds a flat top, so that the book becomes twice as thick.
   EXPECT_GT(ExpectFound(world, MapWorld(world), 0.35), 0.5);
 }
 
-TEST(ObjectMapper, KeepsIdenticalNeighboursApart) {
+TEST(ObjectMapper, SeparatesIdenticalNeighbors) {
   SyntheticWorldOptions options;
   for (int i = 0; i < 4; ++i) {
     const Eigen::Vector3d center(0.13 * i - 0.2, 0.02 * i, 0.06);
@@ -153,7 +153,7 @@ TEST(ObjectMapper, KeepsIdenticalNeighboursApart) {
   EXPECT_GT(ExpectFound(world, MapWorld(world)), 0.6);
 }
 
-// The frame as a camera gives it that does not wait for its detector.
+// The frame of a client that does not wait for its detector.
 TrackedFrame WithoutMasks(TrackedFrame tracked) {
   auto frame = std::make_shared<Frame>(*tracked.frame);
   frame->has_masks = false;
@@ -163,36 +163,36 @@ TrackedFrame WithoutMasks(TrackedFrame tracked) {
   return tracked;
 }
 
-// Masks come for every `every`-th frame only, `late` frames after it.
-Told MapWithSlowDetector(const SyntheticWorld& world, int every, int late) {
+// Masks arrive for every `every`-th frame only, `late` frames later.
+Published MapWithSlowDetector(const SyntheticWorld& world, int every, int late) {
   ObjectMapper mapper({});
-  Told told;
+  Published published;
   for (int i = 0; i < world.frame_count() + late; ++i) {
     if (i < world.frame_count()) {
       TrackedFrame full = world.MakeFrame(i);
       full.is_keyframe = world.IsKeyframe(i);
       const bool on_time = late == 0 && i % every == 0;
       const TrackedFrame frame = on_time ? full : WithoutMasks(full);
-      Take(mapper.ObserveFrame(frame), i, &told);
+      Take(mapper.ObserveFrame(frame), i, &published);
       if (full.is_keyframe) {
         KeyframeView view = world.MakeKeyframe(i, full);
         view.frame = frame.frame;
         if (!on_time) {
           for (PointObservation& seen : view.observations) seen.label = 0;
         }
-        Take(mapper.ObserveKeyframe(view), i, &told);
+        Take(mapper.ObserveKeyframe(view), i, &published);
       }
     }
     const int masked = i - late;
     if (late == 0 || masked < 0 || masked % every != 0) continue;
     const TrackedFrame then = world.MakeFrame(masked);
-    Take(mapper.ObserveLateMasks({then.frame->frame_id, then.frame->labels, then.frame->instances}), i, &told);
+    Take(mapper.ObserveLateMasks({then.frame->frame_id, then.frame->labels, then.frame->instances}), i, &published);
   }
-  Take(mapper.Finish(), world.frame_count(), &told);
-  return told;
+  Take(mapper.Finish(), world.frame_count(), &published);
+  return published;
 }
 
-TEST(ObjectMapper, MasksOnSomeFramesThatAreNoKeyframesAreEnough) {
+TEST(ObjectMapper, MasksOnSomeFramesThatAreNotKeyframesSuffice) {
   SyntheticWorldOptions options;
   options.frames = 150;
   options.keyframe_every = 6;
@@ -200,16 +200,16 @@ TEST(ObjectMapper, MasksOnSomeFramesThatAreNoKeyframesAreEnough) {
   EXPECT_GT(ExpectFound(world, MapWithSlowDetector(world, /*every=*/5, /*late=*/0)), 0.6);
 }
 
-TEST(ObjectMapper, LateMasksGiveTheSameMap) {
+TEST(ObjectMapper, LateMasksGiveAnEquallyGoodMap) {
   const SyntheticWorld world({});
-  const Told on_time = MapWithSlowDetector(world, 1, 0);
-  const Told late = MapWithSlowDetector(world, 1, 12);
+  const Published on_time = MapWithSlowDetector(world, 1, 0);
+  const Published late = MapWithSlowDetector(world, 1, 12);
   const double iou = ExpectFound(world, on_time);
   EXPECT_GT(iou, 0.85);
-  EXPECT_GT(ExpectFound(world, late), 0.8) << "fewer points: late labels are not those of exact pixels";
+  EXPECT_GT(ExpectFound(world, late), 0.8) << "late labels are less exact, so that fewer points have an owner";
 }
 
-TEST(ObjectMapper, LateMasksOnSomeFramesAreEnough) {
+TEST(ObjectMapper, LateMasksOnSomeFramesSuffice) {
   SyntheticWorldOptions options;
   options.frames = 150;
   options.keyframe_every = 6;
@@ -217,65 +217,65 @@ TEST(ObjectMapper, LateMasksOnSomeFramesAreEnough) {
   EXPECT_GT(ExpectFound(world, MapWithSlowDetector(world, /*every=*/5, /*late=*/12)), 0.6);
 }
 
-TEST(ObjectMapper, KnowsAnObjectAgainAfterALongAbsence) {
+TEST(ObjectMapper, MatchesAnObjectThatWasOutOfViewForLong) {
   SyntheticWorldOptions options;
   options.frames = 120;
   options.sweep_deg = 240;
   options.away_frames = {{40, 90}};
   const SyntheticWorld world(options);
-  const Told told = MapWorld(world);
-  EXPECT_GT(ExpectFound(world, told), 0.6);
-  EXPECT_EQ(told.lost, 0) << "out of view is not lost";
+  const Published published = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, published), 0.6);
+  EXPECT_EQ(published.lost, 0) << "out of view is not lost";
 }
 
-TEST(ObjectMapper, GhostsAreNeverTold) {
+TEST(ObjectMapper, DoesNotPublishShortFalseDetections) {
   SyntheticWorldOptions options;
   options.ghosts = {{10, {20, 20, 40, 40}}, {11, {22, 20, 40, 40}}, {30, {250, 150, 30, 60}}};
   const SyntheticWorld world(options);
-  const Told told = MapWorld(world);
-  ExpectFound(world, told);
-  for (const auto& [id, object] : told.objects) EXPECT_NE(object.class_name, "ghost");
+  const Published published = MapWorld(world);
+  ExpectFound(world, published);
+  for (const auto& [id, object] : published.objects) EXPECT_NE(object.class_name, "ghost");
 }
 
-// A landmark's way: provisional, then confirmed, or gone.
-TEST(ObjectMapper, WhatIsNotSureIsToldAsProvisionalAndTrainsNothing) {
+TEST(ObjectMapper, PublishesUnconfirmedObjectsAsProvisionalWithoutTraining) {
   SyntheticWorldOptions options;
-  // A mask on the table's rim that stays for a while, where nothing is.
+  // A false detection that persists for some frames.
   for (int i = 6; i < 11; ++i) options.ghosts.push_back({i, {20 + 2 * i, 190, 30, 30}});
   const SyntheticWorld world(options);
   ObjectMapper mapper({});
-  Told told;
+  Published published;
   std::map<ObjectId, ObjectState> first_state;
   for (int i = 0; i < world.frame_count(); ++i) {
     const TrackedFrame frame = world.MakeFrame(i);
     std::vector<ObjectOutput> outputs = {mapper.ObserveFrame(frame)};
     if (world.IsKeyframe(i)) outputs.push_back(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)));
     for (const ObjectOutput& output : outputs) {
-      Take(output, i, &told);
+      Take(output, i, &published);
       for (const MapEvent& event : output.events) {
         if (const auto* update = std::get_if<ObjectUpdate>(&event)) first_state.try_emplace(update->id, update->state);
       }
       for (const ObjectViews& views : output.views) {
-        EXPECT_NE(told.objects.at(views.object).state, ObjectState::kProvisional);
+        EXPECT_NE(published.objects.at(views.object).state, ObjectState::kProvisional);
         EXPECT_FALSE(views.S_new_old) << "nothing was corrected";
       }
     }
   }
   const auto is_provisional = [](const auto& first) { return first.second == ObjectState::kProvisional; };
   EXPECT_GE(std::count_if(first_state.begin(), first_state.end(), is_provisional), 3);
-  EXPECT_GE(first_state.size(), 5u) << "the ghost, too, was told of";
-  Take(mapper.Finish(), world.frame_count(), &told);
-  for (const auto& [id, object] : told.objects) EXPECT_EQ(object.state, ObjectState::kConfirmed) << object.class_name;
-  EXPECT_EQ(told.objects.size(), 4u);
+  EXPECT_GE(first_state.size(), 5u) << "including the false detection";
+  Take(mapper.Finish(), world.frame_count(), &published);
+  for (const auto& [id, object] : published.objects)
+    EXPECT_EQ(object.state, ObjectState::kConfirmed) << object.class_name;
+  EXPECT_EQ(published.objects.size(), 4u);
 }
 
 TEST(ObjectMapper, UpNeedNotBeZ) {
   SyntheticWorldOptions options;
   options.up_world = {0.3, -0.9, 0.2};
   const SyntheticWorld world(options);
-  const Told told = MapWorld(world);
-  EXPECT_GT(ExpectFound(world, told), 0.6);
-  for (const auto& [id, object] : told.objects) {
+  const Published published = MapWorld(world);
+  EXPECT_GT(ExpectFound(world, published), 0.6);
+  for (const auto& [id, object] : published.objects) {
     EXPECT_GT(object.cuboid.T_world_object.RotationMatrix().col(2).dot(options.up_world.normalized()), 0.9999) << id;
   }
 }
@@ -285,12 +285,12 @@ TEST(ObjectMapper, IsDeterministic) {
   options.frames = 30;
   options.outlier_share = 0.1;
   const SyntheticWorld world(options);
-  const Told first = MapWorld(world);
+  const Published first = MapWorld(world);
   EXPECT_THAT(first.log, Not(IsEmpty()));
   EXPECT_EQ(first.log, MapWorld(world).log);
 }
 
-TEST(ObjectMapper, SaysLostWhenAnObjectIsTakenAway) {
+TEST(ObjectMapper, ReportsARemovedObjectAsLost) {
   SyntheticWorldOptions options;
   options.frames = 60;
   const SyntheticWorld with(options);
@@ -300,26 +300,26 @@ TEST(ObjectMapper, SaysLostWhenAnObjectIsTakenAway) {
   ObjectsConfig config;
   config.lost_after_frames = 20;
   ObjectMapper mapper(config);
-  Told told;
+  Published published;
   for (int i = 0; i < 120; ++i) {
     const SyntheticWorld& world = i < 60 ? with : without;
     TrackedFrame frame = world.MakeFrame(i % 60);
-    Take(mapper.ObserveFrame(frame), i, &told);
-    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i % 60, frame)), i, &told);
+    Take(mapper.ObserveFrame(frame), i, &published);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i % 60, frame)), i, &published);
   }
-  EXPECT_EQ(told.lost, 1);
-  EXPECT_EQ(told.objects.size(), 4u) << "lost is not gone";
+  EXPECT_EQ(published.lost, 1);
+  EXPECT_EQ(published.objects.size(), 4u) << "a lost object stays in the map";
 }
 
-TEST(ObjectMapper, UpdatesOnlyOnNotableChange) {
+TEST(ObjectMapper, PublishesOnlyNoticeableChanges) {
   SyntheticWorldOptions options;
   options.frames = 90;
   options.mask_jitter_px = 1;
-  const Told told = MapWorld(SyntheticWorld(options));
-  for (const auto& [id, updates] : told.updates) EXPECT_LE(updates, 20) << id << " of 30 keyframes";
+  const Published published = MapWorld(SyntheticWorld(options));
+  for (const auto& [id, updates] : published.updates) EXPECT_LE(updates, 20) << id << " of 30 keyframes";
 }
 
-TEST(ObjectMapper, NonsenseInputIsPassedOver) {
+TEST(ObjectMapper, IgnoresInvalidInput) {
   const SyntheticWorld world({});
   ObjectMapper mapper({});
   TrackedFrame frame = world.MakeFrame(0);
@@ -338,7 +338,7 @@ TEST(ObjectMapper, NonsenseInputIsPassedOver) {
   broken.labels = cv::Mat::ones(10, 10, CV_16UC1);
   frame.frame = std::make_shared<Frame>(broken);
   EXPECT_THAT(mapper.ObserveFrame(frame).events, IsEmpty());
-  broken.labels = cv::Mat::ones(broken.image_bgr.size(), CV_16UC1);  // one mask over everything
+  broken.labels = cv::Mat::ones(broken.image_bgr.size(), CV_16UC1);  // one mask that covers the image
   frame.frame = std::make_shared<Frame>(broken);
   for (int i = 0; i < 10; ++i) {
     mapper.ObserveFrame(frame);
@@ -351,27 +351,27 @@ TEST(ObjectMapper, NonsenseInputIsPassedOver) {
   EXPECT_THAT(mapper.ObserveFrame(frame).events, IsEmpty());
   EXPECT_THAT(mapper.Finish().events, IsEmpty());
 
-  // And the mapper still works.
-  Told told;
+  // The mapper still works.
+  Published published;
   for (int i = 0; i < world.frame_count(); ++i) {
     const TrackedFrame good = world.MakeFrame(i);
-    Take(mapper.ObserveFrame(good), i, &told);
-    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, good)), i, &told);
+    Take(mapper.ObserveFrame(good), i, &published);
+    if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, good)), i, &published);
   }
-  ExpectFound(world, told);
+  ExpectFound(world, published);
 }
 
-TEST(ObjectMapper, ViewsSurroundTheObjectAndSayWhatEachRayMeets) {
+TEST(ObjectMapper, ViewsCoverAllDirectionsAndClassifyRays) {
   SyntheticWorldOptions options;
   options.with_depth = true;
   const SyntheticWorld world(options);
-  const Told told = MapWorld(world);
-  ASSERT_EQ(told.views.size(), 4u);
-  for (const auto& [id, views] : told.views) {
+  const Published published = MapWorld(world);
+  ASSERT_EQ(published.views.size(), 4u);
+  for (const auto& [id, views] : published.views) {
     EXPECT_GE(views.size(), 17u) << id;
     EXPECT_LE(views.size(), 30u) << id;
-    const Cuboid& cuboid = told.objects.at(id).cuboid;
-    EXPECT_TRUE((told.training_cuboid.at(id).half_extents.array() > 0.97 * cuboid.half_extents.array()).all());
+    const Cuboid& cuboid = published.objects.at(id).cuboid;
+    EXPECT_TRUE((published.training_cuboid.at(id).half_extents.array() > 0.97 * cuboid.half_extents.array()).all());
     std::set<KeyframeId> keyframes;
     for (const ObjectView& view : views) {
       EXPECT_EQ(view.object, id);

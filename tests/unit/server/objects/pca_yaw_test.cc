@@ -11,7 +11,7 @@
 namespace romap::objects {
 namespace {
 
-// Points spread evenly over an upright cuboid.
+// Points uniformly distributed in an upright cuboid.
 std::vector<Eigen::Vector3d> Fill(const Eigen::Vector3d& half_extents, double yaw_rad, int count) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -35,7 +35,7 @@ TEST(PcaYawTest, FindsTheLongAxis) {
   }
 }
 
-TEST(PcaYawTest, IsNotTurnedByStrays) {
+TEST(PcaYawTest, IsRobustToOutliers) {
   std::vector<Eigen::Vector3d> points = Fill({0.4, 0.1, 0.1}, 0.3, 200);
   for (int i = 0; i < 6; ++i) points.emplace_back(3 - 2.0, -2 + 2.0 + 0.1 * i, 1);
   const auto yaw = PcaYaw(points);
@@ -43,13 +43,13 @@ TEST(PcaYawTest, IsNotTurnedByStrays) {
   EXPECT_NEAR(*yaw, 0.3, 0.1);
 }
 
-TEST(PcaYawTest, KnowsWhenThereIsNoLongAxis) {
+TEST(PcaYawTest, ReturnsNothingWithoutALongAxis) {
   EXPECT_FALSE(PcaYaw(Fill({0.3, 0.3, 0.1}, 0.3, 2000)).has_value());
   EXPECT_FALSE(PcaYaw(Fill({0.3, 0.1, 0.1}, 0.3, 7)).has_value());
   EXPECT_FALSE(PcaYaw(std::vector<Eigen::Vector3d>(20, Eigen::Vector3d::Ones())).has_value());
 }
 
-TEST(PcaYawTest, BearsPointsOnALine) {
+TEST(PcaYawTest, AcceptsPointsOnALine) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 20; ++i) points.emplace_back(0.1 * i, 0.1 * i, 0);
   const auto yaw = PcaYaw(points);

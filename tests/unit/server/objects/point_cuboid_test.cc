@@ -10,7 +10,7 @@
 namespace romap::objects {
 namespace {
 
-// Points on the faces of a box of half extents (3, 1, 0.5), turned by `yaw_rad`, around (10, 20, 30).
+// Points on the faces of a box with half extents (3, 1, 0.5), rotated by `yaw_rad`, around (10, 20, 30).
 std::vector<Eigen::Vector3d> BoxPoints(double yaw_rad) {
   const Eigen::AngleAxisd yaw(yaw_rad, Eigen::Vector3d::UnitZ());
   std::vector<Eigen::Vector3d> points;
@@ -24,7 +24,7 @@ std::vector<Eigen::Vector3d> BoxPoints(double yaw_rad) {
   return points;
 }
 
-TEST(CuboidOfPoints, IsTheBoxAroundThePointsAlongTheirMainAxis) {
+TEST(CuboidOfPoints, BoundsThePointsAlongTheirMainAxis) {
   const auto cuboid = CuboidOfPoints({}, BoxPoints(0.4), std::nullopt);
   ASSERT_TRUE(cuboid);
   EXPECT_NEAR((cuboid->half_extents - Eigen::Vector3d(3, 1, 0.5)).norm(), 0, 1e-6);
@@ -33,13 +33,13 @@ TEST(CuboidOfPoints, IsTheBoxAroundThePointsAlongTheirMainAxis) {
   EXPECT_NEAR(std::abs(x.dot(Eigen::Vector3d(std::cos(0.4), std::sin(0.4), 0))), 1, 1e-9);
 }
 
-TEST(CuboidOfPoints, FollowsTheEdgesWhereGiven) {
+TEST(CuboidOfPoints, HasTheYawOfTheEdgesIfGiven) {
   const auto cuboid = CuboidOfPoints({}, BoxPoints(0.4), 0.0);
   ASSERT_TRUE(cuboid);
   EXPECT_NEAR(cuboid->half_extents.x(), 3 * std::cos(0.4) + std::sin(0.4), 1e-9);
 }
 
-TEST(CuboidOfPoints, IsGivenInTheWorld) {
+TEST(CuboidOfPoints, ConvertsFromGridToWorld) {
   HullRegion region;
   region.R_world_grid = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitX()).toRotationMatrix();
   region.center_world = {1, 2, 3};
@@ -49,7 +49,7 @@ TEST(CuboidOfPoints, IsGivenInTheWorld) {
   EXPECT_NEAR((cuboid->T_world_object.RotationMatrix().col(2) - region.R_world_grid.col(2)).norm(), 0, 1e-9);
 }
 
-TEST(CuboidOfPoints, NeedsAVolume) {
+TEST(CuboidOfPoints, ReturnsNothingWithoutVolume) {
   EXPECT_FALSE(CuboidOfPoints({}, {}, std::nullopt));
   const std::vector<Eigen::Vector3d> flat = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   EXPECT_FALSE(CuboidOfPoints({}, flat, std::nullopt));

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kCells = 20;
 constexpr uint16_t kObjectLabel = 1;
-constexpr uint16_t kNeighbourLabel = 2;
+constexpr uint16_t kNeighborLabel = 2;
 constexpr uint16_t kUnknownLabel = 3;
 
 HullRegion Region() {
@@ -26,8 +26,8 @@ HullRegion Region() {
   return region;
 }
 
-// A picture, from somewhere around the region, with random ellipses: the object, a neighbour whose cuboid is known, and
-// a thing of which nothing is known. Some cameras stand inside the region, so that a part of it is behind them.
+// A random camera around the region whose masks are random ellipses: the object, a neighbor whose cuboid is known, and
+// an object without a known cuboid. Some cameras are inside the region, so that part of it is behind them.
 Silhouette RandomSilhouette(std::mt19937& random) {
   const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   const Eigen::Vector3d center = Region().center_world;
@@ -42,7 +42,7 @@ Silhouette RandomSilhouette(std::mt19937& random) {
   auto frame = std::make_shared<Frame>();
   frame->camera = {.width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500, .cx_px = 320, .cy_px = 240};
   frame->labels = cv::Mat::zeros(480, 640, CV_16UC1);
-  for (const uint16_t label : {kObjectLabel, kNeighbourLabel, kUnknownLabel}) {
+  for (const uint16_t label : {kObjectLabel, kNeighborLabel, kUnknownLabel}) {
     const cv::Point at(static_cast<int>(draw(100, 540)), static_cast<int>(draw(80, 400)));
     const cv::Size axes(static_cast<int>(draw(40, 150)), static_cast<int>(draw(40, 150)));
     cv::ellipse(frame->labels, at, axes, draw(0, 180), 0, 360, cv::Scalar(label), cv::FILLED);
@@ -56,14 +56,25 @@ Silhouette RandomSilhouette(std::mt19937& random) {
   view.frame = frame;
   view.T_world_camera = {R_world_camera, eye};
   Silhouette silhouette = MakeSilhouette(view, ThinMasks(frame->labels, detections, {1, 2, 3}), detections[0], 0);
-  const Cuboid neighbour{.T_world_object = {Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
-                                            center + Eigen::Vector3d(draw(-0.3, 0.3), draw(-0.3, 0.3), 0)},
-                         .half_extents = {0.1, 0.15, 0.2}};
-  UpdateNeighbours({{2, neighbour}}, &silhouette);
+  const Cuboid neighbor{.T_world_object = {Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
+                                           center + Eigen::Vector3d(draw(-0.3, 0.3), draw(-0.3, 0.3), 0)},
+                        .half_extents = {0.1, 0.15, 0.2}};
+  UpdateNeighbors({{2, neighbor}}, &silhouette);
   return silhouette;
 }
 
-// Counts cells for which the hull and a look through every silhouette, in double precision, say different things.
+enum class MaskHit { kUnknown /* outside the image or occluded */, kInside, kOutside };
+
+// What the mask of a silhouette shows at a point, in double precision.
+MaskHit MaskAt(const Silhouette& silhouette, const Eigen::Vector3d& p_world) {
+  const Eigen::Matrix<double, 3, 4>& P = silhouette.P_image_world;
+  const int mask_index = silhouette.IndexAt(P.leftCols<3>() * p_world + P.col(3));
+  if (mask_index == silhouette.index) return MaskHit::kInside;
+  if (mask_index == 0) return MaskHit::kOutside;
+  return mask_index < 0 || silhouette.MayOcclude(mask_index, p_world) ? MaskHit::kUnknown : MaskHit::kOutside;
+}
+
+// Counts the cells for which the hull differs from MaskAt() of every silhouette.
 int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& silhouettes, const HullVotes& votes) {
   const HullRegion& region = hull.region();
   int differences = 0;
@@ -73,7 +84,7 @@ int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& 
     int inside = 0;
     int outside = 0;
     for (const Silhouette& silhouette : silhouettes) {
-      const MaskHit hit = silhouette.Look(region.ToWorld(p_grid));
+      const MaskHit hit = MaskAt(silhouette, region.ToWorld(p_grid));
       inside += hit == MaskHit::kInside ? 1 : 0;
       outside += hit == MaskHit::kOutside ? 1 : 0;
     }
@@ -83,10 +94,10 @@ int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& 
   return differences;
 }
 
-// Cells whose image falls on the border between two pixels of a mask may differ: so few that they do not count.
-constexpr int kMostOnBorders = kCells * kCells * kCells / 1000;
+// Cells that project to the border between two pixels of a mask may differ.
+constexpr int kMaxOnBorders = kCells * kCells * kCells / 1000;
 
-TEST(SilhouetteHullTest, EqualsALookThroughEverySilhouetteAtEveryCell) {
+TEST(SilhouetteHullTest, EqualsTheVotesOfEverySilhouetteAtEveryCell) {
   std::mt19937 random(7);
   for (int round = 0; round < 6; ++round) {
     SilhouetteHull hull;
@@ -97,12 +108,12 @@ TEST(SilhouetteHullTest, EqualsALookThroughEverySilhouetteAtEveryCell) {
       hull.Add(silhouettes.back());
     }
     for (const HullVotes votes : {HullVotes{0, 1}, HullVotes{1, 2}, HullVotes{2, 0}}) {
-      EXPECT_LE(CountDifferences(hull, silhouettes, votes), kMostOnBorders) << "round " << round;
+      EXPECT_LE(CountDifferences(hull, silhouettes, votes), kMaxOnBorders) << "round " << round;
     }
   }
 }
 
-TEST(SilhouetteHullTest, WhatIsRemovedLeavesNoTrace) {
+TEST(SilhouetteHullTest, RemovingASilhouetteUndoesItsVotes) {
   std::mt19937 random(8);
   const Silhouette stays = RandomSilhouette(random);
   const Silhouette goes = RandomSilhouette(random);

@@ -20,7 +20,7 @@ CameraModel TestCamera() {
   return {.width_px = 640, .height_px = 480, .fx_px = 520, .fy_px = 520, .cx_px = 319.5, .cy_px = 239.5};
 }
 
-// Looks at the origin from `distance` map units.
+// A camera that looks at the origin from `distance` map units.
 SE3<World, Camera> LookFrom(double azimuth_rad, double elevation_rad, double distance = 1.5) {
   const Eigen::Vector3d center =
       distance * Eigen::Vector3d(std::cos(azimuth_rad) * std::cos(elevation_rad),
@@ -32,7 +32,7 @@ SE3<World, Camera> LookFrom(double azimuth_rad, double elevation_rad, double dis
   return {R_world_camera, center};
 }
 
-// Cameras, and what each saw of a thing at the origin.
+// Cameras, and the segments that each sees of an object at the origin.
 class Scene {
  public:
   explicit Scene(double noise_px = 0.5) : noise_px_(0, noise_px) {}
@@ -47,14 +47,14 @@ class Scene {
   size_t cameras() const { return T_world_camera_.size(); }
   Eigen::Vector3d CameraCenter(size_t view) const { return T_world_camera_[view].translation(); }
 
-  // An edge in space, seen by one camera.
+  // An edge in space, projected into one camera.
   void AddEdge(size_t view, const Eigen::Vector3d& a_world, const Eigen::Vector3d& b_world) {
     AddSegment(view, Project(view, a_world), Project(view, b_world));
   }
   void AddSegment(size_t view, const Eigen::Vector2d& a_px, const Eigen::Vector2d& b_px) {
     segments_[view].push_back({Noisy(a_px), Noisy(b_px)});
   }
-  // The twelve edges of a cuboid in every view, hidden or not.
+  // The twelve edges of a cuboid in every view, without occlusion.
   void AddCuboid(double yaw_rad, const Eigen::Vector3d& half_extents) {
     const Eigen::AngleAxisd turn(yaw_rad, Eigen::Vector3d::UnitZ());
     for (size_t view = 0; view < cameras(); ++view) {
@@ -70,14 +70,14 @@ class Scene {
       }
     }
   }
-  // The upper and lower rim of an upright truncated cone as chords, and its outline's two sides, in every view.
+  // The upper and lower rim of an upright truncated cone as chords, and the two sides of its outline, in every view.
   void AddRound(double bottom_radius, double top_radius, double height) {
     constexpr int kChords = 18;
     for (size_t view = 0; view < cameras(); ++view) {
       for (int i = 0; i < kChords; ++i) {
         const double a = 2 * kPi * (i + 0.5) / kChords;
         const double b = 2 * kPi * (i + 1.5) / kChords;
-        // Where a rim's ellipse bends much, no straight segment is found.
+        // Only where the rim's ellipse bends little, a detector finds straight segments.
         const Eigen::Vector2d look = CameraCenter(view).head<2>().normalized();
         const double across = std::abs(look.dot(Eigen::Vector2d(std::cos((a + b) / 2), std::sin((a + b) / 2))));
         if (across < 0.97) continue;
@@ -139,7 +139,7 @@ const Eigen::Vector3d kBox(0.15, 0.1, 0.06);
 
 class BoxYawTest : public ::testing::TestWithParam<double> {};
 
-TEST_P(BoxYawTest, IsFoundAmongClutter) {
+TEST_P(BoxYawTest, IsFoundDespiteClutter) {
   Scene scene;
   scene.AddRing(20, 0, 2 * kPi);
   scene.AddCuboid(GetParam(), kBox);
@@ -161,7 +161,7 @@ TEST_P(BoxYawTest, IsFoundFromOneSide) {
   EXPECT_GT(yaw->confidence, 0.25);
 }
 
-TEST_P(BoxYawTest, TurnsWithTheReference) {
+TEST_P(BoxYawTest, IsRelativeToTheReference) {
   Scene scene;
   scene.AddRing(12, 0, 2 * kPi);
   scene.AddCuboid(GetParam(), kBox);
@@ -173,7 +173,7 @@ TEST_P(BoxYawTest, TurnsWithTheReference) {
   EXPECT_NEAR(plain->confidence, turned->confidence, 0.05);
 }
 
-TEST_P(BoxYawTest, BearsATiltedUp) {
+TEST_P(BoxYawTest, IsRobustToATiltedUp) {
   Scene scene;
   scene.AddRing(20, 0, 2 * kPi);
   scene.AddCuboid(GetParam(), kBox);
@@ -187,7 +187,7 @@ TEST_P(BoxYawTest, BearsATiltedUp) {
 
 INSTANTIATE_TEST_SUITE_P(Yaws, BoxYawTest, ::testing::Values(-1.4, -0.7, -0.2, 0.0, 0.35, 0.78, 1.1));
 
-TEST(YawFromLinesTest, DoubtsRoundThings) {
+TEST(YawFromLinesTest, LowConfidenceForRoundObjects) {
   for (const double end_rad : {2 * kPi, kPi / 2, kPi / 6, kPi / 18}) {
     for (const double top_radius : {0.2, 0.26}) {
       Scene scene;
@@ -200,7 +200,7 @@ TEST(YawFromLinesTest, DoubtsRoundThings) {
   }
 }
 
-TEST(YawFromLinesTest, DoubtsClutter) {
+TEST(YawFromLinesTest, LowConfidenceForClutter) {
   Scene scene;
   scene.AddRing(12, 0, 2 * kPi);
   scene.AddClutter(20);
@@ -209,7 +209,7 @@ TEST(YawFromLinesTest, DoubtsClutter) {
   EXPECT_LT(yaw->confidence, 0.1);
 }
 
-TEST(YawFromLinesTest, DoubtsTwoThingsAtDifferentYaws) {
+TEST(YawFromLinesTest, LowConfidenceForTwoObjectsWithDifferentYaws) {
   Scene scene;
   scene.AddRing(12, 0, 2 * kPi);
   scene.AddCuboid(0, kBox);
@@ -219,7 +219,7 @@ TEST(YawFromLinesTest, DoubtsTwoThingsAtDifferentYaws) {
   EXPECT_LT(yaw->confidence, 0.15);
 }
 
-TEST(YawFromLinesTest, DoubtsOneEdge) {
+TEST(YawFromLinesTest, LowConfidenceForOneEdge) {
   Scene scene;
   scene.AddCamera(0.4, 0.6);
   scene.AddEdge(0, {-0.1, 0, 0}, {0.1, 0, 0});
@@ -229,7 +229,7 @@ TEST(YawFromLinesTest, DoubtsOneEdge) {
   EXPECT_LT(yaw->confidence, 0.2);
 }
 
-TEST(YawFromLinesTest, VerticalEdgesTellNothing) {
+TEST(YawFromLinesTest, IgnoresVerticalEdges) {
   Scene scene;
   scene.AddRing(10, 0, 2 * kPi);
   for (size_t view = 0; view < scene.cameras(); ++view) {
@@ -239,14 +239,14 @@ TEST(YawFromLinesTest, VerticalEdgesTellNothing) {
   EXPECT_FALSE(scene.Yaw().has_value());
 }
 
-TEST(YawFromLinesTest, EdgesLevelWithTheCameraTellNothing) {
+TEST(YawFromLinesTest, IgnoresEdgesAtTheHeightOfTheCamera) {
   Scene scene(0);
   scene.AddCamera(0, 0);
   scene.AddEdge(0, {0.1, -0.1, 0}, {-0.2, 0.1, 0});
   EXPECT_FALSE(scene.Yaw().has_value());
 }
 
-TEST(YawFromLinesTest, NothingSeenTellsNothing) {
+TEST(YawFromLinesTest, ReturnsNothingWithoutSegments) {
   EXPECT_FALSE(YawFromLines(Eigen::Matrix3d::Identity(), {}).has_value());
   Scene scene(0);
   scene.AddCamera(0, 0.5);

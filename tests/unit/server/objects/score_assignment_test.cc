@@ -1,4 +1,4 @@
-#include "server/objects/assignment.h"
+#include "server/objects/score_assignment.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,33 +13,33 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-TEST(AssignMaximal, PrefersTheBestSumOverTheBestPair) {
+TEST(AssignByScore, MaximizesTheSumNotTheBestPair) {
   Eigen::MatrixXd scores(2, 2);
   scores << 0.9, 0.8,  //
       0.8, 0.1;
-  EXPECT_THAT(AssignMaximal(scores, 0.05), ElementsAre(1, 0));
+  EXPECT_THAT(AssignByScore(scores, 0.05), ElementsAre(1, 0));
 }
 
-TEST(AssignMaximal, LeavesAloneWhatScoresTooLittle) {
+TEST(AssignByScore, LeavesPairsBelowTheMinimumScoreUnassigned) {
   Eigen::MatrixXd scores(3, 2);
   scores << 0.1, 0.2,  //
       0.9, 0.29,       //
       0.3, 0.0;
-  EXPECT_THAT(AssignMaximal(scores, 0.3), ElementsAre(-1, 0, -1));
+  EXPECT_THAT(AssignByScore(scores, 0.3), ElementsAre(-1, 0, -1));
 }
 
-TEST(AssignMaximal, TakesEmptyMatrices) {
-  EXPECT_THAT(AssignMaximal(Eigen::MatrixXd(0, 3), 0.1), IsEmpty());
-  EXPECT_THAT(AssignMaximal(Eigen::MatrixXd(2, 0), 0.1), ElementsAre(-1, -1));
+TEST(AssignByScore, AcceptsEmptyMatrices) {
+  EXPECT_THAT(AssignByScore(Eigen::MatrixXd(0, 3), 0.1), IsEmpty());
+  EXPECT_THAT(AssignByScore(Eigen::MatrixXd(2, 0), 0.1), ElementsAre(-1, -1));
 }
 
-TEST(AssignMaximal, EqualsExhaustiveSearch) {
+TEST(AssignByScore, EqualsExhaustiveSearch) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int round = 0; round < 50; ++round) {
     Eigen::MatrixXd scores(5, 5);
     for (Eigen::Index i = 0; i < scores.size(); ++i) scores(i) = uniform(random);
-    // In every second round most pairs may not be joined, so that the problem falls into parts.
+    // In every second round most pairs are impossible, so that the problem has several components.
     const double min_score = round % 2 == 0 ? 0 : 0.7;
     const auto counted = [&](double score) { return score >= min_score ? score : 0; };
     std::vector<int> order(5);
@@ -50,7 +50,7 @@ TEST(AssignMaximal, EqualsExhaustiveSearch) {
       for (int i = 0; i < 5; ++i) sum += counted(scores(i, order[static_cast<size_t>(i)]));
       best = std::max(best, sum);
     } while (std::next_permutation(order.begin(), order.end()));
-    const std::vector<int> columns = AssignMaximal(scores, min_score);
+    const std::vector<int> columns = AssignByScore(scores, min_score);
     double sum = 0;
     for (int i = 0; i < 5; ++i) {
       if (columns[static_cast<size_t>(i)] >= 0) sum += scores(i, columns[static_cast<size_t>(i)]);

@@ -1,11 +1,11 @@
-#include "server/objects/assignment.h"
+#include "server/objects/score_assignment.h"
 
 #include "common/assignment.h"
 
 namespace romap::objects {
 namespace {
 
-// Rows and columns that hang together through pairs that may be joined.
+// Rows and columns connected by possible pairs.
 struct Component {
   std::vector<Eigen::Index> rows;
   std::vector<Eigen::Index> columns;
@@ -41,13 +41,13 @@ std::vector<Component> FindComponents(const Eigen::MatrixXd& scores, double min_
 
 }  // namespace
 
-std::vector<int> AssignMaximal(const Eigen::MatrixXd& scores, double min_score) {
+std::vector<int> AssignByScore(const Eigen::MatrixXd& scores, double min_score) {
   std::vector<int> column_of(static_cast<size_t>(scores.rows()), -1);
-  // What is far apart does not compete, and the cost of an assignment grows with the third power of its size.
+  // Each component on its own, because the time of an assignment grows with the third power of its size.
   for (const Component& component : FindComponents(scores, min_score)) {
     const auto rows = static_cast<Eigen::Index>(component.rows.size());
     const auto columns = static_cast<Eigen::Index>(component.columns.size());
-    // A joined pair costs -score, staying alone costs nothing, so padding with zeros lets any row or column stay alone.
+    // A pair costs -score. Zero cost in the padding lets every row and column stay unassigned.
     Eigen::MatrixXd cost = Eigen::MatrixXd::Zero(rows + columns, rows + columns);
     for (Eigen::Index i = 0; i < rows; ++i) {
       for (Eigen::Index j = 0; j < columns; ++j) {

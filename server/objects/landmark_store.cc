@@ -1,0 +1,160 @@
+#include "server/objects/landmark_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <utility>
+
+#include "common/map_motion.h"
+
+namespace romap::objects {
+namespace {
+
+// In the counts of landmark `owner`: what was counted for `from` counts for `into`.
+void RenameKey(LandmarkKey from, LandmarkKey into, LandmarkKey owner, std::map<LandmarkKey, uint64_t>* counts) {
+  const auto old = counts->find(from);
+  if (old == counts->end()) return;
+  if (owner != into) (*counts)[into] += old->second;
+  counts->erase(old);
+}
+
+void AddEvidence(const LandmarkEvidence& from, LandmarkKey into_key, LandmarkEvidence* into) {
+  for (const auto& [name, evidence] : from.class_evidence) into->class_evidence[name] += evidence;
+  for (const auto& [key, count] : from.observed_with) into->observed_with[key] += count;
+  for (const auto& [key, count] : from.covered_by) into->covered_by[key] += count;
+  into->observed_with.erase(into_key);
+  into->covered_by.erase(into_key);
+  into->observations += from.observations;
+  into->expected += from.observations;
+  into->keyframe_observations += from.keyframe_observations;
+}
+
+// The point whose motion stands for that of the landmark.
+Eigen::Vector3d CenterOf(const Landmark& landmark) {
+  const LandmarkGeometry& geometry = landmark.geometry;
+  if (geometry.cuboid) return geometry.cuboid->T_world_object.translation();
+  if (geometry.body_world.empty()) return landmark.last_T_world_camera.translation();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : geometry.body_world) sum += p;
+  return sum / static_cast<double>(geometry.body_world.size());
+}
+
+}  // namespace
+
+std::vector<LandmarkKey> LandmarkStore::Keys() const {
+  std::vector<LandmarkKey> keys;
+  for (const auto& landmark : landmarks_) keys.push_back(landmark->key);
+  return keys;
+}
+
+Landmark* LandmarkStore::Find(LandmarkKey key) const {
+  const auto found =
+      std::find_if(landmarks_.begin(), landmarks_.end(), [&](const auto& landmark) { return landmark->key == key; });
+  return found == landmarks_.end() ? nullptr : found->get();
+}
+
+Landmark& LandmarkStore::Create() { return *landmarks_.emplace_back(std::make_unique<Landmark>(++last_key_, config_)); }
+
+void LandmarkStore::RemoveIf(const std::function<bool(const Landmark&)>& condition) {
+  std::erase_if(landmarks_, [&](const auto& landmark) { return condition(*landmark); });
+}
+
+void LandmarkStore::Clear() {
+  landmarks_.clear();
+  points_ = {};
+}
+
+void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetections& frame) {
+  std::map<uint16_t, LandmarkKey> key_of_label{{0, kBackgroundKey}};
+  for (size_t d = 0; d < frame.detections.size(); ++d) {
+    if (frame.unambiguous[d]) key_of_label[frame.detections[d].label] = frame.keys[d];
+  }
+  const CameraModel& camera = view.frame->camera;
+  const cv::Mat& labels = view.frame->labels;
+  for (const PointObservation& observation : view.observations) {
+    // An observation near the rim of a mask has label 0 too, which is no evidence for the background.
+    if (observation.label == 0 && !labels.empty()) {
+      const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
+      const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);
+      if (labels.at<uint16_t>(v, u) != 0) continue;
+    }
+    const auto key = key_of_label.find(observation.label);
+    if (key != key_of_label.end()) points_.Vote(observation.point, key->second);
+  }
+}
+
+void LandmarkStore::SetUp(const Eigen::Vector3d& up_world) {
+  constexpr double kMinLength = 0.5;  // a shorter vector is not a direction
+  if (up_world.allFinite() && up_world.norm() > kMinLength) up_world_ = up_world.normalized();
+}
+
+void LandmarkStore::CountCoVisibility(const FrameDetections& frame, const std::vector<int>& covered_by) {
+  for (size_t i = 0; i < frame.keys.size(); ++i) {
+    if (frame.keys[i] == kNoLandmark) continue;
+    Landmark& landmark = *Find(frame.keys[i]);
+    for (size_t j = 0; j < frame.keys.size(); ++j) {
+      if (i != j && frame.keys[j] != kNoLandmark) ++landmark.evidence.observed_with[frame.keys[j]];
+    }
+  }
+  for (size_t l = 0; l < covered_by.size(); ++l) {
+    if (covered_by[l] < 0) continue;
+    ++landmarks_[l]->evidence.covered_by[landmarks_[static_cast<size_t>(covered_by[l])]->key];
+  }
+}
+
+void LandmarkStore::Merge(Landmark& from, Landmark& into, bool adopt_silhouettes) {
+  points_.Merge(from.key, into.key);
+  if (adopt_silhouettes) {
+    for (const Silhouette& silhouette : from.shape.silhouettes()) {
+      into.needs_fit |= into.shape.AddSilhouette(silhouette);
+    }
+  }
+  AddEvidence(from.evidence, into.key, &into.evidence);
+  into.keyframes.insert(into.keyframes.end(), from.keyframes.begin(), from.keyframes.end());
+  if (from.evidence.last_frame > into.evidence.last_frame) {
+    into.evidence.last_frame = from.evidence.last_frame;
+    into.evidence.missed_in_view = from.evidence.missed_in_view;
+    into.last_box_px = from.last_box_px;
+    into.last_T_world_camera = from.last_T_world_camera;
+    into.last_track_id = from.last_track_id;
+  }
+  for (const auto& landmark : landmarks_) {
+    if (landmark.get() == &from) continue;
+    RenameKey(from.key, into.key, landmark->key, &landmark->evidence.observed_with);
+    RenameKey(from.key, into.key, landmark->key, &landmark->evidence.covered_by);
+  }
+}
+
+void LandmarkStore::RemoveMerged(LandmarkKey from, LandmarkKey into) {
+  const auto position = [&](LandmarkKey key) {
+    return std::find_if(landmarks_.begin(), landmarks_.end(),
+                        [&](const auto& landmark) { return landmark->key == key; });
+  };
+  auto removed = position(from);
+  const auto kept = position(into);
+  if (removed < kept) {
+    std::swap(*removed, *kept);
+    removed = kept;
+  }
+  landmarks_.erase(removed);
+}
+
+std::optional<Sim3<World, World>> LandmarkStore::Correct(Landmark& landmark,
+                                                         const KeyframeCorrections& keyframes) const {
+  const auto S_new_old = MeanMotion(landmark.keyframes, CenterOf(landmark), keyframes);
+  LandmarkGeometry& geometry = landmark.geometry;
+  if (S_new_old) {
+    if (geometry.cuboid) geometry.cuboid = Moved(*S_new_old, *geometry.cuboid);
+    if (geometry.training_box) geometry.training_box = Moved(*S_new_old, *geometry.training_box);
+    for (Eigen::Vector3d& p : geometry.body_world) p = *S_new_old * p;
+    landmark.last_T_world_camera = S_new_old->Moved(landmark.last_T_world_camera);
+  }
+  // Up may change without any keyframe of this landmark.
+  if (geometry.cuboid) geometry.cuboid = Upright(*geometry.cuboid, up_world_);
+  if (geometry.training_box) geometry.training_box = Upright(*geometry.training_box, up_world_);
+  if (S_new_old) landmark.needs_fit |= landmark.shape.Correct(*S_new_old, keyframes, geometry.cuboid);
+  return S_new_old;
+}
+
+}  // namespace romap::objects
