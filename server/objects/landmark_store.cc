@@ -30,7 +30,7 @@ void AddEvidence(const LandmarkEvidence& from, LandmarkKey into_key, LandmarkEvi
   into->keyframe_observations += from.keyframe_observations;
 }
 
-// The point whose motion stands for that of the landmark.
+// The point at which MeanMotion() averages.
 Eigen::Vector3d CenterOf(const Landmark& landmark) {
   const LandmarkGeometry& geometry = landmark.geometry;
   if (geometry.cuboid) return geometry.cuboid->T_world_object.translation();

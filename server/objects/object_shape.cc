@@ -38,7 +38,7 @@ Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
   return silhouette.T_world_camera.rotation() * silhouette.camera.Unproject(u_px, v_px);
 }
 
-// How many silhouettes must contain a cell: it is in the image of fewer where others or the image's border cut it off.
+// How many silhouettes must contain a cell. Not all, because the cell may be occluded or outside the image in some.
 int MinInside(int silhouettes) { return std::max(1, silhouettes * 3 / 10); }
 
 // A few wrong masks must not remove part of the object, but each silhouette that may be wrong makes the hull wider.

@@ -1,14 +1,13 @@
-// Measures the object map: runs tracking, sparse map and objects over sequences with ground truth, several times with
-// other seeds (of labels, tracking and damage) and with masks damaged as real detectors do it, and prints Markdown
-// tables.
+// Measures the object map: runs tracking, sparse map and objects over sequences with ground truth, with several seeds
+// (of labels, tracking and damage) and with masks that have the errors of real detectors, and prints Markdown tables.
 //
 //   object_quality SEQUENCE... [--poses given|none|both] [--seeds N] [--damage NAME|usual|rare|all]... [--objects]
 //                  [--list] [--draw DIR] [--set SECTION.FIELD=VALUE]... [--masks FILE --detections FILE] [--jobs N]
 //                  [--debug]
 //
-// --damage says which rows there are besides that of undamaged masks. --poses none tracks the camera from the images;
-// trajectory and cuboids are then moved to the true world by the similarity that fits the trajectories best. The same
-// options print the same tables, whatever the number of jobs.
+// --damage selects rows in addition to the one with undamaged masks. --poses none tracks the camera from the images;
+// trajectory and cuboids are then transformed to the true world by the similarity that fits the trajectories best.
+// Equal options print equal tables with any number of jobs.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -38,25 +37,25 @@ struct DamageKind {
   std::string name;   // for --damage
   std::string title;  // in tables
   MaskDamage damage;
-  bool rare = false;  // belongs into the second table
+  bool rare = false;  // in the second table
 };
 
 std::vector<DamageKind> DamageKinds() {
   return {
-      {"none", "as they are", {}},
+      {"none", "undamaged", {}},
       {"drop", "30 % of the masks missing", {.drop_share = 0.3}},
-      {"rate", "on 5 frames a second", {.rate_hz = 5}},
-      {"border", "borders off by up to 4 px", {.border_px = 4}},
+      {"rate", "on 5 frames per second", {.rate_hz = 5}},
+      {"border", "borders displaced by up to 4 px", {.border_px = 4}},
       {"flips", "10 % of the classes wrong", {.class_flip_share = 0.1}},
-      {"merged", "neighbours merged in 5 % of the frames", {.merge_share = 0.05}},
+      {"merged", "neighbors merged in 5 % of the frames", {.merge_share = 0.05}},
       {"late", "half a second late", {.late_s = 0.5}},
       {"together",
        "all of these together",
        {.rate_hz = 5, .late_s = 0.5, .drop_share = 0.3, .border_px = 4, .merge_share = 0.05, .class_flip_share = 0.1}},
-      {"flicker", "missing 30 % of the time, for 10 frames on end", {.flicker_share = 0.3}, true},
+      {"flicker", "missing 30 % of the time, for 10 frames in a row", {.flicker_share = 0.3}, true},
       {"split", "10 % split in two", {.split_share = 0.1}, true},
-      {"leak", "20 % leak over their border", {.leak_share = 0.2}, true},
-      {"ghosts", "a ghost in 30 % of the frames", {.ghost_share = 0.3}, true},
+      {"leak", "20 % extend beyond their object", {.leak_share = 0.2}, true},
+      {"false", "a false detection in 30 % of the frames", {.false_positive_share = 0.3}, true},
       {"empty", "nothing found in 20 % of the frames", {.empty_share = 0.2}, true},
       {"crowd", "200 instances in every frame", {.crowd = 200}, true}};
 }
@@ -74,11 +73,11 @@ struct Options {
   int jobs = 1;
 };
 
-// One run of many that do not depend on each other.
+// One of several independent runs.
 struct Job {
   const files::Sequence* sequence = nullptr;
   ObjectRunOptions options;
-  std::string picture_dir;  // empty = no pictures
+  std::string picture_dir;  // empty = no images
   ScoredRun* result = nullptr;
   absl::Status status = absl::OkStatus();
 };
@@ -102,7 +101,7 @@ absl::Status Execute(const Job& job) {
   absl::StatusOr<Sim3<World, World>> S_true_map = Sim3<World, World>();
   if (job.options.poses == PoseUse::kIgnore) S_true_map = AlignToTruth(*job.sequence, run);
   if (!S_true_map.ok()) {
-    // Not tracked: nothing was found.
+    // The camera was not tracked, so that no object is found.
     job.result->score = ScoreMap(truth, {}, {});
     return absl::OkStatus();
   }
@@ -129,10 +128,11 @@ class Measurement {
  public:
   Measurement(const Options& options, ObjectRunOptions base) : options_(options), base_(std::move(base)) {
     for (const DamageKind& kind : DamageKinds()) {
-      const auto asked = [&](const std::string& name) {
+      const auto is_selected = [&](const std::string& name) {
         return std::find(options.damages.begin(), options.damages.end(), name) != options.damages.end();
       };
-      if (kind.name == "none" || asked("all") || asked(kind.rare ? "rare" : "usual") || asked(kind.name)) {
+      if (kind.name == "none" || is_selected("all") || is_selected(kind.rare ? "rare" : "usual") ||
+          is_selected(kind.name)) {
         kinds_.push_back(kind);
       }
     }
@@ -141,7 +141,8 @@ class Measurement {
   absl::Status Open() {
     for (const std::string& dir : options_.sequences) {
       ROMAP_ASSIGN_OR_RETURN(files::Sequence sequence, files::Sequence::Open(dir, options_.files));
-      if (!sequence.objects()) return NotFound("{}: there is no objects.yaml", dir);
+      if (!sequence.objects())
+        return NotFound("{}/objects.yaml does not exist; the sequence needs ground truth for its objects", dir);
       sequences_.push_back(std::move(sequence));
     }
     return absl::OkStatus();
@@ -150,7 +151,7 @@ class Measurement {
   absl::Status Measure(PoseUse poses) {
     std::vector<SequenceRuns> results;
     for (const files::Sequence& sequence : sequences_) {
-      // Without the slash that a folder's name may end with.
+      // Without a trailing slash.
       SequenceRuns runs{(std::filesystem::path(sequence.dir()) / ".").parent_path().filename().string(), {}};
       for (const DamageKind& kind : kinds_) {
         runs.rows.push_back({kind.title, std::vector<ScoredRun>(static_cast<size_t>(options_.seeds))});
@@ -203,7 +204,8 @@ class Measurement {
       PrintDamage(results, /*rare=*/false, "Damaged masks");
       PrintDamage(results, /*rare=*/true, "Damaged masks, continued");
     }
-    if (const std::string faults = FaultList(results); !faults.empty()) fmt::print("Not once each:\n\n{}\n", faults);
+    if (const std::string faults = FaultList(results); !faults.empty())
+      fmt::print("Missing and extra objects:\n\n{}\n", faults);
     std::fflush(stdout);
   }
 
@@ -246,22 +248,21 @@ int Main(int argc, char** argv) {
   Options options;
   CLI::App app("Measures the object map against ground truth");
   app.add_option("sequences", options.sequences, "Folders of sequences")->required();
-  app.add_option("--poses", options.poses, "Camera poses: given, none or both")
+  app.add_option("--poses", options.poses, "Camera poses: given, none (tracked from the images) or both")
       ->check(CLI::IsMember({"given", "none", "both"}));
-  app.add_option("--seeds", options.seeds, "Runs with seeds 1 to so many")->check(CLI::PositiveNumber);
+  app.add_option("--seeds", options.seeds, "Number of runs, with seeds 1, 2, ..")->check(CLI::PositiveNumber);
   std::vector<std::string> names = {"all", "usual", "rare"};
   for (const DamageKind& kind : DamageKinds()) names.push_back(kind.name);
-  app.add_option("--damage", options.damages, "How masks are damaged, besides not at all: some or all kinds")
-      ->check(CLI::IsMember(names));
+  app.add_option("--damage", options.damages, "Kinds of mask damage in addition to none")->check(CLI::IsMember(names));
   bool debug = false;
-  app.add_flag("--debug", debug, "Log why each mask was given to which object");
-  app.add_flag("--objects", options.objects, "Print the errors of each object too");
-  app.add_flag("--list", options.list, "Print what is in the map of the first seed too");
-  app.add_option("--draw", options.draw, "Folder for pictures of the cuboids of the first seed");
-  app.add_option("--set", options.assignments, "SECTION.FIELD=VALUE of the configuration, slam or objects");
-  app.add_option("--masks", options.files.masks, "List of mask images in the sequences");
-  app.add_option("--detections", options.files.detections, "What the labels of each frame mean");
-  app.add_option("--jobs", options.jobs, "So many runs at the same time")->check(CLI::PositiveNumber);
+  app.add_flag("--debug", debug, "Log the association of every mask");
+  app.add_flag("--objects", options.objects, "Also print the errors of each object");
+  app.add_flag("--list", options.list, "Also print the map of the first seed");
+  app.add_option("--draw", options.draw, "Folder for images with the cuboids of the first seed");
+  app.add_option("--set", options.assignments, "Configuration of slam or objects: SECTION.FIELD=VALUE");
+  app.add_option("--masks", options.files.masks, "List of mask images of each sequence");
+  app.add_option("--detections", options.files.detections, "File with the classes of the labels of each frame");
+  app.add_option("--jobs", options.jobs, "Number of parallel runs")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(debug ? spdlog::level::debug : spdlog::level::warn);
   cv::setNumThreads(1);

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Measures the object map, also under masks as bad as real detectors give, and prints Markdown tables.
+# Measures the object map, also with masks that have the errors of real detectors, and prints Markdown tables.
 #
 #   tests/bench/object_quality.sh BUILD_DIR OUT_DIR [SEQUENCE...]
 #
-# Without SEQUENCE it makes three synthetic ones in OUT_DIR: 150 frames of 12 objects of which three pairs are alike, two
-# hand-held and one orbit. SEEDS (5), POSES (both; given or none) and JOBS (2) in the environment say how much is run.
-# Where ROMAP_DATA_DIR names a folder with redkitchen_600, what a real detector's masks give is listed too.
+# Without SEQUENCE it renders three synthetic ones in OUT_DIR: 150 frames of 12 objects with three identical pairs, two
+# hand-held and one orbit. Environment: SEEDS (5), POSES (both; given or none), JOBS (2). If ROMAP_DATA_DIR contains
+# redkitchen_600, the map from the masks of a real detector is printed too.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
@@ -34,5 +34,5 @@ if [ -f "$kitchen/mask_yolo.txt" ]; then
   "$quality" "$kitchen" --masks mask_yolo.txt --detections detections_yolo.csv --poses "${POSES:-both}" --seeds 1 --list \
     --draw "$out/pictures_detector"
 else
-  echo 'object_quality: no real detector measured, ROMAP_DATA_DIR names no folder with redkitchen_600' >&2
+  echo 'object_quality: skipping the real detector: ROMAP_DATA_DIR/redkitchen_600/mask_yolo.txt does not exist' >&2
 fi

@@ -66,7 +66,7 @@ class Runner {
   }
 
  private:
-  // A frame's pose and what it hangs on, see TrackedFrame.
+  // The pose of a frame and its reference keyframe, see TrackedFrame.
   struct Tracked {
     int64_t timestamp_ns = 0;
     SE3<World, Camera> T_world_camera;
@@ -113,20 +113,20 @@ class Runner {
         entry->second.last = *update;
         ++entry->second.updates;
       } else if (const auto* merged = std::get_if<ObjectMerged>(&event)) {
-        Forget(merged->from, fmt::format("merged into {}", merged->into.ToString()));
+        Remove(merged->from, fmt::format("merged into {}", merged->into.ToString()));
       } else if (const auto* removed = std::get_if<ObjectRemoved>(&event)) {
-        Forget(removed->id, fmt::format("removed: {}", removed->reason));
+        Remove(removed->id, fmt::format("removed: {}", removed->reason));
       }
     }
     for (const ObjectViews& views : output.views) {
-      ToldObject& told = run_.objects[views.object];
-      told.views += views.new_views.size();
-      ++told.cuboid_changes;
+      PublishedObject& object = run_.objects[views.object];
+      object.views += views.new_views.size();
+      ++object.cuboid_changes;
     }
   }
 
-  void Forget(ObjectId id, const std::string& why) {
-    run_.gone.push_back(fmt::format("frame {}: {} {}", run_.frames, id.ToString(), why));
+  void Remove(ObjectId id, const std::string& reason) {
+    run_.removals.push_back(fmt::format("frame {}: {} {}", run_.frames, id.ToString(), reason));
     run_.objects.erase(id);
   }
 
@@ -144,8 +144,8 @@ class Runner {
 
 std::vector<ObjectUpdate> ObjectRun::Confirmed() const {
   std::vector<ObjectUpdate> confirmed;
-  for (const auto& [id, told] : objects) {
-    if (told.last.state == ObjectState::kConfirmed) confirmed.push_back(told.last);
+  for (const auto& [id, object] : objects) {
+    if (object.last.state == ObjectState::kConfirmed) confirmed.push_back(object.last);
   }
   return confirmed;
 }

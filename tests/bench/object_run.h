@@ -1,7 +1,7 @@
 #pragma once
 
-// The object mapper over a recorded sequence: tracking, sparse map and objects as a session runs them, but in one
-// thread and without fields, so that the same options give the same map.
+// Runs tracking, sparse map and object mapper over a recorded sequence as a session does, but in one thread and without
+// fields, so that equal options give equal maps.
 
 #include <cstddef>
 #include <map>
@@ -27,19 +27,19 @@ struct ObjectRunOptions {
   MaskDamage damage;
 };
 
-// What was told of one object.
-struct ToldObject {
+// Everything that was published of one object.
+struct PublishedObject {
   ObjectUpdate last;
   size_t updates = 0;         // ObjectUpdates published
-  size_t first_frame = 0;     // index in the sequence of the frame it was first told with
+  size_t first_frame = 0;     // index in the sequence of the frame of the first update
   size_t views = 0;           // training views
-  size_t cuboid_changes = 0;  // cuboids handed to its field
+  size_t cuboid_changes = 0;  // training boxes sent to its field
 };
 
 struct ObjectRun {
-  std::map<ObjectId, ToldObject> objects;      // those that are left at the end, in any state
-  std::vector<std::string> gone;               // a line for each that was merged or removed
-  std::vector<files::StampedPose> trajectory;  // of the frames that were tracked, as the map has them at the end
+  std::map<ObjectId, PublishedObject> objects;  // those in the map at the end, in any state
+  std::vector<std::string> removals;            // one line per merged or removed object
+  std::vector<files::StampedPose> trajectory;   // of the tracked frames, in the final map
   int frames = 0;
   int keyframes = 0;
   // User time of the object mapper.
@@ -50,8 +50,7 @@ struct ObjectRun {
   std::vector<ObjectUpdate> Confirmed() const;
 };
 
-// `sequence` hands out its own labels: the damage may permute them. Errors: what Sequence::Load and the decoding of
-// frames say.
+// Errors: those of Sequence::Load and of decoding frames.
 absl::StatusOr<ObjectRun> RunObjects(const files::Sequence& sequence, const ObjectRunOptions& options);
 
 }  // namespace romap::measure

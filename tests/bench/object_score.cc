@@ -20,9 +20,9 @@ ObjectErrors Compare(const eval::YawBox& box, const eval::YawBox& truth) {
   return errors;
 }
 
-// Which true object each box is matched with, -1 = none.
+// Index of the true object that each box is matched with, -1 = none.
 std::vector<int> Match(const std::vector<eval::YawBox>& boxes, const std::vector<eval::YawBox>& truth) {
-  constexpr double kNever = 1e6;  // more than all admissible pairs together
+  constexpr double kNever = 1e6;  // more than the sum of all admissible pairs
   Eigen::MatrixXd cost(boxes.size(), truth.size());
   for (size_t i = 0; i < boxes.size(); ++i) {
     for (size_t j = 0; j < truth.size(); ++j) {
@@ -38,7 +38,7 @@ std::vector<int> Match(const std::vector<eval::YawBox>& boxes, const std::vector
   return match;
 }
 
-// Name of the found object that the box shares the most volume with; empty when it touches none.
+// Name of the found object that the box shares the most volume with; empty when it overlaps none.
 std::string MostOverlapped(const eval::YawBox& box, const std::vector<eval::YawBox>& truth,
                            const std::vector<TrueObject>& objects) {
   double most = 0;
@@ -83,7 +83,7 @@ MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate>
   for (size_t i = 0; i < boxes.size(); ++i) {
     if (match[i] < 0) continue;
     const auto j = static_cast<size_t>(match[i]);
-    score.mapped[i].stands_for = score.objects[j].name;
+    score.mapped[i].matched = score.objects[j].name;
     score.objects[j].found = true;
     score.objects[j].errors = Compare(boxes[i], true_boxes[j]);
     score.objects[j].errors.right_class = objects[i].class_name == truth.objects[j].class_name;

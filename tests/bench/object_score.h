@@ -14,13 +14,13 @@ namespace romap::measure {
 // How well one true object was mapped.
 struct ObjectErrors {
   double iou = 0;          // of the upright boxes
-  double center_cm = 0;    // distance of the centres
+  double center_cm = 0;    // distance of the centers
   double in_plane_cm = 0;  // its horizontal part
   double yaw_deg = 0;      // modulo 90 degrees, 0..45: a cuboid has no front
   bool right_class = false;
 };
 
-// A true object, and what was found of it.
+// A true object and the errors of the mapped one matched with it.
 struct TrueObject {
   std::string name;
   bool found = false;
@@ -31,8 +31,8 @@ struct TrueObject {
 struct MappedObject {
   ObjectUpdate object;
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  // in the true world
-  std::string stands_for;                              // the true object it was matched with; empty: it is extra
-  std::string overlaps;  // if extra: the true object, found already, that it shares the most volume with; or empty
+  std::string matched;   // name of the true object it was matched with; empty: it is extra
+  std::string overlaps;  // if extra: name of the found true object that it shares the most volume with; or empty
 };
 
 struct MapScore {
@@ -43,9 +43,10 @@ struct MapScore {
   size_t Extra() const;
 };
 
-// Pairs the objects of a map one to one with the true ones, such that the sum of the distances of their centres is the
-// least. A pair overlaps, and its centres lie no farther apart than half the true box's diagonal; everything else is
-// missing or extra. `S_true_map` maps the world of the map to the true world, in meters.
+// Matches the objects of a map one to one with the true ones so that the sum of the distances of their centers is
+// smallest. A match requires that the boxes overlap and that the centers are no farther apart than half the diagonal of
+// the true box; other true objects are missing, and other mapped ones are extra. `S_true_map` maps the world of the map
+// to the true world, in meters.
 MapScore ScoreMap(const files::ObjectsYaml& truth, std::span<const ObjectUpdate> objects,
                   const Sim3<World, World>& S_true_map);
 

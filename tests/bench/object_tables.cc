@@ -20,10 +20,10 @@ struct Range {
   std::string Text() const { return least == most ? fmt::format("{}", most) : fmt::format("{}..{}", least, most); }
 };
 
-// What many runs amount to.
+// Results of several runs.
 class Summary {
  public:
-  // One map for each sequence, all of one seed.
+  // One map per sequence, all of one seed.
   void Add(std::span<const MapScore* const> maps) {
     size_t found = 0, extra = 0, total = 0;
     for (const MapScore* map : maps) {
@@ -41,7 +41,7 @@ class Summary {
 
   void AddErrors(const ObjectErrors& errors) {
     iou_sum_ += errors.iou;
-    least_iou_ = std::min(least_iou_, errors.iou);
+    lowest_iou_ = std::min(lowest_iou_, errors.iou);
     center_sum_cm_ += errors.center_cm;
     in_plane_sum_cm_ += errors.in_plane_cm;
     yaws_deg_.push_back(errors.yaw_deg);
@@ -52,10 +52,10 @@ class Summary {
   std::string Found() const { return fmt::format("{} of {}", found_.Text(), total_); }
   std::string Extra() const { return extra_.Text(); }
 
-  // IoU and its least, centre, in-plane and yaw errors, as cells without the bars at either end.
+  // Table cells for kErrorTitles, without the bars at either end.
   std::string ErrorCells() const {
     if (yaws_deg_.empty()) return "- | - | - | - | - | -";
-    return fmt::format("{:.3f} | {:.3f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} %", Iou(), least_iou_,
+    return fmt::format("{:.3f} | {:.3f} | {:.2f} | {:.2f} | {:.1f} | {:.0f} %", Iou(), lowest_iou_,
                        center_sum_cm_ / Count(), in_plane_sum_cm_ / Count(), Median(yaws_deg_),
                        100 * right_class_ / Count());
   }
@@ -66,14 +66,14 @@ class Summary {
   Range found_, extra_;
   size_t total_ = 0;
   double iou_sum_ = 0, center_sum_cm_ = 0, in_plane_sum_cm_ = 0, right_class_ = 0;
-  double least_iou_ = 1;
+  double lowest_iou_ = 1;
   std::vector<double> yaws_deg_;
 };
 
 constexpr const char* kErrorTitles =
-    "mean IoU | least IoU | centre [cm] | in plane [cm] | yaw, median [deg] | right class";
+    "mean IoU | lowest IoU | center [cm] | in plane [cm] | yaw, median [deg] | right class";
 
-Summary Summarise(std::span<const SequenceRuns> sequences, size_t row) {
+Summary Summarize(std::span<const SequenceRuns> sequences, size_t row) {
   Summary summary;
   for (size_t i = 0; i < sequences.front().rows[row].runs.size(); ++i) {
     std::vector<const MapScore*> maps;
@@ -90,18 +90,18 @@ std::string Line(int columns) {
 }
 
 std::string Faults(const MapScore& score) {
-  constexpr size_t kMostNamed = 4;
+  constexpr size_t kMaxNamed = 4;
   std::string faults;
   for (const TrueObject& object : score.objects) {
-    if (!object.found) faults += fmt::format("; {} is missing", object.name);
+    if (!object.found) faults += fmt::format("; missing: {}", object.name);
   }
   size_t extra = 0;
   for (const MappedObject& mapped : score.mapped) {
-    if (!mapped.stands_for.empty() || ++extra > kMostNamed) continue;
-    const std::string place = mapped.overlaps.empty() ? "" : " at the place of " + mapped.overlaps;
-    faults += fmt::format("; {} ({}){} is extra", mapped.object.id.ToString(), mapped.object.class_name, place);
+    if (!mapped.matched.empty() || ++extra > kMaxNamed) continue;
+    const std::string overlap = mapped.overlaps.empty() ? "" : ", overlaps " + mapped.overlaps;
+    faults += fmt::format("; extra: {} ({}){}", mapped.object.id.ToString(), mapped.object.class_name, overlap);
   }
-  if (extra > kMostNamed) faults += fmt::format("; {} more are extra", extra - kMostNamed);
+  if (extra > kMaxNamed) faults += fmt::format("; {} more extra", extra - kMaxNamed);
   return faults.empty() ? "" : faults.substr(2);
 }
 
@@ -111,7 +111,7 @@ std::string SequencesTable(std::span<const SequenceRuns> sequences) {
   std::string table =
       fmt::format("| sequence | frames tracked, worst | found | extra | {} |\n", kErrorTitles) + Line(10);
   for (const SequenceRuns& sequence : sequences) {
-    const Summary summary = Summarise({&sequence, 1}, 0);
+    const Summary summary = Summarize({&sequence, 1}, 0);
     double tracked_share = 1;
     for (const ScoredRun& run : sequence.rows.front().runs) tracked_share = std::min(tracked_share, run.tracked_share);
     table += fmt::format("| {} | {:.1f} % | {} | {} | {} |\n", sequence.sequence, 100 * tracked_share, summary.Found(),
@@ -122,9 +122,9 @@ std::string SequencesTable(std::span<const SequenceRuns> sequences) {
 
 std::string DamageTable(std::span<const SequenceRuns> sequences) {
   std::string table = fmt::format("| masks | found | extra | IoU drop | {} |\n", kErrorTitles) + Line(10);
-  const double undamaged = Summarise(sequences, 0).Iou();
+  const double undamaged = Summarize(sequences, 0).Iou();
   for (size_t row = 0; row < sequences.front().rows.size(); ++row) {
-    const Summary summary = Summarise(sequences, row);
+    const Summary summary = Summarize(sequences, row);
     table += fmt::format("| {} | {} | {} | {:.3f} | {} |\n", sequences.front().rows[row].damage, summary.Found(),
                          summary.Extra(), undamaged - summary.Iou(), summary.ErrorCells());
   }
@@ -150,18 +150,19 @@ std::string ObjectsTable(const DamageRuns& row) {
 }
 
 std::string MapTable(const MapScore& score) {
-  std::string table = "| object | class | score | frames | centre [m] | is | IoU | centre off [cm] |\n" + Line(8);
+  std::string table =
+      "| object | class | score | frames | center [m] | true object | IoU | center error [cm] |\n" + Line(8);
   for (const MappedObject& mapped : score.mapped) {
-    std::string is = "none of the true ones | - | -";
-    if (!mapped.overlaps.empty()) is = fmt::format("{} once more | - | -", mapped.overlaps);
+    std::string truth = "no true object | - | -";
+    if (!mapped.overlaps.empty()) truth = fmt::format("duplicate of {} | - | -", mapped.overlaps);
     for (const TrueObject& object : score.objects) {
-      if (object.name != mapped.stands_for) continue;
-      is = fmt::format("{} | {:.3f} | {:.1f}", object.name, object.errors.iou, object.errors.center_cm);
+      if (object.name != mapped.matched) continue;
+      truth = fmt::format("{} | {:.3f} | {:.1f}", object.name, object.errors.iou, object.errors.center_cm);
     }
     const Eigen::Vector3d& center_m = mapped.center_m;
     table += fmt::format("| {} | {} | {:.2f} | {} | {:.2f} {:.2f} {:.2f} | {} |\n", mapped.object.id.ToString(),
                          mapped.object.class_name, mapped.object.class_score, mapped.object.observations, center_m.x(),
-                         center_m.y(), center_m.z(), is);
+                         center_m.y(), center_m.z(), truth);
   }
   std::string missing;
   for (const TrueObject& object : score.objects) {

@@ -15,7 +15,7 @@ struct ScoredRun {
   double tracked_share = 0;  // of the frames
 };
 
-// The runs over a sequence with masks that are damaged alike, one per seed.
+// The runs over a sequence with one kind of mask damage, one per seed.
 struct DamageRuns {
   std::string damage;  // title of the table's row
   std::vector<ScoredRun> runs;
@@ -23,23 +23,22 @@ struct DamageRuns {
 
 struct SequenceRuns {
   std::string sequence;
-  std::vector<DamageRuns> rows;  // the first one is what the others are compared with
+  std::vector<DamageRuns> rows;  // the others are compared with the first one
 };
 
-// Markdown tables. IoU, centre errors and yaw errors are means over the objects that were found, in all runs together
-// (of the yaw the median: round things have none).
+// Markdown tables. IoU and center errors are means over the found objects of all runs; yaw errors are medians, because
+// the yaw of round objects is arbitrary.
 
-// A line per sequence: its first row.
+// A line per sequence, for its first row of runs.
 std::string SequencesTable(std::span<const SequenceRuns> sequences);
-// A line per damage, all sequences together; the sequences have the same rows. Found objects are summed over the
-// sequences for each seed.
+// A line per kind of damage, over all sequences, which have the same rows. Found objects are summed over the sequences
+// of each seed.
 std::string DamageTable(std::span<const SequenceRuns> sequences);
 // A line per true object.
 std::string ObjectsTable(const DamageRuns& row);
-// A line per object of one map: what it is said to be and where, and what it is.
+// A line per object of one map: its class and position, and the true object it was matched with.
 std::string MapTable(const MapScore& score);
-// What is missing or extra, a line for each run that is not perfect; empty when all are. Of many extra objects the
-// first few are named.
+// Missing and extra objects, one line for each run that has any. Names only the first few extra objects.
 std::string FaultList(std::span<const SequenceRuns> sequences);
 
 }  // namespace romap::measure

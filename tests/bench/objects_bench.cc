@@ -1,11 +1,11 @@
-// Runs the object mapper over a recorded sequence with its ground-truth poses and labels permuted in every frame, and
-// compares the cuboids with the sequence's objects.yaml.
+// Runs the object mapper over a recorded sequence with its ground-truth poses and with labels permuted in every frame,
+// and compares the cuboids with the sequence's objects.yaml.
 //
 //   objects_bench DIR [--masks mask_yolo.txt --detections detections_yolo.csv] [--set SECTION.FIELD=VALUE]... [--debug]
 //
-// Prints for each told object: the nearest true one, overlap, errors, the share of the true surface (gt/*.ply, points
-// some camera saw) inside the cuboid as it is and enlarged by 10 % as the fields train on it, updates, views, the frame
-// of the first cuboid; and user time per frame and keyframe.
+// Prints for each published object: the nearest true one, overlap, errors, the share of the true surface (points of
+// gt/*.ply seen by some camera) inside the cuboid and inside the cuboid enlarged by 10 %, the number of updates and
+// views, and the frame of the first cuboid. Also prints the user time per frame and keyframe.
 
 #include <spdlog/spdlog.h>
 
@@ -37,7 +37,7 @@ const files::ObjectRecord* NearestTrue(const files::Sequence& sequence, const Cu
   return nearest;
 }
 
-// Difference of two yaws that leaves the same box: within 45 degrees.
+// Yaw error modulo a quarter turn, 0..45 degrees: a box has no front.
 double YawErrorDeg(const SE3<World, Object>& a, const SE3<World, Object>& b) {
   const Eigen::Vector3d x = (a.rotation().conjugate() * b.rotation()).toRotationMatrix().col(0);
   const double degrees = std::atan2(x.y(), x.x()) * 180 / 3.14159265358979;
@@ -62,17 +62,17 @@ std::vector<Eigen::Vector3d> TrueSurface(const files::Sequence& sequence, const 
 }
 
 void Print(const files::Sequence& sequence, const ObjectRun& run) {
-  for (const std::string& line : run.gone) std::printf("%s\n", line.c_str());
+  for (const std::string& line : run.removals) std::printf("%s\n", line.c_str());
   double iou_sum = 0;
-  for (const auto& [id, told] : run.objects) {
-    const Cuboid& cuboid = told.last.cuboid;
+  for (const auto& [id, object] : run.objects) {
+    const Cuboid& cuboid = object.last.cuboid;
     const Eigen::Vector3d half_cm = 100 * cuboid.half_extents;
     std::printf(
         "%-10s %-13s score %.2f state %d first %3zu seen %3lu updates %2zu boxes %2zu views %2zu half %.1f %.1f %.1f "
         "cm",
-        id.ToString().c_str(), told.last.class_name.c_str(), told.last.class_score, static_cast<int>(told.last.state),
-        told.first_frame, told.last.observations, told.updates, told.cuboid_changes, told.views, half_cm.x(),
-        half_cm.y(), half_cm.z());
+        id.ToString().c_str(), object.last.class_name.c_str(), object.last.class_score,
+        static_cast<int>(object.last.state), object.first_frame, object.last.observations, object.updates,
+        object.cuboid_changes, object.views, half_cm.x(), half_cm.y(), half_cm.z());
     if (const files::ObjectRecord* truth = NearestTrue(sequence, cuboid)) {
       const Cuboid true_cuboid{.T_world_object = truth->T_world_object, .half_extents = truth->half_extents};
       const Eigen::Vector3d true_half_cm = 100 * truth->half_extents;

@@ -1,10 +1,11 @@
-// Yaw from line segments against a sequence's objects.yaml, with its own poses and masks.
+// Compares the yaw from line segments with a sequence's objects.yaml, using the poses and masks of the sequence.
 //
 //   yaw_bench DIR...
 //
-// Takes each object's silhouettes as the object mapper would (keyframes 3 degrees apart, at most 36) and prints its yaw
-// error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2 degrees about x and
-// about y, and for runs of the first, second, ... few views; and the yaw of the principal axis of its map points.
+// Selects each object's silhouettes as the object mapper does (keyframes at least 3 degrees apart, at most 36) and
+// prints the yaw error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2
+// degrees about x and about y, and for consecutive groups of a few views; and the yaw error of the principal axis of
+// the object's map points.
 
 #include <cstdio>
 #include <map>
@@ -27,50 +28,50 @@
 namespace romap::measure {
 namespace {
 
-// What was seen of one object.
-struct Seen {
+// The observations of one object.
+struct ObservedObject {
   std::vector<Eigen::Matrix3d> R_world_camera;
   std::vector<std::vector<objects::LineSegment>> segments;
   std::vector<Eigen::Vector3d> directions;
-  std::map<MapPointId, int> points;  // and how often each lay on the mask
+  std::map<MapPointId, int> points;  // number of keyframes with the point on its mask
 };
 
 struct Run {
-  std::map<int64_t, Seen> objects;  // by label
+  std::map<int64_t, ObservedObject> objects;  // by label
   std::map<MapPointId, Eigen::Vector3d> points;
   double find_s = 0;
   int crops = 0;
   double crop_area_px2 = 0;
 };
 
-void Look(const KeyframeView& view, const objects::ObjectsConfig& config, Run& run) {
+void ObserveKeyframe(const KeyframeView& view, const objects::ObjectsConfig& config, Run& run) {
   const Frame& frame = *view.frame;
   for (const MapPoint& point : view.points) run.points[point.id] = point.position_world;
   for (const PointObservation& observation : view.observations) {
     if (observation.label != 0) ++run.objects[observation.label].points[observation.point];
   }
   for (const objects::Detection& detection : objects::ExtractDetections(frame, config)) {
-    Seen& seen = run.objects[detection.label];
+    ObservedObject& observed = run.objects[detection.label];
     const cv::Rect& box_px = detection.box_px;
     const Eigen::Vector3d direction =
         view.T_world_camera.rotation() *
         frame.camera.Unproject(box_px.x + (box_px.width - 1) / 2.0, box_px.y + (box_px.height - 1) / 2.0);
-    const bool redundant = std::any_of(seen.directions.begin(), seen.directions.end(), [&](const auto& other) {
+    const bool redundant = std::any_of(observed.directions.begin(), observed.directions.end(), [&](const auto& other) {
       return objects::AngleBetween(other, direction) < config.silhouette_angle_deg * objects::kRadPerDeg;
     });
-    if (redundant || seen.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
+    if (redundant || observed.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
     const double start = UserSeconds();
-    seen.segments.push_back(
+    observed.segments.push_back(
         objects::FindLineSegments(frame.image_bgr, frame.labels, detection.label, detection.box_px));
     run.find_s += UserSeconds() - start;
-    seen.directions.push_back(direction);
-    seen.R_world_camera.push_back(view.T_world_camera.RotationMatrix());
+    observed.directions.push_back(direction);
+    observed.R_world_camera.push_back(view.T_world_camera.RotationMatrix());
     run.crop_area_px2 += detection.box_px.area();
     ++run.crops;
   }
 }
 
-absl::StatusOr<Run> LookAtSequence(const files::Sequence& sequence) {
+absl::StatusOr<Run> ObserveSequence(const files::Sequence& sequence) {
   const slam::SlamConfig slam;
   const objects::ObjectsConfig objects;
   slam::LocalMapSlot local_map;
@@ -82,7 +83,7 @@ absl::StatusOr<Run> LookAtSequence(const files::Sequence& sequence) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest.Accept(input));
     const slam::MappedFrame mapped = sparse.Process(tracker.Track(frame));
-    if (mapped.view) Look(*mapped.view, objects, run);
+    if (mapped.view) ObserveKeyframe(*mapped.view, objects, run);
   }
   return run;
 }
@@ -99,7 +100,7 @@ void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::s
               yaw->edges, spent_ms);
 }
 
-void PrintRuns(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
+void PrintGroups(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
   for (const size_t count : {1, 3, 6, 12}) {
     std::printf("    by %2zu:", count);
     for (size_t first = 0; first + count <= views.size(); first += count) {
@@ -113,10 +114,10 @@ void PrintRuns(const Eigen::Matrix3d& R_world_reference, std::span<const objects
 void PrintObject(const files::Sequence& sequence, const Run& run, const files::ObjectRecord& truth) {
   const auto found = run.objects.find(truth.id);
   if (found == run.objects.end()) return;
-  const Seen& seen = found->second;
+  const ObservedObject& observed = found->second;
   std::vector<objects::LineView> views;
-  for (size_t i = 0; i < seen.segments.size(); ++i) {
-    views.push_back({sequence.camera(), seen.R_world_camera[i], seen.segments[i]});
+  for (size_t i = 0; i < observed.segments.size(); ++i) {
+    views.push_back({sequence.camera(), observed.R_world_camera[i], observed.segments[i]});
   }
   const Eigen::Matrix3d R_true = truth.T_world_object.RotationMatrix();
   std::printf("%-10s %2zu views", truth.name.c_str(), views.size());
@@ -125,7 +126,7 @@ void PrintObject(const files::Sequence& sequence, const Run& run, const files::O
   PrintYaw("| tilted", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX()) * R_true, views);
   PrintYaw("|", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()) * R_true, views);
   std::vector<Eigen::Vector3d> points;
-  for (const auto& [id, count] : seen.points) {
+  for (const auto& [id, count] : observed.points) {
     const auto position = run.points.find(id);
     if (count >= 2 && position != run.points.end()) points.push_back(truth.T_world_object.Inverse() * position->second);
   }
@@ -133,17 +134,18 @@ void PrintObject(const files::Sequence& sequence, const Run& run, const files::O
   std::printf(" | PCA of %zu points", points.size());
   if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / objects::kRadPerDeg, 90));
   std::printf("\n");
-  PrintRuns(R_true, views);
+  PrintGroups(R_true, views);
 }
 
 int Main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const auto sequence = files::Sequence::Open(argv[i]);
     if (!sequence.ok() || !sequence->objects()) {
-      std::fprintf(stderr, "%s: %s\n", argv[i], sequence.ok() ? "no objects.yaml" : Message(sequence.status()).c_str());
+      std::fprintf(stderr, "%s: %s\n", argv[i],
+                   sequence.ok() ? "objects.yaml does not exist" : Message(sequence.status()).c_str());
       return 2;
     }
-    const auto run = LookAtSequence(*sequence);
+    const auto run = ObserveSequence(*sequence);
     if (!run.ok()) {
       std::fprintf(stderr, "%s\n", Message(run.status()).c_str());
       return 1;

@@ -15,7 +15,7 @@ namespace {
 
 using synth::Random;
 
-// Each kind of fault draws from a stream of its own, so that it does not depend on the others.
+// Each kind of fault has its own random stream, so that it does not depend on the others.
 enum class Fault : uint64_t {
   kEmpty = 1,
   kDrop,
@@ -25,7 +25,7 @@ enum class Fault : uint64_t {
   kSplit,
   kLeak,
   kClassFlip,
-  kGhost,
+  kFalsePositive,
   kCrowd,
   kLabels
 };
@@ -40,7 +40,7 @@ struct Region {
   int area_px = 0;
 };
 
-// By rising label.
+// Ordered by label.
 std::map<uint32_t, Region> Regions(const cv::Mat& labels) {
   struct Bounds {
     int left, top, right, bottom, area_px;
@@ -71,7 +71,7 @@ Instance* Find(FrameMasks& masks, uint32_t label) {
   return found == masks.instances.end() ? nullptr : &*found;
 }
 
-// Adds an instance like `like` under a label that is not used yet.
+// Adds an instance like `like` with an unused label; returns the label.
 uint32_t AddInstance(FrameMasks& masks, Instance like) {
   uint32_t label = 0;
   for (const Instance& instance : masks.instances) label = std::max(label, instance.label);
@@ -81,7 +81,7 @@ uint32_t AddInstance(FrameMasks& masks, Instance like) {
   return like.label;
 }
 
-// A blob's pixels within an image of this size: 255 in an ellipse, else 0.
+// An image of this size, 255 in a random ellipse and 0 elsewhere.
 cv::Mat Blob(const cv::Size& size, const cv::Point2d& center_px, double radius_px, Random& random) {
   cv::Mat blob = cv::Mat::zeros(size, CV_8UC1);
   const cv::Size2d axes(radius_px * random.Uniform(0.7, 1.3), radius_px * random.Uniform(0.7, 1.3));
@@ -94,7 +94,8 @@ void Drop(const MaskDamage& damage, FrameMasks& masks) {
   for (const auto& [label, region] : Regions(masks.labels)) {
     bool missed = RandomFor(damage.seed, Fault::kDrop, masks.frame_id, label).Chance(damage.drop_share);
     if (damage.flicker_frames > 0) {
-      // Time falls into windows of the runs' length, of which each is missed or not; objects are out of step.
+      // Time is divided into windows of flicker_frames, with an offset per object. The object is missed in whole
+      // windows.
       const auto frames = static_cast<uint64_t>(damage.flicker_frames);
       const uint64_t window = (masks.frame_id + synth::Scramble(label) % frames) / frames;
       missed |= RandomFor(damage.seed, Fault::kFlicker, window, label).Chance(damage.flicker_share);
@@ -103,26 +104,26 @@ void Drop(const MaskDamage& damage, FrameMasks& masks) {
   }
 }
 
-// Distance of the boxes in pixels, 0 when they overlap.
+// Distance between the boxes, 0 when they overlap.
 double Gap_px(const cv::Rect& a, const cv::Rect& b) {
   const int across = std::max({0, a.x - b.br().x, b.x - a.br().x});
   const int down = std::max({0, a.y - b.br().y, b.y - a.br().y});
   return std::hypot(across, down);
 }
 
-// One of the pairs whose boxes touch becomes one instance, or where none do the nearest pair.
-void MergeNeighbours(const MaskDamage& damage, FrameMasks& masks) {
+// One of the pairs of nearest boxes becomes one instance.
+void MergeNeighbors(const MaskDamage& damage, FrameMasks& masks) {
   Random random = RandomFor(damage.seed, Fault::kMerge, masks.frame_id);
   if (!random.Chance(damage.merge_share)) return;
   const std::map<uint32_t, Region> regions = Regions(masks.labels);
-  double least_px = 1e9;
+  double min_px = 1e9;
   std::vector<std::pair<uint32_t, uint32_t>> nearest;
   for (auto a = regions.begin(); a != regions.end(); ++a) {
     for (auto b = std::next(a); b != regions.end(); ++b) {
       const double gap_px = Gap_px(a->second.box_px, b->second.box_px);
-      if (gap_px < least_px) nearest.clear();
-      least_px = std::min(least_px, gap_px);
-      if (gap_px == least_px) nearest.emplace_back(a->first, b->first);
+      if (gap_px < min_px) nearest.clear();
+      min_px = std::min(min_px, gap_px);
+      if (gap_px == min_px) nearest.emplace_back(a->first, b->first);
     }
   }
   if (nearest.empty()) return;
@@ -136,7 +137,7 @@ cv::Point2d Centroid(const cv::Mat& pixels) {
   return {moments.m10 / moments.m00, moments.m01 / moments.m00};
 }
 
-// Cuts masks in two along a line through their middle.
+// Splits masks along a random line through their centroid.
 void Split(const MaskDamage& damage, FrameMasks& masks) {
   for (const auto& [label, region] : Regions(masks.labels)) {
     Random random = RandomFor(damage.seed, Fault::kSplit, masks.frame_id, label);
@@ -162,8 +163,8 @@ void Leak(const MaskDamage& damage, FrameMasks& masks) {
     Random random = RandomFor(damage.seed, Fault::kLeak, masks.frame_id, label);
     if (!random.Chance(damage.leak_share)) continue;
     const cv::Mat pixels = masks.labels == static_cast<int>(label);
-    if (cv::countNonZero(pixels) == 0) continue;  // another one leaked over it
-    // The last pixel of the mask on the way out of its middle.
+    if (cv::countNonZero(pixels) == 0) continue;  // another mask leaked over all of it
+    // The last pixel of the mask on a random ray from its centroid.
     const cv::Point2d middle = Centroid(pixels);
     const double angle = random.Uniform(0, 2 * std::numbers::pi);
     const cv::Point2d outward(std::cos(angle), std::sin(angle));
@@ -178,9 +179,9 @@ void Leak(const MaskDamage& damage, FrameMasks& masks) {
   }
 }
 
-// Smooth noise of about one value per `kBorderWavelength_px`, -amplitude..amplitude.
+// Smooth noise in -amplitude..amplitude with a wavelength of kBorderWavelength_px.
 cv::Mat SmoothNoise(const cv::Size& size, double amplitude, Random& random) {
-  constexpr int kBorderWavelength_px = 16;  // as of a network's coarse mask
+  constexpr int kBorderWavelength_px = 16;  // as in the coarse masks of neural networks
   cv::Mat coarse(size.height / kBorderWavelength_px + 3, size.width / kBorderWavelength_px + 3, CV_32FC1);
   for (auto value = coarse.begin<float>(); value != coarse.end<float>(); ++value) {
     *value = static_cast<float>(random.Uniform(-amplitude, amplitude));
@@ -191,7 +192,7 @@ cv::Mat SmoothNoise(const cv::Size& size, double amplitude, Random& random) {
   return fine(cv::Rect(offset, size));
 }
 
-// Distance to the border, positive inside. The border runs between the pixels.
+// Distance of each pixel to the border of the set ones, positive inside. The border is between pixels.
 cv::Mat SignedDistance_px(const cv::Mat& pixels) {
   cv::Mat inside, outside;
   cv::distanceTransform(pixels, inside, cv::DIST_L2, cv::DIST_MASK_PRECISE);
@@ -201,16 +202,16 @@ cv::Mat SignedDistance_px(const cv::Mat& pixels) {
   return inside - outside;
 }
 
-// Each mask grows and shrinks along its border; where two reach for a pixel the one that lies deeper in it has it.
+// Displaces the border of each mask. A pixel in two displaced masks gets the one it is deeper inside of.
 void DisplaceBorders(const MaskDamage& damage, FrameMasks& masks) {
-  const int reach_px = static_cast<int>(std::ceil(damage.border_px)) + 2;
+  const int margin_px = static_cast<int>(std::ceil(damage.border_px)) + 2;
   const cv::Rect image(cv::Point(), masks.labels.size());
   cv::Mat displaced = cv::Mat::zeros(masks.labels.size(), CV_16UC1);
   cv::Mat depth_px = cv::Mat::zeros(masks.labels.size(), CV_32FC1);
   for (const auto& [label, region] : Regions(masks.labels)) {
     Random random = RandomFor(damage.seed, Fault::kBorder, masks.frame_id, label);
-    const cv::Rect around = cv::Rect(region.box_px.tl() - cv::Point(reach_px, reach_px),
-                                     region.box_px.br() + cv::Point(reach_px, reach_px)) &
+    const cv::Rect around = cv::Rect(region.box_px.tl() - cv::Point(margin_px, margin_px),
+                                     region.box_px.br() + cv::Point(margin_px, margin_px)) &
                             image;
     const cv::Mat inside_px = SignedDistance_px(masks.labels(around) == static_cast<int>(label)) +
                               SmoothNoise(around.size(), damage.border_px, random);
@@ -225,20 +226,20 @@ std::string AnyOf(const std::vector<std::string>& names, Random& random) {
   return names.empty() ? "object" : names[static_cast<size_t>(random.Below(static_cast<int>(names.size())))];
 }
 
-// Adds a blob on free ground; nothing where there is none.
+// Adds a blob where no mask is; nothing if there is no such pixel.
 void AddBlob(FrameMasks& masks, const std::string& class_name, double radius_px, double score, Random& random) {
   const cv::Point2d center_px(random.Uniform(0, masks.labels.cols), random.Uniform(0, masks.labels.rows));
-  const cv::Mat free_ground = Blob(masks.labels.size(), center_px, radius_px, random) & (masks.labels == 0);
-  if (cv::countNonZero(free_ground) == 0) return;
+  const cv::Mat unmasked = Blob(masks.labels.size(), center_px, radius_px, random) & (masks.labels == 0);
+  if (cv::countNonZero(unmasked) == 0) return;
   const uint32_t label = AddInstance(masks, {.class_name = class_name, .score = score, .track_id = std::nullopt});
-  masks.labels.setTo(static_cast<int>(label), free_ground);
+  masks.labels.setTo(static_cast<int>(label), unmasked);
 }
 
-void AddGhost(const MaskDamage& damage, const std::vector<std::string>& class_names, FrameMasks& masks) {
-  if (damage.ghost_frames <= 0) return;
-  const uint64_t window = masks.frame_id / static_cast<uint64_t>(damage.ghost_frames);
-  Random random = RandomFor(damage.seed, Fault::kGhost, window);
-  if (!random.Chance(damage.ghost_share)) return;
+void AddFalsePositive(const MaskDamage& damage, const std::vector<std::string>& class_names, FrameMasks& masks) {
+  if (damage.false_positive_frames <= 0) return;
+  const uint64_t window = masks.frame_id / static_cast<uint64_t>(damage.false_positive_frames);
+  Random random = RandomFor(damage.seed, Fault::kFalsePositive, window);
+  if (!random.Chance(damage.false_positive_share)) return;
   const double radius_px = masks.labels.cols * random.Uniform(0.03, 0.08);
   const std::string class_name = AnyOf(class_names, random);
   AddBlob(masks, class_name, radius_px, random.Uniform(0.3, 0.8), random);
@@ -272,7 +273,7 @@ void PermuteLabels(const MaskDamage& damage, FrameMasks& masks) {
   Random random = RandomFor(damage.seed, Fault::kLabels, masks.frame_id);
   double highest = 0;
   cv::minMaxLoc(masks.labels, nullptr, &highest);
-  // Those of an 8-bit label image, unless there are more.
+  // All labels of an 8-bit image, or more if there are more.
   std::vector<uint16_t> renamed(static_cast<size_t>(std::max(highest, 255.0)) + 1);
   std::iota(renamed.begin(), renamed.end(), uint16_t{0});
   for (size_t i = renamed.size() - 1; i > 1; --i) {
@@ -283,7 +284,7 @@ void PermuteLabels(const MaskDamage& damage, FrameMasks& masks) {
     for (int u = 0; u < masks.labels.cols; ++u) row[u] = renamed[row[u]];
   }
   for (Instance& instance : masks.instances) instance.label = renamed[instance.label];
-  // So that their order tells nothing either.
+  // Otherwise the order of the list would identify the objects.
   std::sort(masks.instances.begin(), masks.instances.end(),
             [](const Instance& a, const Instance& b) { return a.label < b.label; });
 }
@@ -320,7 +321,7 @@ std::optional<FrameMasks> MaskDamager::TakeLateMasks(int64_t now_ns) {
 
 bool MaskDamager::DetectorRuns(const Frame& frame) {
   if (damage_.rate_hz <= 0) return true;
-  // A millisecond of grace: recorded times are rounded.
+  // One millisecond of tolerance, because recorded timestamps are rounded.
   const auto tick =
       static_cast<int64_t>(std::floor((1e-9 * static_cast<double>(frame.timestamp_ns) + 1e-3) * damage_.rate_hz));
   if (last_tick_ && tick <= *last_tick_) return false;
@@ -336,13 +337,13 @@ FrameMasks MaskDamager::DamagedMasks(const Frame& frame) const {
     return masks;
   }
   if (damage_.drop_share > 0 || damage_.flicker_share > 0) Drop(damage_, masks);
-  if (damage_.merge_share > 0) MergeNeighbours(damage_, masks);
+  if (damage_.merge_share > 0) MergeNeighbors(damage_, masks);
   if (damage_.split_share > 0) Split(damage_, masks);
   if (damage_.leak_share > 0) Leak(damage_, masks);
   if (damage_.border_px > 0) DisplaceBorders(damage_, masks);
   KeepVisible(masks);
   if (damage_.class_flip_share > 0) FlipClasses(damage_, class_names_, masks);
-  if (damage_.ghost_share > 0) AddGhost(damage_, class_names_, masks);
+  if (damage_.false_positive_share > 0) AddFalsePositive(damage_, class_names_, masks);
   if (damage_.crowd > 0) AddCrowd(damage_, class_names_, masks);
   if (damage_.permute_labels) PermuteLabels(damage_, masks);
   return masks;

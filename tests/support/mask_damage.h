@@ -1,6 +1,6 @@
 #pragma once
 
-// Instance masks as bad as real detectors give them: every way they go wrong has a dial.
+// Instance masks with the errors of real detectors, each with a parameter.
 
 #include <cstdint>
 #include <deque>
@@ -13,44 +13,44 @@
 
 namespace romap {
 
-// All off by default. Shares are probabilities in 0..1, drawn anew for each mask or frame as said.
+// All errors are off by default. Shares are probabilities in 0..1.
 struct MaskDamage {
   // The whole detector.
-  double rate_hz = 0;      // so often it runs at most, on frames in between there are no masks; 0 = on every frame
-  double late_s = 0;       // after so much of the frames' time its masks arrive; 0 = with their frame
-  double empty_share = 0;  // of the frames on which it runs and finds nothing
-  // What it misses.
-  double drop_share = 0;     // of the masks, each by itself
-  double flicker_share = 0;  // of the time, in which an object is not found for flicker_frames on end
+  double rate_hz = 0;      // maximum rate; frames in between have no masks. 0 = every frame
+  double late_s = 0;       // delay of its masks in time of the frames; 0 = with their frame
+  double empty_share = 0;  // of the frames on which it runs but finds nothing
+  // Missed objects.
+  double drop_share = 0;     // of the masks, independently
+  double flicker_share = 0;  // of the time in which an object is missed, for flicker_frames in a row
   int flicker_frames = 10;
-  // Where one thing ends and the next begins.
-  double border_px = 0;    // the borders are displaced by up to so much, smoothly along the border
-  double merge_share = 0;  // of the frames in which two neighbours are one mask
-  double split_share = 0;  // of the masks that are two instances
-  double leak_share = 0;   // of the masks that spill over their border by a blob, onto whatever is there
-  // What it believes to see.
-  double class_flip_share = 0;  // of the instances that are called something else
-  double ghost_share = 0;       // of the time in which a blob is seen where nothing is, for ghost_frames on end
-  int ghost_frames = 4;
-  int crowd = 0;  // small blobs are added until there are so many instances
-  // Labels are renamed at random in every frame: what a detector without a tracker delivers.
+  // Wrong outlines.
+  double border_px = 0;    // maximum displacement of the borders, smooth along the border
+  double merge_share = 0;  // of the frames in which two neighbors get one mask
+  double split_share = 0;  // of the masks that become two instances
+  double leak_share = 0;   // of the masks that extend beyond the object by a blob, over anything there
+  // Wrong detections.
+  double class_flip_share = 0;      // of the instances with a wrong class
+  double false_positive_share = 0;  // of the time with a false detection, for false_positive_frames in a row
+  int false_positive_frames = 4;
+  int crowd = 0;  // small blobs are added up to this number of instances
+  // Labels are permuted at random in every frame, as by a detector without a tracker.
   bool permute_labels = false;
   uint64_t seed = 1;
 };
 
-// Damages the masks of a sequence. What happens to a frame follows from the seed and the frame's id alone (rate and
-// lateness also from the times), and switching one fault on does not change what the others do. Flicker tells objects
-// by their labels: for its runs to hit one object they have to be the same from frame to frame.
+// Damages the masks of a sequence. The damage of a frame depends on the seed and the frame id alone (rate and delay
+// also on the timestamps), and each error is independent of the others. Flicker identifies objects by their labels,
+// which therefore have to be the same in every frame.
 class MaskDamager {
  public:
-  // `class_names`: the names that flips and ghosts choose from; with fewer than two there are no flips.
+  // `class_names`: classes for class flips and false detections. With fewer than two there are no flips.
   MaskDamager(const MaskDamage& damage, std::vector<std::string> class_names);
 
-  // The next frame in order of time with what is left of its masks. An instance without a pixel is not listed.
+  // The next frame in order of time with damaged masks. Instances without a pixel are removed from its list.
   std::shared_ptr<const Frame> Damage(const Frame& frame);
 
-  // The next masks that have arrived by `now_ns`, oldest first; nullopt when there are none. They belong to earlier
-  // frames, which were handed out without masks. Empty forever unless late_s > 0.
+  // The next masks that arrive until `now_ns`, oldest first; nullopt when there are none. They belong to earlier
+  // frames, which were returned without masks. Only with late_s > 0.
   std::optional<FrameMasks> TakeLateMasks(int64_t now_ns);
 
  private:
@@ -64,7 +64,7 @@ class MaskDamager {
 
   MaskDamage damage_;
   std::vector<std::string> class_names_;
-  std::optional<int64_t> last_tick_;  // of the detector's clock at which it ran
+  std::optional<int64_t> last_tick_;  // tick of the detector's clock at which it last ran
   std::deque<Waiting> late_;
 };
 

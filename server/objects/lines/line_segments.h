@@ -8,7 +8,7 @@
 
 namespace romap::objects {
 
-// A straight edge in an image. Pixels of the whole pinhole image, pixel centres at integer coordinates.
+// A straight edge in an image. Pixels of the whole pinhole image, pixel centers at integer coordinates.
 struct LineSegment {
   Eigen::Vector2d from_px;
   Eigen::Vector2d to_px;

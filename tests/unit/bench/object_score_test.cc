@@ -35,43 +35,44 @@ ObjectUpdate Mapped(uint64_t id, const Eigen::Vector3d& center, double yaw_rad =
   return object;
 }
 
-TEST(ScoreMap, MeasuresWhatItMatched) {
+TEST(ScoreMap, MeasuresTheErrorsOfMatchedObjects) {
   const std::vector<ObjectUpdate> objects = {Mapped(1, {0.33, 0, 0.09}), Mapped(2, {0, 0, 0.05}, std::numbers::pi)};
   const MapScore score = ScoreMap(TwoBooks(), objects, {});
   ASSERT_EQ(score.Found(), 2U);
   EXPECT_EQ(score.Extra(), 0U);
-  EXPECT_EQ(score.mapped[0].stands_for, "right");
-  EXPECT_EQ(score.mapped[1].stands_for, "left");
+  EXPECT_EQ(score.mapped[0].matched, "right");
+  EXPECT_EQ(score.mapped[1].matched, "left");
   EXPECT_NEAR(score.objects[1].errors.center_cm, 5, 1e-9);
   EXPECT_NEAR(score.objects[1].errors.in_plane_cm, 3, 1e-9);
   const double shared = 0.17 * 0.1 * 0.06;
   EXPECT_NEAR(score.objects[1].errors.iou, shared / (2 * 0.002 - shared), 1e-9);
   EXPECT_TRUE(score.objects[1].errors.right_class);
-  EXPECT_NEAR(score.objects[0].errors.iou, 1, 1e-9) << "half a turn leaves a box as it is";
+  EXPECT_NEAR(score.objects[0].errors.iou, 1, 1e-9) << "half a turn does not change a box";
   EXPECT_NEAR(score.objects[0].errors.yaw_deg, 0, 1e-9);
 }
 
-TEST(ScoreMap, CallsTheSameThingTwiceExtra) {
+TEST(ScoreMap, ADuplicateIsExtra) {
   const std::vector<ObjectUpdate> objects = {Mapped(1, {0.02, 0, 0.05}), Mapped(2, {0.01, 0, 0.05}),
                                              Mapped(3, {0.3, 0, 0.05})};
   const MapScore score = ScoreMap(TwoBooks(), objects, {});
   EXPECT_EQ(score.Found(), 2U);
   EXPECT_EQ(score.Extra(), 1U);
-  EXPECT_EQ(score.mapped[0].stands_for, "") << "the other one is nearer";
+  EXPECT_EQ(score.mapped[0].matched, "") << "the duplicate is nearer";
   EXPECT_EQ(score.mapped[0].overlaps, "left");
-  EXPECT_EQ(score.mapped[1].stands_for, "left");
+  EXPECT_EQ(score.mapped[1].matched, "left");
 }
 
-TEST(ScoreMap, DoesNotTakeWhatIsFarForFound) {
+TEST(ScoreMap, DoesNotMatchDistantObjects) {
   const std::vector<ObjectUpdate> objects = {Mapped(1, {0, 0, 0.16}), Mapped(2, {0.47, 0, 0.05})};
   const MapScore score = ScoreMap(TwoBooks(), objects, {});
-  EXPECT_EQ(score.Found(), 0U) << "one shares no volume, the other's centre is beyond half a diagonal";
+  EXPECT_EQ(score.Found(), 0U)
+      << "one shares no volume, the center of the other one is farther away than half a diagonal";
   EXPECT_EQ(score.Extra(), 2U);
   EXPECT_EQ(score.mapped[1].overlaps, "");
 }
 
-TEST(ScoreMap, MovesTheMapIntoTheTrueWorld) {
-  // The map is half as large, turned by 90 degrees and shifted.
+TEST(ScoreMap, TransformsTheMapToTheTrueWorld) {
+  // The map is half as large, rotated by 90 degrees and shifted.
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
   const Sim3<World, World> S_true_map(2, turn, {1, 2, 3});
   const Eigen::Vector3d center_map = S_true_map.Inverse() * Eigen::Vector3d(0.3, 0, 0.05);
@@ -83,7 +84,7 @@ TEST(ScoreMap, MovesTheMapIntoTheTrueWorld) {
   EXPECT_NEAR((score.mapped[0].center_m - Eigen::Vector3d(0.3, 0, 0.05)).norm(), 0, 1e-12);
 }
 
-TEST(ScoreMap, FindsNothingInAnEmptyMap) {
+TEST(ScoreMap, AnEmptyMapHasNoFoundObjects) {
   const MapScore score = ScoreMap(TwoBooks(), {}, {});
   EXPECT_EQ(score.Found(), 0U);
   EXPECT_EQ(score.Extra(), 0U);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int64_t kFrame_ns = 40'000'000;
 
-// Two rows of three squares of 40 px, labels 1..6: 1 and 2 touch, the others keep 40 px apart.
+// Two rows of three squares of 40 px, labels 1..6: 1 and 2 touch, the others are 40 px apart.
 Frame SixSquares(uint64_t frame_id) {
   Frame frame;
   frame.frame_id = frame_id;
@@ -43,7 +43,7 @@ bool SameMasks(const Frame& a, const Frame& b) {
   return !a.has_masks || cv::countNonZero(a.labels != b.labels) == 0;
 }
 
-// What is wrong with a frame's masks; empty when every instance has pixels and every pixel has an instance.
+// An inconsistency of a frame's masks; empty when every instance has pixels and every masked pixel an instance.
 std::string Faults(const Frame& frame) {
   std::set<uint32_t> painted;
   for (auto it = frame.labels.begin<uint16_t>(); it != frame.labels.end<uint16_t>(); ++it) painted.insert(*it);
@@ -56,7 +56,7 @@ std::string Faults(const Frame& frame) {
   return painted == listed ? "" : "the labels in the image and the list differ";
 }
 
-// The first frames, damaged.
+// The first frames with damaged masks.
 std::vector<std::shared_ptr<const Frame>> DamagedFrames(const MaskDamage& damage, int count) {
   MaskDamager damager(damage, kClasses);
   std::vector<std::shared_ptr<const Frame>> frames;
@@ -64,19 +64,19 @@ std::vector<std::shared_ptr<const Frame>> DamagedFrames(const MaskDamage& damage
   return frames;
 }
 
-TEST(MaskDamage, ChangesNothingUnasked) {
+TEST(MaskDamage, ChangesNothingByDefault) {
   for (const auto& frame : DamagedFrames({}, 20)) EXPECT_TRUE(SameMasks(*frame, SixSquares(frame->frame_id)));
 }
 
-TEST(MaskDamage, LeavesTheFrameItGetsAsItIs) {
+TEST(MaskDamage, DoesNotModifyItsInput) {
   const Frame frame = SixSquares(1);
   MaskDamager damager({.drop_share = 1, .permute_labels = true}, kClasses);
   damager.Damage(frame);
   EXPECT_TRUE(SameMasks(frame, SixSquares(1)));
 }
 
-// All faults at once, as much of each as leaves something of the others to see.
-MaskDamage Everything(uint64_t seed) {
+// All faults at once, each weak enough not to hide the others.
+MaskDamage AllFaults(uint64_t seed) {
   MaskDamage damage;
   damage.drop_share = 0.2;
   damage.flicker_share = 0.1;
@@ -85,21 +85,21 @@ MaskDamage Everything(uint64_t seed) {
   damage.split_share = 0.2;
   damage.leak_share = 0.3;
   damage.class_flip_share = 0.3;
-  damage.ghost_share = 0.4;
+  damage.false_positive_share = 0.4;
   damage.crowd = 12;
   damage.permute_labels = true;
   damage.seed = seed;
   return damage;
 }
 
-TEST(MaskDamage, KeepsLabelsAndListTogether) {
-  for (const auto& frame : DamagedFrames(Everything(3), 60)) EXPECT_EQ(Faults(*frame), "") << frame->frame_id;
+TEST(MaskDamage, KeepsLabelsAndInstancesConsistent) {
+  for (const auto& frame : DamagedFrames(AllFaults(3), 60)) EXPECT_EQ(Faults(*frame), "") << frame->frame_id;
 }
 
-TEST(MaskDamage, FollowsFromSeedAndFrameAlone) {
-  const auto all = DamagedFrames(Everything(3), 30);
-  const auto others = DamagedFrames(Everything(4), 30);
-  MaskDamager damager(Everything(3), kClasses);
+TEST(MaskDamage, DependsOnSeedAndFrameIdAlone) {
+  const auto all = DamagedFrames(AllFaults(3), 30);
+  const auto others = DamagedFrames(AllFaults(4), 30);
+  MaskDamager damager(AllFaults(3), kClasses);
   int different = 0;
   for (size_t i = 0; i < all.size(); i += 3) {
     EXPECT_TRUE(SameMasks(*damager.Damage(SixSquares(i + 1)), *all[i]));
@@ -118,13 +118,13 @@ TEST(MaskDamage, OneFaultDoesNotChangeAnother) {
   }
 }
 
-TEST(MaskDamage, DropsTheShareAskedFor) {
+TEST(MaskDamage, DropsTheGivenShare) {
   size_t left = 0;
   for (const auto& frame : DamagedFrames({.drop_share = 0.3}, 200)) left += frame->instances.size();
   EXPECT_NEAR(static_cast<double>(left) / 1200, 0.7, 0.04);
 }
 
-TEST(MaskDamage, RunsAtTheRateAskedFor) {
+TEST(MaskDamage, RunsAtTheGivenRate) {
   // 25 frames a second.
   int masked = 0;
   uint64_t last = 0;
@@ -189,20 +189,20 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
   int changed = 0;
   for (const auto& frame : DamagedFrames({.border_px = amplitude_px}, 10)) {
     const Frame truth = SixSquares(frame->frame_id);
-    for (uint32_t label = 3; label <= 6; ++label) {  // those that have no neighbour
+    for (uint32_t label = 3; label <= 6; ++label) {  // those without a neighbor
       const cv::Mat is = frame->labels == static_cast<int>(label);
       const cv::Mat was = truth.labels == static_cast<int>(label);
-      cv::Mat core, reach, outline;
+      cv::Mat core, max_area, outline;
       const int size_px = 2 * static_cast<int>(amplitude_px) + 3;
       const cv::Mat square = cv::Mat::ones(size_px, size_px, CV_8UC1);
       cv::erode(was, core, square);
-      cv::dilate(was, reach, square);
+      cv::dilate(was, max_area, square);
       EXPECT_EQ(cv::countNonZero(core & ~is), 0) << "a hole in " << label;
-      EXPECT_EQ(cv::countNonZero(is & ~reach), 0) << "beyond the reach of " << label;
+      EXPECT_EQ(cv::countNonZero(is & ~max_area), 0) << "more than the amplitude outside of " << label;
       changed += cv::countNonZero(is != was);
-      // Smooth: one piece, and opening it takes nothing away but its corners.
-      cv::Mat pieces;
-      EXPECT_EQ(cv::connectedComponents(is, pieces), 2);
+      // Smooth: one component, and a morphological opening removes only its corners.
+      cv::Mat components;
+      EXPECT_EQ(cv::connectedComponents(is, components), 2);
       cv::Mat opened;
       cv::morphologyEx(is, opened, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8UC1));
       EXPECT_LT(cv::countNonZero(is != opened), 30);
@@ -213,7 +213,7 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
   EXPECT_LT(mean_shift_px, 0.75 * amplitude_px);
 }
 
-TEST(MaskDamage, FlipsClassesToOthersOfTheSequence) {
+TEST(MaskDamage, FlipsClassesToOtherGivenOnes) {
   int flipped = 0;
   for (const auto& frame : DamagedFrames({.class_flip_share = 0.1}, 300)) {
     const Frame truth = SixSquares(frame->frame_id);
@@ -226,7 +226,7 @@ TEST(MaskDamage, FlipsClassesToOthersOfTheSequence) {
   EXPECT_NEAR(flipped / 1800.0, 0.1, 0.03);
 }
 
-TEST(MaskDamage, MergesTheMasksThatTouch) {
+TEST(MaskDamage, MergesTouchingMasks) {
   for (const auto& frame : DamagedFrames({.merge_share = 1}, 5)) {
     EXPECT_EQ(frame->instances.size(), 5U);
     EXPECT_EQ(std::max(Area_px(*frame, 1), Area_px(*frame, 2)), 3200);
@@ -256,25 +256,26 @@ TEST(MaskDamage, LeaksOverTheBorder) {
     for (uint32_t label = 3; label <= 6; ++label) {
       EXPECT_GT(Area_px(*frame, label), 1650);
       EXPECT_LT(Area_px(*frame, label), 2600);
-      cv::Mat pieces;
-      EXPECT_EQ(cv::connectedComponents(frame->labels == static_cast<int>(label), pieces), 2) << "the blob hangs on";
+      cv::Mat components;
+      EXPECT_EQ(cv::connectedComponents(frame->labels == static_cast<int>(label), components), 2)
+          << "the blob is connected to the mask";
     }
   }
 }
 
-TEST(MaskDamage, GhostsStayForAFewFramesOnFreeGround) {
-  int frames_with_ghost = 0;
-  std::map<uint64_t, cv::Mat> ghost_of_window;
-  for (const auto& frame : DamagedFrames({.ghost_share = 0.5, .ghost_frames = 5}, 400)) {
+TEST(MaskDamage, FalsePositivesPersistForSomeFramesOutsideOtherMasks) {
+  int frames_with_false_positive = 0;
+  std::map<uint64_t, cv::Mat> blob_of_window;
+  for (const auto& frame : DamagedFrames({.false_positive_share = 0.5, .false_positive_frames = 5}, 400)) {
     const Frame truth = SixSquares(frame->frame_id);
     EXPECT_EQ(cv::countNonZero((frame->labels != truth.labels) & (truth.labels != 0)), 0);
     ASSERT_LE(frame->instances.size(), 7U);
-    const cv::Mat ghost = frame->labels == 7;
-    frames_with_ghost += frame->instances.size() == 7 ? 1 : 0;
-    const auto [first, is_first] = ghost_of_window.try_emplace(frame->frame_id / 5, ghost);
-    EXPECT_EQ(cv::countNonZero(first->second != ghost), 0) << "frame " << frame->frame_id;
+    const cv::Mat blob = frame->labels == 7;
+    frames_with_false_positive += frame->instances.size() == 7 ? 1 : 0;
+    const auto [first, is_first] = blob_of_window.try_emplace(frame->frame_id / 5, blob);
+    EXPECT_EQ(cv::countNonZero(first->second != blob), 0) << "frame " << frame->frame_id;
   }
-  EXPECT_NEAR(frames_with_ghost / 400.0, 0.5, 0.15);
+  EXPECT_NEAR(frames_with_false_positive / 400.0, 0.5, 0.15);
 }
 
 TEST(MaskDamage, FindsNothingInSomeFrames) {
@@ -289,14 +290,14 @@ TEST(MaskDamage, FindsNothingInSomeFrames) {
   EXPECT_NEAR(empty / 300.0, 0.2, 0.07);
 }
 
-TEST(MaskDamage, FillsTheFrameWithACrowd) {
+TEST(MaskDamage, AddsInstancesUpToTheCrowd) {
   for (const auto& frame : DamagedFrames({.crowd = 200, .permute_labels = true}, 3)) {
     EXPECT_EQ(frame->instances.size(), 200U);
     EXPECT_EQ(Faults(*frame), "");
   }
 }
 
-TEST(MaskDamage, PermutationKeepsTheMasks) {
+TEST(MaskDamage, PermutingLabelsKeepsTheMasks) {
   std::set<uint32_t> labels_of_vase;
   for (const auto& frame : DamagedFrames({.permute_labels = true}, 20)) {
     const Frame truth = SixSquares(frame->frame_id);
