@@ -77,7 +77,7 @@ class FitPass {
 void ShapeFitter::AddSilhouettes(const KeyframeView& view, const FrameDetections& frame, const Cuboids& cuboids,
                                  LandmarkStore* store) const {
   if (frame.detections.empty()) return;
-  const auto masks = ThinMasks(view.frame->labels, frame.detections, frame.keys);
+  const auto masks = SubsampleMasks(view.frame->labels, frame.detections, frame.keys);
   std::vector<NewSilhouette> added;
   for (size_t d = 0; d < frame.detections.size(); ++d) {
     if (!frame.unambiguous[d]) continue;

@@ -63,8 +63,8 @@ Eigen::Matrix<double, 3, 4> ProjectionOf(const Silhouette& silhouette) {
 
 }  // namespace
 
-std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
-                                               const std::vector<LandmarkKey>& keys) {
+std::shared_ptr<const KeyframeMasks> SubsampleMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
+                                                    const std::vector<LandmarkKey>& keys) {
   auto masks = std::make_shared<KeyframeMasks>();
   masks->stride_px = std::max(1, labels.cols / kMaxColumns);
   masks->keys = keys;

@@ -28,8 +28,8 @@ inline constexpr uint8_t kOtherMask = 255;
 
 // Subsamples to at most about 320 columns, which changes a mask's box by a pixel or two. `keys`: the landmarks of
 // `detections`. Detections beyond the first 254 are kOtherMask.
-std::shared_ptr<const KeyframeMasks> ThinMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
-                                               const std::vector<LandmarkKey>& keys);
+std::shared_ptr<const KeyframeMasks> SubsampleMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
+                                                    const std::vector<LandmarkKey>& keys);
 
 // A cuboid as the affine map from the world that takes its inside to the cube [-1, 1]^3.
 struct UnitBox {

@@ -42,7 +42,7 @@ inline ObservedObject ObserveObject(SyntheticShape shape, const Eigen::Vector3d&
     if (corrupt) corrupt(i, 1, &frame.labels);
     const std::vector<Detection> detections = ExtractDetections(frame, {});
     view.frame = std::make_shared<const Frame>(std::move(frame));
-    const auto masks = ThinMasks(view.frame->labels, detections, {1});
+    const auto masks = SubsampleMasks(view.frame->labels, detections, {1});
     observed.silhouettes.push_back(MakeSilhouette(view, masks, detections.front(), 0));
   }
   CuboidEvidence& evidence = observed.evidence;

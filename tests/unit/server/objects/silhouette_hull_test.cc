@@ -55,7 +55,7 @@ Silhouette RandomSilhouette(std::mt19937& random) {
   KeyframeView view;
   view.frame = frame;
   view.T_world_camera = {R_world_camera, eye};
-  Silhouette silhouette = MakeSilhouette(view, ThinMasks(frame->labels, detections, {1, 2, 3}), detections[0], 0);
+  Silhouette silhouette = MakeSilhouette(view, SubsampleMasks(frame->labels, detections, {1, 2, 3}), detections[0], 0);
   const Cuboid neighbor{.T_world_object = {Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
                                            center + Eigen::Vector3d(draw(-0.3, 0.3), draw(-0.3, 0.3), 0)},
                         .half_extents = {0.1, 0.15, 0.2}};
