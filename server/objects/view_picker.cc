@@ -138,8 +138,8 @@ ObjectView MakeView(const ViewCandidate& candidate, const ViewContext& context) 
   return view;
 }
 
-}  // namespace
-
+// Variance of the Laplacian of the gray image inside `box_px`: small for blurred images. Source: J. L. Pech-Pacheco et
+// al., "Diatom autofocusing in brightfield microscopy", ICPR 2000.
 double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px) {
   const cv::Rect box = box_px & cv::Rect({}, image_bgr.size());
   if (box.empty()) return 0;
@@ -152,6 +152,8 @@ double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px) {
   cv::meanStdDev(laplacian, mean, deviation);
   return deviation[0] * deviation[0];
 }
+
+}  // namespace
 
 void ViewPicker::Offer(ViewCandidate candidate) {
   if (waiting_.size() >= kMaxWaitingKeyframes) {

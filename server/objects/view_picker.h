@@ -42,10 +42,6 @@ struct ViewContext {
   std::span<const Neighbor> neighbors;  // the other confirmed objects
 };
 
-// Variance of the Laplacian of the gray image inside `box_px`: small for blurred images. Source: J. L. Pech-Pacheco et
-// al., "Diatom autofocusing in brightfield microscopy", ICPR 2000.
-double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px);
-
 // Picks the training views of one object from its keyframes. The paper picks a keyframe whose direction differs by 25
 // degrees from that of the last view. Here it must differ by ObjectsConfig::view_angle_deg from every view, or be at a
 // clearly different distance: a camera that returns adds nothing, so a smaller angle is affordable. The first few views
