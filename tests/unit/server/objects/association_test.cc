@@ -63,7 +63,7 @@ class AssociationTest : public ::testing::Test {
   std::vector<std::unique_ptr<Landmark>> landmarks_;
 };
 
-TEST_F(AssociationTest, IdenticalNeighboursKeepTheirMasks) {
+TEST_F(AssociationTest, IdenticalNeighborsKeepTheirMasks) {
   AddCube(-0.15, "cup");
   AddCube(0.15, "cup");
   AddMask(3, BoxOf(*landmarks_[1]), "cup");
