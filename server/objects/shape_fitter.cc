@@ -108,11 +108,12 @@ void ShapeFitter::FindSegments(const KeyframeView& view, std::vector<NewSilhouet
   };
   std::sort(candidates.begin(), candidates.end(), [&](const auto* a, const auto* b) { return rank(a) < rank(b); });
   constexpr size_t kMaxSearches = 1;  // per keyframe
-  if (candidates.size() > kMaxSearches) candidates.resize(kMaxSearches);
-  for (NewSilhouette* entry : candidates) {
-    entry->silhouette.segments =
-        FindLineSegments(view.frame->image_bgr, view.frame->labels, entry->detection->label, entry->detection->box_px);
-    entry->silhouette.has_segments = true;
+  for (size_t i = 0; i < std::min(kMaxSearches, candidates.size()); ++i) {
+    const Detection& detection = *candidates[i]->detection;
+    Silhouette& silhouette = candidates[i]->silhouette;
+    silhouette.segments =
+        FindLineSegments(view.frame->image_bgr, view.frame->labels, detection.label, detection.box_px);
+    silhouette.has_segments = true;
   }
 }
 
