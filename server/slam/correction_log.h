@@ -9,28 +9,27 @@
 
 namespace romap::slam {
 
-// Remembers what later stages were told of keyframes and points, and tells what has moved since. Small motions add up
-// until they are worth a word.
+// Records which keyframe poses and point positions later stages have, and reports which of them have changed
+// noticeably. Motions too small to report accumulate until they are noticeable.
 class CorrectionLog {
  public:
-  void Tell(const KeyframeView& view, double scale);
-  // What moved since it was told; from now on it counts as told. Empty lists: nothing did.
-  MapCorrection Take(const SlamMap& map);
-  void Forget();
+  // A keyframe that is handed to later stages. `scale`: see ScaledPose.
+  void Record(const KeyframeView& view, double scale);
+  // Everything that moved since it was recorded or last returned here.
+  MapCorrection TakeCorrection(const SlamMap& map);
 
  private:
-  struct Told {
-    SE3<World, Camera> T_world_camera;
-    double scale = 1;
-    double depth_mu = 0;  // median, of what it saw: the measure of what is noticeable
+  struct RecordedKeyframe {
+    ScaledPose pose;
+    double depth_mu = 0;  // median of its points; scales the smallest noticeable translation
   };
-  struct ToldPoint {
+  struct RecordedPoint {
     Eigen::Vector3d position_world;
     double noticeable_mu = 0;
   };
 
-  std::map<KeyframeId, Told> keyframes_;
-  std::map<MapPointId, ToldPoint> points_;
+  std::map<KeyframeId, RecordedKeyframe> keyframes_;
+  std::map<MapPointId, RecordedPoint> points_;
 };
 
 }  // namespace romap::slam

@@ -14,9 +14,8 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kMinSharedPoints = 15;
-constexpr int kStrongSharedPoints = 80;  // an edge of the pose graph besides parents and loops
-constexpr double kLoopWeight = 3;        // over that of an edge between neighbors
+constexpr int kStrongSharedPoints = 80;  // for an edge of the pose graph besides those to parents and loops
+constexpr double kLoopWeight = 3;        // relative to an edge between neighbors
 constexpr size_t kFusedNeighbors = 12;
 
 using Similarities = std::map<KeyframeId, Sim3<World, Camera>>;
@@ -25,7 +24,7 @@ Sim3<Camera, Camera> Between(const Similarities& poses, KeyframeId a, KeyframeId
   return poses.at(a).Inverse() * poses.at(b);
 }
 
-// Edges with what the map said before the correction, and the loops with what was measured.
+// Edges between keyframes as they were before the correction, and the measured edge of the new loop.
 std::vector<PoseGraphEdge> Edges(const SlamMap& map, const Similarities& before, const LoopMatch& loop,
                                  const std::map<KeyframeId, int>& node_of) {
   std::vector<PoseGraphEdge> edges;
@@ -34,7 +33,7 @@ std::vector<PoseGraphEdge> Edges(const SlamMap& map, const Similarities& before,
     if (a == b || !known.insert(std::minmax(a, b)).second) return;
     edges.push_back({.a = node_of.at(a), .b = node_of.at(b), .S_a_b = S_a_b, .weight = weight});
   };
-  add(loop.place, loop.keyframe, loop.S_place_keyframe, kLoopWeight);
+  add(loop.old, loop.newest, loop.S_old_newest, kLoopWeight);
   for (const auto& [id, keyframe] : map.keyframes()) {
     for (const auto& [other, S_this_other] : keyframe.loops) add(id, other, Between(before, id, other), kLoopWeight);
     if (keyframe.parent) add(keyframe.parent, id, Between(before, keyframe.parent, id), 1);
@@ -45,8 +44,8 @@ std::vector<PoseGraphEdge> Edges(const SlamMap& map, const Similarities& before,
   return edges;
 }
 
-// Writes new similarities of the keyframes into the map; points go along with the keyframe that saw them first.
-void Write(const Similarities& before, const Similarities& after, SlamMap& map) {
+// Moves all keyframes; each point moves with the keyframe that observed it first.
+void MoveMap(const Similarities& before, const Similarities& after, SlamMap& map) {
   std::map<KeyframeId, Sim3<World, World>> moved;
   for (auto& [id, keyframe] : map.keyframes()) {
     const Sim3<World, World> S_new_old = after.at(id) * before.at(id).Inverse();
@@ -61,53 +60,65 @@ void Write(const Similarities& before, const Similarities& after, SlamMap& map) 
   }
 }
 
+// Moves the keyframes of `new_side` onto the old side and distributes the error. False: the optimization failed and the
+// map is unchanged.
+bool CorrectDrift(const LoopMatch& loop, bool fix_scale, const std::vector<MapKeyframe*>& new_side, SlamMap& map) {
+  Similarities before;
+  std::map<KeyframeId, int> node_of;
+  std::vector<PoseGraphNode> nodes;
+  for (const auto& [id, keyframe] : map.keyframes()) {
+    before.emplace(id, Sim3<World, Camera>(keyframe.T_world_camera()));
+    node_of[id] = static_cast<int>(nodes.size());
+    // Given poses are exact, and the old side defines the world.
+    nodes.push_back({.S_world_camera = before.at(id), .fixed = keyframe.pose_given || id == loop.old});
+  }
+  const std::vector<PoseGraphEdge> edges = Edges(map, before, loop, node_of);
+  // The optimization starts with the new side where the loop puts it.
+  const Sim3<World, Camera> S_world_newest = before.at(loop.old) * loop.S_old_newest;
+  const Sim3<World, World> S_new_old = S_world_newest * before.at(loop.newest).Inverse();
+  for (const MapKeyframe* keyframe : new_side) {
+    PoseGraphNode& node = nodes[static_cast<size_t>(node_of.at(keyframe->id))];
+    if (!node.fixed) node.S_world_camera = S_new_old * before.at(keyframe->id);
+  }
+  const PoseGraphSummary summary = OptimizePoseGraph(nodes, edges, {.fix_scale = fix_scale});
+  spdlog::info(
+      "slam: loop from {} to {}: drift {:.0f} px, scale {:.3f}; pose graph of {} keyframes and {} edges, cost {:.3g} "
+      "-> "
+      "{:.3g}",
+      loop.newest.ToString(), loop.old.ToString(), loop.drift_px, S_new_old.scale(), nodes.size(), edges.size(),
+      summary.initial_cost, summary.final_cost);
+  if (!summary.usable) return false;
+  Similarities after;
+  for (const auto& [id, node] : node_of) after.emplace(id, nodes[static_cast<size_t>(node)].S_world_camera);
+  MoveMap(before, after, map);
+  return true;
+}
+
+// The keyframe and its neighbors.
+std::vector<MapKeyframe*> SideOf(MapKeyframe& keyframe, SlamMap& map) {
+  std::vector<MapKeyframe*> side = {&keyframe};
+  for (const auto& [id, shared] : map.Covisible(keyframe, kMinSharedPoints)) side.push_back(map.FindKeyframe(id));
+  return side;
+}
+
 }  // namespace
 
 bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, SlamMap& map) {
-  MapKeyframe& newest = *map.FindKeyframe(loop.keyframe);
-  MapKeyframe& place = *map.FindKeyframe(loop.place);
-  std::vector<MapKeyframe*> new_side = {&newest};
-  for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) new_side.push_back(map.FindKeyframe(id));
-  std::vector<MapKeyframe*> old_side = {&place};
-  for (const auto& [id, shared] : map.Covisible(place, kMinSharedPoints)) old_side.push_back(map.FindKeyframe(id));
-  const bool drifted = loop.disagreement_px > kNoDrift_px;
-
+  MapKeyframe& newest = *map.FindKeyframe(loop.newest);
+  MapKeyframe& old = *map.FindKeyframe(loop.old);
+  std::vector<MapKeyframe*> new_side = SideOf(newest, map);
+  std::vector<MapKeyframe*> old_side = SideOf(old, map);
+  const bool drifted = loop.drift_px > kNoDrift_px;
   if (drifted) {
-    Similarities before;
-    std::map<KeyframeId, int> node_of;
-    std::vector<PoseGraphNode> nodes;
-    for (const auto& [id, keyframe] : map.keyframes()) {
-      before.emplace(id, Sim3<World, Camera>(keyframe.T_world_camera()));
-      node_of[id] = static_cast<int>(nodes.size());
-      // What the client said of its poses holds; the old side is where the map began to be drawn.
-      nodes.push_back({.S_world_camera = before.at(id), .fixed = keyframe.pose_given || id == loop.place});
-    }
-    const std::vector<PoseGraphEdge> edges = Edges(map, before, loop, node_of);
-    // A good start: the new side where the loop puts it.
-    const Sim3<World, Camera> S_world_newest = before.at(loop.place) * loop.S_place_keyframe;
-    const Sim3<World, World> S_new_old = S_world_newest * before.at(loop.keyframe).Inverse();
-    for (const MapKeyframe* keyframe : new_side) {
-      PoseGraphNode& node = nodes[static_cast<size_t>(node_of.at(keyframe->id))];
-      if (!node.fixed) node.S_world_camera = S_new_old * before.at(keyframe->id);
-    }
-    const PoseGraphSummary summary = OptimizePoseGraph(nodes, edges, {.fix_scale = fix_scale});
-    spdlog::info(
-        "slam: loop from {} to {}: off by {:.0f} px, scale by {:.3f}; pose graph of {} keyframes and {} edges, "
-        "cost {:.3g} -> {:.3g}",
-        loop.keyframe.ToString(), loop.place.ToString(), loop.disagreement_px, S_new_old.scale(), nodes.size(),
-        edges.size(), summary.initial_cost, summary.final_cost);
-    if (!summary.usable) return false;
-    Similarities after;
-    for (const auto& [id, node] : node_of) after.emplace(id, nodes[static_cast<size_t>(node)].S_world_camera);
-    Write(before, after, map);
-    newest.loops.emplace_back(loop.place, loop.S_place_keyframe.Inverse());
-    place.loops.emplace_back(loop.keyframe, loop.S_place_keyframe);
+    if (!CorrectDrift(loop, fix_scale, new_side, map)) return false;
+    newest.loops.emplace_back(loop.old, loop.S_old_newest.Inverse());
+    old.loops.emplace_back(loop.newest, loop.S_old_newest);
   } else {
-    spdlog::debug("slam: loop from {} to {} fits already: {:.1f} px", loop.keyframe.ToString(), loop.place.ToString(),
-                  loop.disagreement_px);
+    spdlog::debug("slam: loop from {} to {} without correction: drift {:.1f} px", loop.newest.ToString(),
+                  loop.old.ToString(), loop.drift_px);
   }
 
-  for (const auto& [seen, known] : loop.same_points) map.MergePoints(seen, known);
+  for (const auto& [from, into] : loop.same_points) map.MergePoints(from, into);
   PointMaker maker(config, &map);
   if (old_side.size() > kFusedNeighbors) old_side.resize(kFusedNeighbors);
   if (new_side.size() > kFusedNeighbors) new_side.resize(kFusedNeighbors);

@@ -9,7 +9,6 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kMinSharedPoints = 15;
 constexpr size_t kMaxHoldingKeyframes = 20;
 
 class ProblemBuilder {

@@ -58,7 +58,7 @@ std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyfram
     // The newest ones are what tracking hangs on, and the first one holds the world.
     return !keyframe.pose_given && keyframe.parent && keyframe.loops.empty() && keyframe.id.value + 5 < newest.id.value;
   };
-  for (const auto& [id, shared] : map.Covisible(newest, 15)) {
+  for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) {
     if (gone.size() == kMaxGone) break;
     const MapKeyframe& keyframe = *map.FindKeyframe(id);
     if (may_go(keyframe) && IsRedundant(keyframe, map)) {

@@ -9,11 +9,11 @@
 namespace romap::slam {
 namespace {
 
-// More frames than any camera takes while masks are waited for.
-constexpr size_t kMaxPassedFrames = 512;
+// 17 s at 30 frames/s, longer than any detector takes.
+constexpr size_t kMaxWaitingFrames = 512;
 
 MapKeyframe* KeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
-  // Late masks are of new keyframes; these are in the order of their frames.
+  // Late masks belong to recent keyframes, and keyframes are in the order of their frames.
   for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
     const uint64_t of_keyframe = it->second.frame->frame_id;
     if (of_keyframe == frame_id) return &it->second;
@@ -27,13 +27,13 @@ MapKeyframe* KeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
 void MaskVoter::ObserveFrame(const TrackedFrame& tracked, SlamMap& map) {
   if (!tracked.reference) return;
   const Frame& frame = *tracked.frame;
-  const PassedFrame passed{.frame_id = frame.frame_id,
-                           .camera = frame.camera,
-                           .reference = tracked.reference,
-                           .T_reference_camera = tracked.T_reference_camera};
-  if (frame.has_masks) return Vote(passed, frame.labels, map);
-  passed_.push_back(passed);
-  if (passed_.size() > kMaxPassedFrames) passed_.pop_front();
+  const WaitingFrame waiting{.frame_id = frame.frame_id,
+                             .camera = frame.camera,
+                             .reference = tracked.reference,
+                             .T_reference_camera = tracked.T_reference_camera};
+  if (frame.has_masks) return Vote(waiting, frame.labels, map);
+  waiting_.push_back(waiting);
+  if (waiting_.size() > kMaxWaitingFrames) waiting_.pop_front();
 }
 
 void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
@@ -43,14 +43,14 @@ void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
     }
     return;
   }
-  const auto passed =
-      std::ranges::find_if(passed_, [&](const PassedFrame& frame) { return frame.frame_id == masks.frame_id; });
-  if (passed == passed_.end()) return;
-  Vote(*passed, masks.labels, map);
-  passed_.erase(passed);
+  const auto waiting =
+      std::ranges::find_if(waiting_, [&](const WaitingFrame& frame) { return frame.frame_id == masks.frame_id; });
+  if (waiting == waiting_.end()) return;
+  Vote(*waiting, masks.labels, map);
+  waiting_.erase(waiting);
 }
 
-void MaskVoter::Vote(const PassedFrame& frame, const cv::Mat& labels, SlamMap& map) const {
+void MaskVoter::Vote(const WaitingFrame& frame, const cv::Mat& labels, SlamMap& map) const {
   const MapKeyframe* reference = map.FindKeyframe(frame.reference);
   if (reference == nullptr || reference->frame->has_masks || labels.empty()) return;
   const SE3<Camera, World> T_camera_world =

@@ -19,21 +19,20 @@ constexpr int kCandidates = 5;
 constexpr int kLoopCandidates = 3;
 constexpr int kMaxDistance = 60;  // Hamming, bits
 constexpr double kRatio = 0.85;
-constexpr int kMinLooksInliers = 12;  // of matches by looks
+constexpr int kMinFirstInliers = 12;  // of matches by descriptors
 constexpr int kMinPoints = 40;        // after a search by projection
 constexpr double kMinInlierShare = 0.5;
 constexpr double kWideRadius_px = 10;
 constexpr double kNarrowRadius_px = 4;
 constexpr size_t kFewNeighbors = 3;
 constexpr size_t kNeighbors = 8;
-constexpr int kMinSharedPoints = 15;
 constexpr int kMinCommonPoints = 15;
-constexpr uint64_t kMinLoopKeyframes = 10;  // between both ends
+constexpr uint64_t kMinLoopKeyframes = 10;  // between the old and the newest keyframe
 
 std::vector<LocalPoint> MakeLocalPoints(const SlamMap& map, const std::vector<MapPointId>& ids) {
-  std::vector<LocalPoint> looks;
-  for (const MapPointId id : ids) looks.push_back(MakeLocalPoint(*map.FindPoint(id)));
-  return looks;
+  std::vector<LocalPoint> points;
+  for (const MapPointId id : ids) points.push_back(MakeLocalPoint(*map.FindPoint(id)));
+  return points;
 }
 
 PoseObservation Observe(const FrameFeatures& frame, int feature, const Eigen::Vector3d& p_world,
@@ -60,18 +59,19 @@ std::vector<MapPointId> PlaceRecognizer::PointsAround(const MapKeyframe& keyfram
   return {points.begin(), points.end()};
 }
 
-std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatures& frame, const MapKeyframe& place,
+std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatures& frame,
+                                                                const MapKeyframe& around_keyframe,
                                                                 uint64_t call) const {
-  const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(place, kFewNeighbors));
+  const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(around_keyframe, kFewNeighbors));
   std::vector<PoseObservation> observations;
   for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxDistance, kRatio)) {
     observations.push_back(
         Observe(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
   }
-  const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinLooksInliers, .seed = config_.Seed(call)});
+  const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinFirstInliers, .seed = config_.Seed(call)});
   if (!pose) return std::nullopt;
 
-  const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(place, kNeighbors));
+  const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(around_keyframe, kNeighbors));
   Located located;
   located.T_world_camera = pose->T_world_camera;
   PoseEstimate refined;
@@ -91,19 +91,21 @@ std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatu
       located.points.emplace_back(around[static_cast<size_t>(matches[i].point)].id, matches[i].feature);
     }
   }
-  spdlog::debug("slam: frame {} looks like {}: {} of {} points", frame.frame_id, place.id.ToString(), refined.inliers,
-                observations.size());
+  spdlog::debug("slam: frame {} matches {}: {} of {} points agree", frame.frame_id, around_keyframe.id.ToString(),
+                refined.inliers, observations.size());
   if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
     return std::nullopt;
   }
   return located;
 }
 
-std::optional<PlaceRecognizer::Found> PlaceRecognizer::FindCamera(const FrameFeatures& frame) const {
+std::optional<PlaceRecognizer::Relocalized> PlaceRecognizer::Relocalize(const FrameFeatures& frame) const {
   for (const PlaceMatch& candidate : index_.Query(frame.features, kCandidates)) {
-    const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
-    if (place == nullptr) continue;
-    if (const auto located = Locate(frame, *place, frame.frame_id)) return Found{located->T_world_camera, place->id};
+    const MapKeyframe* keyframe = map_->FindKeyframe(candidate.keyframe);
+    if (keyframe == nullptr) continue;
+    if (const auto located = Locate(frame, *keyframe, frame.frame_id)) {
+      return Relocalized{located->T_world_camera, keyframe->id};
+    }
   }
   return std::nullopt;
 }
@@ -118,51 +120,51 @@ std::optional<LoopMatch> PlaceRecognizer::FindLoop(const MapKeyframe& keyframe, 
       continue;
     }
     if (++tried > kLoopCandidates) break;
-    const MapKeyframe* place = map_->FindKeyframe(candidate.keyframe);
-    if (place == nullptr) continue;
-    const auto located = Locate(*keyframe.frame, *place, keyframe.id.value);
+    const MapKeyframe* old = map_->FindKeyframe(candidate.keyframe);
+    if (old == nullptr) continue;
+    const auto located = Locate(*keyframe.frame, *old, keyframe.id.value);
     if (!located) continue;
-    if (auto loop = MakeLoop(keyframe, *place, *located, fix_scale)) return loop;
+    if (auto loop = MakeLoop(keyframe, *old, *located, fix_scale)) return loop;
   }
   return std::nullopt;
 }
 
-std::optional<LoopMatch> PlaceRecognizer::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place,
+std::optional<LoopMatch> PlaceRecognizer::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& old,
                                                    const Located& located, bool fix_scale) const {
-  LoopMatch loop{.keyframe = keyframe.id, .place = place.id};
-  const SE3<Camera, World>& T_place_world = place.T_camera_world();
-  std::vector<SimilarityMatch> both;
-  std::vector<double> disagreements_px;
+  LoopMatch loop{.newest = keyframe.id, .old = old.id};
+  const SE3<Camera, World>& T_old_world = old.T_camera_world();
+  std::vector<SimilarityMatch> common;
+  std::vector<double> drifts_px;
   for (const auto& [id, feature_index] : located.points) {
     const Eigen::Vector3d& old_world = map_->FindPoint(id)->point.position_world;
     const Feature& feature = keyframe.features()[static_cast<size_t>(feature_index)];
-    const Eigen::Vector3d as_it_is = keyframe.T_camera_world() * old_world;
-    disagreements_px.push_back(as_it_is.z() > 0
-                                   ? (keyframe.camera().Project(as_it_is) - feature.pixel_px.cast<double>()).norm()
-                                   : keyframe.camera().width_px);
-    const MapPointId seen = keyframe.points[static_cast<size_t>(feature_index)];
-    if (!seen) continue;
-    if (seen != id) loop.same_points.emplace_back(seen, id);
-    const Eigen::Vector3d p_place = T_place_world * old_world;
+    const Eigen::Vector3d p_camera = keyframe.T_camera_world() * old_world;
+    drifts_px.push_back(p_camera.z() > 0
+                            ? (keyframe.camera().Project(p_camera) - feature.pixel_px.cast<double>()).norm()
+                            : keyframe.camera().width_px);
+    const MapPointId observed = keyframe.points[static_cast<size_t>(feature_index)];
+    if (!observed) continue;
+    if (observed != id) loop.same_points.emplace_back(observed, id);
+    const Eigen::Vector3d p_old = T_old_world * old_world;
     const double sigma_px = config_.pixel_sigma_px * feature.octave_scale;
-    both.push_back({.p_first = p_place,
-                    .p_second = keyframe.T_camera_world() * map_->FindPoint(seen)->point.position_world,
-                    .first_px = keyframe.camera().Project(p_place),
-                    .second_px = feature.pixel_px.cast<double>(),
-                    .first_sigma_px = sigma_px,
-                    .second_sigma_px = sigma_px});
+    common.push_back({.p_first = p_old,
+                      .p_second = keyframe.T_camera_world() * map_->FindPoint(observed)->point.position_world,
+                      .first_px = keyframe.camera().Project(p_old),
+                      .second_px = feature.pixel_px.cast<double>(),
+                      .first_sigma_px = sigma_px,
+                      .second_sigma_px = sigma_px});
   }
-  loop.disagreement_px = Median(std::move(disagreements_px));
+  loop.drift_px = Median(std::move(drifts_px));
 
-  loop.S_place_keyframe = Sim3<Camera, Camera>(T_place_world * located.T_world_camera);
-  if (fix_scale || loop.disagreement_px < kNoDrift_px) return loop;
-  // How both sides' lengths compare, only points that both know can tell.
-  const auto similarity = SolveSimilarity(keyframe.camera(), both,
+  loop.S_old_newest = Sim3<Camera, Camera>(T_old_world * located.T_world_camera);
+  if (fix_scale || loop.drift_px < kNoDrift_px) return loop;
+  // Only points that both sides have determine the ratio of their scales.
+  const auto similarity = SolveSimilarity(keyframe.camera(), common,
                                           {.min_inliers = kMinCommonPoints, .seed = config_.Seed(keyframe.id.value)});
-  spdlog::debug("slam: {} again at {}: off by {:.1f} px, {} of {} common points agree", keyframe.id.ToString(),
-                place.id.ToString(), loop.disagreement_px, similarity ? similarity->inliers : 0, both.size());
+  spdlog::debug("slam: loop candidate {} to {}: drift {:.1f} px, {} of {} common points agree", keyframe.id.ToString(),
+                old.id.ToString(), loop.drift_px, similarity ? similarity->inliers : 0, common.size());
   if (!similarity) return std::nullopt;
-  loop.S_place_keyframe = similarity->S_first_second;
+  loop.S_old_newest = similarity->S_first_second;
   return loop;
 }
 

@@ -10,19 +10,19 @@
 
 namespace romap::slam {
 
-// A loop whose ends lie closer together than this, in the newest keyframe's image, has not drifted.
+// A loop with less drift than this in the newest keyframe's image needs no correction.
 inline constexpr double kNoDrift_px = 4;
 
-// A known place that a keyframe shows again.
+// A keyframe that shows a place which an old keyframe shows too.
 struct LoopMatch {
-  KeyframeId keyframe;  // the newest one
-  KeyframeId place;     // the old one
-  Sim3<Camera, Camera> S_place_keyframe = {};
-  std::vector<std::pair<MapPointId, MapPointId>> same_points = {};  // (seen from the new side, known on the old side)
-  double disagreement_px = 0;  // median distance of the old points from where the map as it is puts them
+  KeyframeId newest;
+  KeyframeId old;
+  Sim3<Camera, Camera> S_old_newest = {};
+  std::vector<std::pair<MapPointId, MapPointId>> same_points = {};  // (point of the new side, point of the old side)
+  double drift_px = 0;  // median distance in the newest image between features and projections of the old points
 };
 
-// Knows places again by their looks and proves it by their geometry.
+// Place recognition: finds keyframes by their descriptors and verifies them by geometry.
 class PlaceRecognizer {
  public:
   PlaceRecognizer(const SlamConfig& config, const SlamMap* map) : config_(config), map_(map), index_(1) {}
@@ -30,26 +30,27 @@ class PlaceRecognizer {
   void Add(const MapKeyframe& keyframe) { index_.Add(keyframe.id, keyframe.features()); }
   void Remove(KeyframeId keyframe) { index_.Remove(keyframe); }
 
-  // Where a frame was taken, and the keyframe that looked like it.
-  struct Found {
+  struct Relocalized {
     SE3<World, Camera> T_world_camera;
-    KeyframeId place;
+    KeyframeId keyframe;  // shows the same place
   };
-  std::optional<Found> FindCamera(const FrameFeatures& frame) const;
+  // The pose of a frame without any prior knowledge.
+  std::optional<Relocalized> Relocalize(const FrameFeatures& frame) const;
 
-  // An old place in what the keyframe sees, that shares hardly any points with it so far.
+  // An old keyframe that shows the same place but shares few or no points with this one. `fix_scale`: the map's scale
+  // does not drift.
   std::optional<LoopMatch> FindLoop(const MapKeyframe& keyframe, bool fix_scale) const;
 
  private:
-  // A frame in the part of the map around a place.
+  // The pose of a frame in the part of the map around a keyframe.
   struct Located {
     SE3<World, Camera> T_world_camera;
-    std::vector<std::pair<MapPointId, int>> points;  // with the feature that shows each
+    std::vector<std::pair<MapPointId, int>> points;  // with the feature that observes each
   };
 
   std::vector<MapPointId> PointsAround(const MapKeyframe& keyframe, size_t neighbors) const;
-  std::optional<Located> Locate(const FrameFeatures& frame, const MapKeyframe& place, uint64_t call) const;
-  std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& place, const Located& located,
+  std::optional<Located> Locate(const FrameFeatures& frame, const MapKeyframe& around, uint64_t call) const;
+  std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& old, const Located& located,
                                     bool fix_scale) const;
 
   const SlamConfig config_;

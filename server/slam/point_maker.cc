@@ -145,7 +145,7 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
   const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
   // Those that share points, and the newest, which may not share any yet.
   std::vector<KeyframeId> candidates;
-  for (const auto& [id, shared] : map_->Covisible(keyframe, 15)) candidates.push_back(id);
+  for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) candidates.push_back(id);
   for (auto it = map_->keyframes().rbegin(); it != map_->keyframes().rend() && candidates.size() < 60; ++it) {
     if (it->first != keyframe.id && std::find(candidates.begin(), candidates.end(), it->first) == candidates.end()) {
       if (keyframe.pose_given || candidates.empty()) candidates.push_back(it->first);

@@ -17,6 +17,9 @@
 
 namespace romap::slam {
 
+// Keyframes count as neighbors if they share at least this many points.
+inline constexpr int kMinSharedPoints = 15;
+
 // A keyframe of the sparse map.
 struct MapKeyframe {
   KeyframeId id;

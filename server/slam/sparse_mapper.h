@@ -1,20 +1,17 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <thread>
-#include <vector>
 
 #include "common/stage_messages.h"
 #include "server/slam/correction_log.h"
-#include "server/slam/features/feature_extractor.h"
+#include "server/slam/global_adjuster.h"
+#include "server/slam/keyframe_builder.h"
+#include "server/slam/local_adjuster.h"
 #include "server/slam/local_map.h"
-#include "server/slam/map_adjustment.h"
 #include "server/slam/mask_voter.h"
 #include "server/slam/place_recognizer.h"
-#include "server/slam/point_maker.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/tracker.h"
@@ -22,100 +19,89 @@
 
 namespace romap::slam {
 
-// What became of one frame in the map.
+// The result of mapping one frame.
 struct MappedFrame {
-  TrackedFrame tracked;                          // its pose in the world as it is now
-  std::optional<MapCorrection> correction = {};  // of what was handed on before; comes before `view`
-  std::optional<KeyframeView> view = {};         // of a keyframe
-  bool was_reset = false;                        // all that was handed on before is void
+  TrackedFrame tracked;                          // with its pose in the current world
+  std::optional<MapCorrection> correction = {};  // of earlier results; apply it before `view`
+  std::optional<KeyframeView> view = {};         // only for a keyframe
+  bool was_reset = false;                        // all earlier results are void; apply it before the rest
 };
 
-// The mapping side of slam: makes the sparse map out of what tracking says, keeps it consistent (local and whole bundle
-// adjustment, loops, gravity), finds lost cameras again, and hands the map around the camera to tracking. For one
-// thread; only RequestEarlyStop() may be called from others.
+// The mapping half of slam: builds the sparse map from tracked frames, keeps it consistent (local and global bundle
+// adjustment, loop closing, gravity), relocalizes a lost camera, and publishes the part of the map around the camera
+// for tracking. For one thread, except RequestEarlyStop().
 //
-// A point is tied to an object by the labels of its observations, one per keyframe that sees it. They are evidence, not
-// verdicts: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks, or
-// whose masks have not come yet.
+// The labels of a point's observations, one per keyframe that observes it, tell which object it lies on. They are
+// evidence: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks or whose
+// masks have not arrived.
 class SparseMapper {
  public:
-  // `local_map` outlives the mapper. `inline_adjustment`: the whole bundle is adjusted on the spot and not on a thread
-  // of its own, so that the same frames give the same map.
+  // `local_map` outlives the mapper. `inline_adjustment`: global bundle adjustment runs inside Process() instead of on
+  // a thread, so that the same frames give the same map.
   SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment = false);
-  ~SparseMapper();
 
   MappedFrame Process(const TrackedImage& image);
-  // Masks of an earlier frame that had none, in the order of their frames. They tell which points lie on objects, which
-  // is what WorldUp asks for; passed over when the frame is not known any more.
+  // Masks that arrive after their frame, in the order of their frames. They tell which points lie on objects, which
+  // WorldUp needs. Ignored if the frame is no longer stored.
   void ObserveMasks(const FrameMasks& masks);
-  // No more frames: waits for adjustments under way; what moved by them.
+  // No more frames follow: runs a last global adjustment and returns what it moved.
   MapCorrection Finish();
-  // So many keyframes wait: bundle adjustment ends early.
-  void RequestEarlyStop(bool keyframes_wait) { early_stop_requested_ = keyframes_wait; }
+  // From any thread: `stop` makes local bundle adjustment end early, because keyframes are waiting.
+  void RequestEarlyStop(bool stop) { local_adjuster_.RequestEarlyStop(stop); }
 
-  size_t points() const { return map_->points().size(); }
-  size_t keyframes() const { return map_->keyframe_count(); }
-  const SlamMap& map() const { return *map_; }
-
-  // Counts and times for benchmarks.
-  struct Figures {
-    std::vector<double> window_s;  // per local bundle adjustment
-    int loops = 0;                 // closed with a correction
-    int sewn = 0;                  // closed without one
-    int relocalizations = 0;
-    double up_confidence = 0;
-  };
-  const Figures& figures() const { return figures_; }
+  size_t points() const { return current_->map.points().size(); }
 
  private:
-  struct GlobalAdjustment {
-    MapProblem problem;
-    BundleSummary summary;
-    std::atomic<bool> abort = false;
-    std::atomic<bool> done = false;
-    std::thread thread;
+  friend class SparseMapperInspector;  // tests/support
+
+  // Everything that a reset discards.
+  struct CurrentMap {
+    CurrentMap(const SlamConfig& config, uint64_t keyframes_used, uint64_t points_used);
+
+    SlamMap map;
+    PlaceRecognizer places;
+    CorrectionLog corrections;
+    WorldUp up;
+    MaskVoter mask_voter;
+    KeyframeId newest;
+    bool world_is_given = false;      // the client's poses, given or as priors, define the world
+    bool has_depth_scale = false;     // depth images define the scale
+    uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
+    int frames_lost = 0;              // in a row
   };
 
-  void BeginAnew();
-  bool Begin(const InitialViews& start, const Frame& frame);
-  bool BeginFromTwoViews(const InitialViews& start, const SE3<World, Camera>& T_world_first);
-  KeyframeView AddKeyframe(const TrackedImage& image);
-  MapKeyframe& InsertKeyframe(const TrackedImage& image);
-  void FindLostCamera(const TrackedImage& image);
-  std::vector<KeyframeId> Neighborhood(const MapKeyframe& keyframe, size_t first, size_t second) const;
-  std::vector<MapPointId> PointsOf(const std::vector<KeyframeId>& keyframes) const;
-  void AdjustWindow(const MapKeyframe& keyframe);
-  void CloseLoops(const MapKeyframe& keyframe);
+  // Counts over the whole session, logged at its end.
+  struct Counts {
+    int loops_corrected = 0;
+    int loops_merged = 0;  // closed without moving poses, because the map had not drifted
+    int relocalizations = 0;
+    int resets = 0;
+  };
+
+  void ResetMap();
+  void InitializeFrom(const TrackedImage& image, MappedFrame& mapped);
+  void MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped);
+  void HandleLostFrame(const TrackedImage& image, MappedFrame& mapped);
+  void ReportCorrections(bool map_moved, MappedFrame& mapped);
+
+  void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
+  void CloseLoopOrAdjust(const MapKeyframe& keyframe);
   void StartGlobalAdjustment();
+  bool ApplyGlobalAdjustment(bool wait);
   bool MayFindLens() const;
-  bool TakeGlobalAdjustment(bool wait);
-  void DropGlobalAdjustment();
-  bool TurnUp(bool is_last = false);
-  void PublishLocalMap(KeyframeId around, std::optional<LocalMap::Relocalization> relocalized = {});
-  KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe);
-  void Place(TrackedFrame& tracked) const;
+  void AlignWithUp(bool is_last = false);
+  void UpdatePose(TrackedFrame& tracked) const;
+  void PublishLocalMap(KeyframeId reference, std::optional<LocalMap::Relocalization> relocalized = {});
+  void LogSummary() const;
 
   const SlamConfig config_;
   LocalMapSlot* const slot_;
-  const bool inline_adjustment_;
-  FeatureExtractor extractor_;
-  std::unique_ptr<SlamMap> map_;
-  std::unique_ptr<PointMaker> maker_;
-  std::unique_ptr<PlaceRecognizer> places_;
-  CorrectionLog corrections_;
-  WorldUp up_;
-  MaskVoter mask_voter_;
-  std::unique_ptr<GlobalAdjustment> whole_;
-  Figures figures_;
-
-  int generation_ = 0;
-  bool world_is_given_ = false;
-  bool metric_ = false;  // depth gives the scale
-  KeyframeId latest_;
-  uint64_t next_whole_ = 10;  // keyframes at which the whole bundle is adjusted, loop or not
-  int frames_lost_ = 0;
-  bool window_was_cut_short_ = false;
-  std::atomic<bool> early_stop_requested_ = false;
+  KeyframeBuilder keyframe_builder_;
+  LocalAdjuster local_adjuster_;
+  GlobalAdjuster global_adjuster_;
+  std::unique_ptr<CurrentMap> current_;
+  int generation_ = 0;  // of the map; see LocalMap::generation
+  Counts counts_;
 };
 
 }  // namespace romap::slam

@@ -3,49 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
-
-#include "common/statistics.h"
-#include "server/slam/geometry/pnp.h"
-#include "server/slam/projection_search.h"
 
 namespace romap::slam {
 namespace {
 
 constexpr int kMinFeatures = 50;
-constexpr int kMinFirstInliers = 20;      // among the last frame's points
-constexpr int kMinInliers = 25;           // among all points
-constexpr int kMinInliersAfterLoss = 40;  // stricter as long as the pose has not proven itself
-constexpr int kProvenAfter_frames = 15;
-constexpr double kMinInlierShare = 0.35;  // of the matches
+constexpr int kMinInliers = 25;
+constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kWideRadius_px = 36;
-constexpr double kLocalRadius_px = 3.5;
-constexpr int kMaxDistance = 70;       // Hamming, bits, where a projection narrows the search
-constexpr int kMaxLooksDistance = 60;  // where nothing does
-constexpr double kLooksRatio = 0.8;
-constexpr double kLongestPrediction_s = 0.25;
-constexpr double kLongestDepartureShare = 0.5;  // of the scene's depth: no camera jumps so far between two frames
-constexpr int kStartDepthPoints = 150;
-// Where priors begin a map their errors become the map's until there are enough of them to average out.
+constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
+constexpr int kMinDepthsToInitialize = 150;
+constexpr int kFewInliers = 100;  // below which the depth image would add many points
+// The errors of the priors that a map is initialized with stay in the map until it has enough of them to average out.
 constexpr int kMapPointsToLeavePriors = 150;
 constexpr uint64_t kKeyframesToLeavePriors = 12;
-
-double DepthOf(const SE3<Camera, World>& T_camera_world, const LocalPoint& point) {
-  return (T_camera_world * point.position_world).z();
-}
-
-double MedianDepth_mu(const LocalMap& map, const SE3<World, Camera>& T_world_camera,
-                      const std::vector<int>& point_of_feature) {
-  const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();
-  std::vector<double> depths_mu;
-  for (const int point : point_of_feature) {
-    if (point >= 0) depths_mu.push_back(DepthOf(T_camera_world, map.points[static_cast<size_t>(point)]));
-  }
-  if (depths_mu.empty()) return 0;
-  return Median(std::move(depths_mu));
-}
 
 }  // namespace
 
@@ -60,21 +33,61 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
-  const bool has_map = map_ && !map_->points.empty();
-  const bool has_pose = frame->T_world_camera && pose_use_ != PoseUse::kIgnore;
-  const bool is_clients_world = world_is_given_ || !has_map;
-  if (has_pose && is_clients_world && !waiting_for_map_) {
-    const bool map_suffices = pose_use_ == PoseUse::kPrior && has_map &&
-                              map_->keyframes_done >= kKeyframesToLeavePriors &&
-                              map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
-    if (!map_suffices) return TakeGivenPose(std::move(frame));
-  }
+  if (UsesGivenPose(*frame)) return TakeGivenPose(std::move(frame));
   auto features = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
-  if (!has_map || waiting_for_map_) return Initialize(std::move(frame), std::move(features));
+  if (!HasMap() || waiting_since_generation_) return Initialize(std::move(frame), std::move(features));
   return TrackByImage(std::move(frame), std::move(features));
 }
 
-// ------------------------------------------------------------------------------------------------ poses that are given
+// ------------------------------------------------------------------------------------------------ the local map
+
+void Tracker::TakeNewestMap() {
+  const std::shared_ptr<const LocalMap> newest = slot_->Get();
+  if (!newest || newest == map_) return;
+  const bool was_reset = !map_ || newest->generation != map_->generation;
+  if (was_reset) {
+    AdoptNewMap(*newest);
+  } else if (!world_is_given_) {
+    // The camera moves with the keyframe it was tracked against.
+    const auto before = map_->keyframes.find(map_->reference);
+    const auto after = newest->keyframes.find(map_->reference);
+    if (before != map_->keyframes.end() && after != newest->keyframes.end()) {
+      motion_.Correct(before->second, after->second);
+    }
+  }
+  map_ = newest;
+}
+
+void Tracker::AdoptNewMap(const LocalMap& newest) {
+  if (waiting_since_generation_ && newest.generation > *waiting_since_generation_) {
+    waiting_since_generation_.reset();
+    if (!newest.points.empty()) {
+      // The camera was at the newer of the initial views a moment ago.
+      motion_.RestartAt(newest.keyframes.find(newest.reference)->second.T_world_camera);
+      status_.OnMapInitialized();
+    } else {
+      motion_.ForgetMotion();
+      status_.OnMapReset();
+    }
+  } else if (newest.points.empty() && !world_is_given_) {
+    motion_.Reset();
+    status_.OnMapReset();
+    monocular_initializer_.Reset();
+  }
+  keyframes_sent_ = std::max(keyframes_sent_, newest.keyframes_done);
+}
+
+// ------------------------------------------------------------------------------------------------ given poses
+
+bool Tracker::UsesGivenPose(const Frame& frame) const {
+  if (!frame.T_world_camera || pose_use_ == PoseUse::kIgnore || waiting_since_generation_) return false;
+  // A map that was initialized from images has another world than the client.
+  if (HasMap() && !world_is_given_) return false;
+  const bool map_suffices = pose_use_ == PoseUse::kPrior && HasMap() &&
+                            map_->keyframes_done >= kKeyframesToLeavePriors &&
+                            map_->points.size() >= static_cast<size_t>(kMapPointsToLeavePriors);
+  return !map_suffices;
+}
 
 TrackedImage Tracker::TakeGivenPose(std::shared_ptr<const Frame> frame) {
   TrackedImage image;
@@ -82,15 +95,9 @@ TrackedImage Tracker::TakeGivenPose(std::shared_ptr<const Frame> frame) {
   image.pose_given = pose_use_ == PoseUse::kGiven;
   image.generation = map_ ? map_->generation : 0;
   world_is_given_ = true;
-  state_ = TrackingState::kTracking;
+  status_.OnGivenPose();
   const SE3<World, Camera>& pose = image.tracked.T_world_camera;
-  if (last_pose_) {
-    motion_ = last_pose_->Inverse() * pose;
-    motion_s_ = 1e-9 * static_cast<double>(frame->timestamp_ns - last_timestamp_ns_);
-  }
-  last_pose_ = pose;
-  last_prior_ = pose;
-  last_timestamp_ns_ = frame->timestamp_ns;
+  motion_.Update(pose, pose, frame->timestamp_ns, /*is_continuous=*/true);
   last_points_.clear();
   if (!image.pose_given) AnchorToReference(image.tracked);
   if (!image.tracked.is_keyframe) return image;
@@ -100,7 +107,7 @@ TrackedImage Tracker::TakeGivenPose(std::shared_ptr<const Frame> frame) {
   return image;
 }
 
-// ------------------------------------------------------------------------------------------------ the first views
+// ------------------------------------------------------------------------------------------------ initialization
 
 TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features) {
   TrackedImage image;
@@ -108,82 +115,28 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   image.tracked.frame = frame;
   image.tracked.state = TrackingState::kInitializing;
   image.features = features;
-  if (waiting_for_map_) {
-    image.tracked.reason = "the map is being made";
+  if (waiting_since_generation_) {
+    image.tracked.reason = "initial map is being built";
     return image;
   }
   const auto with_depth =
       std::count_if(features->ranges_mu.begin(), features->ranges_mu.end(), [](double r) { return r > 0; });
-  if (with_depth >= kStartDepthPoints) {
+  if (with_depth >= kMinDepthsToInitialize) {
     image.initial_views = InitialViews{.first = features};
-    image.tracked.reason = "a view with depth, the map begins";
+    image.tracked.reason = "view with depth found; initializing the map";
     monocular_initializer_.Reset();
   } else {
     image.initial_views = monocular_initializer_.Offer(features, &image.tracked.reason);
   }
   if (!image.initial_views) return image;
-  waiting_for_map_ = true;
-  waiting_generation_ = image.generation;
+  waiting_since_generation_ = image.generation;
   world_is_given_ = false;
   keyframes_sent_ += image.initial_views->second ? 2 : 1;
-  last_pose_.reset();
-  motion_.reset();
+  motion_.Reset();
   return image;
 }
 
 // ------------------------------------------------------------------------------------------------ tracking
-
-void Tracker::TakeNewestMap() {
-  const std::shared_ptr<const LocalMap> newest = slot_->Get();
-  if (!newest || newest == map_) return;
-  const bool was_reset = !map_ || newest->generation != map_->generation;
-  if (was_reset) {
-    if (waiting_for_map_ && newest->generation > waiting_generation_) {
-      waiting_for_map_ = false;
-      // The start's newest view is where the camera was a moment ago.
-      if (!newest->points.empty()) {
-        const auto reference = newest->keyframes.find(newest->reference);
-        last_pose_ = reference->second.T_world_camera;
-        state_ = TrackingState::kTracking;
-        frames_since_found_ = 0;
-      } else {
-        state_ = TrackingState::kInitializing;
-      }
-      motion_.reset();
-    } else if (newest->points.empty() && !world_is_given_) {
-      state_ = TrackingState::kInitializing;
-      monocular_initializer_.Reset();
-      last_pose_.reset();
-      motion_.reset();
-    }
-    keyframes_sent_ = std::max(keyframes_sent_, newest->keyframes_done);
-  } else if (last_pose_ && !world_is_given_) {
-    // The camera goes along with the keyframe it was tracked against.
-    const auto before = map_->keyframes.find(map_->reference);
-    const auto after = newest->keyframes.find(map_->reference);
-    if (before != map_->keyframes.end() && after != newest->keyframes.end()) {
-      const double scale = after->second.scale / before->second.scale;
-      const SE3<Camera, Camera> T_reference_last = before->second.T_world_camera.Inverse() * *last_pose_;
-      last_pose_ = ScaledPose{after->second.T_world_camera, scale}.Compose(T_reference_last);
-      if (motion_) motion_ = ScaleTranslation(*motion_, scale);
-    }
-  }
-  map_ = newest;
-}
-
-SE3<World, Camera> Tracker::Predict(const Frame& frame) const {
-  if (pose_use_ == PoseUse::kPrior && frame.T_world_camera && last_prior_) {
-    return *last_pose_ * (last_prior_->Inverse() * *frame.T_world_camera);
-  }
-  if (!motion_ || motion_s_ <= 0) return *last_pose_;
-  const double gap_s = 1e-9 * static_cast<double>(frame.timestamp_ns - last_timestamp_ns_);
-  if (gap_s > kLongestPrediction_s) return *last_pose_;
-  const double share = gap_s / motion_s_;
-  // Slerp extrapolates beyond 1; hands turn so little between two frames that this is the same turn going on.
-  const Eigen::AngleAxisd turn(motion_->rotation());
-  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(share * turn.angle(), turn.axis()));
-  return *last_pose_ * SE3<Camera, Camera>(rotation, share * motion_->translation());
-}
 
 TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features) {
   TrackedImage image;
@@ -192,163 +145,90 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   image.features = features;
   image.generation = map_->generation;
   if (features->size() < static_cast<size_t>(kMinFeatures)) {
-    Lose(fmt::format("too little texture: {} features", features->size()), image);
+    Lose(fmt::format("too little texture: {} features, {} needed", features->size(), kMinFeatures), image);
     return image;
   }
-  if (const std::optional<Attempt> attempt = FindCamera(*frame, *features)) {
-    Accept(*frame, *features, *attempt, image);
+  const LocalMapTracking tracking(*map_, *features, config_);
+  if (const std::optional<PoseFromPoints> pose = FindPose(*frame, tracking)) {
+    Accept(*pose, tracking, image);
   } else {
-    Lose("the image does not fit the map", image);
+    Lose("too few map points matched", image);
   }
   return image;
 }
 
-std::optional<Tracker::Attempt> Tracker::FindCamera(const Frame& frame, const FrameFeatures& features) {
-  std::optional<Attempt> first;
-  if (last_pose_) {
-    const bool lost = state_ == TrackingState::kLost;
-    const SE3<World, Camera> start = lost ? *last_pose_ : Predict(frame);
-    if (!lost) first = FollowLastPoints(features, start, kFollowRadius_px);
-    if (!first) first = FollowLastPoints(features, start, kWideRadius_px);
-    if (!first) first = FindByLooks(features);
+std::optional<PoseFromPoints> Tracker::FindPose(const Frame& frame, const LocalMapTracking& tracking) const {
+  if (const auto first = FindFirstPose(frame, tracking)) {
+    if (auto confirmed = ConfirmByAllPoints(*first, tracking)) return confirmed;
   }
-  if (first) {
-    if (auto whole = UseWholeLocalMap(features, *first)) return whole;
-  }
-  return TrackNearRelocalization(features);
+  // A frame that was relocalized before the current loss would be misleading.
+  const auto& relocalized = map_->relocalized;
+  if (!status_.IsLost() || !relocalized || relocalized->frame_id < status_.lost_since_frame()) return std::nullopt;
+  const auto first = tracking.TrackNear(relocalized->T_world_camera);
+  return first ? ConfirmByAllPoints(*first, tracking) : std::nullopt;
 }
 
-std::optional<Tracker::Attempt> Tracker::FollowLastPoints(const FrameFeatures& features,
-                                                          const SE3<World, Camera>& start, double radius_px) const {
-  std::vector<LocalPoint> points;
-  std::vector<int> index_of;
-  const auto take = [&](int index) {
-    points.push_back(map_->points[static_cast<size_t>(index)]);
-    index_of.push_back(index);
-  };
-  for (const MapPointId id : last_points_) {
-    const auto it = map_->index.find(id);
-    if (it != map_->index.end()) take(it->second);
-  }
-  if (points.size() < static_cast<size_t>(2 * kMinFirstInliers)) {
-    points.clear();
-    index_of.clear();
-    for (size_t i = 0; i < map_->points.size(); ++i) take(static_cast<int>(i));
-  }
-  ProjectionMatcher matcher(features, start);
-  const ProjectionSearch search{.radius_px = radius_px, .max_distance = kMaxDistance, .ratio = 0.9};
-  std::vector<int> point_of_feature(features.size(), -1);
-  for (const PointMatch& match : matcher.MatchAll(points, search, {})) {
-    point_of_feature[static_cast<size_t>(match.feature)] = index_of[static_cast<size_t>(match.point)];
-  }
-  return Refine(features, start, std::move(point_of_feature), kMinFirstInliers);
+std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const {
+  if (!motion_.last_pose()) return std::nullopt;
+  const bool is_lost = status_.IsLost();
+  const SE3<World, Camera> start =
+      is_lost ? *motion_.last_pose() : motion_.Predict(frame, /*use_prior=*/pose_use_ == PoseUse::kPrior);
+  std::optional<PoseFromPoints> first;
+  if (!is_lost) first = tracking.TrackByProjection(last_points_, start, kFollowRadius_px);
+  if (!first) first = tracking.TrackByProjection(last_points_, start, kWideRadius_px);
+  if (!first) first = tracking.TrackByDescriptors(last_points_);
+  return first;
 }
 
-std::optional<Tracker::Attempt> Tracker::FindByLooks(const FrameFeatures& features) const {
-  std::vector<LocalPoint> points;
-  std::vector<int> index_of;
-  for (const MapPointId id : last_points_) {
-    const auto it = map_->index.find(id);
-    if (it == map_->index.end()) continue;
-    points.push_back(map_->points[static_cast<size_t>(it->second)]);
-    index_of.push_back(it->second);
+std::optional<PoseFromPoints> Tracker::ConfirmByAllPoints(const PoseFromPoints& first,
+                                                          const LocalMapTracking& tracking) const {
+  auto pose = tracking.TrackAllPoints(first, status_.NeedsConfirmation() ? kMinInliersToConfirm : kMinInliers);
+  if (pose && motion_.last_pose() && status_.IsTracking()) {
+    const double step_mu = (pose->T_world_camera.translation() - motion_.last_pose()->translation()).norm();
+    if (step_mu > kMaxStepShare * tracking.MedianDepth_mu(*pose)) return std::nullopt;
   }
-  std::vector<PoseObservation> observations;
-  std::vector<PointMatch> matches = MatchByDescriptors(points, features, kMaxLooksDistance, kLooksRatio);
-  for (const PointMatch& match : matches) {
-    const Feature& feature = features.features[static_cast<size_t>(match.feature)];
-    observations.push_back({.p_world = points[static_cast<size_t>(match.point)].position_world,
-                            .pixel_px = feature.pixel_px.cast<double>(),
-                            .sigma_px = config_.pixel_sigma_px * feature.octave_scale});
-  }
-  const auto pose = SolvePnp(features.camera, observations,
-                             {.min_inliers = kMinFirstInliers, .seed = config_.Seed(features.frame_id)});
-  if (!pose) return std::nullopt;
-  std::vector<int> point_of_feature(features.size(), -1);
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (pose->inlier[i] == 0) continue;
-    point_of_feature[static_cast<size_t>(matches[i].feature)] = index_of[static_cast<size_t>(matches[i].point)];
-  }
-  return Refine(features, pose->T_world_camera, std::move(point_of_feature), kMinFirstInliers);
+  return pose;
 }
 
-std::optional<Tracker::Attempt> Tracker::TrackNearRelocalization(const FrameFeatures& features) const {
-  if (state_ != TrackingState::kLost || !map_->relocalized || map_->relocalized->frame_id < lost_since_frame_) {
-    return std::nullopt;
+void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image) {
+  const bool was_lost = status_.IsLost();
+  const Frame& frame = *image.tracked.frame;
+  image.tracked.state = status_.OnTracked();
+  image.tracked.T_world_camera = pose.T_world_camera;
+  AnchorToReference(image.tracked);
+  motion_.Update(pose.T_world_camera, frame.T_world_camera, frame.timestamp_ns, /*is_continuous=*/!was_lost);
+  last_points_.clear();
+  for (const int point : pose.point_of_feature) {
+    if (point >= 0) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
   }
-  // The camera has moved on since that frame: all points, in a wide area.
-  const SE3<World, Camera>& start = map_->relocalized->T_world_camera;
-  ProjectionMatcher matcher(features, start);
-  const ProjectionSearch search{.radius_px = kWideRadius_px, .max_distance = kMaxLooksDistance, .ratio = 0.8};
-  std::vector<int> point_of_feature(features.size(), -1);
-  for (const PointMatch& match : matcher.MatchAll(map_->points, search, {})) {
-    point_of_feature[static_cast<size_t>(match.feature)] = match.point;
+  image.tracked.is_keyframe = DecideKeyframe(pose, tracking, image);
+  if (!image.tracked.is_keyframe) return;
+  ++keyframes_sent_;
+  image.points.resize(image.features->size());
+  for (size_t i = 0; i < image.points.size(); ++i) {
+    const int point = pose.point_of_feature[i];
+    if (point >= 0) image.points[i] = map_->points[static_cast<size_t>(point)].id;
   }
-  const auto first = Refine(features, start, std::move(point_of_feature), kMinFirstInliers);
-  return first ? UseWholeLocalMap(features, *first) : std::nullopt;
 }
 
-std::optional<Tracker::Attempt> Tracker::UseWholeLocalMap(const FrameFeatures& features, const Attempt& first) const {
-  std::vector<int> point_of_feature = first.point_of_feature;
-  std::vector<uint8_t> taken(features.size(), 0);
-  std::vector<uint8_t> seen(map_->points.size(), 0);
-  for (size_t i = 0; i < point_of_feature.size(); ++i) {
-    if (point_of_feature[i] < 0) continue;
-    taken[i] = 1;
-    seen[static_cast<size_t>(point_of_feature[i])] = 1;
-  }
-  ProjectionMatcher matcher(features, first.T_world_camera);
-  const ProjectionSearch search{.radius_px = kLocalRadius_px, .max_distance = kMaxDistance, .ratio = 0.9};
-  std::vector<int> distance_of(features.size(), 256);
-  for (size_t p = 0; p < map_->points.size(); ++p) {
-    if (seen[p] != 0) continue;
-    const auto found = matcher.Find(map_->points[p], search, taken);
-    if (!found || found->distance >= distance_of[static_cast<size_t>(found->feature)]) continue;
-    distance_of[static_cast<size_t>(found->feature)] = found->distance;
-    point_of_feature[static_cast<size_t>(found->feature)] = static_cast<int>(p);
-  }
-  const bool unproven = state_ == TrackingState::kLost || frames_since_found_ < kProvenAfter_frames;
-  const int min_inliers = unproven ? kMinInliersAfterLoss : kMinInliers;
-  auto attempt = Refine(features, first.T_world_camera, std::move(point_of_feature), min_inliers);
-  if (attempt && attempt->inliers < kMinInlierShare * attempt->matches) return std::nullopt;
-  if (attempt && last_pose_ && state_ == TrackingState::kTracking) {
-    const double depth_mu = MedianDepth_mu(*map_, attempt->T_world_camera, attempt->point_of_feature);
-    const double way_mu = (attempt->T_world_camera.translation() - last_pose_->translation()).norm();
-    if (way_mu > kLongestDepartureShare * depth_mu) return std::nullopt;
-  }
-  return attempt;
+void Tracker::Lose(const std::string& why, TrackedImage& image) {
+  status_.OnLost(image.tracked.frame->frame_id);
+  image.tracked.state = TrackingState::kLost;
+  image.tracked.reason = why;
+  motion_.ForgetMotion();
 }
 
-std::optional<Tracker::Attempt> Tracker::Refine(const FrameFeatures& features, const SE3<World, Camera>& start,
-                                                std::vector<int> point_of_feature, int min_inliers) const {
-  std::vector<PoseObservation> observations;
-  std::vector<size_t> feature_of;
-  for (size_t i = 0; i < point_of_feature.size(); ++i) {
-    if (point_of_feature[i] < 0) continue;
-    const Feature& feature = features.features[i];
-    PoseObservation observation{.p_world = map_->points[static_cast<size_t>(point_of_feature[i])].position_world,
-                                .pixel_px = feature.pixel_px.cast<double>(),
-                                .sigma_px = config_.pixel_sigma_px * feature.octave_scale};
-    if (features.ranges_mu[i] > 0) {
-      observation.depth_mu = features.ranges_mu[i] * features.bearings_camera[i].z();
-      observation.depth_sigma_mu = config_.depth_sigma_ratio * observation.depth_mu;
-    }
-    observations.push_back(observation);
-    feature_of.push_back(i);
-  }
-  if (observations.size() < static_cast<size_t>(min_inliers)) return std::nullopt;
-  const PoseEstimate pose = RefinePose(features.camera, start, observations);
-  if (pose.inliers < min_inliers || !pose.T_world_camera.IsFinite()) return std::nullopt;
-  for (size_t i = 0; i < observations.size(); ++i) {
-    if (pose.inlier[i] == 0) point_of_feature[feature_of[i]] = -1;
-  }
-  return Attempt{.T_world_camera = pose.T_world_camera,
-                 .point_of_feature = std::move(point_of_feature),
-                 .inliers = pose.inliers,
-                 .matches = static_cast<int>(observations.size())};
+bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image) {
+  // The pose of a camera that was just relocalized may be wrong: the map must not grow from it yet.
+  if (status_.frames_since_recovery() < 2 && map_->keyframes_done > 4) return false;
+  const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
+  TrackingQuality quality;
+  quality.scene_depth_mu = tracking.MedianDepth_mu(pose);
+  quality.tracked_share = pose.inliers / std::max(1.0, static_cast<double>(map_->reference_points));
+  quality.keyframes_waiting = static_cast<int>(waiting);
+  quality.has_unseen_depth = image.features->HasDepth() && pose.inliers < kFewInliers;
+  return selector_.IsKeyframe(*image.tracked.frame, pose.T_world_camera, quality);
 }
-
-// ------------------------------------------------------------------------------------------------ after the attempt
 
 void Tracker::AnchorToReference(TrackedFrame& tracked) const {
   if (!map_) return;
@@ -356,56 +236,6 @@ void Tracker::AnchorToReference(TrackedFrame& tracked) const {
   if (reference == map_->keyframes.end()) return;
   tracked.reference = map_->reference;
   tracked.T_reference_camera = reference->second.Relative(tracked.T_world_camera);
-}
-
-void Tracker::Accept(const Frame& frame, const FrameFeatures& features, const Attempt& attempt, TrackedImage& image) {
-  const bool was_lost = state_ == TrackingState::kLost;
-  frames_since_found_ = was_lost ? 0 : frames_since_found_ + 1;
-  state_ = TrackingState::kTracking;
-  image.tracked.state = was_lost ? TrackingState::kRelocalized : TrackingState::kTracking;
-  image.tracked.T_world_camera = attempt.T_world_camera;
-  AnchorToReference(image.tracked);
-
-  motion_.reset();
-  if (last_pose_ && !was_lost) {
-    motion_ = last_pose_->Inverse() * attempt.T_world_camera;
-    motion_s_ = 1e-9 * static_cast<double>(frame.timestamp_ns - last_timestamp_ns_);
-  }
-  last_pose_ = attempt.T_world_camera;
-  last_prior_ = frame.T_world_camera;
-  last_timestamp_ns_ = frame.timestamp_ns;
-  last_points_.clear();
-  for (const int point : attempt.point_of_feature) {
-    if (point >= 0) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
-  }
-  image.tracked.is_keyframe = DecideKeyframe(frame, features, attempt);
-  if (!image.tracked.is_keyframe) return;
-  ++keyframes_sent_;
-  image.points.resize(features.size());
-  for (size_t i = 0; i < features.size(); ++i) {
-    const int point = attempt.point_of_feature[i];
-    if (point >= 0) image.points[i] = map_->points[static_cast<size_t>(point)].id;
-  }
-}
-
-bool Tracker::DecideKeyframe(const Frame& frame, const FrameFeatures& features, const Attempt& attempt) {
-  // A pose that was just found again must hold for a while before the map is built on it.
-  if (frames_since_found_ < 2 && map_->keyframes_done > 4) return false;
-  const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
-  TrackingQuality quality;
-  quality.scene_depth_mu = MedianDepth_mu(*map_, attempt.T_world_camera, attempt.point_of_feature);
-  quality.tracked_share = attempt.inliers / std::max(1.0, static_cast<double>(map_->reference_points));
-  quality.keyframes_waiting = static_cast<int>(waiting);
-  quality.has_unseen_depth = features.HasDepth() && attempt.inliers < 100;
-  return selector_.IsKeyframe(frame, attempt.T_world_camera, quality);
-}
-
-void Tracker::Lose(const std::string& why, TrackedImage& image) {
-  if (state_ != TrackingState::kLost) lost_since_frame_ = image.tracked.frame->frame_id;
-  state_ = TrackingState::kLost;
-  image.tracked.state = TrackingState::kLost;
-  image.tracked.reason = why;
-  motion_.reset();
 }
 
 }  // namespace romap::slam

@@ -1,78 +1,67 @@
 #pragma once
 
-#include <absl/status/statusor.h>
-
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "common/client_input.h"
-#include "common/map_events.h"
 #include "common/stage_messages.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/frame_features.h"
-#include "server/slam/geometry/pose_refiner.h"
 #include "server/slam/given_pose_tracker.h"
 #include "server/slam/keyframe_selector.h"
 #include "server/slam/local_map.h"
+#include "server/slam/local_map_tracking.h"
 #include "server/slam/monocular_initializer.h"
+#include "server/slam/motion_model.h"
 #include "server/slam/slam_config.h"
+#include "server/slam/tracking_status.h"
 
 namespace romap::slam {
 
-// What tracking says of one frame, for the mapping thread.
+// The result of tracking one frame, for the mapping thread.
 struct TrackedImage {
   TrackedFrame tracked;
-  std::shared_ptr<const FrameFeatures> features = {};  // none: the pose was given and the frame is no keyframe
+  std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is no keyframe
   std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
   bool pose_given = false;                             // by the client: nothing may correct it
   int generation = 0;                                  // of the local map it was tracked against
 };
 
-// Turns frames into frames with camera poses: takes the poses that come with them, or tracks the camera from the images
-// against the local map. Frames come in order of time, from one thread, which never waits for mapping: it reads the
-// newest local map there is.
+// Finds the camera pose of each frame: takes the pose that comes with it, or tracks the camera from the image against
+// the local map. Frames come in the order of their time stamps, from one thread, which never waits for mapping: it uses
+// the newest local map available.
 //
-// Tracking from images: the motion of the last frames predicts the pose; the points of the last frame are looked for
-// around their projections; if that fails, in a wider area and then by looks alone (P3P); then all points of the local
-// map are looked for around the refined pose, and the pose is refined on all of them (Mur-Artal et al. 2015, section
-// V).
+// Tracking from images: the motion of the last frames predicts the pose; the points of the last frame are searched
+// around their projections; if that fails, in a wider area and then by descriptors alone (P3P). Then all points of the
+// local map are searched around the refined pose, and the pose is refined by all of them (Mur-Artal et al. 2015,
+// section V).
 class Tracker {
  public:
   // `local_map` outlives the tracker.
   Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot* local_map);
 
-  // Never refuses a decoded frame: one without a pose says why in `tracked.reason`.
+  // Never rejects a decoded frame. Without a pose, `tracked.reason` tells people why.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
 
  private:
-  // Points of the local map found in a frame.
-  struct Attempt {
-    SE3<World, Camera> T_world_camera;
-    std::vector<int> point_of_feature;  // index into the local map, -1 = none
-    int inliers = 0;
-    int matches = 0;
-  };
+  void TakeNewestMap();
+  void AdoptNewMap(const LocalMap& newest);
+  bool HasMap() const { return map_ && !map_->points.empty(); }
+  bool UsesGivenPose(const Frame& frame) const;
 
   TrackedImage TakeGivenPose(std::shared_ptr<const Frame> frame);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
-  void TakeNewestMap();
-  SE3<World, Camera> Predict(const Frame& frame) const;
-  std::optional<Attempt> FindCamera(const Frame& frame, const FrameFeatures& features);
-  std::optional<Attempt> FollowLastPoints(const FrameFeatures& features, const SE3<World, Camera>& start,
-                                          double radius_px) const;
-  std::optional<Attempt> FindByLooks(const FrameFeatures& features) const;
-  std::optional<Attempt> TrackNearRelocalization(const FrameFeatures& features) const;
-  std::optional<Attempt> UseWholeLocalMap(const FrameFeatures& features, const Attempt& first) const;
-  std::optional<Attempt> Refine(const FrameFeatures& features, const SE3<World, Camera>& start,
-                                std::vector<int> point_of_feature, int min_inliers) const;
-  void Accept(const Frame& frame, const FrameFeatures& features, const Attempt& attempt, TrackedImage& image);
+  std::optional<PoseFromPoints> FindPose(const Frame& frame, const LocalMapTracking& tracking) const;
+  std::optional<PoseFromPoints> FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const;
+  std::optional<PoseFromPoints> ConfirmByAllPoints(const PoseFromPoints& first, const LocalMapTracking& tracking) const;
+  void Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image);
   void Lose(const std::string& why, TrackedImage& image);
-  bool DecideKeyframe(const Frame& frame, const FrameFeatures& features, const Attempt& attempt);
+  bool DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image);
   void AnchorToReference(TrackedFrame& tracked) const;
 
   const SlamConfig config_;
@@ -85,19 +74,13 @@ class Tracker {
   KeyframeSelector selector_;
   std::shared_ptr<const LocalMap> map_;
 
-  TrackingState state_ = TrackingState::kInitializing;
-  bool world_is_given_ = false;   // the map's world is that of the client's poses
-  bool waiting_for_map_ = false;  // a start was handed on
-  int waiting_generation_ = 0;    // of the map when it was
+  TrackingStatus status_;
+  MotionModel motion_;
+  std::vector<MapPointId> last_points_;  // matched in the last tracked frame
+  bool world_is_given_ = false;          // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
-  int frames_since_found_ = 0;  // since the camera was found again
-  uint64_t lost_since_frame_ = 0;
-  std::vector<MapPointId> last_points_;  // seen in the last tracked frame
-  std::optional<SE3<World, Camera>> last_pose_;
-  std::optional<SE3<World, Camera>> last_prior_;  // what the client said of the last tracked frame
-  int64_t last_timestamp_ns_ = 0;
-  std::optional<SE3<Camera, Camera>> motion_;  // T_previous_last
-  double motion_s_ = 0;                        // the time it took
+  // Of the local map at the time when initial views were sent to mapping; set while waiting for the map they give.
+  std::optional<int> waiting_since_generation_;
 };
 
 }  // namespace romap::slam

@@ -29,7 +29,7 @@ void UpEstimator::Add(const Frame& frame, const SE3<World, Camera>& T_world_came
   if (samples_.size() > kWindowFrames) samples_.pop_front();
 
   const Eigen::Vector3d median = ComponentwiseMedian(samples_);
-  if (median.norm() < 0.5) return;  // the samples contradict each other: stay with what was
+  if (median.norm() < 0.5) return;  // the samples contradict each other: keep the last estimate
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& sample : samples_) {
     if (sample.dot(median.normalized()) > kInlierCosine) sum += sample;
@@ -37,7 +37,7 @@ void UpEstimator::Add(const Frame& frame, const SE3<World, Camera>& T_world_came
   up_world_ = sum.isZero() ? median.normalized() : sum.normalized();
 }
 
-void UpEstimator::Turn(const Eigen::Quaterniond& R_new_old) {
+void UpEstimator::Rotate(const Eigen::Quaterniond& R_new_old) {
   for (Eigen::Vector3d& sample : samples_) sample = R_new_old * sample;
   up_world_ = R_new_old * up_world_;
 }

@@ -8,15 +8,15 @@
 
 namespace romap::slam {
 
-// Which way is up in the world: world z, unless frames bring gravity.
+// Estimates the up direction of the world from the gravity that frames bring.
 class UpEstimator {
  public:
-  // Takes the frame's gravity_camera, if it has one, seen from the pose T_world_camera.
+  // Uses the frame's gravity_camera, if it has one, at the pose T_world_camera.
   void Add(const Frame& frame, const SE3<World, Camera>& T_world_camera);
-  // The world was turned: what was seen before goes along.
-  void Turn(const Eigen::Quaterniond& R_new_old);
-  // Unit length, World frame: the mean over recent frames without those that lie far from their median (an
-  // accelerometer of a hand that moves errs now and then), and world z before the first gravity.
+  // The world was rotated: rotates all samples.
+  void Rotate(const Eigen::Quaterniond& R_new_old);
+  // Unit length, World frame: the mean over recent frames without outliers far from their median, which the
+  // acceleration of a hand-held camera causes. World z before the first gravity.
   const Eigen::Vector3d& up_world() const { return up_world_; }
 
  private:

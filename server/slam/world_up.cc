@@ -13,14 +13,14 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kWorthTurning_rad = 0.3 * std::numbers::pi / 180;
+constexpr double kMinRotation_rad = 0.3 * std::numbers::pi / 180;
 constexpr double kMinConfidence = 0.3;
 constexpr uint64_t kPeriod_keyframes = 5;
-constexpr uint64_t kLongPeriod_keyframes = 20;  // once it is sure
-constexpr double kSure = 0.8;
+constexpr uint64_t kLongPeriod_keyframes = 20;  // once the confidence is high
+constexpr double kHighConfidence = 0.8;
 constexpr size_t kMaxCameras = 200;
-constexpr double kMaxStrayShare = 0.1;   // of the masks that a background point may meet, because masks err
-constexpr double kMaxBorderShare = 0.5;  // and of their borders
+constexpr double kMaxInsideShare = 0.1;  // of a background point's observations; not 0 because masks have errors
+constexpr double kMaxBorderShare = 0.5;
 
 struct Evidence {
   std::vector<SupportPoint> points;
@@ -29,9 +29,9 @@ struct Evidence {
   std::vector<Eigen::Vector3d> ups;
 };
 
-// Points that masks' borders keep meeting are edges of the objects, a little above what they stand on.
+// Points near mask borders in most frames are edges of the objects, slightly above the support plane.
 bool IsBackground(const MaskVotes& votes) {
-  return votes.inside <= kMaxStrayShare * votes.total() && votes.border <= kMaxBorderShare * votes.total();
+  return votes.inside <= kMaxInsideShare * votes.total() && votes.border <= kMaxBorderShare * votes.total();
 }
 
 Evidence Gather(const SlamMap& map) {
@@ -41,11 +41,11 @@ Evidence Gather(const SlamMap& map) {
     for (const FeatureRef& observation : track.observations) {
       votes.Add(map.FindKeyframe(observation.keyframe)->frame->mask_zones[static_cast<size_t>(observation.feature)]);
     }
-    if (votes.total() == 0) continue;  // masks are late, or seldom: what it lies on is not known yet
+    if (votes.total() == 0) continue;  // not observed with masks yet
     if (2 * votes.inside > votes.total()) {
       evidence.object_points.push_back(track.point.position_world);
     } else if (IsBackground(votes) && track.observations.size() >= 2) {
-      // One pixel across the ray, magnified along it by what parallax leaves.
+      // One pixel across the ray; along the ray, the error grows with 1 / parallax.
       const double parallax_rad = std::max(track.point.max_parallax_rad, 0.02);
       evidence.points.push_back({.position_world = track.point.position_world,
                                  .sigma_mu = track.size_mu / parallax_rad,
@@ -64,20 +64,20 @@ Evidence Gather(const SlamMap& map) {
 
 }  // namespace
 
-void WorldUp::Observe(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
+void WorldUp::ObserveGravity(const Frame& frame, const SE3<World, Camera>& T_world_camera) {
   if (!frame.gravity_camera) return;
   gravity_.Add(frame, T_world_camera);
   has_gravity_ = true;
 }
 
-std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map, bool is_last) {
+std::optional<Eigen::Quaterniond> WorldUp::ProposeRotation(const SlamMap& map, bool is_last) {
   Eigen::Vector3d up_world;
   if (has_gravity_) {
     up_world = gravity_.up_world();
     confidence_ = 1;
   } else {
-    if (!is_last && map.keyframe_count() < next_try_) return std::nullopt;
-    next_try_ = map.keyframe_count() + (confidence_ >= kSure ? kLongPeriod_keyframes : kPeriod_keyframes);
+    if (!is_last && map.keyframe_count() < next_fit_) return std::nullopt;
+    next_fit_ = map.keyframe_count() + (confidence_ >= kHighConfidence ? kLongPeriod_keyframes : kPeriod_keyframes);
     const Evidence evidence = Gather(map);
     const auto plane = FindSupportPlane({.points = evidence.points,
                                          .object_points_world = evidence.object_points,
@@ -85,7 +85,7 @@ std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map, bool is_l
                                          .camera_ups_world = evidence.ups,
                                          .seed = map.keyframe_count()});
     if (!plane || plane->confidence < kMinConfidence) return std::nullopt;
-    // A surer plane than this one was seen before: what is seen now is a part of the scene.
+    // A clearly worse plane than before is probably another surface of the scene.
     if (plane->confidence < 0.7 * confidence_) return std::nullopt;
     confidence_ = plane->confidence;
     up_world = plane->normal_world;
@@ -93,10 +93,10 @@ std::optional<Eigen::Quaterniond> WorldUp::Correct(const SlamMap& map, bool is_l
                   plane->confidence, plane->sigma_rad * 180 / std::numbers::pi);
   }
   const double angle_rad = std::acos(std::clamp(up_world.z(), -1.0, 1.0));
-  if (!is_last && angle_rad < kWorthTurning_rad) return std::nullopt;
+  if (!is_last && angle_rad < kMinRotation_rad) return std::nullopt;
   return RotationFromZTo(up_world).conjugate();
 }
 
-void WorldUp::Turned(const Eigen::Quaterniond& R_new_old) { gravity_.Turn(R_new_old); }
+void WorldUp::Rotate(const Eigen::Quaterniond& R_new_old) { gravity_.Rotate(R_new_old); }
 
 }  // namespace romap::slam

@@ -12,6 +12,7 @@
 #include "server/session/ingest.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
+#include "tests/support/sparse_mapper_inspector.h"
 
 namespace romap::measure {
 namespace {
@@ -100,7 +101,7 @@ class Runner {
 
   SE3<World, Camera> PoseNow(const Tracked& tracked) const {
     if (!tracked.reference) return tracked.T_world_camera;
-    const auto reference = sparse_mapper_.map().KeyframePose(tracked.reference);
+    const auto reference = slam::SparseMapperInspector(sparse_mapper_).map().KeyframePose(tracked.reference);
     return reference ? reference->Compose(tracked.T_reference_camera) : tracked.T_world_camera;
   }
 

@@ -4,10 +4,11 @@
 //   track_bench DIR --out FOLDER [--set slam.FIELD=VALUE]... [--depth] [--poses given|prior|ignore] [--cut A:B]
 //               [--until N] [--one-thread] [--fps RATE] [--verbose]
 //
-// FOLDER/trajectory.txt holds every frame's pose as the map says at the end, FOLDER/live.txt as it was said at once
-// (TUM format). Prints what was tracked, the times per frame and per bundle adjustment, and the time of
-// cv::ORB::detectAndCompute at the same number of features in the same run. --cut leaves out the frames A..B-1.
-// --one-thread maps between two frames instead of beside them, so that the same input gives the same result.
+// Writes FOLDER/trajectory.txt with the final pose of every frame and FOLDER/live.txt with the poses as tracking first
+// estimated them (TUM format). Prints the numbers of tracked and lost frames, the times per frame and per bundle
+// adjustment, and the time of cv::ORB::detectAndCompute with the same number of features. --cut skips the frames
+// A..B-1.
+// --one-thread maps between the frames instead of on a thread, so that the same input gives the same result.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -36,6 +37,7 @@
 #include "server/session/ingest.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
+#include "tests/support/sparse_mapper_inspector.h"
 
 namespace romap::measure {
 namespace {
@@ -102,18 +104,18 @@ Options Parse(int argc, char** argv) {
   return options;
 }
 
-// One line per frame that has a pose, with what it hangs on.
-struct Said {
+// A frame with a pose.
+struct TimedFrame {
   double time_s = 0;
   TrackedFrame tracked;
 };
 
-void Write(const std::filesystem::path& path, const std::vector<Said>& frames) {
+void Write(const std::filesystem::path& path, const std::vector<TimedFrame>& frames) {
   std::ofstream file(path);
-  for (const Said& said : frames) {
-    const Eigen::Vector3d t = said.tracked.T_world_camera.translation();
-    const Eigen::Quaterniond q = said.tracked.T_world_camera.rotation();
-    file << fmt::format("{:.6f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f}\n", said.time_s, t.x(), t.y(), t.z(),
+  for (const TimedFrame& frame : frames) {
+    const Eigen::Vector3d t = frame.tracked.T_world_camera.translation();
+    const Eigen::Quaterniond q = frame.tracked.T_world_camera.rotation();
+    file << fmt::format("{:.6f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f}\n", frame.time_s, t.x(), t.y(), t.z(),
                         q.x(), q.y(), q.z(), q.w());
   }
 }
@@ -164,13 +166,15 @@ class Run {
     }
     queue_.Close();
     if (mapping.joinable()) mapping.join();
-    const size_t keyframes_kept = mapper_.map().keyframes().size();
+    const size_t keyframes_kept = Inspect().map().keyframes().size();
     mapper_.Finish();
     Report(keyframes_kept);
     return 0;
   }
 
  private:
+  slam::SparseMapperInspector Inspect() const { return slam::SparseMapperInspector(mapper_); }
+
   void TimeOrb(const Frame& frame, cv::ORB& orb) {
     cv::Mat gray, descriptors;
     std::vector<cv::KeyPoint> keypoints;
@@ -186,12 +190,12 @@ class Run {
     const TrackingState state = image.tracked.state;
     ++frames_;
     if (state == TrackingState::kInitializing) {
-      ++initialising_;
-      if (!tracking_began_) reason_ = image.tracked.reason;
+      ++initializing_;
+      if (!has_tracked_) reason_ = image.tracked.reason;
       if (options_.verbose) fmt::print("frame {}: {}\n", frame->frame_id, image.tracked.reason);
     } else {
-      if (!tracking_began_) first_tracked_ = frame->frame_id;
-      tracking_began_ = true;
+      if (!has_tracked_) first_tracked_ = frame->frame_id;
+      has_tracked_ = true;
       track_s_.push_back(Seconds(Clock::now() - begin));
     }
     if (state == TrackingState::kLost) {
@@ -224,43 +228,46 @@ class Run {
   }
 
   void Report(size_t keyframes_kept) {
-    for (Said& said : final_) {
-      if (!said.tracked.reference) continue;
-      const auto reference = mapper_.map().KeyframePose(said.tracked.reference);
-      if (reference) said.tracked.T_world_camera = reference->Compose(said.tracked.T_reference_camera);
+    for (TimedFrame& frame : final_) {
+      if (!frame.tracked.reference) continue;
+      const auto reference = Inspect().map().KeyframePose(frame.tracked.reference);
+      if (reference) frame.tracked.T_world_camera = reference->Compose(frame.tracked.T_reference_camera);
     }
     if (!options_.out.empty()) {
       std::filesystem::create_directories(options_.out);
       Write(std::filesystem::path(options_.out) / "trajectory.txt", final_);
       Write(std::filesystem::path(options_.out) / "live.txt", live_);
     }
-    const size_t after = frames_ - initialising_;
-    fmt::print("frames {}: initialising {}, tracked {} of the {} after ({:.1f} %), lost {}, first tracked {}\n",
-               frames_, initialising_, after - lost_, after,
+    const size_t after = frames_ - initializing_;
+    fmt::print("frames {}: initializing {}, tracked {} of the {} after ({:.1f} %), lost {}, first tracked {}\n",
+               frames_, initializing_, after - lost_, after,
                100.0 * static_cast<double>(after - lost_) / static_cast<double>(std::max<size_t>(1, after)), lost_,
                first_tracked_);
     if (lost_ > 0) fmt::print("lost:{}\n", lost_frames_);
     if (!relocalized_.empty()) fmt::print("relocalized:{}\n", relocalized_);
-    if (!tracking_began_) fmt::print("never initialised: {}\n", reason_);
+    if (!has_tracked_) fmt::print("never initialized: {}\n", reason_);
     ReportError(keyframes_kept);
-    const auto& figures = mapper_.figures();
+    const slam::SparseMapperInspector mapping = Inspect();
     fmt::print(
-        "keyframes {} made, {} kept; points {}; loops {} corrected, {} sewn; begun anew {}; up confidence {:.2f}\n",
-        mapper_.keyframes(), keyframes_kept, mapper_.points(), figures.loops, figures.sewn, resets_,
-        figures.up_confidence);
+        "keyframes {} made, {} kept; points {}; loops {} corrected, {} merged without correction; map resets {}; up "
+        "confidence {:.2f}\n",
+        mapping.keyframes_made(), keyframes_kept, mapper_.points(), mapping.loops_corrected(), mapping.loops_merged(),
+        resets_, mapping.up_confidence());
     const double orb_ms = 1e3 * QuantileOrZero(orb_s_, 0.5);
     fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
                1e3 * QuantileOrZero(track_s_, 0.5), 1e3 * QuantileOrZero(track_s_, 0.99),
                1e3 * QuantileOrZero(track_s_, 0.5) / orb_ms, orb_ms);
-    fmt::print("keyframe mapping: median {:.0f} ms, p99 {:.0f} ms; local adjustment: median {:.0f} ms, p99 {:.0f} ms\n",
-               1e3 * QuantileOrZero(map_s_, 0.5), 1e3 * QuantileOrZero(map_s_, 0.99),
-               1e3 * QuantileOrZero(figures.window_s, 0.5), 1e3 * QuantileOrZero(figures.window_s, 0.99));
+    const slam::LocalAdjuster::Times& local = mapping.local_adjustment();
+    fmt::print(
+        "keyframe mapping: median {:.0f} ms, p99 {:.0f} ms; local adjustment: mean {:.0f} ms, longest {:.0f} ms\n",
+        1e3 * QuantileOrZero(map_s_, 0.5), 1e3 * QuantileOrZero(map_s_, 0.99),
+        1e3 * local.total_s / std::max(1, local.runs), 1e3 * local.longest_s);
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     fmt::print("peak memory {} MB\n", usage.ru_maxrss / 1024);
   }
 
-  // Against groundtruth.txt of the sequence, where there is one.
+  // Compares the trajectory with groundtruth.txt of the sequence, if it exists.
   void ReportError(size_t keyframes_kept) const {
     if (options_.out.empty() || final_.empty()) return;
     const std::string truth = options_.sequence + "/groundtruth.txt";
@@ -269,22 +276,22 @@ class Run {
                                   .ground_truth = truth,
                                   .alignment = options_.depth ? eval::Alignment::kSe3 : eval::Alignment::kSim3});
     if (!report.ok()) return;
-    fmt::print("ATE rmse {:.3f} cm, {:.3f} % of the way of {:.2f} m, aligned by {}; scale {:.4f}; {} keyframes\n",
+    fmt::print("ATE rmse {:.3f} cm, {:.3f} % of the path of {:.2f} m, aligned by {}; scale {:.4f}; {} keyframes\n",
                100 * report->ate_rmse_m, 100 * report->ate_rmse_m / report->path_length_m, report->path_length_m,
                options_.depth ? "SE3" : "Sim3", report->scale, keyframes_kept);
     ReportUp(truth);
   }
 
-  // Angle between the map's z and the true one, by the orientations of all cameras.
+  // Angle between the map's z axis and the true one, by the orientations of all cameras.
   void ReportUp(const std::string& truth_path) const {
     const auto truth = files::ReadTum(truth_path);
     if (!truth.ok()) return;
     Eigen::Vector3d up_sum = Eigen::Vector3d::Zero();
-    for (const Said& said : final_) {
+    for (const TimedFrame& frame : final_) {
       for (const files::StampedPose& pose : *truth) {
-        if (std::abs(1e-9 * static_cast<double>(pose.timestamp_ns) - said.time_s) > 0.005) continue;
+        if (std::abs(1e-9 * static_cast<double>(pose.timestamp_ns) - frame.time_s) > 0.005) continue;
         const Eigen::Quaterniond R_map_truth =
-            said.tracked.T_world_camera.rotation() * pose.T_world_camera.rotation().conjugate();
+            frame.tracked.T_world_camera.rotation() * pose.T_world_camera.rotation().conjugate();
         up_sum += R_map_truth * Eigen::Vector3d::UnitZ();
       }
     }
@@ -299,11 +306,11 @@ class Run {
   slam::Tracker tracker_;
   BoundedQueue<slam::TrackedImage> queue_;
   std::atomic<int> waiting_ = 0;
-  std::vector<Said> live_, final_;
+  std::vector<TimedFrame> live_, final_;
   std::vector<double> orb_s_, track_s_, map_s_;
-  size_t frames_ = 0, initialising_ = 0, lost_ = 0;
+  size_t frames_ = 0, initializing_ = 0, lost_ = 0;
   int resets_ = 0;
-  bool tracking_began_ = false;
+  bool has_tracked_ = false;
   uint64_t first_tracked_ = 0;
   std::string lost_frames_, relocalized_, reason_;
 };

@@ -57,7 +57,7 @@ class EpipolarMatcherTest : public ::testing::Test {
   std::vector<Feature> second_;
 };
 
-TEST_F(EpipolarMatcherTest, FindsEveryPointAgain) {
+TEST_F(EpipolarMatcherTest, MatchesEveryPoint) {
   const std::vector<FeatureMatch> matches = Match();
   EXPECT_EQ(matches.size(), first_.size());
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
@@ -65,30 +65,31 @@ TEST_F(EpipolarMatcherTest, FindsEveryPointAgain) {
 
 TEST_F(EpipolarMatcherTest, WorksWhenTheCameraMovesForward) {
   const SE3<World, Camera> ahead(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.02, 0.01, 0.6));
-  std::vector<Feature> seen_ahead;
+  std::vector<Feature> features_ahead;
   SlamConfig config;
   config.min_parallax_deg = 0.2;
   const MapKeyframe here = MakeKeyframe(KeyframeId{1}, frame_, kFirst, first_);
   for (size_t i = 0; i < first_.size(); ++i) {
-    seen_ahead.push_back(Project(3 * here.BearingWorld(i), ahead, first_[i].descriptor));
+    features_ahead.push_back(Project(3 * here.BearingWorld(i), ahead, first_[i].descriptor));
   }
-  const auto matches = MatchAlongEpipolarPlanes(MakeKeyframe(KeyframeId{2}, frame_, ahead, seen_ahead), here, config);
+  const auto matches =
+      MatchAlongEpipolarPlanes(MakeKeyframe(KeyframeId{2}, frame_, ahead, features_ahead), here, config);
   EXPECT_GT(matches.size(), first_.size() / 2);
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
 
-TEST_F(EpipolarMatcherTest, ALookalikeOffThePlaneDoesNotConfuse) {
+TEST_F(EpipolarMatcherTest, IgnoresEqualDescriptorsOffTheEpipolarPlane) {
   for (size_t i = 0; i < 200; ++i) {
-    Feature lookalike = second_[i];
-    lookalike.pixel_px.y() += 25;
-    second_.push_back(lookalike);
+    Feature twin = second_[i];
+    twin.pixel_px.y() += 25;
+    second_.push_back(twin);
   }
   const std::vector<FeatureMatch> matches = Match();
   EXPECT_GT(matches.size(), 195);
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
 
-TEST_F(EpipolarMatcherTest, TwoLookalikesInThePlaneAreAmbiguous) {
+TEST_F(EpipolarMatcherTest, EqualDescriptorsInTheEpipolarPlaneAreAmbiguous) {
   const Descriptor twin{1, 2, 3, 4};
   Add({0, 0, 3}, twin);
   second_.push_back(Project({0, 0, 2.5}, kSecond, twin));  // on the same ray of the first camera
@@ -103,7 +104,7 @@ TEST_F(EpipolarMatcherTest, FeaturesWithAPointAreNotMatchedAgain) {
   EXPECT_EQ(matches.size(), first_.size() - 1);
 }
 
-TEST_F(EpipolarMatcherTest, NoBaselineNoMatches) {
+TEST_F(EpipolarMatcherTest, WithoutBaselineThereAreNoMatches) {
   const MapKeyframe keyframe = MakeKeyframe(KeyframeId{1}, frame_, kFirst, first_);
   EXPECT_TRUE(MatchAlongEpipolarPlanes(keyframe, keyframe, SlamConfig{}).empty());
 }

@@ -14,8 +14,7 @@ namespace {
 constexpr uint16_t kLabel = 5;
 constexpr double kDepth_mu = 5;
 
-// Two keyframes without masks that see a row of points in front of them, and a mask over the first columns of whatever
-// picture it is said to be of.
+// Two keyframes without masks that observe a row of points, and masks over the first columns of an image.
 class MaskVoterTest : public ::testing::Test {
  protected:
   static constexpr int kPoints = 15;
@@ -47,7 +46,7 @@ class MaskVoterTest : public ::testing::Test {
     return map_.AddKeyframe(MakeFrameFeatures(frame, features), {Eigen::Quaterniond::Identity(), {x_mu, 0, 0}}).id;
   }
 
-  // Hangs on the second keyframe, from where it moved by x.
+  // A frame anchored to the second keyframe and moved from there by x.
   TrackedFrame PassingFrame(uint64_t frame_id, double x_mu, cv::Mat labels = {}) const {
     auto frame = std::make_shared<Frame>();
     frame->frame_id = frame_id;
@@ -92,17 +91,17 @@ TEST_F(MaskVoterTest, LateMasksLabelTheFeaturesOfAKeyframe) {
     EXPECT_EQ(after.features[i].label, inside ? kLabel : 0) << i;
     EXPECT_EQ(after.mask_zones[i] == MaskZone::kInside, inside) << i;
   }
-  // Whoever shares the sight keeps what it was.
+  // The features are replaced, not changed: other holders keep the old ones.
   EXPECT_FALSE(before->has_masks);
   EXPECT_EQ(before->features[0].label, 0);
   EXPECT_FALSE(map_.FindKeyframe(second_)->frame->has_masks);
-  // Masks do not come twice.
+  // Repeated masks of the same frame are ignored.
   voter_.ObserveMasks({.frame_id = 1, .labels = MaskUntil(300), .instances = {}}, map_);
   EXPECT_EQ(map_.FindKeyframe(first_)->features()[10].label, 0);
 }
 
-TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteWhereItSawThePoints) {
-  // The camera stands 0.2 + 0.5 mu to the right of the first keyframe: everything is 0.7 / 5 * fx further left.
+TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteAtItsProjections) {
+  // The camera stands 0.2 + 0.5 mu to the right of the first keyframe: all points move left by 0.7 / 5 * fx.
   const double shift_px = 0.7 / kDepth_mu * camera_.fx_px;
   voter_.ObserveFrame(PassingFrame(6, 0.5), map_);
   EXPECT_EQ(InsideVotes(), 0);
@@ -110,7 +109,7 @@ TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteWhereItSawThePoints) {
   for (int i = 0; i < kPoints; ++i) {
     const double column_px = 20 + 20.0 * i - shift_px;
     if (column_px < 0) {
-      EXPECT_EQ(VotesFor(i).total(), 0) << i << " is not in the picture";
+      EXPECT_EQ(VotesFor(i).total(), 0) << i << " is outside the image";
     } else if (std::abs(column_px - 130) > 4) {
       EXPECT_EQ(VotesFor(i).inside, column_px < 130 ? 1 : 0) << i;
       EXPECT_EQ(VotesFor(i).total(), 1) << i;
@@ -122,7 +121,7 @@ TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteWhereItSawThePoints) {
   EXPECT_EQ(InsideVotes(), before) << "masks count once";
 }
 
-TEST_F(MaskVoterTest, PosesGoAlongWithTheMap) {
+TEST_F(MaskVoterTest, FramesMoveWithTheMap) {
   voter_.ObserveFrame(PassingFrame(6, 0.5), map_);
   voter_.ObserveMasks({.frame_id = 6, .labels = MaskUntil(130), .instances = {}}, map_);
   const int before = InsideVotes();
@@ -133,9 +132,9 @@ TEST_F(MaskVoterTest, PosesGoAlongWithTheMap) {
   EXPECT_EQ(InsideVotes(), 2 * before);
 }
 
-TEST_F(MaskVoterTest, MasksAreOfThePictureThatTheLensGave) {
+TEST_F(MaskVoterTest, MasksAreInPixelsBeforeTheLensCorrection) {
   map_.CorrectLens({-0.3});
-  // The points are where the corrected features are not, so only the projection counts.
+  // The corrected features no longer match the points, so this tests the projection alone.
   voter_.ObserveFrame(PassingFrame(6, -0.2, MaskUntil(60)), map_);
   const Eigen::Vector2d image_px = map_.lens().Distort(camera_, {40, 120});
   ASSERT_GT(image_px.x(), 45);
@@ -145,7 +144,7 @@ TEST_F(MaskVoterTest, MasksAreOfThePictureThatTheLensGave) {
   EXPECT_EQ(VotesFor(3).inside, 0);  // pinhole pixel 80
 }
 
-TEST_F(MaskVoterTest, TheMasksOfAKeyframeSpeakForTheFramesThatHangOnIt) {
+TEST_F(MaskVoterTest, FramesDoNotVoteWhenTheirReferenceHasMasks) {
   voter_.ObserveFrame(PassingFrame(6, 0, MaskUntil(200)), map_);
   const int before = InsideVotes();
   EXPECT_GT(before, 4);
@@ -155,16 +154,16 @@ TEST_F(MaskVoterTest, TheMasksOfAKeyframeSpeakForTheFramesThatHangOnIt) {
   EXPECT_EQ(InsideVotes(), before);
 }
 
-TEST_F(MaskVoterTest, MasksOfUnknownFramesArePassedOver) {
+TEST_F(MaskVoterTest, MasksOfUnknownFramesAreIgnored) {
   voter_.ObserveMasks({.frame_id = 3, .labels = MaskUntil(320), .instances = {}}, map_);
   voter_.ObserveMasks({.frame_id = 99, .labels = MaskUntil(320), .instances = {}}, map_);
   voter_.ObserveFrame(PassingFrame(6, 0), map_);
-  voter_.Forget();
+  voter_ = MaskVoter(SlamConfig{});
   voter_.ObserveMasks({.frame_id = 6, .labels = MaskUntil(320), .instances = {}}, map_);
   EXPECT_EQ(InsideVotes(), 0);
 }
 
-TEST_F(MaskVoterTest, VotesOutliveTheMergingOfPoints) {
+TEST_F(MaskVoterTest, MergedPointsKeepTheirVotes) {
   voter_.ObserveFrame(PassingFrame(6, 0, MaskUntil(320)), map_);
   ASSERT_EQ(VotesFor(3).inside, 1);
   PointTrack& same = map_.AddPoint(PointAt(3));

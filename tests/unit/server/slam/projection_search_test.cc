@@ -21,7 +21,7 @@ Descriptor Flip(Descriptor descriptor, int bits) {
   return descriptor;
 }
 
-TEST(MatchDescriptors, FindsMutualBestsWithinTheBoundsOnly) {
+TEST(MatchDescriptors, FindsMutualBestMatchesWithinTheLimits) {
   std::mt19937_64 random(3);
   std::vector<Descriptor> first, second;
   for (int i = 0; i < 40; ++i) first.push_back(RandomDescriptor(random));
@@ -76,7 +76,7 @@ TEST_F(ProjectionSearchTest, FindsPointsNearTheirProjection) {
   EXPECT_LE(ProjectionMatcher(*frame_, far).MatchAll(points_, {.radius_px = 8}, {}).size(), 1U);
 }
 
-TEST_F(ProjectionSearchTest, PassesOverWhatCannotBe) {
+TEST_F(ProjectionSearchTest, IgnoresImpossibleMatches) {
   const SE3<World, Camera> here;
   ProjectionMatcher matcher(*frame_, here);
   LocalPoint point = points_[0];
@@ -94,12 +94,12 @@ TEST_F(ProjectionSearchTest, PassesOverWhatCannotBe) {
   behind_the_camera.position_world = -point.position_world;
   behind_the_camera.direction_world = -point.direction_world;
   EXPECT_FALSE(matcher.Find(behind_the_camera, {}, {}));
-  LocalPoint of_other_looks = point;
-  of_other_looks.descriptor = Flip(point.descriptor, 120);
-  EXPECT_FALSE(matcher.Find(of_other_looks, {}, {}));
+  LocalPoint with_other_descriptor = point;
+  with_other_descriptor.descriptor = Flip(point.descriptor, 120);
+  EXPECT_FALSE(matcher.Find(with_other_descriptor, {}, {}));
 }
 
-TEST_F(ProjectionSearchTest, LooksAloneFindThePointsToo) {
+TEST_F(ProjectionSearchTest, DescriptorsAloneFindThePoints) {
   const auto matches = MatchByDescriptors(points_, *frame_, 60, 0.8);
   EXPECT_EQ(matches.size(), points_.size());
   for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);

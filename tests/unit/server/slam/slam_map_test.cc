@@ -11,7 +11,7 @@
 namespace romap::slam {
 namespace {
 
-// Keyframes on a line along x that see the same points ahead of them.
+// Keyframes on a line along x that observe the same points.
 class SlamMapTest : public ::testing::Test {
  protected:
   static constexpr size_t kFeatures = 30;
@@ -35,7 +35,7 @@ class SlamMapTest : public ::testing::Test {
     return track;
   }
 
-  // Every keyframe's list of points and every point's list of sights say the same.
+  // The points of the keyframes and the observations of the points agree.
   void ExpectConsistent() const {
     size_t from_keyframes = 0, from_points = 0;
     for (const auto& [id, keyframe] : map_.keyframes()) {
@@ -60,7 +60,7 @@ class SlamMapTest : public ::testing::Test {
   SlamMap map_{SlamConfig{}};
 };
 
-TEST_F(SlamMapTest, AFeatureShowsOnePointAndAPointIsSeenOnceInAKeyframe) {
+TEST_F(SlamMapTest, AFeatureObservesOnePointAndAKeyframeObservesAPointOnce) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   PointTrack& first = AddPoint(3, {&a, &b});
@@ -70,7 +70,7 @@ TEST_F(SlamMapTest, AFeatureShowsOnePointAndAPointIsSeenOnceInAKeyframe) {
   ExpectConsistent();
 }
 
-TEST_F(SlamMapTest, APointThatIsLeftWithOneSightGoes) {
+TEST_F(SlamMapTest, APointWithOneObservationLeftIsRemoved) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   const MapPointId id = AddPoint(3, {&a, &b}).point.id;
@@ -81,7 +81,7 @@ TEST_F(SlamMapTest, APointThatIsLeftWithOneSightGoes) {
   ExpectConsistent();
 }
 
-TEST_F(SlamMapTest, AMergedPointAnswersForBoth) {
+TEST_F(SlamMapTest, MergedPointsAreFoundByBothIds) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   MapKeyframe& c = AddKeyframe(2);
@@ -90,7 +90,7 @@ TEST_F(SlamMapTest, AMergedPointAnswersForBoth) {
   map_.MergePoints(from, into);
   ASSERT_NE(map_.FindPoint(from), nullptr);
   EXPECT_EQ(map_.FindPoint(from)->point.id, into);
-  EXPECT_EQ(map_.FindPoint(into)->observations.size(), 3U);  // b saw both: once is enough
+  EXPECT_EQ(map_.FindPoint(into)->observations.size(), 3U);  // b observed both; one observation stays
   ExpectConsistent();
 }
 
@@ -106,24 +106,24 @@ TEST_F(SlamMapTest, CovisibilityCountsSharedPoints) {
   EXPECT_TRUE(map_.Covisible(b, 11).empty());
 }
 
-TEST_F(SlamMapTest, ARemovedKeyframeGoesAlongWithItsParent) {
+TEST_F(SlamMapTest, ARemovedKeyframeMovesWithItsParent) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   b.parent = a.id;
-  const KeyframeId gone = b.id;
-  map_.RemoveKeyframe(gone);
-  EXPECT_EQ(map_.FindKeyframe(gone), nullptr);
+  const KeyframeId removed = b.id;
+  map_.RemoveKeyframe(removed);
+  EXPECT_EQ(map_.FindKeyframe(removed), nullptr);
   // The map grows to twice its size and turns by a quarter around z.
   map_.Transform({2, Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(0, 0, 1)});
-  const auto place = map_.KeyframePose(gone);
-  ASSERT_TRUE(place);
-  EXPECT_LT((place->T_world_camera.translation() - Eigen::Vector3d(0, 2, 1)).norm(), 1e-9);
-  EXPECT_DOUBLE_EQ(place->scale, 2);
+  const auto pose = map_.KeyframePose(removed);
+  ASSERT_TRUE(pose);
+  EXPECT_LT((pose->T_world_camera.translation() - Eigen::Vector3d(0, 2, 1)).norm(), 1e-9);
+  EXPECT_DOUBLE_EQ(pose->scale, 2);
   EXPECT_FALSE(map_.KeyframePose(KeyframeId{77}));
 }
 
-TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
+TEST_F(SlamMapTest, CorrectionLogReportsEachMotionOnceAndAccumulatesSmallOnes) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   KeyframeView view;
@@ -131,28 +131,28 @@ TEST_F(SlamMapTest, TheLogTellsWhatMovedOnceAndAddsSmallMotionsUp) {
   view.id = b.id;
   view.T_world_camera = b.T_world_camera();
   CorrectionLog log;
-  log.Tell(view, b.scale);
-  EXPECT_TRUE(log.Take(map_).keyframes.empty());
+  log.Record(view, b.scale);
+  EXPECT_TRUE(log.TakeCorrection(map_).keyframes.empty());
 
-  int told = 0;
-  for (int i = 0; i < 20; ++i) {  // each step below what is noticeable
+  int reported = 0;
+  for (int i = 0; i < 20; ++i) {  // each step is too small to report
     map_.Transform({1, Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0005, 0, 0)});
-    told += static_cast<int>(log.Take(map_).keyframes.size());
+    reported += static_cast<int>(log.TakeCorrection(map_).keyframes.size());
   }
-  EXPECT_GE(told, 2);
-  EXPECT_LE(told, 10);
+  EXPECT_GE(reported, 2);
+  EXPECT_LE(reported, 10);
 
   map_.Transform({1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY())), {1, 2, 3}});
   const SE3<World, Camera> before = b.T_world_camera();
-  const MapCorrection correction = log.Take(map_);
+  const MapCorrection correction = log.TakeCorrection(map_);
   ASSERT_EQ(correction.keyframes.size(), 1U);
   EXPECT_EQ(correction.points.size(), 5U);
   EXPECT_NEAR(correction.keyframes[0].S_new_old.scale(), 1.5, 1e-9);
   EXPECT_LT((correction.keyframes[0].T_world_camera.translation() - before.translation()).norm(), 1e-9);
-  EXPECT_TRUE(log.Take(map_).keyframes.empty());
+  EXPECT_TRUE(log.TakeCorrection(map_).keyframes.empty());
 }
 
-TEST_F(SlamMapTest, ALensCorrectsAllKeyframesAndThoseThatCome) {
+TEST_F(SlamMapTest, LensCorrectionAppliesToOldAndNewKeyframes) {
   const RadialCorrection lens{-0.05};
   MapKeyframe& before = AddKeyframe(0);
   const Eigen::Vector2f image_px = before.features()[0].pixel_px;
@@ -169,7 +169,7 @@ TEST_F(SlamMapTest, ALensCorrectsAllKeyframesAndThoseThatCome) {
     EXPECT_NE(std::find(near.begin(), near.end(), 0), near.end());
   }
   EXPECT_EQ(UncorrectedFeatures(*after.frame)[0].pixel_px, image_px);
-  // Corrections are of what was seen and do not add up.
+  // Corrections start from the pixels of the image and do not accumulate.
   map_.CorrectLens({});
   EXPECT_LT((before.features()[0].pixel_px - image_px).norm(), 1e-3);
 }

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "common/statistics.h"
+#include "tests/support/sparse_mapper_inspector.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap::slam {
@@ -31,14 +32,14 @@ class Mapper {
   explicit Mapper(const SlamConfig& config = {}) : mapper_(config, &slot_, /*inline_adjustment=*/true) {}
   KeyframeView AddKeyframe(const TrackedImage& image) { return *mapper_.Process(image).view; }
   size_t points() const { return mapper_.points(); }
-  size_t keyframes() const { return mapper_.keyframes(); }
+  size_t keyframes() const { return SparseMapperInspector(mapper_).keyframes_made(); }
 
  private:
   LocalMapSlot slot_;
   SparseMapper mapper_;
 };
 
-// What a reader of the views knows of the map.
+// The map as a receiver of the views knows it.
 struct KnownPoints {
   std::map<MapPointId, MapPoint> points;
   std::map<MapPointId, std::map<uint16_t, int>> labels;
@@ -54,7 +55,7 @@ struct KnownPoints {
     }
   }
 
-  // Distance to the true surface that `share` of the points keep.
+  // Quantile `share` of the distances to the true surface.
   double Error_mu(double share) const {
     std::vector<double> errors_mu;
     for (const auto& [id, point] : points) {
@@ -81,13 +82,13 @@ TEST(SparseMapper, PointsLieOnTheTrueSurfaces) {
   EXPECT_EQ(mapper.keyframes(), 10);
   EXPECT_EQ(mapper.points(), known.points.size());
   EXPECT_GT(known.points.size(), 200);
-  // One and five percent of the distance of 1.6 mu; a pixel is 0.006 mu wide there, and points that were just made have
-  // 12 degrees of parallax, which magnify its error in depth five times.
+  // One and five percent of the distance of 1.6 mu. A pixel is 0.006 mu wide there; new points have 12 degrees of
+  // parallax, so that their errors in depth are five times larger.
   EXPECT_LT(known.Error_mu(0.5), 0.016);
   EXPECT_LT(known.Error_mu(0.9), 0.08);
 }
 
-TEST(SparseMapper, AViewIsConsistentInItself) {
+TEST(SparseMapper, ViewsAreConsistent) {
   const TexturedWorld world;
   Mapper mapper;
   for (int i = 0; i < 6; ++i) {
@@ -96,21 +97,21 @@ TEST(SparseMapper, AViewIsConsistentInItself) {
     EXPECT_EQ(view.id, KeyframeId{static_cast<uint64_t>(i + 1)});
     EXPECT_EQ(view.frame, frame);
     ASSERT_EQ(view.observations.size(), view.points.size());
-    std::set<MapPointId> seen;
+    std::set<MapPointId> observed;
     for (size_t k = 0; k < view.points.size(); ++k) {
       const MapPoint& point = view.points[k];
       EXPECT_EQ(view.observations[k].point, point.id);
-      EXPECT_TRUE(seen.insert(point.id).second) << point.id << " is seen twice";
+      EXPECT_TRUE(observed.insert(point.id).second) << point.id << " is observed twice";
       EXPECT_GE(point.observations, 2);
       EXPECT_GT(point.max_parallax_rad, 0.034);
       const Eigen::Vector2d pixel_px = world.camera().Project(view.T_world_camera.Inverse() * point.position_world);
       EXPECT_LT((pixel_px - view.observations[k].pixel_px.cast<double>()).norm(), 10);
     }
-    for (const MapPointId gone : view.removed_points) EXPECT_FALSE(seen.contains(gone));
+    for (const MapPointId removed : view.removed_points) EXPECT_FALSE(observed.contains(removed));
   }
 }
 
-TEST(SparseMapper, LabelsTellThePlateFromTheFloor) {
+TEST(SparseMapper, LabelsSeparateThePlateFromTheFloor) {
   const TexturedWorld world;
   Mapper mapper;
   const KnownPoints known = MapOrbit(world, mapper, 8);
@@ -139,12 +140,12 @@ TEST(SparseMapper, PointsGainObservationsAndAccuracy) {
   EXPECT_GE(most->second.observations, 5);
 }
 
-TEST(SparseMapper, AnUnrelatedImageAddsNoLastingPoints) {
+TEST(SparseMapper, UnrelatedImagesAddNoLastingPoints) {
   const TexturedWorld world;
   Mapper mapper;
   MapOrbit(world, mapper, 4);
   const size_t before = mapper.points();
-  for (int i = 0; i < 6; ++i) {  // noise of its own in every frame: whatever matches is wrong
+  for (int i = 0; i < 6; ++i) {  // different noise in every frame: every match is wrong
     auto frame = world.Render(static_cast<uint64_t>(100 + i), TexturedWorld::OrbitPose(24 + 6.0 * i));
     cv::RNG random(static_cast<uint64_t>(i + 1));
     random.fill(frame->image_bgr, cv::RNG::UNIFORM, 0, 255);
@@ -154,7 +155,7 @@ TEST(SparseMapper, AnUnrelatedImageAddsNoLastingPoints) {
   EXPECT_LT(mapper.points(), before + 10);
 }
 
-TEST(SparseMapper, DepthImagesGivePointsFromTheFirstKeyframeOn) {
+TEST(SparseMapper, DepthImagesGivePointsFromTheFirstKeyframe) {
   const TexturedWorld world;
   Mapper one;
   const KnownPoints first = MapOrbit(world, one, 1, true);
@@ -164,7 +165,7 @@ TEST(SparseMapper, DepthImagesGivePointsFromTheFirstKeyframeOn) {
   EXPECT_LT(MapOrbit(world, five, 5, true).Error_mu(0.9), 0.02);
 }
 
-TEST(SparseMapper, TheSameKeyframesGiveTheSameMap) {
+TEST(SparseMapper, SameKeyframesGiveTheSameMap) {
   const TexturedWorld world;
   Mapper once;
   Mapper again;
@@ -189,7 +190,7 @@ TEST(SparseMapper, ImagesWithoutTextureGiveAnEmptyView) {
   EXPECT_EQ(mapper.points(), 0);
 }
 
-TEST(SparseMapper, GoesOnWhenTheImageSizeChanges) {
+TEST(SparseMapper, ContinuesWhenTheImageSizeChanges) {
   const TexturedWorld world(320, 240);
   const TexturedWorld larger(400, 300);
   Mapper mapper;
@@ -203,7 +204,7 @@ TEST(SparseMapper, GoesOnWhenTheImageSizeChanges) {
   EXPECT_LT(known.Error_mu(0.5), 0.02);
 }
 
-TEST(SparseMapper, TheMapStaysWithinItsBounds) {
+TEST(SparseMapper, RespectsTheMaximumNumberOfPoints) {
   const TexturedWorld world;
   SlamConfig config;
   config.max_points = 150;
@@ -214,7 +215,7 @@ TEST(SparseMapper, TheMapStaysWithinItsBounds) {
   EXPECT_EQ(known.points.size(), mapper.points());
 }
 
-TEST(SparseMapper, AnAbsurdPoseDoesNoHarm) {
+TEST(SparseMapper, AbsurdPoseDoesNotDamageTheMap) {
   const TexturedWorld world;
   Mapper mapper;
   MapOrbit(world, mapper, 4);

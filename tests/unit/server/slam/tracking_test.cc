@@ -13,6 +13,7 @@
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
+#include "tests/support/sparse_mapper_inspector.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap::slam {
@@ -22,15 +23,17 @@ using ::testing::HasSubstr;
 
 class TrackingTest : public ::testing::Test {
  protected:
-  explicit TrackingTest(PoseUse pose_use = PoseUse::kIgnore) { Begin(pose_use); }
+  explicit TrackingTest(PoseUse pose_use = PoseUse::kIgnore) { Restart(pose_use); }
 
-  void Begin(PoseUse pose_use) {
+  void Restart(PoseUse pose_use) {
     slot_ = std::make_unique<LocalMapSlot>();
     mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), /*inline_adjustment=*/true);
     tracker_ = std::make_unique<Tracker>(SlamConfig{}, pose_use, slot_.get());
   }
 
-  // A way with parallax: an arc above the plate.
+  const SlamMap& map() const { return SparseMapperInspector(*mapper_).map(); }
+
+  // A path with parallax: an arc above the plate.
   static SE3<World, Camera> Pose(int i) {
     const double angle_rad = 0.02 * i;
     return TexturedWorld::LookAt({1.5 * std::cos(angle_rad), 1.5 * std::sin(angle_rad), 1.3 + 0.1 * std::sin(0.1 * i)},
@@ -52,32 +55,32 @@ class TrackingTest : public ::testing::Test {
     return state;
   }
 
-  // Feeds the frames 0..end-1. Once the camera is followed it must not be lost; returns how many frames that took.
+  // Feeds the frames 0..end-1. Once tracking works it must not be lost; returns the number of frames before that.
   int Follow(int end) {
-    int initialising = 0;
+    int initializing = 0;
     for (int i = 0; i < end; ++i) {
       const TrackingState state = Feed(Render(i));
-      if (state == TrackingState::kInitializing && initialising == i) {
-        ++initialising;
+      if (state == TrackingState::kInitializing && initializing == i) {
+        ++initializing;
       } else {
         EXPECT_EQ(state, TrackingState::kTracking) << i << ": " << reason_;
       }
     }
-    return initialising;
+    return initializing;
   }
 
-  struct Followed {
+  struct TrackedPose {
     TrackedFrame tracked;
     SE3<World, Camera> truth;
   };
 
-  // Largest distance of a followed camera from the truth after the best similarity, map units of the truth; and the
-  // scale of the truth over the map's.
+  // Largest distance of a tracked camera from the truth after alignment by the best similarity, in the truth's units;
+  // and the scale of that similarity.
   std::pair<double, double> Error() const {
     std::vector<Eigen::Vector3d> estimated, truth;
-    for (const Followed& frame : frames_) {
+    for (const TrackedPose& frame : frames_) {
       SE3<World, Camera> pose = frame.tracked.T_world_camera;
-      if (const auto reference = mapper_->map().KeyframePose(frame.tracked.reference)) {
+      if (const auto reference = map().KeyframePose(frame.tracked.reference)) {
         pose = reference->Compose(frame.tracked.T_reference_camera);
       }
       estimated.push_back(pose.translation());
@@ -90,17 +93,17 @@ class TrackingTest : public ::testing::Test {
     return {worst, S->scale()};
   }
 
-  // Angle between the map's up, which is z, and the truth's.
+  // Angle between the true up direction and the map's, which is z.
   double UpError_deg() const {
-    const Followed& last = frames_.back();
-    const auto reference = mapper_->map().KeyframePose(last.tracked.reference);
+    const TrackedPose& last = frames_.back();
+    const auto reference = map().KeyframePose(last.tracked.reference);
     const Eigen::Quaterniond R_world_camera =
         reference->T_world_camera.rotation() * last.tracked.T_reference_camera.rotation();
     const Eigen::Vector3d up_in_map = R_world_camera * (last.truth.rotation().conjugate() * Eigen::Vector3d::UnitZ());
     return std::acos(std::min(1.0, up_in_map.z())) * 180 / std::numbers::pi;
   }
 
-  // Takes a piece of the floor for the only object, a tile that stands out by nothing.
+  // Labels a rectangle of the floor as the only object: a tile without height.
   void LabelTile(Frame& frame) const {
     std::vector<cv::Point> corners_px;
     for (const auto& [x, y] : {std::pair{0.25, 0.35}, {0.65, 0.35}, {0.65, 0.8}, {0.25, 0.8}}) {
@@ -111,7 +114,7 @@ class TrackingTest : public ::testing::Test {
     cv::fillConvexPoly(frame.labels, corners_px, cv::Scalar(TexturedWorld::kPlateLabel));
   }
 
-  // What a detector says that is slower than the camera: the frame goes on without.
+  // Removes the masks from the frame and returns them, as if a slow detector sent them later.
   static FrameMasks TakeMasks(Frame& frame) {
     FrameMasks masks{.frame_id = frame.frame_id, .labels = frame.labels, .instances = frame.instances};
     frame.has_masks = false;
@@ -124,20 +127,20 @@ class TrackingTest : public ::testing::Test {
   std::unique_ptr<LocalMapSlot> slot_;
   std::unique_ptr<SparseMapper> mapper_;
   std::unique_ptr<Tracker> tracker_;
-  std::vector<Followed> frames_;
+  std::vector<TrackedPose> frames_;
   MappedFrame mapped_;
   std::string reason_;
   int resets_ = 0;
 };
 
-TEST_F(TrackingTest, FollowsTheCameraFromImagesAlone) {
+TEST_F(TrackingTest, TracksFromImagesAlone) {
   EXPECT_LT(Follow(90), 25);
   const auto [worst, scale] = Error();
-  EXPECT_LT(worst, 0.02);  // of a way of two units
-  EXPECT_GT(mapper_->keyframes(), 5U);
+  EXPECT_LT(worst, 0.02);  // of a path of two units
+  EXPECT_GT(map().keyframe_count(), 5U);
 }
 
-TEST_F(TrackingTest, AStandingCameraWaitsAndSaysWhy) {
+TEST_F(TrackingTest, StandingCameraWaitsAndReportsTheReason) {
   for (int i = 0; i < 8; ++i) {
     auto frame = Render(0);
     frame->frame_id = static_cast<uint64_t>(i + 1);
@@ -145,10 +148,10 @@ TEST_F(TrackingTest, AStandingCameraWaitsAndSaysWhy) {
     EXPECT_EQ(Feed(frame), TrackingState::kInitializing);
   }
   EXPECT_THAT(reason_, HasSubstr("too little parallax"));
-  EXPECT_EQ(mapper_->keyframes(), 0U);
+  EXPECT_EQ(map().keyframe_count(), 0U);
 }
 
-TEST_F(TrackingTest, ATurningCameraWaitsAndSaysWhy) {
+TEST_F(TrackingTest, RotatingCameraWaitsAndReportsTheReason) {
   for (int i = 0; i < 12; ++i) {
     const SE3<World, Camera> pose = TexturedWorld::LookAt({1.2, 0, 1.2}, {0.02 * i, 0.04 * i, 0});
     EXPECT_EQ(Feed(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitializing) << i;
@@ -156,25 +159,25 @@ TEST_F(TrackingTest, ATurningCameraWaitsAndSaysWhy) {
   EXPECT_THAT(reason_, HasSubstr("parallax"));
 }
 
-TEST_F(TrackingTest, ACoveredLensIsSurvived) {
+TEST_F(TrackingTest, RecoversFromACoveredLens) {
   Follow(60);
-  const size_t keyframes = mapper_->keyframes();
+  const size_t keyframes = map().keyframe_count();
   for (int i = 60; i < 66; ++i) {
     auto frame = Render(i);
     frame->image_bgr.setTo(0);
     EXPECT_EQ(Feed(frame), TrackingState::kLost);
     EXPECT_THAT(reason_, HasSubstr("texture"));
   }
-  EXPECT_EQ(mapper_->keyframes(), keyframes);
+  EXPECT_EQ(map().keyframe_count(), keyframes);
   EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalized) << reason_;
   EXPECT_EQ(Feed(Render(67)), TrackingState::kTracking) << reason_;
   EXPECT_EQ(resets_, 0);
   EXPECT_LT(Error().first, 0.02);
 }
 
-TEST_F(TrackingTest, ACameraThatWasCarriedOffIsFoundAgainInTheSameMap) {
+TEST_F(TrackingTest, RelocalizesAMovedCameraInTheSameMap) {
   Follow(110);
-  // Looking away for a while, then back where it was long ago: nothing of the last frames helps.
+  // Unrelated images, then a pose from long ago: the last frames do not help.
   for (int i = 110; i < 113; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(i + 1), Pose(i));
     cv::Mat noise(frame->image_bgr.size(), CV_8UC3);
@@ -183,19 +186,18 @@ TEST_F(TrackingTest, ACameraThatWasCarriedOffIsFoundAgainInTheSameMap) {
     cv::GaussianBlur(noise, frame->image_bgr, {7, 7}, 0);
     EXPECT_EQ(Feed(frame), TrackingState::kLost);
   }
-  int found_after = -1;
-  for (int i = 0; i < 10 && found_after < 0; ++i) {
-    const int place = 20 + i;
-    auto frame = world_.Render(static_cast<uint64_t>(120 + i), Pose(place));
-    if (Feed(frame) == TrackingState::kRelocalized) found_after = i;
+  int relocalized_after = -1;
+  for (int i = 0; i < 10 && relocalized_after < 0; ++i) {
+    auto frame = world_.Render(static_cast<uint64_t>(120 + i), Pose(20 + i));
+    if (Feed(frame) == TrackingState::kRelocalized) relocalized_after = i;
   }
-  EXPECT_GE(found_after, 0) << "not found again: " << reason_;
-  EXPECT_LE(found_after, 3);
+  EXPECT_GE(relocalized_after, 0) << "not relocalized: " << reason_;
+  EXPECT_LE(relocalized_after, 3);
   EXPECT_EQ(resets_, 0);
   EXPECT_LT(Error().first, 0.03);
 }
 
-TEST_F(TrackingTest, AYoungMapThatIsLostForLongIsBegunAnew) {
+TEST_F(TrackingTest, ResetsASmallMapAfterALongLoss) {
   for (int i = 0; Feed(Render(i)) != TrackingState::kTracking; ++i) ASSERT_LT(i, 30) << reason_;
   for (int i = 0; i < 60; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(100 + i), Pose(0));
@@ -210,7 +212,7 @@ TEST_F(TrackingTest, AYoungMapThatIsLostForLongIsBegunAnew) {
   EXPECT_GT(tracked, 15);
 }
 
-TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrameOn) {
+TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrame) {
   for (int i = 0; i < 40; ++i) {
     auto frame = Render(i);
     frame->depth_mu = world_.RenderDepth(*frame);
@@ -222,21 +224,21 @@ TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrameOn) {
   EXPECT_LT(worst, 0.02);
 }
 
-TEST_F(TrackingTest, TheSameFramesGiveTheSamePoses) {
+TEST_F(TrackingTest, SameFramesGiveTheSamePoses) {
   std::vector<Eigen::Matrix4d> first;
   for (int round = 0; round < 2; ++round) {
-    Begin(PoseUse::kIgnore);
+    Restart(PoseUse::kIgnore);
     frames_.clear();
     for (int i = 0; i < 45; ++i) Feed(Render(i));
     if (round == 0) {
-      for (const Followed& frame : frames_) first.push_back(frame.tracked.T_world_camera.Matrix());
+      for (const TrackedPose& frame : frames_) first.push_back(frame.tracked.T_world_camera.Matrix());
     }
   }
   ASSERT_EQ(first.size(), frames_.size());
   for (size_t i = 0; i < first.size(); ++i) EXPECT_EQ(first[i], frames_[i].tracked.T_world_camera.Matrix()) << i;
 }
 
-TEST_F(TrackingTest, GravityFromTheClientMakesZUp) {
+TEST_F(TrackingTest, GravityOfTheClientMakesZUp) {
   const Eigen::Vector3d down_world = -Eigen::Vector3d::UnitZ();
   for (int i = 0; i < 45; ++i) {
     auto frame = Render(i);
@@ -247,8 +249,8 @@ TEST_F(TrackingTest, GravityFromTheClientMakesZUp) {
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-// The first camera looks 40 degrees down, and its own up is the map's until an object stands on something.
-TEST_F(TrackingTest, WhatObjectsStandOnTellsUp) {
+// The first camera looks down by 40 degrees and defines the map's up direction until objects show the support plane.
+TEST_F(TrackingTest, SupportPlaneMakesZUp) {
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
     LabelTile(*frame);
@@ -258,7 +260,7 @@ TEST_F(TrackingTest, WhatObjectsStandOnTellsUp) {
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-TEST_F(TrackingTest, MasksThatComeLateTellUpToo) {
+TEST_F(TrackingTest, LateMasksMakeZUp) {
   std::deque<FrameMasks> late;
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
@@ -275,7 +277,7 @@ TEST_F(TrackingTest, MasksThatComeLateTellUpToo) {
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-TEST_F(TrackingTest, MasksOfFramesThatAreNoKeyframesTellUpToo) {
+TEST_F(TrackingTest, MasksOfOtherFramesThanKeyframesMakeZUp) {
   int keyframes_without = 0, others_with = 0;
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
@@ -295,8 +297,8 @@ TEST_F(TrackingTest, MasksOfFramesThatAreNoKeyframesTellUpToo) {
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-TEST_F(TrackingTest, PosesMayStopComing) {
-  Begin(PoseUse::kGiven);
+TEST_F(TrackingTest, TracksFromImagesWhenGivenPosesStop) {
+  Restart(PoseUse::kGiven);
   for (int i = 0; i < 40; ++i) {
     auto frame = Render(i);
     EXPECT_EQ(Feed(frame), TrackingState::kTracking);
@@ -309,7 +311,7 @@ TEST_F(TrackingTest, PosesMayStopComing) {
     const TrackedImage image = tracker_->Track(frame);
     mapped_ = mapper_->Process(image);
     ASSERT_EQ(image.tracked.state, TrackingState::kTracking) << i << ": " << image.tracked.reason;
-    // In the client's own world and unit, without any alignment.
+    // In the client's world and units, without any alignment.
     EXPECT_LT((mapped_.tracked.T_world_camera.translation() - truth.translation()).norm(), 0.02) << i;
   }
   auto frame = Render(60);
@@ -317,8 +319,8 @@ TEST_F(TrackingTest, PosesMayStopComing) {
   EXPECT_EQ(mapped_.tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
 }
 
-TEST_F(TrackingTest, PriorsAreCorrectedByTheImages) {
-  Begin(PoseUse::kPrior);
+TEST_F(TrackingTest, ImagesCorrectPriors) {
+  Restart(PoseUse::kPrior);
   std::mt19937_64 random(9);
   std::normal_distribution<double> noise(0, 0.01);
   double of_priors = 0, of_tracking = 0;

@@ -10,7 +10,7 @@
 namespace romap::slam {
 namespace {
 
-// A frame whose gravity is that of a world where up is `up_world`.
+// A frame with the gravity of a world whose up direction is `up_world`.
 Frame FrameWithGravity(const Eigen::Vector3d& up_world, const SE3<World, Camera>& T_world_camera) {
   Frame frame;
   frame.gravity_camera = -(T_world_camera.rotation().conjugate() * up_world).normalized();
@@ -27,7 +27,7 @@ TEST(UpEstimator, IsWorldZWithoutGravity) {
   EXPECT_EQ(up.up_world(), Eigen::Vector3d::UnitZ());
 }
 
-TEST(UpEstimator, FollowsGravityThroughTurnsOfTheCamera) {
+TEST(UpEstimator, FollowsGravityWhileTheCameraRotates) {
   const Eigen::Vector3d truth = Eigen::Vector3d(0.2, -0.9, 0.3).normalized();
   UpEstimator up;
   for (int i = 0; i < 5; ++i) {
@@ -45,9 +45,9 @@ TEST(UpEstimator, AveragesNoiseAndIgnoresJolts) {
   UpEstimator up;
   for (int i = 0; i < 100; ++i) {
     const bool jolt = i % 5 == 4;
-    const Eigen::Vector3d seen = truth + Eigen::Vector3d(noise(random), noise(random), noise(random)) +
-                                 (jolt ? 2.0 : 0.0) * Eigen::Vector3d::UnitX();
-    up.Add(FrameWithGravity(seen.normalized(), {}), {});
+    const Eigen::Vector3d measured = truth + Eigen::Vector3d(noise(random), noise(random), noise(random)) +
+                                     (jolt ? 2.0 : 0.0) * Eigen::Vector3d::UnitX();
+    up.Add(FrameWithGravity(measured.normalized(), {}), {});
   }
   EXPECT_LT(AngleBetween_deg(up.up_world(), truth), 0.6);
 }

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A thin book on a table, seen from all around: few points of the table on one side of it, many on the book's edge on
-// the other.
+// A thin book on a table, seen from all sides: few points of the table on one side of the book, many on the book's edge
+// on the other.
 class WorldUpTest : public ::testing::Test {
  protected:
   static constexpr double kThickness_mu = 0.012;
@@ -73,31 +73,31 @@ class WorldUpTest : public ::testing::Test {
   SlamMap map_{SlamConfig{}};
 };
 
-TEST_F(WorldUpTest, EdgesOfFlatThingsDoNotTiltTheWorld) {
+TEST_F(WorldUpTest, EdgesOfFlatObjectsDoNotTiltTheWorld) {
   AddPoints();
   TakeMasks();
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(10 * kDegree, Eigen::Vector3d(1, 1, 0).normalized()));
   map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
   WorldUp up;
-  const auto R_new_old = up.Correct(map_);
+  const auto R_new_old = up.ProposeRotation(map_);
   ASSERT_TRUE(R_new_old);
   const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
   EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.2 * kDegree);
 }
 
-TEST_F(WorldUpTest, WithoutMasksNothingStandsOnAnything) {
+TEST_F(WorldUpTest, WithoutMasksThereIsNoSupportPlane) {
   AddPoints();
-  EXPECT_FALSE(WorldUp().Correct(map_, /*is_last=*/true));
+  EXPECT_FALSE(WorldUp().ProposeRotation(map_, /*is_last=*/true));
 }
 
-TEST_F(WorldUpTest, SmallTurnsAreMadeAtTheEndOnly) {
+TEST_F(WorldUpTest, SmallRotationsAreProposedOnlyAtTheEnd) {
   AddPoints();
   TakeMasks();
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.15 * kDegree, Eigen::Vector3d::UnitX()));
   map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
   WorldUp up;
-  EXPECT_FALSE(up.Correct(map_));
-  const auto R_new_old = up.Correct(map_, /*is_last=*/true);
+  EXPECT_FALSE(up.ProposeRotation(map_));
+  const auto R_new_old = up.ProposeRotation(map_, /*is_last=*/true);
   ASSERT_TRUE(R_new_old);
   const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
   EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.1 * kDegree);

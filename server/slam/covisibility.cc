@@ -1,0 +1,43 @@
+#include "server/slam/covisibility.h"
+
+#include <set>
+
+namespace romap::slam {
+namespace {
+
+constexpr size_t kMaxPoints = 8000;
+
+}  // namespace
+
+std::vector<KeyframeId> Neighborhood(const SlamMap& map, const MapKeyframe& keyframe, size_t first, size_t second) {
+  std::vector<KeyframeId> ids;
+  std::set<KeyframeId> known = {keyframe.id};
+  auto around = map.Covisible(keyframe, kMinSharedPoints);
+  if (around.empty() && keyframe.parent) around.emplace_back(keyframe.parent, 0);
+  if (around.size() > first) around.resize(first);
+  for (const auto& [id, shared] : around) {
+    if (known.insert(id).second) ids.push_back(id);
+  }
+  if (second == 0) return ids;
+  for (const auto& [id, shared] : around) {
+    size_t taken = 0;
+    for (const auto& [next, count] : map.Covisible(*map.FindKeyframe(id), kMinSharedPoints)) {
+      if (taken++ == second) break;
+      if (known.insert(next).second) ids.push_back(next);
+    }
+  }
+  return ids;
+}
+
+std::vector<MapPointId> PointsOf(const SlamMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::set<MapPointId> points;
+  for (const KeyframeId id : keyframes) {
+    for (const MapPointId point : map.FindKeyframe(id)->points) {
+      if (point) points.insert(point);
+    }
+    if (points.size() > kMaxPoints) break;
+  }
+  return {points.begin(), points.end()};
+}
+
+}  // namespace romap::slam

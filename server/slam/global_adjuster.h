@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+
+#include "server/slam/slam_config.h"
+#include "server/slam/slam_map.h"
+
+namespace romap::slam {
+
+// Global bundle adjustment: adjusts a copy of the whole map on a thread while the map keeps growing, and writes the
+// result back later. At most one run at a time. For one thread.
+class GlobalAdjuster {
+ public:
+  // `run_inline`: Start() solves on the calling thread, so that the same frames give the same map.
+  GlobalAdjuster(const SlamConfig& config, bool run_inline);
+  ~GlobalAdjuster();  // cancels the run
+
+  // Copies the map and starts to adjust it; cancels an earlier run. `find_lens`: see GlobalProblem.
+  void Start(const SlamMap& map, bool find_lens);
+  // Discards the run, whether it is finished or not; the map stays as it is.
+  void Cancel();
+  // Started, and neither applied nor canceled since.
+  bool IsPending() const { return run_ != nullptr; }
+  // Writes the result of the pending run to the map it was started with. `wait`: blocks until the run is finished.
+  // Returns whether the map changed: false without a pending or finished run, or if the solver failed.
+  bool Apply(bool wait, SlamMap& map);
+
+ private:
+  struct Run;
+
+  const SlamConfig config_;
+  const bool run_inline_;
+  std::unique_ptr<Run> run_;
+};
+
+}  // namespace romap::slam

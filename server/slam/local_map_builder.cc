@@ -1,0 +1,59 @@
+#include "server/slam/local_map_builder.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "server/slam/covisibility.h"
+#include "server/slam/point_maker.h"
+
+namespace romap::slam {
+namespace {
+
+constexpr size_t kNeighbors = 20;
+constexpr size_t kSecondNeighbors = 5;          // of each of those
+constexpr uint64_t kNewestKeyframes = 60;       // whose poses tracking gets besides the neighbors
+constexpr int kMinObservationsOfGoodPoint = 3;  // or all keyframes, in a map of fewer
+
+// The number of well-observed points among the features that an ordinary frame has too.
+int CountReferencePoints(const SlamMap& map, const MapKeyframe& reference) {
+  const int min_observations = std::min(kMinObservationsOfGoodPoint, static_cast<int>(map.keyframes().size()));
+  int count = 0;
+  for (size_t i = 0; i < reference.scene_features; ++i) {
+    const MapPointId id = reference.points[i];
+    count += id && map.FindPoint(id)->point.observations >= min_observations ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+std::shared_ptr<const LocalMap> MakeLocalMap(const SlamMap& map, KeyframeId reference, int generation,
+                                             const std::optional<LocalMap::Relocalization>& relocalized) {
+  auto local = std::make_shared<LocalMap>();
+  local->keyframes_done = map.keyframe_count();
+  local->generation = generation;
+  local->lens = map.lens();
+  local->reference = reference;
+  local->relocalized = relocalized;
+  const MapKeyframe* center = map.FindKeyframe(reference);
+  if (center == nullptr) return local;
+
+  std::vector<KeyframeId> keyframes = Neighborhood(map, *center, kNeighbors, kSecondNeighbors);
+  keyframes.insert(keyframes.begin(), reference);
+  for (const MapPointId id : PointsOf(map, keyframes)) {
+    local->index[id] = static_cast<int>(local->points.size());
+    local->points.push_back(MakeLocalPoint(*map.FindPoint(id)));
+  }
+  local->reference_points = CountReferencePoints(map, *center);
+
+  const uint64_t newest = map.keyframe_count();
+  for (uint64_t id = newest > kNewestKeyframes ? newest - kNewestKeyframes : 1; id <= newest; ++id) {
+    keyframes.push_back(KeyframeId{id});
+  }
+  for (const KeyframeId id : keyframes) {
+    if (const auto pose = map.KeyframePose(id)) local->keyframes[id] = *pose;
+  }
+  return local;
+}
+
+}  // namespace romap::slam

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "server/slam/frame_features.h"
+#include "server/slam/local_map.h"
+#include "server/slam/slam_config.h"
+
+namespace romap::slam {
+
+// A camera pose with the points of the local map that were matched to the frame.
+struct PoseFromPoints {
+  SE3<World, Camera> T_world_camera;
+  std::vector<int> point_of_feature;  // per feature: index into LocalMap::points, -1 = none or outlier
+  int inliers = 0;
+  int matches = 0;  // inliers and outliers
+};
+
+// Estimates the pose of one frame from the points of a local map. All methods return nullopt if they match too few
+// points. Holds references: `map` and `frame` outlive it.
+class LocalMapTracking {
+ public:
+  LocalMapTracking(const LocalMap& map, const FrameFeatures& frame, const SlamConfig& config)
+      : map_(map), frame_(frame), config_(config) {}
+
+  // Searches the points `ids`, or all points if too few of those are in the map, within `radius_px` around their
+  // projections at the pose `start`.
+  std::optional<PoseFromPoints> TrackByProjection(const std::vector<MapPointId>& ids, const SE3<World, Camera>& start,
+                                                  double radius_px) const;
+  // Matches the points `ids` by their descriptors alone, then solves P3P.
+  std::optional<PoseFromPoints> TrackByDescriptors(const std::vector<MapPointId>& ids) const;
+  // Searches all points in a wide area around their projections at the pose of a recently relocalized frame.
+  std::optional<PoseFromPoints> TrackNear(const SE3<World, Camera>& start) const;
+  // Refines `first` by all points of the local map, searched close to their projections.
+  std::optional<PoseFromPoints> TrackAllPoints(const PoseFromPoints& first, int min_inliers) const;
+
+  // Median depth of the matched points [mu]; 0 without any.
+  double MedianDepth_mu(const PoseFromPoints& pose) const;
+
+ private:
+  // The points of `ids` that are in the map, as indices into map_.points.
+  std::vector<int> Indices(const std::vector<MapPointId>& ids) const;
+  std::optional<PoseFromPoints> Refine(const SE3<World, Camera>& start, std::vector<int> point_of_feature,
+                                       int min_inliers) const;
+
+  const LocalMap& map_;
+  const FrameFeatures& frame_;
+  const SlamConfig& config_;
+};
+
+}  // namespace romap::slam

@@ -1,0 +1,55 @@
+#include "server/slam/motion_model.h"
+
+#include <Eigen/Geometry>
+
+namespace romap::slam {
+namespace {
+
+constexpr double kLongestPrediction_s = 0.25;
+
+}  // namespace
+
+void MotionModel::Reset() {
+  last_pose_.reset();
+  motion_.reset();
+}
+
+void MotionModel::RestartAt(const SE3<World, Camera>& T_world_camera) {
+  last_pose_ = T_world_camera;
+  motion_.reset();
+}
+
+void MotionModel::Update(const SE3<World, Camera>& T_world_camera, const std::optional<SE3<World, Camera>>& prior,
+                         int64_t timestamp_ns, bool is_continuous) {
+  motion_.reset();
+  if (last_pose_ && is_continuous) {
+    motion_ = last_pose_->Inverse() * T_world_camera;
+    motion_s_ = 1e-9 * static_cast<double>(timestamp_ns - last_timestamp_ns_);
+  }
+  last_pose_ = T_world_camera;
+  last_prior_ = prior;
+  last_timestamp_ns_ = timestamp_ns;
+}
+
+void MotionModel::Correct(const ScaledPose& before, const ScaledPose& after) {
+  if (!last_pose_) return;
+  const double scale = after.scale / before.scale;
+  const SE3<Camera, Camera> T_reference_last = before.T_world_camera.Inverse() * *last_pose_;
+  last_pose_ = ScaledPose{after.T_world_camera, scale}.Compose(T_reference_last);
+  if (motion_) motion_ = ScaleTranslation(*motion_, scale);
+}
+
+SE3<World, Camera> MotionModel::Predict(const Frame& frame, bool use_prior) const {
+  if (use_prior && frame.T_world_camera && last_prior_) {
+    return *last_pose_ * (last_prior_->Inverse() * *frame.T_world_camera);
+  }
+  if (!motion_ || motion_s_ <= 0) return *last_pose_;
+  const double gap_s = 1e-9 * static_cast<double>(frame.timestamp_ns - last_timestamp_ns_);
+  if (gap_s > kLongestPrediction_s) return *last_pose_;
+  const double share = gap_s / motion_s_;
+  const Eigen::AngleAxisd turn(motion_->rotation());
+  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(share * turn.angle(), turn.axis()));
+  return *last_pose_ * SE3<Camera, Camera>(rotation, share * motion_->translation());
+}
+
+}  // namespace romap::slam
