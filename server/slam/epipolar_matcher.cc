@@ -11,10 +11,10 @@ namespace romap::slam {
 namespace {
 
 constexpr double kSigmas = 2.5;              // width of the search band on either side of the epipolar plane
-constexpr double kMaxParallax_rad = 0.8;     // ORB does not survive a larger change of view
-constexpr double kMinSineToBaseline = 0.05;  // rays closer to the baseline tell no depth
+constexpr double kMaxParallax_rad = 0.8;     // ORB descriptors differ too much beyond
+constexpr double kMinSineToBaseline = 0.05;  // rays closer to the baseline do not determine depth
 constexpr int kMaxOctaveDifference = 2;
-constexpr float kSameSpot_px = 4;  // per octave scale: a rival nearer than this is the same corner found twice
+constexpr float kSameSpot_px = 4;  // per octave scale: a second candidate closer than this is the same corner
 
 // A ray in the polar coordinates of a pair of keyframes.
 struct EpipolarRay {
@@ -70,7 +70,7 @@ void Offer(const MapKeyframe& keyframe, int feature, int distance, Best& best) {
   }
 }
 
-// Calls `visit` for each ray of `sorted` (by around_rad) in the epipolar plane of `ray`, give or take the errors.
+// Calls `visit` for each ray of `sorted` (by around_rad) in the epipolar plane of `ray`, within the errors.
 template <class Visit>
 void VisitPlane(const EpipolarRay& ray, const std::vector<EpipolarRay>& sorted, double max_sigma_rad, Visit visit) {
   const double reach_rad = kSigmas * (ray.around_sigma_rad + max_sigma_rad);

@@ -13,10 +13,10 @@ struct FeatureMatch {
   int distance = 0;
 };
 
-// Matches the features of `first` that have no map point yet with those of `second`. The known poses make the search
-// one-dimensional: all rays of one epipolar plane share the angle around the baseline, and a pair of them meets at the
-// difference of their angles with the baseline, the parallax. A match is the best of its candidates from both sides and
-// clearly better than the second best. In order of `first`.
+// Matches the features of `first` without a map point with those of `second`. The known poses make the search
+// one-dimensional: all rays of one epipolar plane have the same angle around the baseline, and the parallax of two of
+// them is the difference of their angles with the baseline. A match is the best candidate of both features and clearly
+// better than the second best. In order of `first`.
 std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, const MapKeyframe& second,
                                                    const SlamConfig& config);
 

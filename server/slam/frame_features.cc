@@ -12,7 +12,7 @@ namespace {
 constexpr int kCell_px = 16;
 constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighborhood
 
-// z by the depth image, 0 where there is none or where the surface jumps.
+// z depth at a feature; 0 where the depth image has none or is discontinuous.
 double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
   const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
   const int v = static_cast<int>(std::lround(feature.pixel_px.y()));

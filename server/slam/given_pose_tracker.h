@@ -9,13 +9,12 @@
 
 namespace romap::slam {
 
-// For frames that bring their camera pose: takes Frame::T_world_camera as it is, however far it jumps, and chooses the
-// keyframes.
+// Tracks frames that bring their camera pose: uses Frame::T_world_camera without any check and selects the keyframes.
 class GivenPoseTracker {
  public:
   explicit GivenPoseTracker(const SlamConfig& config) : selector_(config) {}
 
-  // `frame` must bring a pose.
+  // `frame` must have a pose.
   TrackedFrame Take(std::shared_ptr<const Frame> frame);
 
  private:

@@ -11,28 +11,28 @@ namespace romap::slam {
 
 // How well a frame was tracked from its image.
 struct TrackingQuality {
-  double scene_depth_mu = 0;      // median over the points it saw
-  double tracked_share = 1;       // points found, over those that the newest keyframe saw
+  double scene_depth_mu = 0;      // median over its matched points
+  double tracked_share = 1;       // matched points over the points of the newest keyframe
   int keyframes_waiting = 0;      // chosen, but not yet in the map
-  bool has_unseen_depth = false;  // its depth image would give many new points
+  bool has_unseen_depth = false;  // its depth image would add many points
 };
 
-// Chooses keyframes from camera poses: one is due when the camera has turned or moved enough since the last one, or
-// when it has moved at all and much time has passed; a camera that stands still gets no more. A due keyframe waits a
-// few frames for one that is sharp and, where masks come with some frames only, has masks.
+// Selects keyframes by camera poses: one is due when the camera has rotated or moved enough since the last one, or has
+// moved a little and much time has passed; a camera that does not move gets none. A due keyframe waits a few frames for
+// one that is sharp and, if only some frames have masks, has masks.
 class KeyframeSelector {
  public:
   explicit KeyframeSelector(const SlamConfig& config) : config_(config) {}
 
-  // Is this frame a keyframe? Call once per frame, in order. The first frame always is.
+  // Whether this frame is a keyframe. Call once per frame, in order. The first frame always is one.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera);
 
-  // The same for a pose that was tracked from the image. A keyframe is also due when the map runs out of points; while
-  // earlier ones wait to be mapped, only what tracking needs is taken.
+  // The same for a pose that was tracked from the image. A keyframe is also due when few points of the map are left in
+  // view. While earlier keyframes wait for mapping, only those that tracking needs are selected.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera, const TrackingQuality& quality);
 
  private:
-  // How far the camera has come towards the next keyframe; 1 = there.
+  // Motion since the last keyframe relative to that which makes the next one due: 1 = due.
   double Progress(const SE3<World, Camera>& T_world_camera) const;
   bool IsDue(const DepthView& view);
   bool IsGood(const Frame& frame, double sharpness);
@@ -41,7 +41,7 @@ class KeyframeSelector {
   const SlamConfig config_;
   std::optional<DepthView> last_keyframe_;
   std::optional<double> scene_depth_mu_;
-  bool depth_is_of_keyframe_ = false;  // scene_depth_mu_ was measured from the last keyframe, not from an earlier one
+  bool depth_is_of_keyframe_ = false;  // scene_depth_mu_ was measured from the last keyframe
   int frames_since_keyframe_ = 0;
   int frames_due_ = 0;
   int frames_since_mask_ = 1 << 20;

@@ -18,28 +18,28 @@
 
 namespace romap::slam {
 
-// What is needed to find a map point in a frame.
+// The data needed to find a map point in a frame.
 struct LocalPoint {
   MapPointId id;
   Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of the rays that saw it
+  Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
   double size_mu = 0;                                          // of one pixel of its octave, at the point
   Descriptor descriptor{};
 };
 
-// The part of the sparse map around the camera, as of one moment: what the mapping thread hands to the tracking thread.
-// Immutable, so that neither ever waits for the other.
+// A copy of the sparse map around the camera, made by the mapping thread for the tracking thread. Immutable, so that
+// neither thread waits for the other.
 struct LocalMap {
   uint64_t keyframes_done = 0;                 // keyframes that are in the map
-  int generation = 0;                          // grows when the map is begun anew
+  int generation = 0;                          // increases when the map is reset or initialized
   RadialCorrection lens;                       // for the features of frames that are tracked against it
   KeyframeId reference;                        // the newest keyframe
-  int reference_points = 0;                    // well-placed points that it sees
-  std::map<KeyframeId, ScaledPose> keyframes;  // the newest ones and those around
+  int reference_points = 0;                    // well-observed points that it observes
+  std::map<KeyframeId, ScaledPose> keyframes;  // the newest ones and those around `reference`
   std::vector<LocalPoint> points;
   std::unordered_map<MapPointId, int> index;  // into `points`
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
-  // The newest frame that was found again while the camera was lost.
+  // The newest frame that was relocalized while tracking was lost.
   struct Relocalization {
     uint64_t frame_id = 0;
     SE3<World, Camera> T_world_camera;

@@ -17,7 +17,7 @@ class ProblemBuilder {
     problem_.bundle.camera = camera;
   }
 
-  // The bundle's pixels become those that the pictures show. Comes before the points.
+  // The observations become pixels of the image, before the lens correction. Call it before AddPoint.
   void FindLens() { problem_.bundle.lens = BundleLens{.correction = map_.lens()}; }
 
   void AddKeyframe(const MapKeyframe& keyframe, bool fixed) {
@@ -92,7 +92,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   std::sort(holding.rbegin(), holding.rend());
   if (holding.size() > kMaxHoldingKeyframes) holding.resize(kMaxHoldingKeyframes);
 
-  // Nothing holds a young map: its oldest keyframe does. Its scale stays free, and damping keeps it where it is.
+  // A small map has no keyframes outside the window: its oldest one is fixed. The scale is free; damping keeps it.
   KeyframeId held;
   if (holding.empty()) {
     held = (*std::min_element(window.begin(), window.end(), [](auto* a, auto* b) { return a->id < b->id; }))->id;
@@ -134,7 +134,7 @@ void ApplyWindow(const MapProblem& problem, SlamMap& map) {
 
 void ApplyGlobal(const MapProblem& problem, SlamMap& map) {
   if (problem.bundle.lens) map.CorrectLens(problem.bundle.lens->correction);
-  // What happened to the space around each keyframe.
+  // The similarity that the space around each keyframe underwent.
   std::map<KeyframeId, Sim3<World, World>> moved;
   for (size_t i = 0; i < problem.keyframes.size(); ++i) {
     const SE3<World, Camera>& after = problem.bundle.cameras[i].T_world_camera;
@@ -143,7 +143,7 @@ void ApplyGlobal(const MapProblem& problem, SlamMap& map) {
   for (auto& [id, keyframe] : map.keyframes()) {
     auto it = moved.find(id);
     if (it == moved.end()) {
-      // Parents are older, so theirs is known.
+      // Parents are older than their children, so theirs is known.
       const auto parent = moved.find(keyframe.parent);
       it = moved.emplace(id, parent == moved.end() ? Sim3<World, World>() : parent->second).first;
     }

@@ -10,7 +10,7 @@
 namespace romap::slam {
 
 // A part of the map as a bundle problem, and which keyframe and point each entry is. A value: it can be solved on
-// another thread while the map goes on.
+// another thread while the map changes.
 struct MapProblem {
   BundleProblem bundle;
   std::vector<KeyframeId> keyframes;       // of bundle.cameras
@@ -22,15 +22,15 @@ struct MapProblem {
 // these points hold the window in place.
 MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config);
 
-// Everything. The first keyframe stays, unless priors hold the map; without depth the scale is free, and damping keeps
-// it where it is. `find_lens`: what is left of the lens is found along with it.
+// All keyframes and points. The first keyframe is fixed unless it has a prior. Without depth the scale is free, and
+// damping keeps it. `find_lens`: the lens correction is estimated too.
 MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
 
 // Writes the solution of a window back and drops the outlier observations.
 void ApplyWindow(const MapProblem& problem, SlamMap& map);
 
-// Writes back a solution that was found while the map went on: keyframes and points that came meanwhile go along with
-// the keyframe they hang on.
+// Writes back a solution that was found while the map changed: newer keyframes move with their parents, and newer
+// points with their first keyframe.
 void ApplyGlobal(const MapProblem& problem, SlamMap& map);
 
 }  // namespace romap::slam

@@ -11,7 +11,7 @@ constexpr uint64_t kTrialKeyframes = 3;
 constexpr int kTrialObservations = 3;
 constexpr double kRedundantShare = 0.97;
 constexpr int kOtherKeyframes = 3;
-constexpr size_t kMaxGone = 2;  // at once, so that adjustment can settle
+constexpr size_t kMaxRemoved = 2;  // at once, so that bundle adjustment can compensate
 
 bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
   int points = 0;
@@ -34,12 +34,12 @@ bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
 }  // namespace
 
 void CullPoints(const SlamConfig& config, SlamMap& map) {
-  std::vector<MapPointId> gone;
+  std::vector<MapPointId> removed;
   std::vector<std::pair<uint64_t, MapPointId>> by_age;
   for (const auto& [id, track] : map.points()) {
     const bool trial_is_over = map.keyframe_count() - track.born_keyframe >= kTrialKeyframes;
     if (trial_is_over && track.point.observations < kTrialObservations) {
-      gone.push_back(id);
+      removed.push_back(id);
     } else {
       by_age.emplace_back(track.latest_keyframe, id);
     }
@@ -47,33 +47,33 @@ void CullPoints(const SlamConfig& config, SlamMap& map) {
   if (by_age.size() > static_cast<size_t>(config.max_points)) {
     std::sort(by_age.begin(), by_age.end());
     by_age.resize(by_age.size() - static_cast<size_t>(config.max_points));
-    for (const auto& [latest_keyframe, id] : by_age) gone.push_back(id);
+    for (const auto& [latest_keyframe, id] : by_age) removed.push_back(id);
   }
-  for (const MapPointId id : gone) map.RemovePoint(id);
+  for (const MapPointId id : removed) map.RemovePoint(id);
 }
 
 std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map) {
-  std::vector<KeyframeId> gone;
-  const auto may_go = [&](const MapKeyframe& keyframe) {
-    // The newest ones are what tracking hangs on, and the first one holds the world.
+  std::vector<KeyframeId> removed;
+  const auto may_remove = [&](const MapKeyframe& keyframe) {
+    // Tracking depends on the newest ones, and the first one defines the world.
     return !keyframe.pose_given && keyframe.parent && keyframe.loops.empty() && keyframe.id.value + 5 < newest.id.value;
   };
   for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) {
-    if (gone.size() == kMaxGone) break;
+    if (removed.size() == kMaxRemoved) break;
     const MapKeyframe& keyframe = *map.FindKeyframe(id);
-    if (may_go(keyframe) && IsRedundant(keyframe, map)) {
+    if (may_remove(keyframe) && IsRedundant(keyframe, map)) {
       map.RemoveKeyframe(id);
-      gone.push_back(id);
+      removed.push_back(id);
     }
   }
   if (map.keyframes().size() > static_cast<size_t>(config.max_keyframes)) {
-    // The one that shares most with its parent tells least of its own.
+    // The one closest to its parent adds the least information.
     KeyframeId least;
     double highest = 0;
     for (const auto& [id, keyframe] : map.keyframes()) {
-      if (!may_go(keyframe)) continue;
-      const double way_mu = (keyframe.center_world() - map.FindKeyframe(keyframe.parent)->center_world()).norm();
-      const double closeness = 1 / (1e-9 + way_mu);
+      if (!may_remove(keyframe)) continue;
+      const double distance_mu = (keyframe.center_world() - map.FindKeyframe(keyframe.parent)->center_world()).norm();
+      const double closeness = 1 / (1e-9 + distance_mu);
       if (closeness > highest) {
         highest = closeness;
         least = id;
@@ -81,10 +81,10 @@ std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyfram
     }
     if (least) {
       map.RemoveKeyframe(least);
-      gone.push_back(least);
+      removed.push_back(least);
     }
   }
-  return gone;
+  return removed;
 }
 
 }  // namespace romap::slam

@@ -7,11 +7,12 @@
 
 namespace romap::slam {
 
-// Points whose trial is over without enough observations, and beyond the allowed number those seen longest ago.
+// Removes points that have too few observations after their first keyframes and, beyond the maximum number of points,
+// those not observed for the longest time.
 void CullPoints(const SlamConfig& config, SlamMap& map);
 
-// Takes out keyframes around `newest` that say nothing new: nearly all of their points are seen by several others as
-// well or better (Mur-Artal et al. 2015, section VI-E). Returns those that went.
+// Removes redundant keyframes around `newest`: several others observe nearly all of their points equally well or better
+// (Mur-Artal et al. 2015, section VI-E). Returns the removed ones.
 std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map);
 
 }  // namespace romap::slam

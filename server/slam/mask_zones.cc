@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kShrink = 8;           // masks are shrunk so many times to tell what is close to one
+constexpr int kShrink = 8;           // factor between the masks and the smaller image for kNear
 constexpr double kNearShare = 0.08;  // of the image's width
 constexpr double kBorder_px = 3;     // for the finest octave
 
@@ -40,11 +40,11 @@ MaskZone MaskZones::At(const Eigen::Vector2f& pixel_px, double octave_scale, uin
   return AnyMaskWithin(labels_, pixel_px, reach_px) ? MaskZone::kBorder : MaskZone::kNear;
 }
 
-void MaskVotes::Add(MaskZone place) {
-  inside += place == MaskZone::kInside ? 1 : 0;
-  border += place == MaskZone::kBorder ? 1 : 0;
-  near += place == MaskZone::kNear ? 1 : 0;
-  far += place == MaskZone::kFar ? 1 : 0;
+void MaskVotes::Add(MaskZone zone) {
+  inside += zone == MaskZone::kInside ? 1 : 0;
+  border += zone == MaskZone::kBorder ? 1 : 0;
+  near += zone == MaskZone::kNear ? 1 : 0;
+  far += zone == MaskZone::kFar ? 1 : 0;
 }
 
 void MaskVotes::Add(const MaskVotes& other) {

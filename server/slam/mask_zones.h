@@ -6,21 +6,21 @@
 
 namespace romap::slam {
 
-// How a place of a picture lies to the picture's instance masks.
+// Where a pixel lies relative to the instance masks of its image.
 enum class MaskZone : uint8_t {
-  kUnknown,  // no detector ran on the picture
+  kUnknown,  // no detector ran on the image
   kFar,      // outside of all masks, close to none
   kNear,     // outside of all masks, but close to one
-  kBorder,   // so close to a mask's border that the mask, which errs there, does not tell
+  kBorder,   // too close to a mask's border to tell, because masks are inaccurate there
   kInside,
 };
 
-// Tells where places lie in one mask image.
+// Classifies pixels of one mask image.
 class MaskZones {
  public:
-  // `labels`: CV_16UC1, 0 = nothing. Empty: no detector ran. Not written to meanwhile.
+  // `labels`: CV_16UC1, 0 = nothing. Empty: no detector ran. Must not change while this exists.
   explicit MaskZones(const cv::Mat& labels);
-  // Of what is `octave_scale` px wide at a pixel of the image, to which the masks give `label` (see LabelAt).
+  // The zone of a feature `octave_scale` px wide, to which the masks give `label` (see LabelAt).
   MaskZone At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const;
 
  private:
@@ -28,7 +28,7 @@ class MaskZones {
   cv::Mat around_;  // CV_8UC1, shrunk: not 0 in and around masks
 };
 
-// What several pictures say of one point.
+// Counts of the zones of one point in several images.
 struct MaskVotes {
   int inside = 0;
   int border = 0;
@@ -36,7 +36,7 @@ struct MaskVotes {
   int far = 0;
 
   int total() const { return inside + border + near + far; }
-  void Add(MaskZone place);
+  void Add(MaskZone zone);
   void Add(const MaskVotes& other);
 };
 

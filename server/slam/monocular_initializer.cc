@@ -13,20 +13,21 @@ namespace romap::slam {
 namespace {
 
 constexpr int kMinFeatures = 100;
-constexpr int kMaxOctave = 3;          // coarser corners are too uncertain to begin with
-constexpr double kSearchShare = 0.08;  // of the image's width, around where a feature was seen last
+constexpr int kMaxOctave = 3;          // coarser corners are too inaccurate
+constexpr double kSearchShare = 0.08;  // of the image's width, around the last pixel of a feature
 constexpr int kMaxDistance = 60;       // Hamming, bits
 constexpr double kRatio = 0.85;
-constexpr double kMinMotionShare = 0.012;  // of the image's width: median motion of the features worth a try
-constexpr int kMaxWait_frames = 90;        // a first view that led to nothing for so long is given up
-constexpr double kMinParallax_deg = 1.5;   // median over the points of the two first views
-constexpr double kMinKeptShare = 0.15;     // of the first view's features must still be followed
-constexpr double kSpacingShare = 0.03;     // of the image's width: motion after which one more view is followed
+constexpr double kMinMotionShare =
+    0.012;                           // of the image's width: least median motion of the features to try SolveTwoView
+constexpr int kMaxWait_frames = 90;  // a view is dropped after this
+constexpr double kMinParallax_deg = 1.5;  // median over the points of the two first views
+constexpr double kMinKeptShare = 0.15;    // of the first view's features must still be followed
+constexpr double kSpacingShare = 0.03;    // of the image's width: motion after which one more view is followed
 constexpr size_t kMaxFollowed = 4;
 
 }  // namespace
 
-void MonocularInitializer::Begin(std::shared_ptr<const FrameFeatures> frame) {
+void MonocularInitializer::AddView(std::shared_ptr<const FrameFeatures> frame) {
   FollowedView view{.frame = std::move(frame)};
   for (const Feature& feature : view.frame->features) view.latest_px.push_back(feature.pixel_px.cast<double>());
   followed_.push_back(std::move(view));
@@ -85,20 +86,20 @@ std::optional<InitialViews> MonocularInitializer::Offer(std::shared_ptr<const Fr
   *reason = "waiting for a second view";
   for (FollowedView& view : followed_) Follow(*frame, view);
   const int min_matches = TwoViewOptions{}.min_matches;
-  const size_t gone = std::erase_if(followed_, [&](const FollowedView& view) {
+  const size_t dropped = std::erase_if(followed_, [&](const FollowedView& view) {
     const auto matches = static_cast<double>(view.matches.size());
     return matches < kMinKeptShare * static_cast<double>(view.frame->size()) || matches < min_matches ||
            view.frames > kMaxWait_frames;
   });
-  if (gone > 0) *reason = "the first view is no longer visible";
+  if (dropped > 0) *reason = "too few features of the first view are still visible";
   for (auto view = followed_.rbegin(); view != followed_.rend(); ++view) {
-    if (auto start = Try(*view, frame, reason)) {
+    if (auto views = Try(*view, frame, reason)) {
       followed_.clear();
-      return start;
+      return views;
     }
   }
   const bool has_moved_on = followed_.empty() || followed_.back().motion_px > kSpacingShare * frame->camera.width_px;
-  if (has_moved_on && followed_.size() < kMaxFollowed) Begin(std::move(frame));
+  if (has_moved_on && followed_.size() < kMaxFollowed) AddView(std::move(frame));
   return std::nullopt;
 }
 
@@ -130,7 +131,7 @@ std::optional<InitialViews> MonocularInitializer::Try(const FollowedView& view,
     if (!result.points_first[i]) continue;
     start.points.push_back({view.matches[i].first, view.matches[i].second, *result.points_first[i]});
   }
-  *reason = "two views found, the map begins";
+  *reason = "two views found; initializing the map";
   return start;
 }
 

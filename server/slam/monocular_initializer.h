@@ -12,7 +12,7 @@
 
 namespace romap::slam {
 
-// From what a map begins: two views without depth, or one with depth.
+// The views from which a map is initialized: two without depth, or one with depth.
 struct InitialViews {
   std::shared_ptr<const FrameFeatures> first;
   std::shared_ptr<const FrameFeatures> second = {};  // none: `first` has depth
@@ -20,18 +20,18 @@ struct InitialViews {
   struct Point {
     int first_feature = 0;
     int second_feature = 0;
-    Eigen::Vector3d p_first = Eigen::Vector3d::Zero();  // in the first camera's frame, in lengths of the baseline
+    Eigen::Vector3d p_first = Eigen::Vector3d::Zero();  // in the first camera's frame, in units of the baseline
   };
   std::vector<Point> points = {};
 };
 
-// Waits for two views that a map can begin with. A few views are kept and followed from frame to frame until structure
-// and motion come out of one of them and the newest frame (SolveTwoView), or too little of it is left.
+// Searches for two views that can initialize a map. Follows the features of a few earlier views from frame to frame
+// until SolveTwoView succeeds for one of them and the newest frame, or too few of its features are left.
 class MonocularInitializer {
  public:
   explicit MonocularInitializer(const SlamConfig& config) : config_(config) {}
 
-  // The next frame. Without a result, `reason` says why for people.
+  // The next frame. Without a result, `reason` tells people why.
   std::optional<InitialViews> Offer(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
   void Reset() { followed_.clear(); }
 
@@ -42,13 +42,13 @@ class MonocularInitializer {
   };
   struct FollowedView {
     std::shared_ptr<const FrameFeatures> frame;
-    std::vector<Eigen::Vector2d> latest_px = {};  // where each feature was seen last
+    std::vector<Eigen::Vector2d> latest_px = {};  // last pixel of each feature
     std::vector<Match> matches = {};              // with the newest frame
     double motion_px = 0;                         // median over the matches
-    int frames = 0;                               // since it was taken
+    int frames = 0;                               // since the view
   };
 
-  void Begin(std::shared_ptr<const FrameFeatures> frame);
+  void AddView(std::shared_ptr<const FrameFeatures> frame);
   void Follow(const FrameFeatures& frame, FollowedView& view) const;
   std::optional<InitialViews> Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& frame,
                                   std::string* reason) const;

@@ -17,7 +17,7 @@ namespace romap::slam {
 namespace {
 
 constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
-constexpr double kMaxSizeRatio = 1.9;        // between the sizes that two features of one point claim to have
+constexpr double kMaxSizeRatio = 1.9;        // between the sizes of one point by two features
 constexpr double kSearchRadius_px = 4;       // around the projection of a known point
 constexpr double kFuseRadius_px = 2.5;
 constexpr int kFuseDistance = 50;  // Hamming, bits
@@ -143,7 +143,7 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
     min_baseline_mu = Median(std::move(depths_mu)) * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
   }
   const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
-  // Those that share points, and the newest, which may not share any yet.
+  // Keyframes that share points, and the newest ones, which may not share any yet.
   std::vector<KeyframeId> candidates;
   for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) candidates.push_back(id);
   for (auto it = map_->keyframes().rbegin(); it != map_->keyframes().rend() && candidates.size() < 60; ++it) {
@@ -151,7 +151,7 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
       if (keyframe.pose_given || candidates.empty()) candidates.push_back(it->first);
     }
   }
-  // With given poses the newest are as good as any, and the ones nearest in time look most alike.
+  // With given poses all are equally accurate, and those nearest in time have the most similar views.
   if (keyframe.pose_given) std::sort(candidates.rbegin(), candidates.rend());
   std::vector<MapKeyframe*> others;
   for (const KeyframeId id : candidates) {
@@ -182,7 +182,7 @@ int PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& p
       fused += Tie(keyframe, found->feature, *track) ? 1 : 0;
       continue;
     }
-    // The one that more keyframes saw stays.
+    // Keep the point with more observations.
     const PointTrack* other = map_->FindPoint(there);
     const bool keep_other = other->observations.size() >= track->observations.size();
     map_->MergePoints(keep_other ? track->point.id : there, keep_other ? there : track->point.id);

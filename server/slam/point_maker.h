@@ -10,25 +10,25 @@ namespace romap::slam {
 
 LocalPoint MakeLocalPoint(const PointTrack& track);
 
-// Finds known points in a new keyframe and makes new ones. Where poses were given they are exact and points are checked
-// strictly against all their observations; where they were estimated, adjustment and culling see to that later.
+// Finds known points in a new keyframe and makes new ones. Given poses are exact: there, points are checked against all
+// their observations at once. With estimated poses, bundle adjustment and culling remove bad observations later.
 class PointMaker {
  public:
   PointMaker(const SlamConfig& config, SlamMap* map) : config_(config), map_(map) {}
 
-  // The same for a keyframe that knows few points: looks at more keyframes and takes less parallax, because a map with
-  // uncertain points is better than a lost camera.
+  // The configuration for a keyframe with few points: matches more keyframes and accepts less parallax, because
+  // uncertain points are better than losing track.
   static SlamConfig Generous(SlamConfig config);
 
-  // Ties the features of `keyframe` to those of `candidates` that it shows.
+  // Adds observations of those `candidates` that are found in the keyframe.
   void FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPointId>& candidates);
-  // New points from features of `keyframe` and of `others`, seen from directions that differ enough.
+  // New points from features of `keyframe` and of `others`, with enough parallax.
   void MakePointsByParallax(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& others);
   // New points from the depth image.
   void MakePointsByDepth(MapKeyframe& keyframe);
-  // Points of `neighbors` and of `keyframe` that turn out to be the same become one.
+  // Merges points of `neighbors` and of `keyframe` that are the same.
   void FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbors);
-  // Earlier keyframes with enough baseline to make points with: those that share most points come first.
+  // Earlier keyframes with enough baseline for new points, those that share most points first.
   std::vector<MapKeyframe*> KeyframesToMatch(const MapKeyframe& keyframe) const;
 
  private:

@@ -11,15 +11,16 @@
 
 namespace romap::slam {
 
-// How far and how strictly known points are looked for around their projection.
+// How far and how strictly known points are searched around their projections.
 struct ProjectionSearch {
-  double radius_px = 4;          // times the octave scale expected, up to three
-  int max_distance = 60;         // Hamming, bits
-  double ratio = 0.9;            // best over second best distance; rivals at the same spot do not count
-  double min_view_cosine = 0.7;  // between the ray and the mean of the rays that saw it; ORB does not survive more
+  double radius_px = 4;   // times the octave scale expected, up to three
+  int max_distance = 60;  // Hamming, bits
+  double ratio = 0.9;     // best over second best distance; rivals at the same spot do not count
+  double min_view_cosine =
+      0.7;  // between the ray and the mean ray of the point; ORB descriptors differ too much beyond
 };
 
-// Where a point was found.
+// The feature that matches a point.
 struct FoundFeature {
   int feature = 0;
   int distance = 0;  // Hamming, bits
@@ -31,24 +32,24 @@ struct PointMatch {
   int distance = 0;
 };
 
-// Finds points in one frame seen from one pose. Keeps its buffers; for one thread.
+// Finds points in one frame with a known pose. Reuses its buffers; for one thread.
 class ProjectionMatcher {
  public:
   ProjectionMatcher(const FrameFeatures& frame, const SE3<World, Camera>& T_world_camera);
 
-  // Pixel and expected octave scale of a point; nullopt: behind the camera, outside the image, or seen from too
-  // different a direction.
+  // Pixel and expected octave scale of a point; nullopt: behind the camera, outside the image, or viewed
+  // from too different a direction.
   struct Expected {
     Eigen::Vector2d pixel_px;
     double octave_scale = 1;
   };
   std::optional<Expected> Expect(const LocalPoint& point, double min_view_cosine) const;
 
-  // The feature that shows the point. Features with a non-zero entry in `taken` (empty: none) are passed over.
+  // The feature that matches the point. Features with a non-zero entry in `taken` (empty: none) are ignored.
   std::optional<FoundFeature> Find(const LocalPoint& point, const ProjectionSearch& search,
                                    std::span<const uint8_t> taken);
 
-  // One-to-one matches: where two points claim a feature, the one that looks more like it gets it.
+  // One-to-one matches: of two points with the same feature, the one with the smaller descriptor distance gets it.
   std::vector<PointMatch> MatchAll(std::span<const LocalPoint> points, const ProjectionSearch& search,
                                    std::span<const uint8_t> taken);
 
@@ -59,7 +60,7 @@ class ProjectionMatcher {
   std::vector<int> near_;
 };
 
-// Points and features alike by their looks alone: mutual best, and clearly better than the second best.
+// Matches by descriptors alone: mutually best, and clearly better than the second best.
 std::vector<PointMatch> MatchByDescriptors(std::span<const LocalPoint> points, const FrameFeatures& frame,
                                            int max_distance, double ratio);
 

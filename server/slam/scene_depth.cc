@@ -16,14 +16,14 @@ namespace {
 constexpr int kWidth_px = 160;
 constexpr int kBlock_px = 16;
 constexpr int kDepths = 24;
-// The parallax (baseline over depth) of the planes, evenly spaced on a log scale. Below the first one a baseline tells
-// nothing at this image size.
+// The parallax (baseline over depth) of the planes, evenly spaced on a log scale. Less than the first is not measurable
+// at this image size.
 constexpr double kFirstParallax = 0.008;
 constexpr double kLastParallax = 0.4;
 constexpr int kMinVotes = 8;       // blocks
 constexpr float kDistinct = 0.6F;  // best cost of a block over its mean cost
 
-// Pixels of a view to pixels of another one by way of the plane z = depth_mu in the first camera.
+// Maps pixels of one view to pixels of another one by the plane z = depth_mu in the first camera.
 cv::Matx33d PlaneHomography(const DepthView& first, const DepthView& second, double depth_mu) {
   const SE3<Camera, Camera> T_second_first = second.T_world_camera.Inverse() * first.T_world_camera;
   Eigen::Matrix3d K_first_inverse, K_second;
@@ -70,7 +70,7 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
   return Median(std::move(depths));
 }
 
-// At half the image's size: motion blur that matters is still seen, noise is not.
+// At half the image's size, which keeps strong motion blur but averages noise.
 double Sharpness(const cv::Mat& image_bgr) {
   cv::Mat half, gray, laplacian;
   cv::resize(image_bgr, half, {}, 0.5, 0.5, cv::INTER_AREA);
@@ -128,7 +128,7 @@ std::optional<double> SceneDepth(const DepthView& first, const DepthView& second
         sum += cost;
         ++finite;
       }
-      // A block votes when one depth stands out, and not at either end: there the true depth may lie beyond.
+      // A block votes if one depth is distinct and not at either end, where the true depth may lie beyond the range.
       const bool distinct = finite > kDepths / 2 && costs[best].at<float>(row, col) < kDistinct * sum / finite;
       if (distinct && best > 0 && best < kDepths - 1) votes.push_back(depths_mu[best]);
     }

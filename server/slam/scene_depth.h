@@ -7,7 +7,7 @@
 
 namespace romap::slam {
 
-// A small gray copy of a frame with what is needed to measure depth against another one, and its sharpness.
+// A small gray copy of a frame for measuring depth with another one, and the frame's sharpness.
 struct DepthView {
   CameraModel camera;  // of `gray`
   SE3<World, Camera> T_world_camera;
@@ -20,8 +20,8 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
 
 // Typical depth of the scene in map units, seen from `first`. A depth image gives it directly. Otherwise it is the
 // median over image blocks of a plane sweep (Collins 1996): `second` is warped to `first` for planes at several depths
-// and each block keeps the depth under which it fits best. nullopt: the views are too close together, too different or
-// without texture.
+// and each block votes for the depth with the least difference. nullopt: the views are too close together or too
+// different, or have no texture.
 std::optional<double> SceneDepth(const DepthView& first, const DepthView& second);
 
 }  // namespace romap::slam

@@ -169,14 +169,14 @@ std::vector<ObservedRay> SlamMap::RaysOf(const PointTrack& track, size_t max_ray
 
 void SlamMap::Refresh(PointTrack& track) const {
   if (track.observations.empty()) return;
-  constexpr size_t kMaxLooks = 12;
+  constexpr size_t kMaxSamples = 12;
   const size_t count = track.observations.size();
-  const size_t looks = std::min(count, kMaxLooks);
+  const size_t samples = std::min(count, kMaxSamples);
   std::vector<Descriptor> descriptors;
   Eigen::Vector3d directions = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> rays;
-  for (size_t i = 0; i < looks; ++i) {
-    const FeatureRef& observation = track.observations[looks < 2 ? 0 : i * (count - 1) / (looks - 1)];
+  for (size_t i = 0; i < samples; ++i) {
+    const FeatureRef& observation = track.observations[samples < 2 ? 0 : i * (count - 1) / (samples - 1)];
     const MapKeyframe& keyframe = keyframes_.at(observation.keyframe);
     descriptors.push_back(keyframe.features()[static_cast<size_t>(observation.feature)].descriptor);
     rays.push_back((track.point.position_world - keyframe.center_world()).normalized());
@@ -196,7 +196,7 @@ void SlamMap::Refresh(PointTrack& track) const {
       feature.octave_scale * (track.point.position_world - keyframe.center_world()).norm() / keyframe.camera().fx_px;
 
   int least_sum = std::numeric_limits<int>::max();
-  for (size_t i = 0; i < looks; ++i) {
+  for (size_t i = 0; i < samples; ++i) {
     int sum = 0;
     for (const Descriptor& other : descriptors) sum += HammingDistance(descriptors[i], other);
     if (sum >= least_sum) continue;

@@ -24,12 +24,12 @@ inline constexpr int kMinSharedPoints = 15;
 struct MapKeyframe {
   KeyframeId id;
   std::shared_ptr<const FrameFeatures> frame;
-  bool pose_given = false;              // by the client: nothing may move it
-  std::optional<PosePrior> prior = {};  // what the client believes of its pose
-  size_t scene_features = 0;            // the first ones: those that an ordinary frame has too
+  bool pose_given = false;              // by the client: it is never moved
+  std::optional<PosePrior> prior = {};  // the client's estimate of its pose
+  size_t scene_features = 0;            // number of the first features that an ordinary frame has too
   std::vector<MapPointId> points = {};  // one per feature, 0 = none
-  KeyframeId parent = {};               // the keyframe it shared most points with when it came; 0 for the first
-  std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, found by their looks
+  KeyframeId parent = {};               // the keyframe it shared most points with when it was added; 0 for the first
+  std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, by place recognition
   double scale = 1;  // product of all scale corrections of the map around it
 
   const std::vector<Feature>& features() const { return frame->features; }
@@ -56,40 +56,41 @@ struct FeatureRef {
   int feature = 0;
 };
 
-// A map point with all that is needed to find it again and to place it better.
+// A map point with what is needed to match it and to refine its position.
 struct PointTrack {
   MapPoint point;
   std::vector<FeatureRef> observations = {};                   // by keyframe
-  Descriptor descriptor{};                                     // the sight's that differs least from all others
-  Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of the rays that saw it
+  Descriptor descriptor{};                                     // of the observation that differs least from all others
+  Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
   double size_mu = 0;          // width of one pixel of the feature's own octave at the point: size that does not change
   uint64_t born_keyframe = 0;  // number of the keyframe that made it
-  uint64_t latest_keyframe = 0;  // number of the newest keyframe that saw it
+  uint64_t latest_keyframe = 0;  // number of the newest keyframe that observes it
   MaskVotes votes = {};          // of masked frames that are no keyframes
 };
 
 // The keyframes and points of one session. For one thread. Ids are never used twice.
 //
-// Invariant: keyframe k lists point p at feature f if and only if p lists the sight (k, f).
+// Invariant: keyframe k lists point p at feature f if and only if p lists the observation (k, f).
 class SlamMap {
  public:
-  // Ids go on after those that an earlier map of the session used up.
+  // `keyframes_used`, `points_used`: ids used by earlier maps of the session.
   explicit SlamMap(const SlamConfig& config, uint64_t keyframes_used = 0, uint64_t points_used = 0)
       : config_(config), keyframe_count_(keyframes_used), point_count_(points_used) {}
 
   MapKeyframe& AddKeyframe(std::shared_ptr<const FrameFeatures> frame, const SE3<World, Camera>& T_world_camera);
   PointTrack& AddPoint(const Eigen::Vector3d& position_world);
-  // Ties a feature to a point. False and nothing changed: the feature has a point or the point is seen there already.
+  // The feature observes the point. False, and nothing changes, if the feature already observes a point or the keyframe
+  // already observes this one.
   bool AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature);
-  // Unties them. A point that is left with fewer than two sights (one, if depth gave it) goes.
+  // Also removes a point that keeps fewer than two observations, or none with depth.
   void RemoveObservation(MapPointId point, KeyframeId keyframe);
   void RemovePoint(MapPointId point);
-  // `from` is gone; its sights count for `into` where that is possible.
+  // Removes `from` and moves its observations to `into` where that is possible.
   void MergePoints(MapPointId from, MapPointId into);
-  // Its children are given to its parent; its place relative to that is remembered (see KeyframePose).
+  // Its children get its parent, and its pose relative to the parent is kept (see KeyframePose).
   void RemoveKeyframe(KeyframeId keyframe);
 
-  // nullptr: unknown or gone. A merged point answers for those that became it.
+  // nullptr: unknown or removed. The id of a point that was merged finds the point it was merged into.
   PointTrack* FindPoint(MapPointId point);
   const PointTrack* FindPoint(MapPointId point) const { return const_cast<SlamMap*>(this)->FindPoint(point); }
   MapKeyframe* FindKeyframe(KeyframeId keyframe);
@@ -104,14 +105,14 @@ class SlamMap {
   std::vector<std::pair<KeyframeId, int>> Covisible(const MapKeyframe& keyframe, int min_shared) const;
 
   ObservedRay RayOf(const MapKeyframe& keyframe, int feature) const;
-  // A diverse selection of at most `max_rays` sights.
+  // At most `max_rays` of the rays to the point, evenly spread over its observations.
   std::vector<ObservedRay> RaysOf(const PointTrack& track, size_t max_rays = 16) const;
-  // Looks, direction, size and parallax anew, after its sights or the map around it changed.
+  // Recomputes descriptor, direction, size and parallax, after observations or poses changed.
   void Refresh(PointTrack& track) const;
 
-  // What is left of the lens, by which all keyframes are corrected.
+  // The lens correction of all keyframes.
   const RadialCorrection& lens() const { return lens_; }
-  // The points stay where they are: for an adjustment that found places for them, too.
+  // Does not move points, because the adjustment that estimates the lens moves them.
   void CorrectLens(const RadialCorrection& lens);
 
   // Applies a similarity to everything.
@@ -123,7 +124,7 @@ class SlamMap {
   const std::map<MapPointId, PointTrack>& points() const { return points_; }
   uint64_t keyframe_count() const { return keyframe_count_; }  // ids used so far
   uint64_t point_count() const { return point_count_; }
-  // Points that went since the last call.
+  // Points removed since the last call.
   std::vector<MapPointId> TakeRemovedPoints() { return std::exchange(removed_points_, {}); }
 
  private:

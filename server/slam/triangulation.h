@@ -6,7 +6,7 @@
 
 namespace romap::slam {
 
-// One ray of a point: a ray with its uncertainty, and where a depth image was there, how far the point was.
+// An observation of a point: a ray with its uncertainty and, with a depth image, the distance to the point.
 struct ObservedRay {
   Eigen::Vector3d center_world = Eigen::Vector3d::Zero();    // of the camera, map units
   Eigen::Vector3d bearing_world = Eigen::Vector3d::UnitZ();  // unit length, from the camera to the point
@@ -15,13 +15,13 @@ struct ObservedRay {
   double range_sigma_mu = 0;                                 // its standard deviation
 };
 
-// The 95 % bound of a squared, normalised bearing error (two degrees of freedom).
+// The 95 % bound of a squared, normalized bearing error (two degrees of freedom).
 inline constexpr double kBearingChi2Bound = 5.991;
 
 // Squared error of the bearing in units of its variance; infinite for a point behind the camera.
 double BearingChi2(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 
-// Does the point lie where the ray says, within the 95 % bound of its bearing and three sigmas of its range?
+// Whether the point agrees with the ray within the 95 % bound of its bearing and three sigmas of its range.
 bool Agrees(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 
 // Angle between the rays from two camera centers to a point.

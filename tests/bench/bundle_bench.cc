@@ -34,12 +34,12 @@ void Measure(const std::string& name, const slam::BundleWorldOptions& world_opti
              1e3 * least_s, summary.iterations, summary.initial_rms_px, summary.final_rms_px);
 }
 
-slam::BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int sights) {
+slam::BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int observations) {
   slam::BundleWorldOptions options;
   options.cameras = cameras;
   options.fixed_cameras = fixed_cameras;
   options.points = points;
-  options.sights_per_point = sights;
+  options.observations_per_point = observations;
   options.step_rad = 0.05;
   options.pixel_noise_px = 1;
   options.pose_noise_rad = 0.002;
@@ -55,7 +55,7 @@ void MeasureAll(int repeats) {
   local.max_iterations = 8;
   slam::BundleOptions local_sparse = local;
   local_sparse.dense = false;
-  // Eight sights of each point: seven cameras before the free ones still see some of their points.
+  // Eight observations of each point: seven cameras before the free ones still share points with them.
   for (const int points : {1000, 1500, 2500}) {
     for (const int free : {10, 20}) {
       const slam::BundleWorldOptions window = Window(free + 7, 7, points, 8);

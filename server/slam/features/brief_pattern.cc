@@ -1,5 +1,5 @@
-// Printed by tests/bench/learn_brief_pattern.cc, which says how the tests were chosen. Do not edit: a descriptor means
-// something only to those who use the same tests in the same order.
+// Printed by tests/bench/learn_brief_pattern.cc, which describes how the tests were chosen. Do not edit: descriptors
+// are comparable only if they use the same tests in the same order.
 
 #include "server/slam/features/steered_brief.h"
 

@@ -7,12 +7,11 @@
 namespace romap::slam {
 namespace {
 
-// Parts of the image this large should not have fewer corners ...
+// Each cell of the image of this size keeps at least this many corners, because with weak structure the camera pose
+// depends on corners in all parts of the image.
 constexpr int kCell_px = 80;
-// ... than so many: where structure is weak only all of the image together holds the camera.
 constexpr int kMinInCell = 8;
-// How many corners, over those wanted, there are to choose from. More choice spreads them better, but weak corners are
-// found again less often.
+// Detected corners per wanted corner. A larger choice spreads them better, but weak corners are matched less often.
 constexpr double kChoice = 3;
 constexpr int kCircleRadius_px = 3;  // of FAST's test
 
@@ -46,7 +45,7 @@ class CellGrid {
   int rows_;
 };
 
-// Keeps the corners that may be taken: the strongest, and of each cell the best few, however weak.
+// Keeps the strongest corners and the best few of each cell, even if weak.
 void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
   std::stable_sort(corners.begin(), corners.end(), Stronger);
   const CellGrid grid(cv::Rect(cv::Point(), image_size));

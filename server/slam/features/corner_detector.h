@@ -12,8 +12,8 @@ using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST 
 // row by row. Only the strongest of adjacent ones counts.
 Corners DetectCorners(const cv::Mat& image, const cv::Rect& part, int threshold);
 
-// The same, but cells that have no corner at `threshold` are searched again at `min_threshold`: a dim or blurred part
-// of the picture is better seen by weak corners than not at all.
+// The same, but cells that have no corner at `threshold` are searched again at `min_threshold`: in a dim or blurred
+// part of the image, weak corners are better than none.
 Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int threshold, int min_threshold);
 
 // `count` of the corners, or all if there are not as many, evenly spread: strong corners that keep a distance from each

@@ -9,14 +9,13 @@ namespace romap::slam {
 // 256 bits of an ORB descriptor (Rublee et al., ICCV 2011).
 using Descriptor = std::array<uint64_t, 4>;
 
-// Without an instruction that counts bits, which not every x86-64 has, std::popcount calls a function for each word.
-// Here all words are counted side by side: first in pairs of bits, then in 4, 8 and 16 bits, each as wide as its sum
-// needs.
 // Two descriptors match when their distance is at most this (of 256 bits) and below this share of the distance to the
 // second best match.
 inline constexpr int kMaxMatchDistance_bits = 60;
 inline constexpr double kMaxMatchRatio = 0.8;
 
+// Number of differing bits. Without an instruction that counts bits, which not every x86-64 has, std::popcount calls a
+// function for each word. Here all words are counted in parallel: in pairs of bits, then in groups of 4, 8 and 16.
 inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
   constexpr uint64_t kOf2 = 0x5555555555555555, kOf4 = 0x3333333333333333;
   constexpr uint64_t kOf8 = 0x0f0f0f0f0f0f0f0f, kOf16 = 0x00ff00ff00ff00ff;
@@ -41,11 +40,11 @@ inline constexpr double kMaxOctaveScale = 3.58;  // kOctaveFactor ^ (kOctaves - 
 
 // A corner of one frame.
 struct Feature {
-  Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, whatever the lens
+  Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, for every lens
   int octave = 0;            // pyramid level it was found on, 0 = full size
   double octave_scale = 1;   // kOctaveFactor ^ octave
   float angle_rad = 0;       // of its patch: from the image's +x towards +y (clockwise as seen), -pi..pi
-  uint16_t label = 0;        // of the mask under it; 0 = none, or too close to the mask's border to tell
+  uint16_t label = 0;        // of the mask under it; 0 = none, or too close to the mask's border
   Descriptor descriptor{};
 };
 

@@ -38,7 +38,7 @@ bool IsSet(const cv::Mat& mask, const Eigen::Vector2f& pixel_px) {
          0;
 }
 
-// Takes the pixels around a feature out of `free`.
+// Marks the pixels around a feature as not free.
 void Occupy(cv::Mat& free, const Feature& feature) {
   const auto radius_px = static_cast<float>(kSameCorner_px * feature.octave_scale);
   const Eigen::Vector2f begin_px = feature.pixel_px.array() - radius_px;
@@ -48,8 +48,8 @@ void Occupy(cv::Mat& free, const Feature& feature) {
   free(around & cv::Rect(cv::Point(), free.size())).setTo(0);
 }
 
-// Features due to the octave `octave` when `left` of them are to be shared among it and all finer ones. The share of an
-// octave goes with its image's side: coarse corners are fewer, but are seen from farther off.
+// The number of features of `octave` when `left` are distributed over it and all finer octaves, in proportion to the
+// sides of their images: coarse corners are fewer, but visible from farther away.
 size_t Share(size_t left, int octave) {
   double sum = 0;
   for (int i = 0; i <= octave; ++i) sum += 1 / kOctaveScales[static_cast<size_t>(i)];
@@ -59,13 +59,13 @@ size_t Share(size_t left, int octave) {
 
 }  // namespace
 
-void FeatureExtractor::LookAt(const Frame& frame) {
-  const cv::Mat& picture = frame.source_gray.empty() ? frame.image_bgr : frame.source_gray;
-  if (picture_.data == picture.data && picture_.size() == picture.size() && picture_frame_id_ == frame.frame_id) return;
-  picture_ = picture;
-  picture_frame_id_ = frame.frame_id;
-  if (picture.channels() == 3) cv::cvtColor(picture, gray_, cv::COLOR_BGR2GRAY);
-  pyramid_.Build(picture.channels() == 3 ? gray_ : picture, kMinImageSide_px);
+void FeatureExtractor::Prepare(const Frame& frame) {
+  const cv::Mat& source = frame.source_gray.empty() ? frame.image_bgr : frame.source_gray;
+  if (image_.data == source.data && image_.size() == source.size() && image_frame_id_ == frame.frame_id) return;
+  image_ = source;
+  image_frame_id_ = frame.frame_id;
+  if (source.channels() == 3) cv::cvtColor(source, gray_, cv::COLOR_BGR2GRAY);
+  pyramid_.Build(source.channels() == 3 ? gray_ : source, kMinImageSide_px);
 }
 
 std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame, int octave,
@@ -76,7 +76,8 @@ std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame,
   return frame.source_gray.empty() ? pixels_px : UndistortPixels(frame.source_camera, pixels_px);
 }
 
-Corners FeatureExtractor::KeepSeen(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const {
+Corners FeatureExtractor::KeepVisible(const Frame& frame, int octave, const Corners& corners,
+                                      const cv::Mat& free) const {
   const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
   Corners seen;
   for (size_t i = 0; i < corners.size(); ++i) {
@@ -85,8 +86,7 @@ Corners FeatureExtractor::KeepSeen(const Frame& frame, int octave, const Corners
   return seen;
 }
 
-// From the coarsest octave on, so that what an octave cannot fill goes to the finer ones, which have more to choose
-// from.
+// Starts with the coarsest octave, so that the finer ones, which have more corners, make up for missing features.
 std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const Frame& frame, int count,
                                                                          const FindCorners& find) const {
   std::vector<Candidate> candidates;
@@ -99,12 +99,12 @@ std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const F
 }
 
 std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
-  LookAt(frame);
+  Prepare(frame);
   const auto find = [&](int octave, size_t count) {
     const cv::Mat& image = pyramid_.sharp(octave);
     Corners corners = DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
                                               config_.scene_fast_min_threshold);
-    if (!frame.source_gray.empty()) corners = KeepSeen(frame, octave, corners, {});
+    if (!frame.source_gray.empty()) corners = KeepVisible(frame, octave, corners, {});
     return SpreadEvenly(std::move(corners), image.size(), count);
   };
   return Describe(frame, FindInOctaves(frame, config_.scene_features, find));
@@ -115,8 +115,8 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
   const cv::Mat inside = frame.labels > 0;
   cv::Rect box_px = cv::boundingRect(inside);
   if (box_px.empty()) return {};
-  LookAt(frame);
-  // A lens may show the objects anywhere else than the pinhole image does.
+  Prepare(frame);
+  // With distortion, the masks of the pinhole image do not apply to the source image.
   if (!frame.source_gray.empty()) box_px = cv::Rect(cv::Point(), frame.source_gray.size());
   cv::Mat free;
   const auto find = [&](int octave, size_t count) {
@@ -127,7 +127,7 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
     const cv::Mat& image = pyramid_.sharp(octave);
     const cv::Rect part = Describable(image) & pyramid_.Part(octave, box_px);
     const Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
-    return SpreadEvenly(KeepSeen(frame, octave, corners, free), image.size(), count);
+    return SpreadEvenly(KeepVisible(frame, octave, corners, free), image.size(), count);
   };
   return Describe(frame, FindInOctaves(frame, config_.object_features, find));
 }

@@ -17,10 +17,10 @@ namespace romap::slam {
 
 // Finds oriented FAST corners with steered BRIEF descriptors (ORB: Rublee et al., ICCV 2011). The same frame gives the
 // same features in the same order; an image that is too small or has no texture gives none. For one thread: keeps its
-// buffers, and the pyramid of the last frame, from call to call (its picture must not be written to meanwhile).
+// buffers, and the pyramid of the last frame, from call to call (its image must not be written to meanwhile).
 //
-// Where the frame has the picture as the lens gave it (Frame::source_gray), corners are found and described there and
-// only their positions are undistorted: a resampled picture is less sharp.
+// If the frame has its image before undistortion (Frame::source_gray), corners are found and described there and only
+// their positions are undistorted, because a resampled image is less sharp.
 class FeatureExtractor {
  public:
   explicit FeatureExtractor(const SlamConfig& config) : config_(config) {}
@@ -28,15 +28,16 @@ class FeatureExtractor {
   // At most SlamConfig::scene_features, spread evenly over the image at every octave.
   std::vector<Feature> ExtractScene(const Frame& frame);
 
-  // At most SlamConfig::object_features further ones inside the instance masks, where weaker corners are welcome
-  // because objects are small and have little texture. None repeats one of `have`, the same frame's scene features.
+  // At most SlamConfig::object_features further ones inside the instance masks, where weaker corners are
+  // accepted because objects are small and have little texture. None repeats one of `have`, the same frame's scene
+  // features.
   std::vector<Feature> ExtractObjects(const Frame& frame, const std::vector<Feature>& have);
 
   // Both, scene features first.
   std::vector<Feature> Extract(const Frame& frame);
 
  private:
-  // A corner on its way to become a feature.
+  // A corner before its description.
   struct Candidate {
     cv::Point2f corner_px;  // in the octave's image
     int octave = 0;
@@ -46,18 +47,18 @@ class FeatureExtractor {
   // Finds that many corners of an octave, or fewer.
   using FindCorners = std::function<Corners(int octave, size_t count)>;
 
-  void LookAt(const Frame& frame);
-  // The corners that the pinhole image shows, where `free` (CV_8UC1, of its size; empty = anywhere) is set.
-  Corners KeepSeen(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const;
-  // NaN or outside the image where the pinhole camera does not see the corner.
+  void Prepare(const Frame& frame);
+  // The corners inside the pinhole image, where `free` (CV_8UC1, of its size; empty = anywhere) is set.
+  Corners KeepVisible(const Frame& frame, int octave, const Corners& corners, const cv::Mat& free) const;
+  // NaN or outside the image if the corner is not visible to the pinhole camera.
   std::vector<Eigen::Vector2f> PinholePixels(const Frame& frame, int octave, const Corners& corners) const;
   std::vector<Candidate> FindInOctaves(const Frame& frame, int count, const FindCorners& find) const;
   std::vector<Feature> Describe(const Frame& frame, const std::vector<Candidate>& candidates);
 
   const SlamConfig config_;
   cv::Mat gray_;
-  cv::Mat picture_;  // what the pyramid shows; holding it keeps its memory from becoming another picture's
-  uint64_t picture_frame_id_ = 0;
+  cv::Mat image_;  // of the pyramid; held so that its memory is not reused for another image
+  uint64_t image_frame_id_ = 0;
   ImagePyramid pyramid_;
 };
 

@@ -22,7 +22,7 @@ class ImagePyramid {
   const cv::Mat& smooth(int octave);
   // The pixel of the full image at a pixel of an octave, both with pixel centers at integer coordinates.
   Eigen::Vector2f ToFullSize(int octave, const cv::Point2f& pixel_px) const;
-  // The smallest part of the octave's image that shows all of `part_px` of the full one.
+  // The smallest part of the octave's image that contains all of `part_px` of the full image.
   cv::Rect Part(int octave, const cv::Rect& part_px) const;
 
  private:

@@ -8,8 +8,8 @@
 
 namespace romap::slam {
 
-// How far from a corner its orientation and its descriptor look, rounding included; corners closer than this to the
-// image's edge cannot be described.
+// Radius of the patch that orientation and descriptor use; corners closer than kPatchBorder_px, which includes
+// rounding, to the image's edge cannot be described.
 inline constexpr int kPatchRadius_px = 15;
 inline constexpr int kPatchBorder_px = kPatchRadius_px + 1;
 
@@ -32,7 +32,7 @@ struct BriefTest {
   int8_t second_y_px = 0;
 };
 
-// The 256 tests, learned so that each tells corners apart and no two say the same; bit i of the descriptor is bit i %
+// The 256 tests, learned to be discriminative and uncorrelated; bit i of the descriptor is bit i %
 // 64 of its word i / 64.
 const std::array<BriefTest, 256>& BriefTests();
 

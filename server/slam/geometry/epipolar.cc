@@ -168,11 +168,11 @@ RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::
     for (const RayMatch& match : matches) {
       if (SampsonChi2(camera, essential, match) < reach * kEpipolarChi2Bound) inliers.push_back(match);
     }
-    const auto linearise = [&](const Motion& at) { return EpipolarEquations(camera, at, inliers); };
+    const auto linearize = [&](const Motion& at) { return EpipolarEquations(camera, at, inliers); };
     const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
-    equations = Minimise<5>(kIterationsPerRound, linearise, move, refined.motion);
+    equations = Minimize<5>(kIterationsPerRound, linearize, move, refined.motion);
   }
-  // The errors do not tell forth from back; the sides of the cameras that the points are on do.
+  // The errors are equal for both directions; the points must be in front of both cameras.
   const Motion opposite{refined.motion.rotation, -refined.motion.direction};
   const double opposite_support = Support(camera, opposite, matches);
   refined.support = Support(camera, refined.motion, matches);

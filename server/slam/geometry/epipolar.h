@@ -27,7 +27,7 @@ struct Motion {
   Eigen::Matrix3d Essential() const;
 };
 
-// 95 % bound of chi-square with one degree of freedom: a match says one thing about a motion.
+// 95 % bound of chi-square with one degree of freedom: a match is one constraint on a motion.
 inline constexpr double kEpipolarChi2Bound = 3.841;
 
 // Squared distance of a match to the nearest that obeys `essential`, to first order (Sampson 1982), in units of its
@@ -42,7 +42,7 @@ struct RayMeeting {
   double first_depth = 0;   // z in the first camera, in units of the distance between the cameras
   double second_depth = 0;  // z in the second camera
   double parallax_rad = 0;  // angle between the rays
-  // The angle stands out from the noise of the pixels: depth, and its sign, mean something.
+  // The angle is larger than the noise of the pixels, so that depth and its sign are significant.
   bool is_significant = false;
 
   bool IsBeforeBoth() const { return first_depth > 0 && second_depth > 0; }
@@ -50,8 +50,8 @@ struct RayMeeting {
 
 RayMeeting MeetingOf(const CameraModel& camera, const Motion& motion, const RayMatch& match);
 
-// How many matches a motion explains, each counted by how well (1 = exactly, 0 = at the bound, as in MSAC, Torr and
-// Zisserman 2000), those behind a camera not at all.
+// Number of matches that a motion explains, each weighted by how well (1 = exactly, 0 = at the bound, as in MSAC, Torr
+// and Zisserman 2000), matches behind a camera do not count.
 double Support(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches);
 
 using MotionEquations = NormalEquations<5>;
@@ -62,16 +62,16 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
 // step = (turn of the second camera's frame, shift of the direction along two axes across it).
 Motion Moved(const Motion& motion, const MotionEquations::Vector& step);
 
-// A motion that was fitted to its inliers, and how sure it is.
+// A motion that was fitted to its inliers, with its uncertainty.
 struct RefinedMotion {
   Motion motion;
   double support = 0;              // of all matches
   double rotation_sigma_rad = 0;   // standard deviation about the least certain axis
-  double direction_sigma_rad = 0;  // and of the direction, the least certain way
+  double direction_sigma_rad = 0;  // of the direction, in its least certain direction
 };
 
-// Two-view bundle adjustment with the points eliminated: the Sampson errors of the matches within the bound, told anew
-// a few times, over the five parameters of the motion.
+// Two-view bundle adjustment with the points eliminated: the Sampson errors of the matches within the bound, which
+// are selected again a few times, over the five parameters of the motion.
 RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::span<const RayMatch> matches);
 
 }  // namespace romap::slam

@@ -7,7 +7,7 @@
 
 namespace romap::slam {
 
-// Huber's robust cost of a squared, normalised error, quadratic up to `bound` and linear in the error beyond; in the
+// Huber's robust cost of a squared, normalized error, quadratic up to `bound` and linear in the error beyond; in the
 // units of chi2 (no factor 1/2).
 inline double HuberCost(double chi2, double bound) {
   return chi2 <= bound ? chi2 : 2 * std::sqrt(bound * chi2) - bound;
@@ -33,15 +33,15 @@ struct NormalEquations {
   }
 };
 
-// Levenberg-Marquardt for few parameters (Marquardt 1963: damping scales the diagonal), without allocation. `linearise`
+// Levenberg-Marquardt for few parameters (Marquardt 1963: damping scales the diagonal), without allocation. `linearize`
 // makes NormalEquations<N> of a State, `move` a new State of a State and a step. `state` ends at the best found; the
-// equations there are returned. A step that promises next to nothing ends the loop.
-template <int N, class State, class Linearise, class Move>
-NormalEquations<N> Minimise(int max_iterations, const Linearise& linearise, const Move& move, State& state) {
+// equations there are returned. A step with a negligible expected gain ends the loop.
+template <int N, class State, class Linearize, class Move>
+NormalEquations<N> Minimize(int max_iterations, const Linearize& linearize, const Move& move, State& state) {
   constexpr double kNegligibleGain = 1e-6;          // of the cost
   constexpr double kNegligibleAbsoluteGain = 1e-9;  // in units of chi2, for data without noise
   double damping = 1e-4;
-  NormalEquations<N> here = linearise(state);
+  NormalEquations<N> here = linearize(state);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     typename NormalEquations<N>::Matrix damped = here.hessian;
     damped.diagonal() *= 1 + damping;
@@ -49,7 +49,7 @@ NormalEquations<N> Minimise(int max_iterations, const Linearise& linearise, cons
     const double promised_gain = -step.dot(here.gradient);
     if (!step.allFinite() || !(promised_gain > kNegligibleGain * here.cost + kNegligibleAbsoluteGain)) break;
     const State candidate = move(state, step);
-    const NormalEquations<N> there = linearise(candidate);
+    const NormalEquations<N> there = linearize(candidate);
     if (there.cost < here.cost) {
       state = candidate;
       here = there;

@@ -18,7 +18,7 @@ constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
 constexpr double kNearRotation_rad = 1 * kDegree_rad;
 constexpr double kNearDirection_rad = 10 * kDegree_rad;
 constexpr double kMedianChi2 = 0.4549;  // of chi-square with one degree of freedom
-constexpr double kLeastNoise = 0.25;    // of what the matches claim
+constexpr double kLeastNoise = 0.25;    // of the given noise
 
 std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const Motion> starts,
                                      std::span<const RayMatch> matches) {

@@ -11,15 +11,15 @@ namespace romap::slam {
 // All motions that could explain the matches, refined, best first, no two the same.
 struct MotionRanking {
   std::vector<RefinedMotion> motions;
-  std::vector<RayMatch> matches;  // with the noise that they show, where that is less than they claimed
+  std::vector<RayMatch> matches;  // with the noise estimated from them, where that is less than given
 
   // The support of the best motion that is not near the first; 0: none.
   double RivalSupport() const;
 };
 
 // Refines what RANSAC found, the motions of its homography, and starts in all directions about the best: errors of two
-// views have several minima (forwards and sideways, a plane and its twin), and a rival that nobody looked for is how
-// wrong maps begin.
+// views have several minima (forward and sideways motion, the two solutions of a plane), and a missed one may give a
+// wrong map.
 MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches);
 
 }  // namespace romap::slam

@@ -10,11 +10,11 @@
 
 namespace romap::slam {
 
-// What RANSAC found: rough models, from minimal samples.
+// The result of RANSAC: approximate models from minimal samples.
 struct MotionSearch {
   std::vector<Motion> motions;                // the best by five matches, best first, no two alike
   double essential_support = 0;               // of the best, sides of the camera aside
-  std::optional<Eigen::Matrix3d> homography;  // the best by four matches, polished
+  std::optional<Eigen::Matrix3d> homography;  // the best by four matches, refined
   double homography_support = 0;
 };
 
@@ -23,7 +23,7 @@ struct MotionSearch {
 MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
                            uint64_t seed);
 
-// Do two motions differ by less than these angles?
+// Whether two motions differ by less than these angles.
 bool AreAlike(const Motion& a, const Motion& b, double rotation_rad, double direction_rad);
 
 }  // namespace romap::slam

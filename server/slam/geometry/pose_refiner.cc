@@ -64,7 +64,7 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
   std::vector<uint8_t> agreeing(observations.size());
   int active_count = options.start_is_close ? MarkInliers(camera, pose, observations, active)
                                             : MarkPlausible(camera, pose, observations, active);
-  const auto linearise = [&](const CameraFromWorld& at) {
+  const auto linearize = [&](const CameraFromWorld& at) {
     PoseEquations equations;
     for (size_t i = 0; i < observations.size(); ++i) {
       if (active[i]) AddObservation(camera, at, observations[i], equations);
@@ -72,7 +72,7 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
     return equations;
   };
   for (int round = 0; round < options.rounds && active_count >= kMinObservations; ++round) {
-    Minimise<6>(options.iterations_per_round, linearise, Moved, pose);
+    Minimize<6>(options.iterations_per_round, linearize, Moved, pose);
     active_count = MarkInliers(camera, pose, observations, agreeing);
     if (agreeing == active) break;
     active.swap(agreeing);

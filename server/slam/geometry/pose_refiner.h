@@ -10,7 +10,7 @@
 
 namespace romap::slam {
 
-// Sight of a known point.
+// An observation of a known point.
 struct PoseObservation {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();   // map units
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();  // undistorted
@@ -21,15 +21,15 @@ struct PoseObservation {
 
 struct PoseEstimate {
   SE3<World, Camera> T_world_camera;
-  std::vector<uint8_t> inlier;  // per observation: within the 95 % bound, and before the camera
+  std::vector<uint8_t> inlier;  // per observation: within the 95 % bound, and in front of the camera
   int inliers = 0;
   double rms_px = 0;  // of the inliers' reprojection errors
 };
 
 struct PoseRefinerOptions {
-  int rounds = 3;                // outliers are told anew before each round but the first
+  int rounds = 3;                // outliers are selected again before each round but the first
   int iterations_per_round = 5;  // of Gauss-Newton (Levenberg-Marquardt)
-  // Outliers are told before the first round, too: for a start that is nearly right among many wrong matches.
+  // Also selects outliers before the first round: for an accurate start with many wrong matches.
   bool start_is_close = false;
 };
 

@@ -9,7 +9,7 @@
 namespace romap::slam {
 
 // K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
-// libraries and the same seed is to give the same map everywhere.
+// libraries and the same seed must give the same map everywhere.
 template <int K>
 std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
   std::array<int, K> sample;
@@ -22,8 +22,8 @@ std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
   return sample;
 }
 
-// How many samples of `size` matches RANSAC needs until one of them is free of outliers with 99.9 % certainty (Fischler
-// and Bolles 1981), at most `limit`.
+// Number of samples of `size` matches RANSAC needs until one of them is free of outliers with 99.9 % certainty
+// (Fischler and Bolles 1981), at most `limit`.
 inline int SamplesNeeded(double inlier_share, int size, int limit) {
   constexpr double kLogOfMissing = -6.907755;  // log(0.001)
   const double clean = std::pow(inlier_share, size);

@@ -9,7 +9,7 @@
 
 namespace romap::slam {
 
-// A camera's pose as the inner loops want it: p_camera = rotation * p_world + translation.
+// A camera's pose in the form that the inner loops use: p_camera = rotation * p_world + translation.
 struct CameraFromWorld {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
@@ -22,7 +22,7 @@ inline bool HasDepth(const PoseObservation& observation) {
 // 95 % bounds of chi-square with two degrees of freedom, and with three where depth was measured, too.
 inline double Chi2Bound(const PoseObservation& observation) { return HasDepth(observation) ? 7.815 : 5.991; }
 
-// What an observation says against a pose: pixels and depth in units of their standard deviations.
+// Residual of an observation for a pose: pixels and depth in units of their standard deviations.
 struct ObservationError {
   Eigen::Vector3d p_camera;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
@@ -46,8 +46,8 @@ inline ObservationError ErrorOf(const CameraModel& camera, const CameraFromWorld
 
 using PoseEquations = NormalEquations<6>;
 
-// Adds what one observation says about the pose, with Huber's weight at its bound. Parameters: shift, then turn, of the
-// camera's frame, as in Moved.
+// Adds one observation to the normal equations of the pose, with Huber's weight at its bound. Parameters: shift, then
+// turn, of the camera's frame, as in Moved.
 void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, const PoseObservation& observation,
                     PoseEquations& equations);
 

@@ -30,7 +30,7 @@ bool Agrees(const CameraModel& camera, const Similarity& similarity, const Simil
             const SimilarityOptions& options) {
   const SimilarityErrors errors = ErrorsOf(camera, similarity, match);
   return errors.first.squaredNorm() <= options.chi2_bound && errors.second.squaredNorm() <= options.chi2_bound &&
-         errors.is_before_both;
+         errors.is_in_front_of_both;
 }
 
 int MarkInliers(const CameraModel& camera, const Similarity& similarity, std::span<const SimilarityMatch> matches,
@@ -113,7 +113,7 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
   std::vector<uint8_t> active(matches.size());
   std::vector<uint8_t> agreeing(matches.size());
   int inliers = MarkInliers(camera, similarity, matches, options, active);
-  const auto linearise = [&](const Similarity& at) {
+  const auto linearize = [&](const Similarity& at) {
     SimilarityEquations equations;
     for (size_t i = 0; i < matches.size(); ++i) {
       if (active[i]) AddSimilarityErrors(camera, at, matches[i], options, equations);
@@ -121,7 +121,7 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
     return equations;
   };
   for (int round = 0; round < kRefineRounds && inliers >= kSampleSize; ++round) {
-    Minimise<7>(kIterationsPerRound, linearise, MovedSimilarity, similarity);
+    Minimize<7>(kIterationsPerRound, linearize, MovedSimilarity, similarity);
     inliers = MarkInliers(camera, similarity, matches, options, agreeing);
     const bool is_settled = agreeing == active;
     active.swap(agreeing);

@@ -21,7 +21,7 @@ std::optional<PointAlignment> AlignPointSets(std::span<const Eigen::Vector3d> p_
                                              std::span<const Eigen::Vector3d> p_to, bool fix_scale);
 
 // Least-squares similarity p_to = S * p_from (Umeyama 1991) of points that correspond by index. `fix_scale`: scale
-// is 1. nullopt: fewer than three points, different numbers, or all on a line.
+// is 1. nullopt: fewer than three points, different counts, or all on a line.
 template <class To, class From>
 std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_from,
                                           std::span<const Eigen::Vector3d> p_to, bool fix_scale) {
@@ -30,7 +30,7 @@ std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_fro
   return Sim3<To, From>(alignment->scale, Eigen::Quaterniond(alignment->rotation), alignment->translation);
 }
 
-// A landmark that two keyframes see, each with its own opinion of where it is.
+// A point that two keyframes observe, with its position in the map of each.
 struct SimilarityMatch {
   Eigen::Vector3d p_first = Eigen::Vector3d::Zero();   // in the first camera's frame, by the first's map
   Eigen::Vector3d p_second = Eigen::Vector3d::Zero();  // in the second camera's frame, by the second's map
@@ -60,7 +60,7 @@ struct SimilarityEstimate {
 std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std::span<const SimilarityMatch> matches,
                                                   const SimilarityOptions& options);
 
-// The refinement alone, from a known start. Inliers are told by the bound.
+// The refinement alone, from a known start. Inliers are selected by the bound.
 SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera, Camera>& start,
                                     std::span<const SimilarityMatch> matches, const SimilarityOptions& options);
 

@@ -9,7 +9,7 @@ namespace {
 
 // What a match costs that a step takes behind a camera: see reprojection.cc.
 constexpr double kCostBehindCamera = 1e4;
-// Keeps the normal equations regular where the scale is not asked for.
+// Keeps the normal equations regular if the scale is fixed.
 constexpr double kIdleInformation = 1;
 
 using PointDerivative = Eigen::Matrix<double, 3, 7>;
@@ -39,8 +39,8 @@ SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarit
   errors.second_in_first = similarity.scale * (similarity.rotation * match.p_second) + similarity.translation;
   errors.first_in_second =
       similarity.rotation.transpose() * (match.p_first - similarity.translation) / similarity.scale;
-  errors.is_before_both = errors.second_in_first.z() > 0 && errors.first_in_second.z() > 0;
-  if (!errors.is_before_both) return errors;
+  errors.is_in_front_of_both = errors.second_in_first.z() > 0 && errors.first_in_second.z() > 0;
+  if (!errors.is_in_front_of_both) return errors;
   errors.first = (camera.Project(errors.second_in_first) - match.first_px) / match.first_sigma_px;
   errors.second = (camera.Project(errors.first_in_second) - match.second_px) / match.second_sigma_px;
   return errors;
@@ -49,7 +49,7 @@ SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarit
 void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match,
                          const SimilarityOptions& options, SimilarityEquations& equations) {
   const SimilarityErrors errors = ErrorsOf(camera, similarity, match);
-  if (!errors.is_before_both) {
+  if (!errors.is_in_front_of_both) {
     equations.cost += kCostBehindCamera;
     return;
   }

@@ -8,21 +8,21 @@
 
 namespace romap::slam {
 
-// A similarity as the inner loops want it: p_first = scale * rotation * p_second + translation.
+// A similarity in the form that the inner loops use: p_first = scale * rotation * p_second + translation.
 struct Similarity {
   double scale = 1;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
-// What a match says against a similarity, in units of the pixels' standard deviations: the second's point seen by the
-// first camera, and the first's by the second.
+// Residuals of a match for a similarity, in units of the pixels' standard deviations: the second's point in the
+// first camera, and the first's in the second.
 struct SimilarityErrors {
   Eigen::Vector3d second_in_first;  // the points, each in the other camera's frame
   Eigen::Vector3d first_in_second;
   Eigen::Vector2d first = Eigen::Vector2d::Zero();
   Eigen::Vector2d second = Eigen::Vector2d::Zero();
-  bool is_before_both = false;  // else there are no errors
+  bool is_in_front_of_both = false;  // else there are no errors
 };
 
 SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match);

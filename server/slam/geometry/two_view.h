@@ -14,25 +14,25 @@ namespace romap::slam {
 struct TwoViewMatch {
   Eigen::Vector2d first_px = Eigen::Vector2d::Zero();  // undistorted
   Eigen::Vector2d second_px = Eigen::Vector2d::Zero();
-  // Standard deviation per axis of the worse of the two. May be generous, because the matches' own scatter counts where
-  // it is smaller; may not be too small, or good matches are taken for wrong.
+  // Standard deviation per axis of the worse of the two. May be too large, because the scatter of the
+  // matches is used where it is smaller; must not be too small, or good matches are rejected.
   double sigma_px = 1;
 };
 
 enum class TwoViewOutcome {
   kOk,
   kTooFewMatches,      // fewer than min_matches, or fewer inliers than min_points under the best model
-  kTooLittleParallax,  // a mere turn explains it, rays are too close to parallel, or the motion too uncertain
+  kTooLittleParallax,  // a pure rotation explains it, rays are too close to parallel, or the motion too uncertain
   kAmbiguous,          // two motions explain the matches about equally well
 };
 
 struct TwoViewOptions {
   int min_matches = 80;
-  int min_points = 50;            // triangulated, before both cameras, with small reprojection errors
+  int min_points = 50;            // triangulated, in front of both cameras, with small reprojection errors
   double min_parallax_deg = 1.5;  // of the agreeing matches' rays, in the median, those of distant points included
-  // A mere turn that explains this share of what the best motion explains is taken for the truth.
+  // If a pure rotation explains this share of what the best motion explains, it is assumed.
   double max_turn_share = 0.6;
-  // Another motion that explains this share of what the best one explains makes the matter ambiguous.
+  // If another motion explains this share of what the best one explains, the result is ambiguous.
   double max_rival_share = 0.88;
   // By the covariance of the refined motion, in its least certain direction.
   double max_rotation_sigma_deg = 0.8;
@@ -53,8 +53,8 @@ struct TwoViewResult {
 // Structure and motion from two views of one calibrated camera, without any prior. RANSAC fits a homography and an
 // essential matrix to the same samples (as Mur-Artal et al., 2015, section IV, but with the five points of Nister 2004
 // instead of eight: planes are no special case to them, and outliers hurt less). The motions of both models (of the
-// homography: Malis and Vargas 2007) are refined, and the one that most matches agree with, before both cameras, is
-// returned if nothing speaks against it: neither a mere turn, nor a rival motion, nor its own uncertainty.
+// homography: Malis and Vargas 2007) are refined, and the one that most matches agree with, in front of both cameras,
+// is returned if nothing speaks against it: neither a mere turn, nor a rival motion, nor its own uncertainty.
 TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMatch> matches,
                            const TwoViewOptions& options);
 

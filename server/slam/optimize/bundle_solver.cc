@@ -126,24 +126,24 @@ void BundleSolver::MeasureUnit() {
   if (typical_mu > 0) unit_mu_ = typical_mu;
 }
 
-// Leaves out what would only cost time or make the equations singular: points that no free camera sees do not touch the
-// cameras, and a single sight without depth does not determine a point.
+// Omits points that only cost time or make the equations singular: points that no free camera observes have no effect
+// on the cameras, and a single observation without depth does not determine a point.
 void BundleSolver::SelectPoints() {
-  struct Sights {
+  struct Observations {
     int constraints = 0;
     bool from_free_camera = false;
   };
-  std::vector<Sights> sights(points_.size());
+  std::vector<Observations> observations_of(points_.size());
   for (size_t i = 0; i < use_.size(); ++i) {
     if (!use_[i]) continue;
     const BundleObservation& observation = problem_.observations[i];
-    Sights& point = sights[observation.point];
+    Observations& point = observations_of[observation.point];
     point.constraints += HasDepth(observation) ? 2 : 1;
     if (!problem_.cameras[observation.camera].fixed) point.from_free_camera = true;
   }
   for (size_t i = 0; i < use_.size(); ++i) {
     if (!use_[i]) continue;  // its indices may be wrong
-    const Sights& point = sights[problem_.observations[i].point];
+    const Observations& point = observations_of[problem_.observations[i].point];
     const bool fixed = problem_.points[problem_.observations[i].point].fixed;
     use_[i] = point.from_free_camera && (fixed || point.constraints >= 2);
   }
@@ -216,7 +216,7 @@ ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options,
   solver.logging_type = ceres::SILENT;
   // In the solver's own unit the columns are of like size already, and the damping follows their norms.
   solver.jacobi_scaling = false;
-  // The points are eliminated first; found by hand, this costs Ceres a search for independent sets.
+  // The points are eliminated first; given here, because Ceres would have to search for independent sets.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (size_t i = 0; i < points_.size(); ++i) {
     if (varied_points_[i]) ordering->AddElementToGroup(points_[i].data(), 0);

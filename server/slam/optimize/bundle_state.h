@@ -10,12 +10,12 @@
 
 namespace romap::slam {
 
-// A camera in the optimisation: a start and an increment on it, R = R_start * Exp(w), t = t_start + R_start * v.
+// A camera in the optimization: a start and an increment on it, R = R_start * Exp(w), t = t_start + R_start * v.
 // The increment is what Ceres varies. Being a plain vector of six it needs no Manifold, by whose Jacobian Ceres would
 // multiply (with sizes known only at run time) that of each of thousands of observations; and all that the observations
-// of a camera have in common is worked out once per evaluation (Refresh) instead of once for each.
+// of a camera have in common is computed once per evaluation (Refresh) instead of once for each.
 struct CameraState {
-  // `start` in the lengths of the optimisation.
+  // `start` in the lengths of the optimization.
   explicit CameraState(const SE3<World, Camera>& start);
 
   // Brings what follows `increment` up to date.

@@ -9,7 +9,7 @@
 
 namespace romap::slam {
 
-// Exponentials of rotations and similarities and what optimisation needs of them (Sola et al., "A micro Lie theory for
+// Exponentials of rotations and similarities and what optimization needs of them (Sola et al., "A micro Lie theory for
 // state estimation in robotics", 2018; Strasdat, "Local accuracy and global consistency for efficient visual SLAM",
 // 2012, for sim(3)). Increments are right-multiplied: X * Exp(d).
 

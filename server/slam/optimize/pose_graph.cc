@@ -29,7 +29,7 @@ std::vector<PoseGraphEdge> SoundEdges(const std::vector<PoseGraphNode>& nodes,
   return sound;
 }
 
-// Every node is fixed or hangs, by edges, on one that is: otherwise part of the graph would float.
+// Whether every node is fixed or connected to a fixed one; otherwise part of the graph is undetermined.
 bool HangsTogether(const std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges) {
   std::vector<int> parent(nodes.size());
   std::iota(parent.begin(), parent.end(), 0);

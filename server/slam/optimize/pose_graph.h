@@ -20,7 +20,7 @@ struct PoseGraphEdge {
 };
 
 struct PoseGraphOptions {
-  bool fix_scale = false;  // SE3: scales stay as they are
+  bool fix_scale = false;  // SE3: scales do not change
   int max_iterations = 30;
 };
 
@@ -28,10 +28,10 @@ struct PoseGraphSummary {
   int iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;
-  bool usable = false;  // false: nothing was changed
+  bool usable = false;  // false: nothing changed
 };
 
-// Spreads the error of closed loops over a graph of similarities (Strasdat et al., RSS 2010): residual
+// Distributes the error of closed loops over a graph of similarities (Strasdat et al., RSS 2010): residual
 // log(S_a_b^-1 * S_world_a^-1 * S_world_b) in sim(3), translations divided by the graph's typical edge length so that
 // nothing depends on the scale of the map. Ceres, sparse Cholesky, analytic Jacobians. At least one node must be fixed.
 PoseGraphSummary OptimizePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,

@@ -10,10 +10,10 @@
 
 namespace romap::slam {
 
-// A node in the optimisation: a start and an increment on it, S = S_start * Exp(increment). What edges need of it is
-// worked out once per evaluation (Refresh).
+// A node in the optimization: a start and an increment on it, S = S_start * Exp(increment). Values that edges share are
+// computed once per evaluation (Refresh).
 struct NodeState {
-  // `start` in the lengths of the optimisation.
+  // `start` in the lengths of the optimization.
   explicit NodeState(const Sim3<World, Camera>& start);
 
   // Brings S_world_camera and the Jacobian up to date with the increment.

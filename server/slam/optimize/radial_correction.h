@@ -6,9 +6,9 @@
 
 namespace romap::slam {
 
-// What the calibration that comes with the frames leaves of the lens. Many cameras are calibrated as plain pinholes;
-// that they are not bends the whole map. Brown's first radial term says most of it: what a pinhole shows at
-// m = (p - c) / f the picture shows at m (1 + k1 |m|^2).
+// Lens distortion that the client's calibration does not model. Many cameras are calibrated as plain pinholes although
+// they are none, which bends the whole map. Brown's first radial term models most of it: a point that a pinhole images
+// at m = (p - c) / f is in the image at m (1 + k1 |m|^2).
 struct RadialCorrection {
   double k1 = 0;
 
@@ -18,7 +18,7 @@ struct RadialCorrection {
     return center_px + (1 + k1 * Radius2(camera, off_px)) * off_px;
   }
 
-  // The other way round, by fixed-point iteration; to 0.001 px for the small k1 that a calibration leaves.
+  // The inverse, by fixed-point iteration; accurate to 0.001 px for the small k1 of calibrated cameras.
   Eigen::Vector2d Undistort(const CameraModel& camera, const Eigen::Vector2d& seen_px) const {
     constexpr int kIterations = 6;
     const Eigen::Vector2d center_px(camera.cx_px, camera.cy_px);

@@ -63,7 +63,7 @@ void DescriptorTree::Insert(const Entry& entry) {
 
 std::vector<Descriptor> DescriptorTree::PickCenters(std::span<const Entry> entries) {
   std::vector<Descriptor> centers;
-  // A descriptor that is already a center is drawn in vain; a few draws more than needed make up for that.
+  // Draws of a descriptor that is already a center are wasted; a few extra draws compensate.
   for (size_t draw = 0; draw < 2 * kBranching && centers.size() < kBranching; ++draw) {
     const Descriptor& drawn = entries[random_() % entries.size()].descriptor;
     if (std::ranges::find(centers, drawn) == centers.end()) centers.push_back(drawn);
@@ -78,7 +78,7 @@ std::vector<Descriptor> DescriptorTree::PickCenters(std::span<const Entry> entri
 void DescriptorTree::Split(uint32_t leaf) {
   const std::vector<Descriptor> centers = PickCenters(nodes_[leaf].entries);
   if (centers.size() < 2) {
-    // All alike: nothing to tell them apart by. Asked again only when there are many more.
+    // All descriptors are equal. Try again only when there are many more.
     nodes_[leaf].split_at *= 2;
     return;
   }
@@ -93,9 +93,9 @@ void DescriptorTree::Split(uint32_t leaf) {
   for (const Entry& entry : entries) nodes_[NearestChild(nodes_[leaf], entry.descriptor)].entries.push_back(entry);
 }
 
-void DescriptorTree::RemoveOwners(std::span<const uint8_t> gone) {
+void DescriptorTree::RemoveOwners(std::span<const uint8_t> is_removed) {
   for (Node& node : nodes_) {
-    std::erase_if(node.entries, [&](const Entry& entry) { return gone[entry.owner] != 0; });
+    std::erase_if(node.entries, [&](const Entry& entry) { return is_removed[entry.owner] != 0; });
   }
 }
 

@@ -9,19 +9,19 @@
 
 namespace romap::slam {
 
-// A tree of binary descriptors that grows with what is put into it, so that it needs no vocabulary trained beforehand.
-// Every inner node has up to kBranching centers, a descriptor goes to the child with the nearest one, and a leaf that
-// gets too full splits around centers that are bitwise majorities of its own descriptors (after the hierarchical
+// A tree of binary descriptors that grows with its entries, so that it needs no vocabulary trained in advance.
+// Every inner node has up to kBranching centers, a descriptor goes to the child with the nearest one, and a leaf with
+// too many entries splits around centers that are bitwise majorities of its own descriptors (after the hierarchical
 // clustering trees of Muja and Lowe, "Fast Matching of Binary Features", CRV 2012). The order of insertion shapes the
 // tree; the same order and seed give the same tree.
 class DescriptorTree {
  public:
   struct Entry {
     Descriptor descriptor{};
-    uint32_t owner = 0;  // whatever the caller likes
+    uint32_t owner = 0;  // chosen by the caller
   };
 
-  // What a search needs and the next one can use again.
+  // Buffers of a search, to be reused by the next one.
   struct Search {
     struct Branch {
       int distance;
@@ -34,11 +34,11 @@ class DescriptorTree {
   explicit DescriptorTree(uint64_t seed);
 
   void Insert(const Entry& entry);
-  // Takes out all entries of the owners with gone[owner] != 0. Touches every entry.
-  void RemoveOwners(std::span<const uint8_t> gone);
+  // Removes all entries of the owners with is_removed[owner] != 0. Visits every entry.
+  void RemoveOwners(std::span<const uint8_t> is_removed);
 
-  // Puts up to `max_leaves` leaves where descriptors near to this one may be into `search.leaves`, the most likely
-  // first: best-bin-first by the distance to the centers passed by.
+  // Writes up to `max_leaves` leaves that may contain similar descriptors to `search.leaves`, the most likely first
+  // (best-bin-first by the distance to the centers of skipped branches).
   void FindLeaves(const Descriptor& descriptor, int max_leaves, Search& search) const;
   std::span<const Entry> entries(uint32_t leaf) const { return nodes_[leaf].entries; }
 
@@ -49,7 +49,7 @@ class DescriptorTree {
   static constexpr size_t kLeafEntries = 256;
 
   struct Node {
-    uint32_t first_child = 0;  // children follow each other; 0 = leaf
+    uint32_t first_child = 0;  // children are consecutive; 0 = leaf
     uint32_t children = 0;
     size_t split_at = kLeafEntries;  // a leaf splits when it holds more
     std::vector<Entry> entries;      // of a leaf
@@ -60,7 +60,7 @@ class DescriptorTree {
   std::vector<Descriptor> PickCenters(std::span<const Entry> entries);
 
   std::vector<Node> nodes_;          // [0] is the root
-  std::vector<Descriptor> centers_;  // [i] of nodes_[i]; apart from them, so that siblings are close in memory
+  std::vector<Descriptor> centers_;  // [i] of nodes_[i]; stored apart so that siblings are close in memory
   std::mt19937_64 random_;
 };
 

@@ -9,7 +9,7 @@ namespace {
 // ORB features of one corner differ by some 10-20 % of their 256 bits between views, those of different corners by
 // half.
 constexpr int kMaxDistanceBits = 50;
-// How many words a feature is looked for in. One alone loses most neighbors across its border.
+// Number of words searched per feature. With one, most neighbors beyond its border would be lost.
 constexpr int kLeavesPerFeature = 2;
 
 // The votes of one query.
@@ -17,17 +17,17 @@ class Votes {
  public:
   explicit Votes(size_t slots) : votes_(slots, 0.0), nearest_(slots, kNone) {}
 
-  // One more descriptor of `slot` that is near to the present feature.
+  // Another descriptor of `slot` that is similar to the current feature.
   void See(uint32_t slot, int distance) {
     if (nearest_[slot] == kNone) seen_.push_back(slot);
     nearest_[slot] = std::min(nearest_[slot], distance);
   }
 
-  // Turns what was seen of the present feature into votes and goes on to the next. Returns the feature's weight.
+  // Turns the neighbors of the current feature into votes and starts the next feature. Returns the feature's weight.
   double Count(double keyframes) {
     const double weight = std::log((keyframes + 1) / (static_cast<double>(seen_.size()) + 0.5));
     for (const uint32_t slot : seen_) {
-      // A stray neighbor is likely to be far, a true one to be near.
+      // Wrong neighbors are mostly far, true ones near.
       votes_[slot] += weight * (1 - static_cast<double>(nearest_[slot]) / (kMaxDistanceBits + 1));
       nearest_[slot] = kNone;
     }
@@ -40,7 +40,7 @@ class Votes {
  private:
   static constexpr int kNone = 257;
   std::vector<double> votes_;
-  std::vector<int> nearest_;  // of the present feature, by slot
+  std::vector<int> nearest_;  // of the current feature, by slot
   std::vector<uint32_t> seen_;
 };
 
@@ -76,9 +76,9 @@ void PlaceIndex::Remove(KeyframeId keyframe) {
 }
 
 void PlaceIndex::SweepRemoved() {
-  std::vector<uint8_t> gone(slots_.size(), 0);
-  for (const uint32_t slot : removed_slots_) gone[slot] = 1;
-  tree_.RemoveOwners(gone);
+  std::vector<uint8_t> is_removed(slots_.size(), 0);
+  for (const uint32_t slot : removed_slots_) is_removed[slot] = 1;
+  tree_.RemoveOwners(is_removed);
   free_slots_.insert(free_slots_.end(), removed_slots_.begin(), removed_slots_.end());
   removed_slots_.clear();
   removed_entries_ = 0;
@@ -102,7 +102,7 @@ std::vector<PlaceMatch> PlaceIndex::Query(std::span<const Feature> features, int
   std::vector<PlaceMatch> matches;
   for (size_t slot = 0; slot < slots_.size(); ++slot) {
     if (votes[slot] <= 0) continue;
-    // A keyframe with many features gets more stray votes.
+    // A keyframe with many features gets more wrong votes.
     const double features_ratio = static_cast<double>(features.size()) / static_cast<double>(slots_[slot].features);
     matches.push_back({slots_[slot].keyframe, std::min(1.0, votes[slot] / total_weight * std::sqrt(features_ratio))});
   }

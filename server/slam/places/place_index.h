@@ -11,7 +11,7 @@
 
 namespace romap::slam {
 
-// A keyframe that looks like what was asked for.
+// A keyframe with descriptors similar to the query.
 struct PlaceMatch {
   KeyframeId keyframe;
   double score = 0;  // 0..1, comparable between queries
@@ -20,25 +20,25 @@ struct PlaceMatch {
 // Finds keyframes that show the same place, by their binary descriptors alone and without a vocabulary file. For one
 // thread at a time.
 //
-// An inverted index whose words are the leaves of a tree that grows with the keyframes. A word holds whole descriptors,
-// so that a feature votes only for the keyframes that have a similar one (Hamming embedding: Jegou et al., ECCV 2008),
-// and votes less the more keyframes it is similar to (inverse document frequency: Sivic and Zisserman, ICCV 2003).
-// About 60 bytes per feature.
+// An inverted index whose words are the leaves of a tree that grows with the keyframes. A word stores whole
+// descriptors, so that a feature votes only for keyframes with a similar descriptor (Hamming embedding: Jegou et al.,
+// ECCV 2008), and votes less the more keyframes it is similar to (inverse document frequency: Sivic and Zisserman, ICCV
+// 2003). About 60 bytes per feature.
 class PlaceIndex {
  public:
   explicit PlaceIndex(uint64_t seed = 1);
 
-  // A keyframe that is known already gets these features instead of its old ones.
+  // Replaces the features of a keyframe that was added before.
   void Add(KeyframeId keyframe, std::span<const Feature> features);
-  void Remove(KeyframeId keyframe);  // unknown: nothing happens
-  // The `max_results` best, best first. Scores fall for words that are everywhere. The same picture scores about 1; on
-  // hand-held video another view of the place some 0.005 to 0.04, and the best of the strangers up to 0.01.
+  void Remove(KeyframeId keyframe);  // ignored if unknown
+  // The `max_results` best, best first. Features that match many keyframes score less. The same image scores about 1;
+  // on hand-held video, other views of the same place score 0.005 to 0.04, and those of other places up to 0.01.
   std::vector<PlaceMatch> Query(std::span<const Feature> features, int max_results) const;
   size_t size() const { return slots_of_.size(); }
-  size_t bytes() const;  // about, for statistics
+  size_t bytes() const;  // approximate, for statistics
 
  private:
-  // A keyframe as the tree's entries name it.
+  // A keyframe, by DescriptorTree::Entry::owner.
   struct Slot {
     KeyframeId keyframe;  // none: removed, or free
     size_t features = 0;
@@ -50,7 +50,7 @@ class PlaceIndex {
   std::vector<Slot> slots_;
   std::vector<uint32_t> free_slots_;
   std::unordered_map<KeyframeId, uint32_t> slots_of_;
-  // Entries of removed keyframes stay in the tree, unseen, until they are many: one sweep is cheaper than many
+  // Entries of removed keyframes stay in the tree and are ignored until there are many: one sweep is cheaper than many
   // searches.
   std::vector<uint32_t> removed_slots_;
   size_t live_entries_ = 0;

@@ -19,13 +19,13 @@ struct PlaneFit {
   double sigma_rad = 0;  // standard deviation of the normal's direction (root mean square angle)
 };
 
-// The plane through all three; nullopt when they are as good as on one line.
+// The plane through all three; nullopt when they are almost on one line.
 std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
 // The plane with the least weighted sum of squared distances. Its normal is on the side of `up`. weights[i] >= 0, in
-// any unit, is of points[i]. The deviation comes from the distances themselves, not from the weights (White's
-// covariance estimate, 1980), so weights may say what matters as well as what is accurate. nullopt: fewer than four
-// points with a weight, or all of them about on one line.
+// any unit, belongs to points[i]. The deviation is estimated from the distances, not from the weights (White's
+// covariance estimate, 1980), so weights may express relevance as well as accuracy. nullopt: fewer than four
+// points with a weight, or almost all on one line.
 std::optional<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, std::span<const double> weights,
                                  const Eigen::Vector3d& up);
 

@@ -25,14 +25,14 @@ constexpr size_t kMaxCandidates = 30;
 constexpr double kSame_rad = 0.5 * kDegree;
 constexpr int kRefinements = 10;
 // Lengths without a unit are shares of the typical distance from a camera to the objects.
-constexpr double kLeastSigma = 0.002;  // points of a real surface scatter at least so much
-constexpr double kMostSigma = 0.03;    // points worse than this tell nothing
+constexpr double kLeastSigma = 0.002;  // points of a real surface scatter at least this much
+constexpr double kMostSigma = 0.03;    // less accurate points are ignored
 constexpr double kInlierSigmas = 2.5;
-// What a point counts for that is far from the objects' masks, relative to one that is near.
+// Weight of a point far from the objects' masks, relative to one near them.
 constexpr double kFarWeight = 0.3;
-constexpr double kReach = 0.25;  // how far around an object its support is looked for
+constexpr double kReach = 0.25;  // distance around an object in which its support is searched
 constexpr double kMinCamerasAbove = 0.9;
-// The estimate of the deviation knows of scatter only. A map also bends, and tables are not flat.
+// The estimated deviation covers scatter only; maps are also bent, and tables are not exactly flat.
 constexpr double kSigmaFloor_rad = 0.3 * kDegree;
 constexpr double kMinConfidence = 0.05;
 constexpr size_t kMaxObjectPoints = 300;
@@ -43,13 +43,13 @@ double Ramp(double value, double zero_at, double one_at) {
 
 double Angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
-// The query made clean: finite values only, typical lengths, and a weight for every point.
+// The query without invalid values, with typical lengths and a weight for every point.
 struct Scene {
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> cameras;
   std::vector<Eigen::Vector3d> object_points;
   double distance_mu = 0;       // from the cameras to the objects
-  double object_spread_mu = 0;  // of the object points around their middle
+  double object_spread_mu = 0;  // of the object points around their median
 
   std::vector<Eigen::Vector3d> points;
   std::vector<double> sigmas_mu;
@@ -57,7 +57,7 @@ struct Scene {
   std::vector<double> weights;    // by closeness and precision
 };
 
-// Middle and typical lengths. False: the cameras or objects do not allow for a scene.
+// Computes median and typical lengths. False: invalid cameras or objects.
 bool MeasureScene(const SupportPlaneQuery& query, Scene& scene) {
   for (const auto& up : query.camera_ups_world) {
     if (up.allFinite()) scene.up += up.stableNormalized();
@@ -84,7 +84,7 @@ bool MeasureScene(const SupportPlaneQuery& query, Scene& scene) {
     return LowerQuantile(std::move(distances), share);
   };
   scene.distance_mu = distance(scene.cameras, 0.5);
-  scene.object_spread_mu = distance(scene.object_points, 0.8);  // masks take in some of the background
+  scene.object_spread_mu = distance(scene.object_points, 0.8);  // masks include some background
   return scene.distance_mu > 0;
 }
 
@@ -98,7 +98,7 @@ double DistanceToObjects(const Scene& scene, const Eigen::Vector3d& p) {
 
 void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
   const double least_sigma_mu = kLeastSigma * scene.distance_mu;
-  // Masks tell what is near in the picture; in space it may be the floor behind the table.
+  // Points near a mask in the image may be far away in space, such as the floor behind the table.
   const double reach_mu = std::max(2 * scene.object_spread_mu, kReach * scene.distance_mu);
   for (const SupportPoint& point : query.points) {
     if (!point.position_world.allFinite() || !(point.sigma_mu <= kMostSigma * scene.distance_mu)) continue;
@@ -112,7 +112,7 @@ void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
   }
 }
 
-// Share, 0..1, of what speaks for the objects standing on this plane, whatever the points say.
+// Plausibility, 0..1, that the objects stand on this plane, regardless of the points on it.
 double ObjectsStandOn(const Scene& scene, const Plane& plane) {
   const auto above = [&](const Eigen::Vector3d& p) { return plane.Height(p) > 0; };
   const auto cameras_above = static_cast<double>(std::ranges::count_if(scene.cameras, above));
@@ -122,16 +122,16 @@ double ObjectsStandOn(const Scene& scene, const Plane& plane) {
   for (const auto& p : scene.object_points) heights.push_back(plane.Height(p));
   const double low = LowerQuantile(heights, 0.1);
   const double extent = LowerQuantile(heights, 0.9) - low;
-  // Masks are not exact and take in some of what lies behind and below.
+  // Masks are inexact and include some points behind and below the object.
   const double tolerance = 0.1 * extent + 3 * kLeastSigma * scene.distance_mu;
   const auto below = static_cast<double>(std::ranges::count_if(heights, [&](double h) { return h < -tolerance; }));
   const double rest_above = 1 - Ramp(below / static_cast<double>(heights.size()), 0.1, 0.3);
-  // The lowest points that were seen of an object may be some way up it, but not objects' heights above the plane.
+  // The lowest observed points of an object may be above its bottom, but not by several object heights.
   const double gap = std::max(0.0, low) / (extent + 0.02 * scene.distance_mu);
   return rest_above / (1 + std::pow(gap, 4));
 }
 
-// What one point says for the plane: its weight when on it, nothing when away from it.
+// Score of one point for the plane: its weight when on the plane, 0 when off it.
 double SupportOf(const Scene& scene, const Plane& plane, size_t point) {
   const double residual = plane.Height(scene.points[point]) / (kInlierSigmas * scene.sigmas_mu[point]);
   return scene.weights[point] * std::max(0.0, 1 - residual * residual);
@@ -143,8 +143,8 @@ double Support(const Scene& scene, const Plane& plane) {
   return support;
 }
 
-// Refits while the points that the plane is made of are found anew: Tukey's biweight with the scale of the residuals
-// themselves, for stated uncertainties are often off by a factor. nullopt: they do not make a plane.
+// Refits the plane and reselects its points in turns: Tukey's biweight with the scale of the residuals, because the
+// given uncertainties are often wrong by a factor. nullopt: no plane fits.
 std::optional<PlaneFit> Refine(const Scene& scene, const Plane& start) {
   PlaneFit fit{.plane = start, .sigma_rad = 0};
   double scale = 1;  // of a residual, in the points' own sigmas
@@ -181,7 +181,7 @@ double Score(const Scene& scene, const Plane& plane) {
   return IsLevel(scene, plane) ? Support(scene, plane) * ObjectsStandOn(scene, plane) : 0;
 }
 
-// Promising planes through three points that are drawn by their weights, best first (RANSAC with the score of MSAC:
+// Promising planes through three points drawn by their weights, best first (RANSAC with the score of MSAC:
 // Torr and Zisserman, 2000).
 std::vector<Candidate> SearchPlanes(const Scene& scene, uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -206,8 +206,8 @@ struct FoundPlane {
   double score = 0;
 };
 
-// How likely `other` would have been as good as `best`, had other points of the same surfaces been found: 1 if it is as
-// good, less the more points say that it is worse. Points that agree with both do not tell.
+// How likely `other` would be as good as `best` with another sample of points from the same surfaces: 1 if it is as
+// good, and less the more points contradict it. Points that agree with both do not count.
 double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlane& other) {
   const double best_stands = ObjectsStandOn(scene, best.fit.plane);
   const double other_stands = ObjectsStandOn(scene, other.fit.plane);
@@ -221,7 +221,7 @@ double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlan
 }
 
 // The best of the candidates after refinement. Other planes may explain the points about as well, as with few points
-// and clutter next to the support; the deviation tells of them too. nullopt: none holds.
+// and clutter next to the support; the deviation accounts for them. nullopt: no candidate is plausible.
 std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidate> candidates) {
   std::vector<FoundPlane> refined;
   for (const Candidate& candidate : candidates) {
@@ -251,7 +251,7 @@ std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidat
   return chosen;
 }
 
-// Share of the object points that have inliers around the place on the plane below them.
+// Share of the object points that have inliers around their projection onto the plane.
 double SupportedShare(const Scene& scene, const Plane& plane, std::span<const size_t> inliers) {
   const double reach_mu = kReach * scene.distance_mu;
   const auto is_supported = [&](const Eigen::Vector3d& p) {
@@ -271,7 +271,7 @@ double Confidence(const Scene& scene, const PlaneFit& fit, std::span<const size_
   }
   const double all_weight = std::accumulate(scene.weights.begin(), scene.weights.end(), 0.0);
   const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kDegree), 2));
-  // A few points among the objects and many far away make a sharp plane of something else.
+  // Few inliers near the objects and many far away indicate another surface.
   return Ramp(inlier_weight / all_weight, 0.1, 0.4) * Ramp(close_inliers, 3, 15) * sharpness *
          SupportedShare(scene, fit.plane, inliers) * ObjectsStandOn(scene, fit.plane);
 }

@@ -7,11 +7,11 @@
 
 namespace romap::slam {
 
-// A map point that may lie on what the objects stand on.
+// A map point that may lie on the support plane.
 struct SupportPoint {
   Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
   double sigma_mu = 0;       // uncertainty of its position
-  bool near_object = false;  // seen close to a mask, outside of it
+  bool near_object = false;  // observed outside of a mask but close to it
 };
 
 struct SupportPlane {
@@ -24,13 +24,13 @@ struct SupportPlane {
 
 struct SupportPlaneQuery {
   std::span<const SupportPoint> points;
-  std::span<const Eigen::Vector3d> object_points_world;   // of the objects: they lie above their support
-  std::span<const Eigen::Vector3d> camera_centers_world;  // above it too
+  std::span<const Eigen::Vector3d> object_points_world;   // of the objects, which are above their support
+  std::span<const Eigen::Vector3d> camera_centers_world;  // also above it
   std::span<const Eigen::Vector3d> camera_ups_world;      // -y of the cameras: up is within 75 degrees of their mean
   uint64_t seed = 1;
 };
 
-// The plane under the objects, and with it which way is up. nullopt: no plane that the objects could stand on.
+// The plane that supports the objects; its normal is the up direction. nullopt: no plane can support them.
 std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query);
 
 }  // namespace romap::slam

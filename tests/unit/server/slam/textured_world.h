@@ -119,7 +119,7 @@ class TexturedWorld {
     return texture;
   }
 
-  // Texture pixels to image pixels, for a horizontal texture centerd above the origin.
+  // Texture pixels to image pixels, for a horizontal texture centered above the origin.
   cv::Matx33d FromTexture(const SE3<World, Camera>& T_world_camera, const cv::Mat& texture, double half_side_mu,
                           double height_mu) const {
     const double mu_per_px = 2 * half_side_mu / texture.cols;

@@ -60,8 +60,8 @@ TEST(Epipolar, GradientAgreesWithDifferencesOfTheCost) {
   for (const Eigen::Vector2d& off_px :
        {Eigen::Vector2d(1, -2), Eigen::Vector2d(-6, 12)}) {  // within Huber's bound, beyond
     const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, off_px);
-    const auto linearise = [&](const Motion& at) { return EpipolarEquations(camera, at, {&match, 1}); };
-    ExpectGradientOfCost<5>(linearise, move, TestMotion());
+    const auto linearize = [&](const Motion& at) { return EpipolarEquations(camera, at, {&match, 1}); };
+    ExpectGradientOfCost<5>(linearize, move, TestMotion());
   }
 }
 

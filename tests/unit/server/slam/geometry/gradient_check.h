@@ -9,14 +9,14 @@
 namespace romap::slam {
 
 // Checks the gradient of normal equations (half the cost's derivative) against central differences of the cost along
-// the parameters of `move`. `linearise` and `move` are as for Minimise.
-template <int N, class State, class Linearise, class Move>
-void ExpectGradientOfCost(const Linearise& linearise, const Move& move, const State& state) {
+// the parameters of `move`. `linearize` and `move` are as for Minimize.
+template <int N, class State, class Linearize, class Move>
+void ExpectGradientOfCost(const Linearize& linearize, const Move& move, const State& state) {
   constexpr double kStep = 1e-6;
-  const NormalEquations<N> equations = linearise(state);
+  const NormalEquations<N> equations = linearize(state);
   for (int k = 0; k < N; ++k) {
     const typename NormalEquations<N>::Vector step = kStep * NormalEquations<N>::Vector::Unit(k);
-    const double difference = linearise(move(state, step)).cost - linearise(move(state, -step)).cost;
+    const double difference = linearize(move(state, step)).cost - linearize(move(state, -step)).cost;
     const double expected = difference / (2 * kStep) / 2;
     EXPECT_NEAR(equations.gradient[k], expected, 1e-4 * std::abs(expected) + 1e-4) << "parameter " << k;
   }

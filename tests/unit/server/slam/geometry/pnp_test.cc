@@ -72,7 +72,7 @@ TEST(Pnp, ObservationsThatCannotBeUsedAreLeftOut) {
   Scene scene = MakeScene(60, 0, false, 4);
   scene.observations[0].p_world.y() = std::numeric_limits<double>::quiet_NaN();
   scene.observations[1].sigma_px = 0;
-  scene.observations[2].p_world = scene.observations[3].p_world;  // two sights of one point
+  scene.observations[2].p_world = scene.observations[3].p_world;  // two observations of one point
   const std::optional<PoseEstimate> estimate = SolvePnp(scene.camera, scene.observations, {});
   ExpectPose(scene, estimate);
   EXPECT_FALSE(estimate->inlier[0]);

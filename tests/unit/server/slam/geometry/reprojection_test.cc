@@ -13,13 +13,13 @@ class ReprojectionGradient : public testing::TestWithParam<PoseObservation> {};
 TEST_P(ReprojectionGradient, AgreesWithDifferencesOfTheCost) {
   const CameraModel camera = TestCamera();
   const CameraFromWorld pose{Turn(10, -20, 5).toRotationMatrix(), {0.1, -0.2, 0.4}};
-  const auto linearise = [&](const CameraFromWorld& at) {
+  const auto linearize = [&](const CameraFromWorld& at) {
     PoseEquations equations;
     AddObservation(camera, at, GetParam(), equations);
     return equations;
   };
-  ASSERT_GT(linearise(pose).cost, 0);
-  ExpectGradientOfCost<6>(linearise, Moved, pose);
+  ASSERT_GT(linearize(pose).cost, 0);
+  ExpectGradientOfCost<6>(linearize, Moved, pose);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -150,14 +150,14 @@ TEST(Similarity, GradientAgreesWithDifferencesOfTheCost) {
   for (const double chi2_bound : {9.21, 1e6}) {  // beyond Huber's bound, within
     const Scene scene = MakeScene(kTruth, 5, 0.01, 0, 11);
     const SimilarityOptions options{.chi2_bound = chi2_bound};
-    const auto linearise = [&](const Similarity& at) {
+    const auto linearize = [&](const Similarity& at) {
       SimilarityEquations equations;
       for (const SimilarityMatch& match : scene.matches) {
         AddSimilarityErrors(scene.camera, at, match, options, equations);
       }
       return equations;
     };
-    ExpectGradientOfCost<7>(linearise, MovedSimilarity, near_truth);
+    ExpectGradientOfCost<7>(linearize, MovedSimilarity, near_truth);
   }
 }
 

@@ -96,7 +96,7 @@ TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
 
 TEST(BundleAdjustment, TenPercentOutliersHardlyMatter) {
   BundleWorldOptions options = NoisyStart();
-  options.sights_per_point = 8;
+  options.observations_per_point = 8;
   BundleWorld clean = MakeBundleWorld(options);
   ASSERT_TRUE(AdjustBundle(clean.problem, {.dense = true}).usable);
   options.outlier_share = 0.1;

@@ -16,16 +16,16 @@ struct BundleWorldOptions {
   int cameras = 10;
   int fixed_cameras = 2;  // the first ones; they start where they truly are
   int points = 200;
-  int sights_per_point = 6;      // by so many consecutive cameras
-  double step_rad = 0.1;         // between neighbors on the orbit
-  double scale = 1;              // map units; the orbit's radius is 3, the ball's 1
-  double pixel_noise_px = 0;     // standard deviation per axis
-  double pose_noise_rad = 0;     // of the start, per axis
-  double pose_noise_mu = 0;      // of the start, per axis, before `scale`
-  double point_noise_mu = 0;     // of the start, per axis, before `scale`
-  double outlier_share = 0;      // share of the observations that are anywhere in the image
-  bool with_depth = false;       // observations carry depth
-  double depth_noise_mu = 0.01;  // before `scale`
+  int observations_per_point = 6;  // by this many consecutive cameras
+  double step_rad = 0.1;           // between neighbors on the orbit
+  double scale = 1;                // map units; the orbit's radius is 3, the ball's 1
+  double pixel_noise_px = 0;       // standard deviation per axis
+  double pose_noise_rad = 0;       // of the start, per axis
+  double pose_noise_mu = 0;        // of the start, per axis, before `scale`
+  double point_noise_mu = 0;       // of the start, per axis, before `scale`
+  double outlier_share = 0;        // share of the observations that are anywhere in the image
+  bool with_depth = false;         // observations carry depth
+  double depth_noise_mu = 0.01;    // before `scale`
   unsigned seed = 1;
 };
 
@@ -107,9 +107,9 @@ class BundleWorldMaker {
     world_.true_points.push_back(p_world);
     world_.problem.points.push_back({p_world + options_.scale * NormalVector(options_.point_noise_mu), false});
 
-    const int sights = std::min(options_.sights_per_point, options_.cameras);
-    const auto first = static_cast<int>(Uniform(0, options_.cameras - sights + 1));
-    for (int i = first; i < first + sights; ++i) MakeObservation(i, index, p_world);
+    const int observations = std::min(options_.observations_per_point, options_.cameras);
+    const auto first = static_cast<int>(Uniform(0, options_.cameras - observations + 1));
+    for (int i = first; i < first + observations; ++i) MakeObservation(i, index, p_world);
   }
 
   void MakeObservation(int camera, int point, const Eigen::Vector3d& p_world) {

@@ -11,9 +11,9 @@
 namespace romap::slam {
 namespace {
 
-// A camera some way off its start, so that the Jacobians of the increment matter, and a point in its view.
-struct Sight {
-  explicit Sight(const Eigen::Vector3d& p_camera, double turn_rad = 0.7)
+// A camera away from its start, so that the Jacobians of the increment matter, and a point in its view.
+struct PointView {
+  explicit PointView(const Eigen::Vector3d& p_camera, double turn_rad = 0.7)
       : camera(SE3<World, Camera>(ExpRotation({0.4, -0.9, 1.3}), {0.5, -0.2, 0.8})) {
     camera.increment = {turn_rad, -0.5 * turn_rad, 0.3 * turn_rad, 0.2, -0.1, 0.15};
     camera.Refresh();
@@ -26,45 +26,45 @@ struct Sight {
 };
 
 TEST(ReprojectionCost, IsThePixelErrorInSigmas) {
-  Sight sight({0.3, -0.2, 1.5});
+  PointView view({0.3, -0.2, 1.5});
   const CameraModel model = BundleWorldCamera();
   const Eigen::Vector2d pixel_px = model.Project({0.3, -0.2, 1.5}) + Eigen::Vector2d(3, -4);
-  const ReprojectionCost cost(model, &sight.camera, pixel_px, 2);
+  const ReprojectionCost cost(model, &view.camera, pixel_px, 2);
   Eigen::Vector2d residual;
-  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), nullptr));
+  ASSERT_TRUE(cost.Evaluate(view.Parameters().data(), residual.data(), nullptr));
   EXPECT_LT((residual - Eigen::Vector2d(-1.5, 2)).norm(), 1e-9);
 }
 
 TEST(ReprojectionCost, JacobiansMatchFiniteDifferences) {
   for (const double turn_rad : {0.0, 1e-6, 0.02, 0.7, 2.0}) {
-    Sight sight({0.3, -0.2, 1.5}, turn_rad);
-    const ReprojectionCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1.7);
-    ExpectJacobiansMatch(cost, sight.Parameters(), [&] { sight.camera.Refresh(); });
+    PointView view({0.3, -0.2, 1.5}, turn_rad);
+    const ReprojectionCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1.7);
+    ExpectJacobiansMatch(cost, view.Parameters(), [&] { view.camera.Refresh(); });
   }
 }
 
 TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
-  Sight sight({0.3, -0.2, -1.5});
-  const ReprojectionCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1);
+  PointView view({0.3, -0.2, -1.5});
+  const ReprojectionCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1);
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_camera;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
   double* jacobians[] = {by_camera.data(), by_point.data()};
-  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), jacobians));
+  ASSERT_TRUE(cost.Evaluate(view.Parameters().data(), residual.data(), jacobians));
   EXPECT_GT(residual.norm(), 50);
   EXPECT_TRUE(by_camera.isZero());
   EXPECT_TRUE(by_point.isZero());
 }
 
 TEST(LensedCost, IsTheErrorInThePictureThatTheLensGives) {
-  Sight sight({0.6, -0.4, 1.5});
+  PointView view({0.6, -0.4, 1.5});
   const CameraModel model = BundleWorldCamera();
   double k1 = -0.1;
   const Eigen::Vector2d seen_px = RadialCorrection{k1}.Distort(model, model.Project({0.6, -0.4, 1.5}));
   const Eigen::Vector2d pixel_px = seen_px + Eigen::Vector2d(3, -4);
-  const ReprojectionCost inner(model, &sight.camera, pixel_px, 2);
+  const ReprojectionCost inner(model, &view.camera, pixel_px, 2);
   const LensedCost<ReprojectionCost> cost(model, pixel_px, 2, &inner);
-  std::vector<double*> parameters = sight.Parameters();
+  std::vector<double*> parameters = view.Parameters();
   parameters.push_back(&k1);
   Eigen::Vector2d residual;
   ASSERT_TRUE(cost.Evaluate(parameters.data(), residual.data(), nullptr));
@@ -72,46 +72,46 @@ TEST(LensedCost, IsTheErrorInThePictureThatTheLensGives) {
 }
 
 TEST(LensedCost, JacobiansMatchFiniteDifferences) {
-  Sight sight({0.6, -0.4, 1.5});
+  PointView view({0.6, -0.4, 1.5});
   const CameraModel model = BundleWorldCamera();
   double k1 = -0.1;
-  std::vector<double*> parameters = sight.Parameters();
+  std::vector<double*> parameters = view.Parameters();
   parameters.push_back(&k1);
-  const ReprojectionCost pixel(model, &sight.camera, {400, 200}, 1.7);
+  const ReprojectionCost pixel(model, &view.camera, {400, 200}, 1.7);
   ExpectJacobiansMatch(LensedCost<ReprojectionCost>(model, {400, 200}, 1.7, &pixel), parameters,
-                       [&] { sight.camera.Refresh(); });
-  const ReprojectionDepthCost depth(model, &sight.camera, {400, 200}, 1.7, 2.5, 0.1);
+                       [&] { view.camera.Refresh(); });
+  const ReprojectionDepthCost depth(model, &view.camera, {400, 200}, 1.7, 2.5, 0.1);
   ExpectJacobiansMatch(LensedCost<ReprojectionDepthCost>(model, {400, 200}, 1.7, &depth), parameters,
-                       [&] { sight.camera.Refresh(); });
+                       [&] { view.camera.Refresh(); });
 }
 
 TEST(ReprojectionDepthCost, AddsTheErrorOfInverseDepthInSigmas) {
-  Sight sight({0.3, -0.2, 2.0});
+  PointView view({0.3, -0.2, 2.0});
   const CameraModel model = BundleWorldCamera();
   const Eigen::Vector2d pixel_px = model.Project({0.3, -0.2, 2.0}) + Eigen::Vector2d(3, -4);
   // sigma of 1 / depth is 0.1 / 2.5^2.
-  const ReprojectionDepthCost cost(model, &sight.camera, pixel_px, 2, 2.5, 0.1);
+  const ReprojectionDepthCost cost(model, &view.camera, pixel_px, 2, 2.5, 0.1);
   Eigen::Vector3d residual;
-  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), nullptr));
+  ASSERT_TRUE(cost.Evaluate(view.Parameters().data(), residual.data(), nullptr));
   EXPECT_LT((residual - Eigen::Vector3d(-1.5, 2, (1 / 2.0 - 1 / 2.5) / (0.1 / 6.25))).norm(), 1e-9);
 }
 
 TEST(ReprojectionDepthCost, JacobiansMatchFiniteDifferences) {
   for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
-    Sight sight({0.3, -0.2, 1.5}, turn_rad);
-    const ReprojectionDepthCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1.7, 1.4, 0.001);
-    ExpectJacobiansMatch(cost, sight.Parameters(), [&] { sight.camera.Refresh(); });
+    PointView view({0.3, -0.2, 1.5}, turn_rad);
+    const ReprojectionDepthCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1.7, 1.4, 0.001);
+    ExpectJacobiansMatch(cost, view.Parameters(), [&] { view.camera.Refresh(); });
   }
 }
 
 TEST(ReprojectionDepthCost, APointBehindTheCameraCostsButDoesNotFail) {
-  Sight sight({0.3, -0.2, -1.5});
-  const ReprojectionDepthCost cost(BundleWorldCamera(), &sight.camera, {400, 200}, 1, 1.4, 0.05);
+  PointView view({0.3, -0.2, -1.5});
+  const ReprojectionDepthCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1, 1.4, 0.05);
   Eigen::Vector3d residual;
   Eigen::Matrix<double, 3, 6, Eigen::RowMajor> by_camera;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
   double* jacobians[] = {by_camera.data(), by_point.data()};
-  ASSERT_TRUE(cost.Evaluate(sight.Parameters().data(), residual.data(), jacobians));
+  ASSERT_TRUE(cost.Evaluate(view.Parameters().data(), residual.data(), jacobians));
   EXPECT_GT(residual.minCoeff(), 50);
   EXPECT_TRUE(by_camera.isZero());
   EXPECT_TRUE(by_point.isZero());
@@ -132,21 +132,21 @@ TEST(PosePriorCost, IsTheDistanceInSigmas) {
 
 TEST(PosePriorCost, JacobianMatchesFiniteDifferences) {
   for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
-    Sight sight({0, 0, 1}, turn_rad);
+    PointView view({0, 0, 1}, turn_rad);
     PosePrior prior;
     prior.T_world_camera = SE3<World, Camera>(ExpRotation({0.5, -0.8, 1.2}), {0.4, -0.1, 0.7});
     prior.rotation_sigma_rad = 0.03;
     prior.translation_sigma_mu = 0.2;
-    const PosePriorCost cost(&sight.camera, prior);
-    ExpectJacobiansMatch(cost, {sight.camera.increment.data()}, [&] { sight.camera.Refresh(); });
+    const PosePriorCost cost(&view.camera, prior);
+    ExpectJacobiansMatch(cost, {view.camera.increment.data()}, [&] { view.camera.Refresh(); });
   }
 }
 
 TEST(CameraState, PoseAgreesWithWhatTheCostsRead) {
-  const Sight sight({0, 0, 1});
-  const SE3<World, Camera> pose = sight.camera.Pose();
-  EXPECT_LT((pose.RotationMatrix().transpose() - sight.camera.R_camera_world).norm(), 1e-12);
-  EXPECT_LT((pose.translation() - sight.camera.t_world_camera).norm(), 1e-12);
+  const PointView view({0, 0, 1});
+  const SE3<World, Camera> pose = view.camera.Pose();
+  EXPECT_LT((pose.RotationMatrix().transpose() - view.camera.R_camera_world).norm(), 1e-12);
+  EXPECT_LT((pose.translation() - view.camera.t_world_camera).norm(), 1e-12);
 }
 
 }  // namespace

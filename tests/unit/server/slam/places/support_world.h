@@ -11,7 +11,7 @@
 namespace romap::slam {
 
 // A sparse monocular map of boxes on a table, seen from above on part of a circle, with dials for what goes wrong.
-// Built with the table at z = 0 and metres, then turned, shifted and scaled at random, as a monocular map is.
+// Built with the table at z = 0 and meters, then turned, shifted and scaled at random, as a monocular map is.
 class SupportWorld {
  public:
   struct Dials {
@@ -51,7 +51,7 @@ class SupportWorld {
   double TiltError_rad(const SupportPlane& plane) const {
     return std::acos(std::clamp(plane.normal_world.dot(up()), -1.0, 1.0));
   }
-  // How far the plane found is from the table under the objects, metres.
+  // How far the plane found is from the table under the objects, meters.
   double HeightError_m(const SupportPlane& plane) const {
     return std::abs(plane.normal_world.dot(ToMap({0, 0, 0})) - plane.offset_mu) / scale_;
   }
