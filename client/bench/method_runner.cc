@@ -48,7 +48,7 @@ void FillIn(const TimedTraining& training, ObjectTraining& row) {
   row.sampling_s = Sum(stats, {nerf::TrainPhase::kSampling});
   row.forward_s = Sum(stats, {nerf::TrainPhase::kEncode, nerf::TrainPhase::kMlp, nerf::TrainPhase::kRender});
   row.backward_s =
-      Sum(stats, {nerf::TrainPhase::kMlpBackward, nerf::TrainPhase::kEncodeBackward, nerf::TrainPhase::kOptimise});
+      Sum(stats, {nerf::TrainPhase::kMlpBackward, nerf::TrainPhase::kEncodeBackward, nerf::TrainPhase::kOptimize});
 }
 
 }  // namespace

@@ -21,18 +21,6 @@ absl::StatusOr<nerf::ObjectField> MakeField(const TrainingRequest& request, cons
   return field;
 }
 
-void AddTo(nerf::TrainStats& sum, const nerf::TrainStats& slice) {
-  sum.steps += slice.steps;
-  sum.rays += slice.rays;
-  sum.samples += slice.samples;
-  sum.active_samples += slice.active_samples;
-  sum.wall_s += slice.wall_s;
-  sum.look_cpu_s += slice.look_cpu_s;
-  sum.color_loss = slice.color_loss;
-  sum.restarted |= slice.restarted;
-  for (size_t p = 0; p < sum.phase_cpu_s.size(); ++p) sum.phase_cpu_s[p] += slice.phase_cpu_s[p];
-}
-
 absl::StatusOr<double> ProbeSecondsPerStep(const TrainingRequest& request) {
   ROMAP_ASSIGN_OR_RETURN(nerf::ObjectField field, MakeField(request, request.config));
   field.Train(1, request.threads);  // builds the ray lists
@@ -76,7 +64,7 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
     const int slice = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(steps)));
     const nerf::TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
     if (stats.steps == 0) break;  // no pixels to train on
-    AddTo(result.stats, stats);
+    result.stats.Append(stats);
     while (marked() && training.total_s() >= request.marks_s[result.at_marks.size()]) {
       result.at_marks.push_back(field.Snapshot());
     }

@@ -6,13 +6,10 @@
 
 namespace romap::nerf {
 
-// The share of the dense depths, all multiplied by `scale`, that other views contradict: put into space, the point lies
-// on background of at least one of them, or before what that one measured. Looks at a sample of the object's pixels. 0
-// without dense depth.
-double MisplacedShare(std::span<const ObjectView> views, double scale);
-
-// Whether the dense depths belong to these views: no other scale makes clearly more of them agree with the masks, and
-// most of them do. Holes and outliers are no misfit. True without dense depth.
-bool DepthsFit(std::span<const ObjectView> views);
+// Whether the dense depth of the views is consistent with their masks, on a sample of object pixels. A point from one
+// view contradicts another view if it projects to background there, or lies in front of the depth measured there. The
+// depth is consistent if most points contradict no view, and no other scale of the depth leaves clearly fewer
+// contradictions. Tolerates holes and outliers. True without dense depth.
+bool DepthIsConsistent(std::span<const ObjectView> views);
 
 }  // namespace romap::nerf

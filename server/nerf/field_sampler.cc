@@ -16,20 +16,20 @@ uint8_t ToByte(float color) { return static_cast<uint8_t>(std::lround(255.0f * s
 }  // namespace
 
 void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const {
-  const nerf::KernelTable& kernels = nerf::SimdKernels().For(model_);
-  nerf::SampleChunk chunk(kBatch, model_.layout.features, model_.mlp.hidden);
+  const KernelTable& kernels = SimdKernels().For(model_);
+  SampleChunk chunk(kBatch, model_.layout.features, model_.mlp.hidden);
   std::array<size_t, kBatch> source;
   const Eigen::Vector3f half = box_.half_extents.cast<float>();
   const float per_mu = static_cast<float>(1.0 / box_.unit_mu);
   const Eigen::Vector3f extent = box_.ExtentUnit();
-  const nerf::GridPose grid = box_.GridPose();
+  const GridPose grid = box_.GridPose();
   size_t next = 0;
   while (next < p_object.size()) {
     chunk.size = 0;
     for (; next < p_object.size() && chunk.size < kBatch; ++next) {
       raw[next] = kOutside;
       if (!rgb.empty()) rgb[next] = {0, 0, 0};
-      // Rounding must not push the box's own corners outside.
+      // The slack keeps the corners of the box inside despite rounding.
       const Eigen::Vector3f p = (p_object[next] + half) * per_mu;
       constexpr float kSlack = 1e-5f;
       if (!((p.array() >= -kSlack).all() && (p.array() <= extent.array() + kSlack).all())) continue;
@@ -45,7 +45,7 @@ void TrainedField::Sample(std::span<const Eigen::Vector3f> p_object, std::span<f
     kernels.mlp_forward(model_.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
     if (!rgb.empty()) kernels.activate(chunk, model_.density_bias);
     for (size_t i = 0; i < static_cast<size_t>(chunk.size); ++i) {
-      raw[source[i]] = chunk.raw[nerf::kOutputs * i + 3] + model_.density_bias;
+      raw[source[i]] = chunk.raw[kOutputs * i + 3] + model_.density_bias;
       if (!rgb.empty()) rgb[source[i]] = {ToByte(chunk.red[i]), ToByte(chunk.green[i]), ToByte(chunk.blue[i])};
     }
   }

@@ -6,15 +6,15 @@
 
 namespace romap::nerf {
 
-// A frozen copy of a field; see FieldSampler.
+// An immutable copy of a trained field; see FieldSampler.
 class TrainedField : public FieldSampler {
  public:
-  TrainedField(nerf::FieldModel model, const TrainingBox& box) : model_(std::move(model)), box_(box) {}
-  // Works in batches of some hundred points: ask for many points in one call.
+  TrainedField(FieldModel model, const TrainingBox& box) : model_(std::move(model)), box_(box) {}
+  // Processes batches of 512 points, so calls with many points are faster per point.
   void Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const override;
 
  private:
-  const nerf::FieldModel model_;
+  const FieldModel model_;
   const TrainingBox box_;
 };
 

@@ -7,8 +7,8 @@
 
 namespace romap::nerf {
 
-// Fills in what the raw values of a field mean: surface_level, optics and connect_level of its snapshot.
-void DescribeSurface(const NerfConfig& config, const nerf::FieldModel& model, const TrainingBox& box,
+// Sets surface_level, optics and connect_level of the snapshot of a field.
+void DescribeSurface(const NerfConfig& config, const FieldModel& model, const TrainingBox& box,
                      FieldSnapshot& snapshot);
 
 }  // namespace romap::nerf

@@ -7,9 +7,9 @@
 
 namespace romap::nerf {
 
-// Signed distance of the middles of cells to the border of a body of cells, positive outside, in the unit of `extent`,
-// the sides of the grid. `inside` [kOccupancyResolution^3], x fastest. Exact up to some cells from the border, beyond
-// that a bound; without a border everywhere the bound.
+// The signed distance from the center of each cell to the border of the volume of all cells that are `inside`, positive
+// outside. `inside`: [kOccupancyResolution^3], x fastest; `extent`: the sides of the grid, whose unit is that of the
+// distances. Exact within ten cells of the border; clamped to that distance beyond, and everywhere without a border.
 std::vector<float> DistanceToBorder(std::span<const uint8_t> inside, const Eigen::Vector3f& extent);
 
 }  // namespace romap::nerf

@@ -3,26 +3,21 @@
 #include <absl/status/status.h>
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "common/cuboid.h"
 #include "common/field_snapshot.h"
 #include "common/stage_messages.h"
+#include "server/nerf/boxed_field.h"
 #include "server/nerf/field_probe.h"
-#include "server/nerf/gain_meter.h"
-#include "server/nerf/model/occupancy.h"
+#include "server/nerf/field_warnings.h"
+#include "server/nerf/loss_trend.h"
 #include "server/nerf/nerf_config.h"
-#include "server/nerf/pose_refiner.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/train_stats.h"
-#include "server/nerf/trainer.h"
-#include "server/nerf/training_box.h"
 #include "server/nerf/training_plan.h"
-#include "server/nerf/view_trust.h"
-#include "server/nerf/visual_hull.h"
+#include "server/nerf/training_views.h"
 
 namespace romap::nerf {
 
@@ -33,98 +28,72 @@ class ObjectField {
   // The same seed, inputs and thread counts give the same field.
   ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed);
 
-  // The object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing. For another one
-  // the box is made anew and what is learned is carried over; training goes on, the longer the more of the new box is
-  // unknown. Only a box that has little in common with the old one starts a new training. INVALID_ARGUMENT: pose or
-  // size that cannot be.
+  // Sets the object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing. Otherwise
+  // the learned field is transferred to a new box, and the training plan is extended in proportion to the unknown part
+  // of that box. If the boxes have little in common, training restarts. INVALID_ARGUMENT: see ValidateCuboid.
   absl::Status SetBox(const Cuboid& cuboid);
 
-  // Adds a view, or replaces the one of the same keyframe. FAILED_PRECONDITION: no box yet, or the view is of another
-  // object. INVALID_ARGUMENT: see ValidateView.
+  // Adds a view, or replaces the view of the same keyframe. FAILED_PRECONDITION: there is no box yet, or the view is of
+  // another object. INVALID_ARGUMENT: see ValidateView. RESOURCE_EXHAUSTED: see TrainingViews::Add.
   absl::Status AddView(ObjectView view);
 
-  // The map was corrected: the object's space underwent `S_new_old`, and boxes and views come in the new world from now
-  // on. What is learned is relative to the box, which goes along with all views, so nothing is trained anew. A motion
-  // that is not finite is passed over.
+  // Applies a map correction: the space around the object moved by `S_new_old`. Later boxes and views are in the new
+  // world. The field, its box and its views move together, so nothing has to be retrained. Ignored if not finite.
   void Move(const Sim3<World, World>& S_new_old);
 
-  // The corrected pose, in the new world, of a view that is there; one that is not (any more) is passed over. Training
-  // goes on from what is learned, the longer the more changed. What training itself found the old pose to be off is
-  // taken to hold for one close to it too. INVALID_ARGUMENT: see ValidateView; then the view stays as it was.
+  // Sets the corrected pose, in the new world, of an existing view; ignored if the view does not exist. The training
+  // plan is extended in proportion to the change. See TrainingViews::Correct. INVALID_ARGUMENT: see ValidateView; the
+  // view is unchanged.
   absl::Status CorrectView(const ViewPose& pose);
 
-  // What is wrong with what the object was given, for people: views that were refused or that contradict the others, a
-  // box that misses what the masks show, and the like. Empty: nothing is known to be wrong.
-  std::string Concern() const;
-
-  // `steps` steps of optimisation on `threads` (1..64) threads. Nothing happens without box and views.
+  // Does `steps` optimization steps on `threads` (1..64) threads. No effect without box or views.
   TrainStats Train(int steps, int threads);
 
-  // The field as it is now. `converged` is left false; the caller knows whether more training is planned.
+  // A copy of the current field. The caller sets `converged`, because it knows whether more training is planned.
   FieldSnapshot Snapshot() const;
 
-  // Memory that only Train() needs is given back until the next call.
-  void ReleaseScratch() { trainer_->ReleaseScratch(); }
+  // What is wrong with the object's input, for people; empty if nothing is. See FieldWarnings.
+  std::string Warning() const;
 
-  ObjectId id() const { return id_; }
+  // Frees the memory that only Train() needs, until the next Train().
+  void ReleaseScratch() { field_.ReleaseScratch(); }
+
   int views() const { return static_cast<int>(views_.size()); }
-  uint64_t steps() const { return trainer_->steps_done(); }
-  // Share of the loss that 100 steps take away at present; nothing while that is not known.
-  std::optional<double> LossFall() const { return gain_.FallPer100Steps(); }
-  // Steps the training plan allows now; `complete`: no more views are expected. 0 once training has diverged again and
-  // again with the views there are.
+  uint64_t steps() const { return field_.steps(); }
+  // See LossTrend::DecreasePer100Steps.
+  std::optional<double> LossDecrease() const { return loss_trend_.DecreasePer100Steps(); }
+  // The number of steps that the training plan allows now; see TrainingPlan. 0 while training is paused because it
+  // diverged several times on the same views and box.
   uint64_t AllowedSteps(bool complete) const;
 
  private:
   absl::Status FitBox(const Cuboid& cuboid);
-  absl::Status Refuse(absl::Status why);
-  size_t TakeView(ObjectView view, bool keep_verdict);
-  SE3<World, Camera> WithRefinement(size_t index, const SE3<World, Camera>& T_world_camera) const;
-  double ShiftShare(const SE3<World, Camera>& T_old, const SE3<World, Camera>& T_new) const;
-  bool CarryOverTo(const TrainingBox& box);
-  void Restart();
-  void PrepareViews();
-  uint64_t StepsUntilLook() const;
-  TrainStats RunSteps(int steps, int threads);
-  void JudgeDepths();
-  void Look();
-  void RefinePoses();
+  absl::Status Reject(absl::Status error);
+  void OnNewInput();
+  void RestartTraining();
+  void ResetProgress();
   void RebuildHull();
-  void VoteOnHull(size_t view);
-  void WithdrawVote(size_t view);
-  bool CanTrain() const;
-  nerf::RenderSpace Space() const;
-  size_t MostRedundantView(const ObjectView& view) const;
+  void PrepareViews();
+  uint64_t StepsUntilEvaluation() const;
+  TrainStats RunSteps(int steps, int threads);
+  void Evaluate();
+  void RefinePoses();
+  bool IsPaused() const;
 
   NerfConfig config_;
   ObjectId id_;
-  uint64_t seed_;
-  uint64_t restarts_ = 0;
-  int divergences_ = 0;  // since the last new view or box
-  double loosened_ = 1;  // how far the features were shrunk for new boxes since training began
-  // The field lives in the world as it was when the object was first told of, whatever corrections follow: box, views
-  // and hull below never move. What comes in is taken back to that world, what goes out is brought to the present one.
+  // Field, box, views and hull stay in the world frame in which the object was created. Input is transformed into that
+  // frame, output into the current world frame.
   Sim3<World, World> S_new_first_;
-  TrainingBox box_;
-  bool has_box_ = false;
-  bool views_changed_ = false;
-  std::vector<ObjectView> views_;  // with their refined poses
-  VisualHull hull_;
+  BoxedField field_;
+  TrainingViews views_;
+  bool views_changed_ = false;  // since PrepareViews()
   RaySet rays_;
   FieldProbe probe_;
-  ViewTrust trust_;
-  PoseRefiner refiner_;
-  std::vector<SE3<World, Camera>> voted_;  // where the views were when they voted on the hull
-  GainMeter gain_;
-  std::string box_fault_, view_fault_;  // of the last box or view that was refused
-  int refused_views_ = 0;
-  bool motion_refused_ = false;
-  int black_views_ = 0;
-  bool depths_fit_ = true;
-  double share_in_box_ = 1;  // of the rays through its masks
-  nerf::Occupancy occupancy_;
+  LossTrend loss_trend_;
   TrainingPlan plan_;
-  std::unique_ptr<nerf::Trainer> trainer_;
+  FieldWarnings warnings_;
+  int divergences_ = 0;  // since the last change of views or box
   double train_seconds_ = 0;
   double loss_ = 0;
 };

@@ -10,13 +10,13 @@
 namespace romap::nerf {
 namespace {
 
-constexpr size_t kFewestViews = 6;  // fewer do not tell who is wrong
-constexpr size_t kPixels = 100;     // of a view, of each kind
-constexpr double kGain = 0.7;       // of what is found, which is noisy: the next looks see the rest
-constexpr double kStill_px = 0.3;   // views that move less need not be looked at so soon
+constexpr size_t kMinViews = 6;  // fewer views do not show which one is wrong
+constexpr size_t kPixels = 100;  // per view: on the object, and on the outline
+constexpr double kGain = 0.7;    // share of the noisy estimate that is applied; later refinements correct the rest
+constexpr double kMinMotion_px = 0.3;  // RMS motion of the views below which the refinement interval doubles
 
-// The standard deviation that cameras are believed to have, besides its upper bound.
-constexpr double kLeastPrior_px = 1;
+// Standard deviation of the given poses. The configuration sets the upper bound.
+constexpr double kMinPrior_px = 1;
 constexpr double kPriorPerError = 2;
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
@@ -24,33 +24,34 @@ Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
   return turn.angle() * turn.axis();
 }
 
+// Renders the field at `pixels` of a view. Where the field is transparent, the depth is that of the box center.
 std::vector<RenderedPixel> Render(const ObjectView& view, uint16_t index, std::span<const cv::Point> pixels,
-                                  const TrainingBox& box, const RaySet& ray_set, const nerf::FieldModel& model,
-                                  const NerfConfig& config, const nerf::RenderSpace& space) {
-  constexpr float kSomething = 0.1f;  // opacity from which there is a depth
-  std::vector<nerf::Ray> rays;
+                                  const TrainingBox& box, const RaySet& ray_set, const FieldModel& model,
+                                  const NerfConfig& config, const RenderSpace& space) {
+  constexpr float kMinOpacity = 0.1f;  // of a pixel with depth
+  std::vector<Ray> rays;
   for (const cv::Point& at : pixels) {
     const TrainingPixel pixel{index, static_cast<uint16_t>(at.x), static_cast<uint16_t>(at.y), {}, 0};
     rays.push_back(ray_set.Through(pixel, true, 0.5f));
-    rays.back().target.depth = 0;  // so that the excess is the depth itself, times the opacity
+    rays.back().target.depth = 0;  // makes depth_error the depth times the opacity
   }
-  const std::vector<nerf::RayResult> results = nerf::RenderRays(model, config, space, rays);
-  const double middle_z_mu = (view.T_world_camera.Inverse() * box.T_world_object.translation()).z();
+  const std::vector<RayResult> results = RenderRays(model, config, space, rays);
+  const double center_z_mu = (view.T_world_camera.Inverse() * box.T_world_object.translation()).z();
   std::vector<RenderedPixel> rendered;
   for (size_t i = 0; i < results.size(); ++i) {
-    const nerf::RayResult& result = results[i];
+    const RayResult& result = results[i];
     const Eigen::Vector3d direction((pixels[i].x - view.camera.cx_px) / view.camera.fx_px,
                                     (pixels[i].y - view.camera.cy_px) / view.camera.fy_px, 1);
-    const double z_mu = result.opacity > kSomething
+    const double z_mu = result.opacity > kMinOpacity
                             ? result.depth_error / result.opacity * box.unit_mu / direction.norm()
-                            : middle_z_mu;
+                            : center_z_mu;
     rendered.push_back(
         {pixels[i].x, pixels[i].y, z_mu * direction, {result.rgb[2], result.rgb[1], result.rgb[0]}, result.opacity});
   }
   return rendered;
 }
 
-// How far an object's middle moves in the picture.
+// The motion of the object's center in the image.
 double Shift_px(const ObjectView& view, const SE3<Camera, Object>& T_from, const SE3<Camera, Object>& T_to) {
   return (view.camera.Project(T_to.translation()) - view.camera.Project(T_from.translation())).norm();
 }
@@ -65,12 +66,11 @@ void PoseRefiner::OnView(size_t index, const SE3<World, Camera>& T_world_camera)
 }
 
 bool PoseRefiner::IsDue(size_t views, uint64_t step) const {
-  return config_.pose_prior_px > 0 && views >= kFewestViews && step >= next_step_;
+  return config_.pose_prior_px > 0 && views >= kMinViews && step >= next_step_;
 }
 
 void PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box,
-                         const RaySet& rays, const nerf::FieldModel& model, const nerf::RenderSpace& space,
-                         uint64_t step) {
+                         const RaySet& rays, const FieldModel& model, const RenderSpace& space, uint64_t step) {
   const double prior_px = prior_px_ > 0 ? prior_px_ : config_.pose_prior_px;
   std::vector<SE3<Camera, Object>> before;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -83,35 +83,34 @@ void PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> wei
     views[i].T_world_camera = box.T_world_object * Moved(T_now, kGain * motion).Inverse();
     before.push_back(T_now);
   }
-  GiveUpOutliers(views, weights, box);
+  ResetOutliers(views, weights, box);
   RemoveCommonMotion(views, weights, box);
   prior_px_ = std::clamp(kPriorPerError * TypicalError_px(views, weights, box),
-                         std::min(kLeastPrior_px, config_.pose_prior_px), config_.pose_prior_px);
+                         std::min(kMinPrior_px, config_.pose_prior_px), config_.pose_prior_px);
   double square = 0;
   for (size_t i = 0; i < views.size(); ++i) {
     const double shift_px = Shift_px(views[i], before[i], views[i].T_world_camera.Inverse() * box.T_world_object);
     square += shift_px * shift_px;
   }
   const double moved_px = std::sqrt(square / static_cast<double>(views.size()));
-  if (moved_px < kStill_px) interval_steps_ *= 2;
+  if (moved_px < kMinMotion_px) interval_steps_ *= 2;
   next_step_ = step + interval_steps_;
 }
 
-// A view that is much further off than the others is not a little off but wrong. It must not be bent until it fits
-// somewhere, but stay as odd as it is, so that it is seen to be.
-void PoseRefiner::GiveUpOutliers(std::span<ObjectView> views, std::span<const float> weights,
-                                 const TrainingBox& box) const {
-  constexpr double kPerTypicalError = 3, kAlways_px = 2;
-  const double most_px = kAlways_px + kPerTypicalError * TypicalError_px(views, weights, box);
+// A view with a much larger error than the others is wrong rather than inaccurate. It returns to its given pose, so
+// that ViewTrust can detect it instead of comparing a pose that was fitted to something else.
+void PoseRefiner::ResetOutliers(std::span<ObjectView> views, std::span<const float> weights,
+                                const TrainingBox& box) const {
+  constexpr double kPerTypicalError = 3, kOffset_px = 2;
+  const double max_px = kOffset_px + kPerTypicalError * TypicalError_px(views, weights, box);
   for (size_t i = 0; i < views.size(); ++i) {
     const double error_px = Shift_px(views[i], given_[i].Inverse() * box.T_world_object,
                                      views[i].T_world_camera.Inverse() * box.T_world_object);
-    if (weights[i] <= 0 || error_px > most_px) views[i].T_world_camera = given_[i];
+    if (weights[i] <= 0 || error_px > max_px) views[i].T_world_camera = given_[i];
   }
 }
 
-// Standard deviation, along each axis of the picture, of where cameras were told to be. Single cameras that are far off
-// do not make it larger.
+// Standard deviation of the errors of the given poses, along each axis of the image. Robust against outliers.
 double PoseRefiner::TypicalError_px(std::span<const ObjectView> views, std::span<const float> weights,
                                     const TrainingBox& box) const {
   constexpr double kMedianOfRayleigh = 1.1774;  // for a standard deviation of 1
@@ -125,8 +124,8 @@ double PoseRefiner::TypicalError_px(std::span<const ObjectView> views, std::span
   return Median(std::move(errors_px)) / kMedianOfRayleigh;
 }
 
-// A similarity of the object's space takes a camera at c to one that is turned alike, and shifted by shift + growth c:
-// the part of the changes that looks like one, by least squares, is taken back.
+// A small similarity transform of the object's space rotates every camera by the same angle, and shifts a camera at c
+// by shift + growth c. Subtracts the similarity transform that fits the changes of all cameras best, by least squares.
 void PoseRefiner::RemoveCommonMotion(std::span<ObjectView> views, std::span<const float> weights,
                                      const TrainingBox& box) const {
   const SE3<Object, World> T_object_world = box.T_world_object.Inverse();

@@ -13,36 +13,37 @@
 
 namespace romap::nerf {
 
-// Where a field is trained on cameras that are a little off, it blurs. The refiner moves each camera, in turns with
-// training, to where its view fits what the field has learned from all. It never moves them all alike: that would be a
-// motion of the object, or a change of its size, of which the views cannot tell. How far it believes cameras to be off
-// follows from how far it finds them off, so that cameras that are right are left where they are.
+// Refines the camera poses of the views during training, because small pose errors blur the field. Every camera is
+// moved to where its view fits the current field best. The motion common to all cameras is removed: it would be a
+// motion of the object, or a change of its scale, which the views cannot determine. A prior keeps the cameras near
+// their given poses; its standard deviation follows the errors found so far, so that accurate cameras stay in place.
 class PoseRefiner {
  public:
   explicit PoseRefiner(const NerfConfig& config) : config_(config) {}
 
-  // The view at `index` is new, or its pose was given anew.
+  // The view at `index` is new, or has a new given pose.
   void OnView(size_t index, const SE3<World, Camera>& T_world_camera);
-  // The pose that was given.
+  // The pose before refinement.
   const SE3<World, Camera>& given(size_t index) const { return given_[index]; }
 
-  // Whether views should be looked at after `step` steps: often at first, seldom once they no longer move.
+  // Whether a refinement is due after `step` steps. The interval doubles with every refinement that hardly moves the
+  // views.
   bool IsDue(size_t views, uint64_t step) const;
 
-  // Moves the cameras of `views`, all of which OnView() knows, and on which `rays` was built. Common motion is judged
-  // by those whose weight is not 0.
+  // Moves the cameras of `views`. OnView() must have been called for all of them, and `rays` built on them. The common
+  // motion is estimated from the views with weight > 0; the others return to their given poses.
   void Refine(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box, const RaySet& rays,
-              const nerf::FieldModel& model, const nerf::RenderSpace& space, uint64_t step);
+              const FieldModel& model, const RenderSpace& space, uint64_t step);
 
  private:
-  void GiveUpOutliers(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;
+  void ResetOutliers(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;
   void RemoveCommonMotion(std::span<ObjectView> views, std::span<const float> weights, const TrainingBox& box) const;
   double TypicalError_px(std::span<const ObjectView> views, std::span<const float> weights,
                          const TrainingBox& box) const;
 
   NerfConfig config_;
   std::vector<SE3<World, Camera>> given_;
-  double prior_px_ = 0;  // 0: nothing was found yet
+  double prior_px_ = 0;  // 0: not estimated yet
   uint64_t next_step_ = 0;
   uint64_t interval_steps_ = 0;
 };

@@ -22,13 +22,13 @@ void RaySet::SetCameras(std::span<const ObjectView> views, const TrainingBox& bo
   }
 }
 
-nerf::Ray RaySet::Through(const TrainingPixel& pixel, bool is_object, float jitter) const {
+Ray RaySet::Through(const TrainingPixel& pixel, bool is_object, float jitter) const {
   const ViewCamera& camera = cameras_[pixel.view];
   const Eigen::Vector3f direction_camera((pixel.u_px - camera.cx_px) / camera.fx_px,
                                          (pixel.v_px - camera.cy_px) / camera.fy_px, 1.0f);
   const float norm = direction_camera.norm();
   const Eigen::Vector3f direction = camera.R_object_camera * (direction_camera / norm);
-  nerf::Ray ray;
+  Ray ray;
   for (int a = 0; a < 3; ++a) {
     ray.origin[a] = camera.origin_unit[a];
     ray.direction[a] = direction[a];
@@ -40,13 +40,13 @@ nerf::Ray RaySet::Through(const TrainingPixel& pixel, bool is_object, float jitt
   return ray;
 }
 
-nerf::Ray RaySet::Get(uint64_t step, int index) const {
+Ray RaySet::Get(uint64_t step, int index) const {
   const PixelSampler::Choice choice = sampler_.At(step, index);
   const uint64_t draw = 8 * static_cast<uint64_t>(index);
-  nerf::Ray ray = Through(choice.pixel, choice.is_object, nerf::RandomUniform(seed_, step, draw));
+  Ray ray = Through(choice.pixel, choice.is_object, RandomUniform(seed_, step, draw));
   ray.target.partner = choice.partner;
   if (config_.random_background) {
-    for (int c = 0; c < 3; ++c) ray.target.background[c] = nerf::RandomUniform(seed_, step, draw + 1 + c);
+    for (int c = 0; c < 3; ++c) ray.target.background[c] = RandomUniform(seed_, step, draw + 1 + c);
   }
   return ray;
 }

@@ -12,15 +12,15 @@
 
 namespace romap::nerf {
 
-// The rays an object is trained on: through the pixels that a PixelSampler chooses.
+// The training rays of an object, through the pixels that a PixelSampler chooses.
 class RaySet {
  public:
   RaySet(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed), sampler_(config, seed) {}
 
-  // Replaces all rays. `use_depth`: rays through pixels with dense depth are told of it. Keeps no reference to the
+  // Replaces all rays. `use_depth`: rays through pixels with dense depth get a target depth. Keeps no reference to the
   // views.
   void Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth = true);
-  // The views are the same, but their cameras or the box moved.
+  // Updates the rays after the cameras of the same views, or the box, moved.
   void SetCameras(std::span<const ObjectView> views, const TrainingBox& box);
   bool empty() const { return sampler_.empty(); }
 
@@ -29,10 +29,10 @@ class RaySet {
   const PixelSampler& sampler() const { return sampler_; }
 
   // Ray `index` (0 .. rays_per_step - 1) of `step`, in Unit space. Thread-safe.
-  nerf::Ray Get(uint64_t step, int index) const;
+  Ray Get(uint64_t step, int index) const;
 
-  // The ray through any of the sampler's pixels, `jitter` 0..1 telling where in their strata its samples lie.
-  nerf::Ray Through(const TrainingPixel& pixel, bool is_object, float jitter) const;
+  // The ray through any pixel of the sampler. `jitter`, 0..1, is the position of each sample in its stratum.
+  Ray Through(const TrainingPixel& pixel, bool is_object, float jitter) const;
 
  private:
   struct ViewCamera {

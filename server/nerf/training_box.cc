@@ -7,9 +7,9 @@
 namespace romap::nerf {
 namespace {
 
-constexpr double kSmallestMargin = 0.02;  // of the longest side: room for the surface of sheets
-constexpr double kSmallestFill = 0.4;     // of the volume; a cuboid that shrank below deserves a finer grid
-constexpr double kMostLean_rad = 0.2;     // between a box that was turned and an upright cuboid
+constexpr double kMinMargin = 0.02;   // of the longest half extent; keeps the surface of flat objects inside
+constexpr double kMinFill = 0.4;      // of the volume; a smaller cuboid needs a finer grid
+constexpr double kMaxTilt_rad = 0.2;  // of the box against the upright cuboid
 
 }  // namespace
 
@@ -17,7 +17,7 @@ TrainingBox TrainingBox::Around(const Cuboid& cuboid, double enlargement) {
   TrainingBox box;
   box.T_world_object = cuboid.T_world_object;
   const Eigen::Vector3d& half = cuboid.half_extents;
-  box.half_extents = (half * (1.0 + enlargement)).cwiseMax((half.array() + kSmallestMargin * half.maxCoeff()).matrix());
+  box.half_extents = (half * (1.0 + enlargement)).cwiseMax((half.array() + kMinMargin * half.maxCoeff()).matrix());
   box.unit_mu = box.LongestSide_mu();
   return box;
 }
@@ -49,14 +49,14 @@ bool TrainingBox::StillFits(const Cuboid& cuboid) const {
   const SE3<Object, World> T_object_world = T_world_object.Inverse();
   Eigen::Quaterniond rotation = T_object_world.rotation() * cuboid.T_world_object.rotation();
   const Eigen::Vector3d up = rotation * Eigen::Vector3d::UnitZ();
-  if (up.z() > std::cos(kMostLean_rad)) rotation = ShortestRotation(up, Eigen::Vector3d::UnitZ()) * rotation;
+  if (up.z() > std::cos(kMaxTilt_rad)) rotation = ShortestRotation(up, Eigen::Vector3d::UnitZ()) * rotation;
   const SE3<Object, Object> T_object_cuboid(rotation, T_object_world * cuboid.T_world_object.translation());
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
     const Eigen::Vector3d p = T_object_cuboid * sign.cwiseProduct(cuboid.half_extents);
     if ((p.cwiseAbs().array() > half_extents.array()).any()) return false;
   }
-  return cuboid.half_extents.prod() >= kSmallestFill * half_extents.prod();
+  return cuboid.half_extents.prod() >= kMinFill * half_extents.prod();
 }
 
 Eigen::Affine3d TrainingBox::ShareOf(const TrainingBox& other) const {
@@ -69,15 +69,15 @@ Eigen::Affine3d TrainingBox::ShareOf(const TrainingBox& other) const {
 }
 
 double TrainingBox::ShareCovered(const TrainingBox& other) const {
-  constexpr int kProbes = 8;  // per axis
+  constexpr int kSamples = 8;  // per axis
   const Eigen::Affine3d share = ShareOf(other);
   int inside = 0;
-  for (int i = 0; i < kProbes * kProbes * kProbes; ++i) {
-    const Eigen::Vector3d probe(i % kProbes, i / kProbes % kProbes, i / (kProbes * kProbes));
-    const Eigen::Vector3d at = share * ((probe.array() + 0.5) / kProbes).matrix();
-    if ((at.array() >= 0).all() && (at.array() <= 1).all()) ++inside;
+  for (int i = 0; i < kSamples * kSamples * kSamples; ++i) {
+    const Eigen::Vector3d sample(i % kSamples, i / kSamples % kSamples, i / (kSamples * kSamples));
+    const Eigen::Vector3d p = share * ((sample.array() + 0.5) / kSamples).matrix();
+    if ((p.array() >= 0).all() && (p.array() <= 1).all()) ++inside;
   }
-  return inside / std::pow(kProbes, 3);
+  return inside / std::pow(kSamples, 3);
 }
 
 absl::Status ValidateCuboid(const Cuboid& cuboid) {

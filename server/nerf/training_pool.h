@@ -1,98 +1,75 @@
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
-#include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "common/field_snapshot.h"
 #include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/object_field.h"
+#include "server/nerf/training_queue.h"
 
 namespace romap::nerf {
 
-// The server's workers that train the objects of all clients (paper: one thread pool trains all models). An object is
-// leased to one worker for a slice of steps and queued again: clients take turns, and within a client the object goes
-// first that is furthest from its plan, then, of those beyond their plans, the one whose loss falls fastest. The budget
-// of an object grows with its views (TrainingPlan), and ends with its time. Thread-safe.
+// The server's worker threads, which train the objects of all sessions (paper: one thread pool trains all models). A
+// worker leases an object for a slice of steps; see TrainingQueue for the order. The number of steps of an object is
+// limited by its views (TrainingPlan) and by its total training time. Thread-safe.
 //
-// A pool without workers trains only in TrainSlices(), on the caller's thread: what it does then depends on the order
-// of the calls alone, never on time.
+// A pool without workers trains only in TrainSlices(), on the thread of the caller. Then the result depends only on the
+// order of the calls, and never on time.
 class TrainingPool {
  public:
-  // Receives snapshots on worker threads (or in TrainSlices()), no two at a time of the same object, with no lock held.
-  // Must not call Unregister().
-  using Sink = std::function<void(FieldSnapshot)>;
+  using SessionId = TrainingSessionId;
+  using Progress = TrainingProgress;
+  // Receives snapshots on worker threads (or in TrainSlices()) without a lock held, and never two of the same object
+  // concurrently. Must not call RemoveSession().
+  using Sink = TrainingQueue::Sink;
 
-  struct Progress {
-    int objects_total = 0;
-    int objects_training = 0;  // with steps left or views waiting
-    uint64_t steps = 0;        // done on all objects that are still there
-    double progress = 0;       // 0..1, mean over objects of steps done / steps planned; 1 without objects
-    // What is wrong with what objects were given, for people: see ObjectField::Concern.
-    std::vector<std::pair<ObjectId, std::string>> concerns = {};
-  };
-
-  // `threads` workers; 0 = none.
-  TrainingPool(const NerfConfig& config, int threads);
-  // Ends all clients; running slices are finished first.
+  // `workers` threads; 0 = none.
+  TrainingPool(const NerfConfig& config, int workers);
+  // Waits for running slices, then removes all sessions.
   ~TrainingPool();
   TrainingPool(const TrainingPool&) = delete;
   TrainingPool& operator=(const TrainingPool&) = delete;
 
-  // A new client; the result names it in all other calls. Calls with an unknown client do nothing.
-  uint64_t Register(Sink sink);
-  // What is new about an object: corrections, cuboid, views. Taken in the order of the calls, between slices. What
-  // cannot be used is left out, and so is all of an object whose training failed; what is wrong is logged, once.
-  void Offer(uint64_t client, ObjectViews views);
-  // The object is gone (merged, or an error). A snapshot already on its way may still arrive.
-  void Remove(uint64_t client, ObjectId object);
-  // No more views will come: every object is trained to the end of its plan.
-  void Finish(uint64_t client);
-  // For a pool without workers: trains this client's objects for at most `count` slices; fewer when there is nothing
-  // more to do.
-  void TrainSlices(uint64_t client, int count);
-  Progress GetProgress(uint64_t client) const;
-  // Nothing is being trained, waits to be, or would be if only time passed. Objects without enough views do not count.
-  bool Idle(uint64_t client) const;
-  // Waits until no slice of this client runs and no call of its sink is in flight; none follows.
-  void Unregister(uint64_t client);
+  // Adds a session and returns its id. Calls with an unknown id have no effect.
+  SessionId AddSession(Sink sink);
+  // Waits until no slice of the session runs and no call of its sink is in progress; none follows.
+  void RemoveSession(SessionId session);
+
+  // Adds an update of one object: correction, cuboid and views. Updates are applied between slices, in the order of the
+  // calls. Invalid parts are rejected and logged. Ignored if the training of the object failed before.
+  void Offer(SessionId session, ObjectViews update);
+  // Removes an object that no longer exists. A snapshot that is already being sent may still arrive.
+  void RemoveObject(SessionId session, ObjectId object);
+  // No more views will arrive: trains every object to the end of its plan.
+  void Finish(SessionId session);
+
+  // For a pool without workers: trains the session's objects for at most `count` slices, fewer if there is nothing more
+  // to do.
+  void TrainSlices(SessionId session, int count);
+
+  Progress GetProgress(SessionId session) const;
+  // See TrainingQueue::IsIdle.
+  bool IsIdle(SessionId session) const;
 
  private:
-  using Clock = std::chrono::steady_clock;
-  struct Job;
-  struct Client;
-  struct Lease;
-
   void Work();
-  std::optional<Lease> Next(Clock::time_point now, std::optional<uint64_t> only_client = std::nullopt);
-  void Serve(Lease& lease, std::unique_lock<std::mutex>& lock);
-  void RunSlice(Lease& lease);
-  static void GiveTo(ObjectField& field, ObjectViews offer);
-  void TakeNews(Job& job, const ObjectField& field) const;
-  bool HasTimeLeft(const Job& job) const;
-  bool ShouldSend(const Job& job, bool budget_used) const;
-  bool Complete(const Client& client, const Job& job, Clock::time_point now) const;
-  bool Runnable(const Client& client, const Job& job, Clock::time_point now) const;
-  std::optional<Clock::time_point> NextSettleTime() const;
+  void Serve(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock);
+  void RunSlice(TrainingQueue::Lease& lease);
+  static void ApplyUpdate(ObjectField& field, ObjectViews update);
+  TrainStats TrainField(ObjectField& field, const TrainingQueue::Lease& lease) const;
+  void UpdateJob(TrainingJob& job, const TrainStats& stats) const;
 
   const NerfConfig config_;
-  const int threads_;  // 0: by hand
   mutable std::mutex mutex_;
-  std::condition_variable work_changed_;  // something became runnable, or stop
+  std::condition_variable work_changed_;  // a job became runnable, or stopping_ was set
   std::condition_variable lease_returned_;
-  std::map<uint64_t, std::unique_ptr<Client>> clients_;
-  uint64_t next_client_ = 1;
-  uint64_t turns_ = 0;
+  TrainingQueue queue_;  // guarded by mutex_, except for the field of a leased job
   bool stopping_ = false;
   std::vector<std::jthread> workers_;
 };

@@ -11,19 +11,20 @@
 namespace romap::nerf {
 namespace {
 
-constexpr int kReach_px = 5;           // the outline is looked at on both sides so far
-constexpr double kSmoothing_px = 1.5;  // gradients of the picture must reach as far as errors of poses do
-constexpr int kBorder_px = 2;          // of the crop, where gradients cannot be taken
+constexpr int kReach_px = 5;           // half width of the band around the outline that is compared
+constexpr double kSmoothing_px = 1.5;  // image gradients must extend as far as the pose errors
+constexpr int kBorder_px = 2;          // of the crop, where no gradients are computed
 constexpr int kIterations = 4;
-constexpr float kSolid = 0.5f;  // opacity from which a colour is compared
-constexpr size_t kFewestSolid = 10;
+constexpr float kMinOpacity = 0.5f;  // of pixels whose color is compared
+constexpr size_t kMinOpaquePixels = 10;
 
-// Errors of neighbouring pixels are alike, and the field is no more than a guess: only so much of what they say counts.
+// Weight of the pixels relative to the prior. Small, because errors of neighboring pixels are correlated and the field
+// itself is inaccurate.
 constexpr double kInformation = 0.05;
 
-constexpr double kFirstColorScale = 0.1;  // while the errors' own is not known
-constexpr double kLeastColorScale = 0.02;
-constexpr double kLeastOutlineScale = 0.1;
+constexpr double kInitialColorScale = 0.1;  // before the scale of the errors is estimated
+constexpr double kMinColorScale = 0.02;
+constexpr double kMinOutlineScale = 0.1;
 
 Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -35,7 +36,7 @@ Eigen::Quaterniond Turn(const Eigen::Vector3d& turn_rad) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad.norm(), turn_rad.stableNormalized()));
 }
 
-// Bilinear; channels 0..1. (x, y) lies in the image, off its last row and column.
+// Bilinear interpolation; channels 0..1. (x, y) must be inside the image, and not in its last row or column.
 template <size_t kChannels>
 Eigen::Array<double, kChannels, 1> Interpolate(const cv::Mat& image, double x, double y) {
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
@@ -62,12 +63,14 @@ Eigen::Matrix<double, kChannels, 2> Gradient(const cv::Mat& image, const Eigen::
   return gradient;
 }
 
-// `count` of all, evenly spread, beginning at a share `offset` of their distance.
-void AppendSpread(const std::vector<cv::Point>& all, size_t count, double offset, std::vector<cv::Point>& chosen) {
+// Appends up to `count` evenly spaced elements of `all`. `offset`, 0..1, shifts the choice by that share of the
+// spacing.
+void AppendEvenlySpaced(const std::vector<cv::Point>& all, size_t count, double offset,
+                        std::vector<cv::Point>& chosen) {
   count = std::min(count, all.size());
-  const double apart = static_cast<double>(all.size()) / static_cast<double>(std::max<size_t>(1, count));
+  const double spacing = static_cast<double>(all.size()) / static_cast<double>(std::max<size_t>(1, count));
   for (size_t i = 0; i < count; ++i) {
-    chosen.push_back(all[std::min(all.size() - 1, static_cast<size_t>((static_cast<double>(i) + offset) * apart))]);
+    chosen.push_back(all[std::min(all.size() - 1, static_cast<size_t>((static_cast<double>(i) + offset) * spacing))]);
   }
 }
 
@@ -84,16 +87,16 @@ ObjectMotion MotionBetween(const SE3<Camera, Object>& T_from, const SE3<Camera, 
   return motion;
 }
 
-// What errors are divided by.
+// Scales by which residuals are divided.
 struct ViewAlignment::Scales {
-  double color = kFirstColorScale, outline = 1;
+  double color = kInitialColorScale, outline = 1;
 };
 
-// Where a point of the object is now.
-struct ViewAlignment::Place {
-  cv::Point before;    // its pixel before all motion, in the crop
-  Eigen::Vector2d at;  // in the crop
-  Eigen::Matrix<double, 2, 6> flow;
+// A rendered point, projected into the view after the current motion.
+struct ViewAlignment::Projection {
+  cv::Point before;                  // pixel before the motion, in the crop
+  Eigen::Vector2d at;                // pixel after the motion, in the crop
+  Eigen::Matrix<double, 2, 6> flow;  // derivative of `at` with respect to the motion
 };
 
 // Normal equations at one motion.
@@ -115,7 +118,7 @@ struct ViewAlignment::Equations {
     b += weight * residual * gradient;
   }
 
-  // Light that changes with the view is an offset of a channel: it is eliminated.
+  // Eliminates a constant offset per channel, which models changes of exposure and light between views.
   void EliminateOffsets() {
     for (const Channel& channel : channels) {
       if (channel.weight <= 0) continue;
@@ -125,10 +128,10 @@ struct ViewAlignment::Equations {
     }
   }
 
-  // As large as the errors themselves: then those of a field that is not sharp yet say little.
-  Scales OwnScales() {
+  // The spread of the residuals. It is large, so that they count little, while the field is still blurred.
+  Scales ResidualScales() {
     const double outline = std::sqrt(outline_square / static_cast<double>(outline_count));
-    return {std::max(kLeastColorScale, 1.48 * Median(color_errors)), std::max(kLeastOutlineScale, outline)};
+    return {std::max(kMinColorScale, 1.48 * Median(color_errors)), std::max(kMinOutlineScale, outline)};
   }
 };
 
@@ -139,50 +142,51 @@ ViewAlignment::ViewAlignment(const ObjectView& view)
   object_ = view.ray_kind == static_cast<int>(RayKind::kObject);
   cv::blur(object_, ramp_, surroundings, {-1, -1}, cv::BORDER_REPLICATE);
   const cv::Mat occluder = view.ray_kind == static_cast<int>(RayKind::kOccluder);
-  cv::dilate(occluder, doubtful_, cv::getStructuringElement(cv::MORPH_RECT, surroundings));
+  cv::dilate(occluder, near_occluder_, cv::getStructuringElement(cv::MORPH_RECT, surroundings));
 }
 
-std::vector<cv::Point> ViewAlignment::Pixels(size_t most, uint64_t salt) const {
+std::vector<cv::Point> ViewAlignment::Pixels(size_t count, uint64_t salt) const {
   std::vector<cv::Point> inside, outline;
   for (int y = 0; y < roi_px_.height; ++y) {
     const uint8_t* ramp = ramp_.ptr<uint8_t>(y);
     const uint8_t* object = object_.ptr<uint8_t>(y);
-    const uint8_t* doubtful = doubtful_.ptr<uint8_t>(y);
+    const uint8_t* near_occluder = near_occluder_.ptr<uint8_t>(y);
     for (int x = 0; x < roi_px_.width; ++x) {
       if (object[x] != 0) inside.emplace_back(x + roi_px_.x, y + roi_px_.y);
-      if (ramp[x] > 0 && ramp[x] < 255 && doubtful[x] == 0) outline.emplace_back(x + roi_px_.x, y + roi_px_.y);
+      if (ramp[x] > 0 && ramp[x] < 255 && near_occluder[x] == 0) outline.emplace_back(x + roi_px_.x, y + roi_px_.y);
     }
   }
   std::vector<cv::Point> chosen;
-  AppendSpread(inside, most, nerf::RandomUniform(salt, 7, 0), chosen);
-  AppendSpread(outline, most, nerf::RandomUniform(salt, 7, 1), chosen);
+  AppendEvenlySpaced(inside, count, RandomUniform(salt, 7, 0), chosen);
+  AppendEvenlySpaced(outline, count, RandomUniform(salt, 7, 1), chosen);
   return chosen;
 }
 
-// The mask must change along the way as the rendering differs from it at the start. Where both agree nothing is asked,
-// however wide the ramp, so a pose that is right stays.
-void ViewAlignment::AddOutline(const RenderedPixel& pixel, const Place& place, const Scales& scales,
+// The change of the mask along the motion must equal the difference between rendering and mask at the start. Where both
+// agree, the residual at zero motion is 0 for any width of the ramp, so a correct pose does not move.
+void ViewAlignment::AddOutline(const RenderedPixel& pixel, const Projection& projection, const Scales& scales,
                                Equations& equations) const {
-  const cv::Point now_px(cvRound(place.at.x()), cvRound(place.at.y()));
-  if (doubtful_.at<uint8_t>(place.before) != 0 || doubtful_.at<uint8_t>(now_px) != 0) return;
-  const double change = Interpolate<1>(ramp_, place.at.x(), place.at.y())[0] - ramp_.at<uint8_t>(place.before) / 255.0;
-  const double residual = change + object_.at<uint8_t>(place.before) / 255.0 - pixel.opacity;
+  const cv::Point now_px(cvRound(projection.at.x()), cvRound(projection.at.y()));
+  if (near_occluder_.at<uint8_t>(projection.before) != 0 || near_occluder_.at<uint8_t>(now_px) != 0) return;
+  const double change =
+      Interpolate<1>(ramp_, projection.at.x(), projection.at.y())[0] - ramp_.at<uint8_t>(projection.before) / 255.0;
+  const double residual = change + object_.at<uint8_t>(projection.before) / 255.0 - pixel.opacity;
   const double weight = 1 / (scales.outline * scales.outline);
-  equations.Add((Gradient<1>(ramp_, place.at) * place.flow).transpose(), residual, weight);
+  equations.Add((Gradient<1>(ramp_, projection.at) * projection.flow).transpose(), residual, weight);
   equations.cost += weight * residual * residual;
   equations.outline_square += residual * residual;
   ++equations.outline_count;
 }
 
-void ViewAlignment::AddColor(const RenderedPixel& pixel, const Place& place, const Scales& scales,
+void ViewAlignment::AddColor(const RenderedPixel& pixel, const Projection& projection, const Scales& scales,
                              Equations& equations) const {
-  if (pixel.opacity < kSolid || object_.at<uint8_t>(place.before) == 0) return;
-  const Eigen::Array3d now = Interpolate<3>(smooth_bgr_, place.at.x(), place.at.y());
-  const Eigen::Matrix<double, 3, 6> gradient = Gradient<3>(smooth_bgr_, place.at) * place.flow;
+  if (pixel.opacity < kMinOpacity || object_.at<uint8_t>(projection.before) == 0) return;
+  const Eigen::Array3d now = Interpolate<3>(smooth_bgr_, projection.at.x(), projection.at.y());
+  const Eigen::Matrix<double, 3, 6> gradient = Gradient<3>(smooth_bgr_, projection.at) * projection.flow;
   const double limit = 1.345 * scales.color;  // Huber's
   for (int c = 0; c < 3; ++c) {
-    const double before = smooth_bgr_.at<cv::Vec3b>(place.before)[c] / 255.0;
-    const double seen = bgr_.at<cv::Vec3b>(place.before)[c] / 255.0;
+    const double before = smooth_bgr_.at<cv::Vec3b>(projection.before)[c] / 255.0;
+    const double seen = bgr_.at<cv::Vec3b>(projection.before)[c] / 255.0;
     const double residual = now[c] - before + seen - pixel.bgr[static_cast<size_t>(c)];
     const double size = std::abs(residual), square = scales.color * scales.color;
     const double weight = (size <= limit ? 1 : limit / size) / square;
@@ -214,9 +218,9 @@ ViewAlignment::Equations ViewAlignment::Linearize(std::span<const RenderedPixel>
     moved << -Skew(arm), Eigen::Matrix3d::Identity();
     Eigen::Matrix<double, 2, 3> projected;
     projected << camera_.fx_px, 0, -camera_.fx_px * p.x() / p.z(), 0, camera_.fy_px, -camera_.fy_px * p.y() / p.z();
-    const Place place{{pixel.u_px - roi_px_.x, pixel.v_px - roi_px_.y}, at, projected / p.z() * moved};
-    AddOutline(pixel, place, scales, equations);
-    AddColor(pixel, place, scales, equations);
+    const Projection projection{{pixel.u_px - roi_px_.x, pixel.v_px - roi_px_.y}, at, projected / p.z() * moved};
+    AddOutline(pixel, projection, scales, equations);
+    AddColor(pixel, projection, scales, equations);
   }
   equations.EliminateOffsets();
   return equations;
@@ -227,9 +231,10 @@ ObjectMotion ViewAlignment::Align(std::span<const RenderedPixel> rendered, const
   const Eigen::Vector3d center = T_camera_object.translation();
   ObjectMotion best = ObjectMotion::Zero();
   Equations equations = Linearize(rendered, center, best, {});
-  if (equations.color_errors.size() < 3 * kFewestSolid || equations.outline_count == 0) return best;
-  const Scales scales = equations.OwnScales();
-  // A camera that is turned or shifted by so much moves the object by `prior_px`, but hardly turns it.
+  if (equations.color_errors.size() < 3 * kMinOpaquePixels || equations.outline_count == 0) return best;
+  const Scales scales = equations.ResidualScales();
+  // These deviations move the object by `prior_px` in the image, by a rotation or by a shift of the camera. They hardly
+  // rotate the object.
   ObjectMotion per_deviation = ObjectMotion::Constant(camera_.fx_px / prior_px);
   per_deviation.tail<3>() /= center.z();
   const ObjectMotion prior = per_deviation.cwiseAbs2();

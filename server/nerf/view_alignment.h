@@ -11,55 +11,58 @@
 
 namespace romap::nerf {
 
-// A small rigid motion of an object before a camera: p goes to center + R(turn) (p - center) + shift, all in the Camera
-// frame, with the object's centre. The six are turn (rotation vector, rad) and shift (map units).
+// A small rigid motion of an object relative to a camera: p moves to center + R(turn) (p - center) + shift, in the
+// Camera frame, where `center` is the center of the object. Elements: turn (rotation vector, rad), then shift (map
+// units).
 using ObjectMotion = Eigen::Matrix<double, 6, 1>;
 
-// `T_camera_object` after the object underwent `motion`; the origin of the Object frame is its centre.
+// `T_camera_object` after `motion` of the object, whose center is the origin of the Object frame.
 SE3<Camera, Object> Moved(const SE3<Camera, Object>& T_camera_object, const ObjectMotion& motion);
 // The motion for which Moved(T_from, motion) is T_to.
 ObjectMotion MotionBetween(const SE3<Camera, Object>& T_from, const SE3<Camera, Object>& T_to);
 
-// What a field shows in one pixel of a view.
+// A rendering of the field at one pixel of a view.
 struct RenderedPixel {
   int u_px = 0, v_px = 0;                                 // in the full image
-  Eigen::Vector3d p_camera_mu = Eigen::Vector3d::Zero();  // what is seen there; where nothing is, as deep as the object
+  Eigen::Vector3d p_camera_mu = Eigen::Vector3d::Zero();  // surface point; at the object's depth if transparent
   std::array<float, 3> bgr = {};                          // 0..1
   float opacity = 0;                                      // 0..1
 };
 
-// A view's picture and mask, ready to be compared with renderings of a field. Keeps a reference to the view's images.
+// Aligns one view with renderings of the field. Shares the image data of the view.
 class ViewAlignment {
  public:
   explicit ViewAlignment(const ObjectView& view);
 
-  // Up to `most` pixels, in the full image, spread over the object, and as many spread over both sides of its outline.
-  // Another `salt` chooses others.
-  std::vector<cv::Point> Pixels(size_t most, uint64_t salt) const;
+  // Up to `count` pixels, in the full image, evenly spaced over the object, and up to `count` over both sides of its
+  // outline. `salt` varies the choice.
+  std::vector<cv::Point> Pixels(size_t count, uint64_t salt) const;
 
-  // The motion of the object after which the view would show what was rendered: the colours, up to an offset per
-  // channel, and the outline. Least squares by Gauss-Newton on the view's own gradients (B. Lucas, T. Kanade, "An
-  // Iterative Image Registration Technique", 1981). Cameras are taken to be off by `prior_px` (standard deviation) in
-  // each direction and by what turns them so far; `so_far` is how much of that was made up for before. Zero when
-  // nothing better was found or too little is seen.
+  // The motion of the object that makes the view match the rendering: its colors, up to an offset per channel, and its
+  // outline. Least squares by Gauss-Newton on the gradients of the view (B. Lucas, T. Kanade, "An Iterative Image
+  // Registration Technique", 1981). The prior on the camera error is a shift of the object by `prior_px` (standard
+  // deviation) in each direction, and a rotation of the camera that causes the same shift. `so_far` is the motion
+  // already applied. Zero if there is no improvement or there are too few pixels.
   ObjectMotion Align(std::span<const RenderedPixel> rendered, const SE3<Camera, Object>& T_camera_object,
                      const ObjectMotion& so_far, double prior_px) const;
 
  private:
   struct Scales;
   struct Equations;
-  struct Place;
+  struct Projection;
   Equations Linearize(std::span<const RenderedPixel> rendered, const Eigen::Vector3d& center,
                       const ObjectMotion& motion, const Scales& scales) const;
-  void AddOutline(const RenderedPixel& pixel, const Place& place, const Scales& scales, Equations& equations) const;
-  void AddColor(const RenderedPixel& pixel, const Place& place, const Scales& scales, Equations& equations) const;
+  void AddOutline(const RenderedPixel& pixel, const Projection& projection, const Scales& scales,
+                  Equations& equations) const;
+  void AddColor(const RenderedPixel& pixel, const Projection& projection, const Scales& scales,
+                Equations& equations) const;
 
   CameraModel camera_;
   cv::Rect roi_px_;
-  cv::Mat bgr_, smooth_bgr_;  // CV_8UC3
+  cv::Mat bgr_, smooth_bgr_;  // CV_8UC3; smoothed
   cv::Mat object_;            // CV_8UC1, 255 = object
-  cv::Mat ramp_;              // CV_8UC1, how much of the surroundings is object, 255 = all
-  cv::Mat doubtful_;          // CV_8UC1, not 0 where an occluder is near
+  cv::Mat ramp_;              // CV_8UC1, share of the neighborhood that is object, 255 = all
+  cv::Mat near_occluder_;     // CV_8UC1, not 0 near an occluder
 };
 
 }  // namespace romap::nerf

@@ -7,9 +7,9 @@
 
 namespace romap::nerf {
 
-// INVALID_ARGUMENT, naming object, keyframe and fault, for a view that cannot be trained on: no keyframe, bad camera or
-// a distorted one, pose not finite, crop outside the image, an image of another size or type than the crop needs, fewer
-// than a few object pixels, or a box that lies behind the camera.
+// INVALID_ARGUMENT, with object, keyframe and reason, if the view cannot be trained on: no keyframe id, invalid camera
+// or one with distortion, pose not finite, crop outside the image, an image whose size or type does not match the crop,
+// too few object pixels, or a box behind the camera.
 absl::Status ValidateView(const ObjectView& view, const TrainingBox& box);
 
 }  // namespace romap::nerf

@@ -7,22 +7,22 @@
 namespace romap::nerf {
 namespace {
 
-constexpr size_t kFewestViews = 6;        // below, what is odd may just as well be right
-constexpr uint64_t kPatience_steps = 40;  // of training on a view before it is judged
-constexpr double kMostDistrusted = 0.34;  // of all views
+constexpr size_t kMinViews = 6;              // with fewer views, an outlier may be the only correct view
+constexpr uint64_t kMinSteps = 40;           // of training on a view before it is compared with the others
+constexpr double kMaxUntrustedShare = 0.34;  // of all views
 
-// A residual is odd beyond `floor` + `medians` times the median over the views. Shapes that are hard to learn have a
-// large median; colours differ between good views where things shine.
+// A residual is an outlier if it exceeds `floor` + `medians` times the median over the views. Shapes that are hard to
+// learn have a large median. The color limit is wide because glossy objects differ in color between correct views.
 struct Limit {
   double floor, medians;
 };
 constexpr Limit kOutlineLimit = {0.15, 3.0};
 constexpr Limit kColorLimit = {0.1, 4.0};
-constexpr double kForgiven = 0.75;  // of the limit: a view that was odd must come below this
+constexpr double kHysteresis = 0.75;  // an untrusted view must fall below this share of the limit
 
-// How odd each view is: 1 is at the limit.
-std::vector<double> Oddness(const ProbeReport& report) {
-  std::vector<double> outlines, colors, oddness;
+// The residual of each view in units of its limit.
+std::vector<double> RelativeResiduals(const ProbeReport& report) {
+  std::vector<double> outlines, colors, relative;
   for (const ViewResidual& view : report.views) {
     outlines.push_back(view.Outline());
     colors.push_back(view.color);
@@ -30,9 +30,9 @@ std::vector<double> Oddness(const ProbeReport& report) {
   const double outline_limit = kOutlineLimit.floor + kOutlineLimit.medians * Median(outlines);
   const double color_limit = kColorLimit.floor + kColorLimit.medians * Median(colors);
   for (size_t i = 0; i < outlines.size(); ++i) {
-    oddness.push_back(std::max(outlines[i] / outline_limit, colors[i] / color_limit));
+    relative.push_back(std::max(outlines[i] / outline_limit, colors[i] / color_limit));
   }
-  return oddness;
+  return relative;
 }
 
 }  // namespace
@@ -42,34 +42,30 @@ void ViewTrust::OnView(size_t index, uint64_t step) {
   views_[index] = {step, true};
 }
 
-bool ViewTrust::Judge(const ProbeReport& report, uint64_t step) {
-  if (report.views.size() < kFewestViews) return false;
-  const std::vector<double> oddness = Oddness(report);
-  std::vector<bool> verdict(views_.size());
-  size_t odd = 0;
+bool ViewTrust::Update(const ProbeReport& report, uint64_t step) {
+  if (report.views.size() < kMinViews) return false;
+  const std::vector<double> residuals = RelativeResiduals(report);
+  std::vector<bool> trusted(views_.size());
+  size_t untrusted = 0;
   for (size_t i = 0; i < views_.size(); ++i) {
-    verdict[i] = IsYoung(i, step) || oddness[i] <= (views_[i].trusted ? 1.0 : kForgiven);
-    odd += verdict[i] ? 0 : 1;
+    trusted[i] = IsNew(i, step) || residuals[i] <= (views_[i].trusted ? 1.0 : kHysteresis);
+    untrusted += trusted[i] ? 0 : 1;
   }
-  if (static_cast<double>(odd) > kMostDistrusted * static_cast<double>(views_.size())) {
-    verdict.assign(views_.size(), true);
+  if (static_cast<double>(untrusted) > kMaxUntrustedShare * static_cast<double>(views_.size())) {
+    trusted.assign(views_.size(), true);
   }
   bool changed = false;
   for (size_t i = 0; i < views_.size(); ++i) {
-    changed |= views_[i].trusted != verdict[i];
-    views_[i].trusted = verdict[i];
+    changed |= views_[i].trusted != trusted[i];
+    views_[i].trusted = trusted[i];
   }
   return changed;
 }
 
-bool ViewTrust::IsYoung(size_t index, uint64_t step) const { return step < views_[index].since_step + kPatience_steps; }
+bool ViewTrust::IsNew(size_t index, uint64_t step) const { return step < views_[index].since_step + kMinSteps; }
 
 void ViewTrust::Restart() {
   for (State& view : views_) view = {};
-}
-
-size_t ViewTrust::distrusted() const {
-  return static_cast<size_t>(std::ranges::count_if(views_, [](const State& view) { return !view.trusted; }));
 }
 
 std::vector<float> ViewTrust::Weights() const {

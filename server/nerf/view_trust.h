@@ -8,21 +8,20 @@
 
 namespace romap::nerf {
 
-// Which views of an object can be believed. A view with a wrong pose, or with the mask of something else, shows what
-// all others contradict, and its residual does not fall as theirs do; it is left out for as long as that is so. Nothing
-// is doubted while there are few views, nor if many would have to be: then nobody knows which ones are wrong.
+// Detects views that contradict the others, because of a wrong pose or the mask of another object: their residuals do
+// not decrease with those of the other views. Such views are not trusted, and are excluded from training until their
+// residuals are normal again. All views are trusted if there are few, or if too many contradict the others: then it is
+// unknown which ones are wrong.
 class ViewTrust {
  public:
-  // The view at `index` is new, or another one than before: it is trusted until it was trained on for a while.
+  // The view at `index` is new or was replaced. It is trusted until it has been trained on for some steps.
   void OnView(size_t index, uint64_t step);
-  // Judges all views by what was seen after `step` steps. True when some view is trusted now that was not, or the other
-  // way round.
-  bool Judge(const ProbeReport& report, uint64_t step);
-  // The field forgot all; so do the verdicts.
+  // Updates the trust in all views from their residuals after `step` steps. True if the trust in any view changed.
+  bool Update(const ProbeReport& report, uint64_t step);
+  // Trusts all views again, because training restarted.
   void Restart();
 
   bool trusted(size_t index) const { return views_[index].trusted; }
-  size_t distrusted() const;
   // One per view: 1 trusted, 0 not.
   std::vector<float> Weights() const;
 
@@ -31,8 +30,9 @@ class ViewTrust {
     uint64_t since_step = 0;
     bool trusted = true;
   };
-  // Was trained on for too short a time to be judged.
-  bool IsYoung(size_t index, uint64_t step) const;
+  // Whether the view has been trained on for too few steps to be compared with the others.
+  bool IsNew(size_t index, uint64_t step) const;
+
   std::vector<State> views_;
 };
 

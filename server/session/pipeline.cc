@@ -76,7 +76,7 @@ void Pipeline::Publish(objects::ObjectOutput output) {
     if (views.S_new_old) map_->MoveObject(views.object, *views.S_new_old);
   }
   for (MapEvent& event : output.events) PublishEvent(std::move(event));
-  for (ObjectViews& views : output.views) pool_->Offer(pool_client_, std::move(views));
+  for (ObjectViews& views : output.views) pool_->Offer(pool_session_, std::move(views));
 }
 
 void Pipeline::PublishEvent(MapEvent event) {
@@ -84,7 +84,7 @@ void Pipeline::PublishEvent(MapEvent event) {
   if (const auto* removed = std::get_if<ObjectRemoved>(&event)) ended = removed->id;
   if (const auto* merged = std::get_if<ObjectMerged>(&event)) ended = merged->from;
   if (ended) {
-    pool_->Remove(pool_client_, ended);
+    pool_->RemoveObject(pool_session_, ended);
     mesher_->RemoveObject(mesher_session_, ended);
   }
   map_->Apply(std::move(event));
@@ -99,7 +99,7 @@ void Pipeline::PublishMesh(MeshUpdate mesh, const MeshPose& pose) { map_->Publis
 void Pipeline::FinishMapping() {
   Correct(sparse_mapper_.Finish());
   Publish(object_mapper_.Finish());
-  pool_->Finish(pool_client_);
+  pool_->Finish(pool_session_);
 }
 
 // -------------------------------------------------------------------------------------------------------------------
@@ -119,11 +119,11 @@ Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const 
       object_mapper_(config.objects) {
   mesher_session_ =
       mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
-  pool_client_ = pool_->Register([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
+  pool_session_ = pool_->AddSession([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
 }
 
 Pipeline::~Pipeline() {
-  pool_->Unregister(pool_client_);
+  pool_->RemoveSession(pool_session_);
   mesher_->RemoveSession(mesher_session_);
 }
 
@@ -136,8 +136,8 @@ void Pipeline::Record(const SessionInput& input) {
   recorder_ = nullptr;
 }
 
-bool Pipeline::IsTrainingDone() const { return pool_->Idle(pool_client_) && mesher_->IsIdle(mesher_session_); }
+bool Pipeline::IsTrainingDone() const { return pool_->IsIdle(pool_session_) && mesher_->IsIdle(mesher_session_); }
 
-void Pipeline::TrainSlices(int count) { pool_->TrainSlices(pool_client_, count); }
+void Pipeline::TrainSlices(int count) { pool_->TrainSlices(pool_session_, count); }
 
 }  // namespace romap::session

@@ -64,7 +64,7 @@ class Pipeline {
   // Makes bundle adjustment end early while keyframes wait. Thread-safe.
   void RequestEarlyStop(bool keyframes_wait) { sparse_mapper_.RequestEarlyStop(keyframes_wait); }
 
-  nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_client_); }
+  nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_session_); }
 
  private:
   void ProcessFrame(const Arrival& arrival, const MappingExecutor& execute);
@@ -92,7 +92,7 @@ class Pipeline {
   objects::ObjectMapper object_mapper_;
 
   Mesher::SessionId mesher_session_ = 0;
-  uint64_t pool_client_ = 0;
+  nerf::TrainingPool::SessionId pool_session_ = 0;
 };
 
 }  // namespace romap::session

@@ -62,7 +62,7 @@ struct CpuTrainer::Worker {
   void DistributeRenderTime() {
     const double timed_s = std::accumulate(phase_s.begin(), phase_s.end(), 0.0);
     for (size_t p = 0; p < phase_s.size(); ++p) stats.phase_cpu_s[p] = phase_s[p] * render_s / std::max(1e-9, timed_s);
-    stats.phase_cpu_s[static_cast<size_t>(TrainPhase::kOptimise)] = optimize_s;
+    stats.phase_cpu_s[static_cast<size_t>(TrainPhase::kOptimize)] = optimize_s;
   }
 
   struct Visit {

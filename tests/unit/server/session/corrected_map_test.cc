@@ -49,12 +49,12 @@ class Stages {
   Stages() {
     mesher_session_ =
         mesher_.AddSession([this](MeshUpdate mesh, const MeshPose& pose) { map.PublishMesh(std::move(mesh), pose); });
-    pool_client_ =
-        pool_.Register([this](FieldSnapshot snapshot) { mesher_.Offer(mesher_session_, std::move(snapshot)); });
+    pool_session_ =
+        pool_.AddSession([this](FieldSnapshot snapshot) { mesher_.Offer(mesher_session_, std::move(snapshot)); });
     outbox = map.Subscribe(Outbox::Acks::kAll, 100);
   }
   ~Stages() {
-    pool_.Unregister(pool_client_);
+    pool_.RemoveSession(pool_session_);
     mesher_.RemoveSession(mesher_session_);
   }
 
@@ -63,7 +63,7 @@ class Stages {
       if (views.S_new_old) map.MoveObject(views.object, *views.S_new_old);
     }
     for (MapEvent& event : output.events) map.Apply(std::move(event));
-    for (ObjectViews& views : output.views) pool_.Offer(pool_client_, std::move(views));
+    for (ObjectViews& views : output.views) pool_.Offer(pool_session_, std::move(views));
   }
 
   void MapFrames(const SyntheticWorld& world) {
@@ -84,17 +84,17 @@ class Stages {
   }
 
   void TrainToTheEnd() {
-    pool_.Finish(pool_client_);
+    pool_.Finish(pool_session_);
     WaitUntilIdle();
   }
   void WaitUntilIdle() const {
-    ASSERT_TRUE(testing::Eventually([&] { return pool_.Idle(pool_client_) && mesher_.IsIdle(mesher_session_); }));
+    ASSERT_TRUE(testing::Eventually([&] { return pool_.IsIdle(pool_session_) && mesher_.IsIdle(mesher_session_); }));
   }
   // Waits until at least one more training step was done, or nothing is left to train.
   void WaitForTraining() const {
-    const uint64_t steps = pool_.GetProgress(pool_client_).steps;
-    ASSERT_TRUE(
-        testing::Eventually([&] { return pool_.GetProgress(pool_client_).steps > steps || pool_.Idle(pool_client_); }));
+    const uint64_t steps = pool_.GetProgress(pool_session_).steps;
+    ASSERT_TRUE(testing::Eventually(
+        [&] { return pool_.GetProgress(pool_session_).steps > steps || pool_.IsIdle(pool_session_); }));
   }
 
   objects::ObjectMapper mapper{objects::ObjectsConfig{}};
@@ -105,7 +105,7 @@ class Stages {
  private:
   Mesher mesher_{mesh::MeshConfig{}};
   nerf::TrainingPool pool_{FastNerf(), 1};
-  uint64_t mesher_session_ = 0, pool_client_ = 0;
+  uint64_t mesher_session_ = 0, pool_session_ = 0;
 };
 
 // The map of a client that applies all events.

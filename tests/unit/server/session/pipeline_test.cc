@@ -43,7 +43,7 @@ class PipelineTest : public ::testing::Test {
   }
 
   const ServerConfig config_ = SingleThread();
-  nerf::TrainingPool pool_{config_.nerf, /*threads=*/0};
+  nerf::TrainingPool pool_{config_.nerf, /*workers=*/0};
   Mesher mesher_{config_.mesh, Mesher::Threading::kCaller};
   MapState map_;
   std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);

@@ -1,0 +1,46 @@
+#include "server/nerf/field_warnings.h"
+
+#include <fmt/format.h>
+
+#include "common/status.h"
+
+namespace romap::nerf {
+namespace {
+
+constexpr double kMinShareMeetingBox = 0.5;
+
+}  // namespace
+
+void FieldWarnings::OnBox(const absl::Status& status) { box_error_ = Message(status); }
+
+void FieldWarnings::OnRejectedView(const absl::Status& status) {
+  ++rejected_views_;
+  view_error_ = Message(status);
+}
+
+std::string FieldWarnings::Text(int divergences, const std::vector<KeyframeId>& untrusted) const {
+  std::vector<std::string> warnings;
+  if (divergences > 0) {
+    warnings.push_back(fmt::format("training diverged {} times; paused until new data arrives", divergences));
+  }
+  if (invalid_correction_) warnings.push_back("ignored a map correction that is not finite");
+  if (!box_error_.empty()) warnings.push_back(box_error_);
+  if (rejected_views_ > 0) {
+    warnings.push_back(fmt::format("{} views rejected, the last one: {}", rejected_views_, view_error_));
+  }
+  if (checks_.black_views > 0) {
+    warnings.push_back(fmt::format("the object is black in {} of {} views", checks_.black_views, checks_.views));
+  }
+  if (!checks_.depth_consistent) warnings.push_back("depth images contradict the masks; depth is ignored");
+  if (checks_.share_meeting_box < kMinShareMeetingBox) {
+    warnings.push_back("most rays through the masks miss the object's box");
+  }
+  if (!untrusted.empty()) {
+    std::vector<std::string> names;
+    for (const KeyframeId keyframe : untrusted) names.push_back(keyframe.ToString());
+    warnings.push_back(fmt::format("views excluded because they contradict the others: {}", fmt::join(names, ", ")));
+  }
+  return fmt::format("{}", fmt::join(warnings, "; "));
+}
+
+}  // namespace romap::nerf
