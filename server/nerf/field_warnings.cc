@@ -31,7 +31,7 @@ std::string FieldWarnings::Text(int divergences, const std::vector<KeyframeId>& 
   if (checks_.black_views > 0) {
     warnings.push_back(fmt::format("the object is black in {} of {} views", checks_.black_views, checks_.views));
   }
-  if (!checks_.depth_consistent) warnings.push_back("depth images contradict the masks; depth is ignored");
+  if (!checks_.depth_consistent) warnings.push_back("depth images contradict the masks and are ignored");
   if (checks_.share_meeting_box < kMinShareMeetingBox) {
     warnings.push_back("most rays through the masks miss the object's box");
   }

@@ -10,14 +10,14 @@ namespace {
 
 using testing::BallScene;
 
-TEST(FieldProbeTest, LossIsTheMeanOverTheViewsThatCount) {
+TEST(FieldProbeTest, LossIsTheWeightedMeanOverTheViews) {
   const ProbeReport report{{{0.1f, 0.2f, 0.2f}, {0.3f, 0.0f, 0.4f}, {9.0f, 9.0f, 9.0f}}};
   EXPECT_NEAR(report.Loss(std::vector<float>{1, 1, 0}), 0.5 * (0.1 + 0.2 + 0.3 + 0.2), 1e-6);
   EXPECT_EQ(report.Loss(std::vector<float>{0, 0, 0}), 0);
 }
 
-TEST(FieldProbeTest, SeesWhichRaysMeetTheBoxAndHowAnEmptySpaceDiffersFromTheViews) {
-  testing::BallScene scene;
+TEST(FieldProbeTest, MeasuresRaysThatMissTheBoxAndTheResidualOfAnEmptyField) {
+  BallScene scene;
   scene.views = 3;
   const std::vector<ObjectView> views = scene.Views();
   const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
@@ -25,14 +25,14 @@ TEST(FieldProbeTest, SeesWhichRaysMeetTheBoxAndHowAnEmptySpaceDiffersFromTheView
   RaySet rays(config, 1);
   rays.Build(views, box);
   FieldProbe probe;
-  EXPECT_EQ(probe.ShareMeeting({1, 1, 1}), 1) << "without rays";
+  EXPECT_EQ(probe.ShareMeetingBox({1, 1, 1}), 1) << "without rays";
   probe.Build(rays, views.size());
-  EXPECT_EQ(probe.ShareMeeting({1, 1, 1}), 1);
-  EXPECT_LT(probe.ShareMeeting({0.1f, 0.1f, 0.1f}), 0.2);
+  EXPECT_EQ(probe.ShareMeetingBox({1, 1, 1}), 1);
+  EXPECT_LT(probe.ShareMeetingBox({0.1f, 0.1f, 0.1f}), 0.2);
 
-  nerf::Occupancy occupancy(config);
+  Occupancy occupancy(config);
   occupancy.SetHull(std::vector<uint8_t>(occupancy.hull().size(), 0));
-  const ProbeReport report = probe.Look(nerf::FieldModel(config, 1), config, {occupancy.bits(), {1, 1, 1}, {}});
+  const ProbeReport report = probe.Measure(FieldModel(config, 1), config, {occupancy.bits(), {1, 1, 1}, {}});
   ASSERT_EQ(report.views.size(), 3u);
   for (const ViewResidual& view : report.views) {
     EXPECT_EQ(view.missing, 1);

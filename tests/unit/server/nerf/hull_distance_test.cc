@@ -10,9 +10,9 @@
 namespace romap::nerf {
 namespace {
 
-constexpr int kSide = nerf::kOccupancyResolution;
+constexpr int kSide = kOccupancyResolution;
 
-Eigen::Vector3f MiddleOf(size_t cell, const Eigen::Vector3f& extent) {
+Eigen::Vector3f CenterOf(size_t cell, const Eigen::Vector3f& extent) {
   const Eigen::Vector3f index(static_cast<float>(cell % kSide), static_cast<float>(cell / kSide % kSide),
                               static_cast<float>(cell / kSide / kSide));
   return (index.array() + 0.5f).matrix().cwiseProduct(extent / kSide);
@@ -22,7 +22,7 @@ TEST(HullDistanceTest, MeasuresTheDistanceToABall) {
   const Eigen::Vector3f extent(1, 0.8f, 0.6f);
   constexpr float kRadius = 0.2f;
   std::vector<uint8_t> ball(static_cast<size_t>(kSide) * kSide * kSide);
-  const auto distance_at = [&](size_t cell) { return (MiddleOf(cell, extent) - extent / 2).norm() - kRadius; };
+  const auto distance_at = [&](size_t cell) { return (CenterOf(cell, extent) - extent / 2).norm() - kRadius; };
   for (size_t i = 0; i < ball.size(); ++i) ball[i] = distance_at(i) < 0 ? 1 : 0;
   const std::vector<float> distance = DistanceToBorder(ball, extent);
   const float cell = (extent / kSide).maxCoeff(), reach = 9 * (extent / kSide).minCoeff();
@@ -33,10 +33,10 @@ TEST(HullDistanceTest, MeasuresTheDistanceToABall) {
     if (std::fabs(truth) < reach) largest_error = std::max(largest_error, std::fabs(distance[i] - truth));
   }
   EXPECT_LT(largest_error, cell);
-  EXPECT_GT(distance[0], reach) << "far away it is a bound";
+  EXPECT_GT(distance[0], reach) << "clamped";
 }
 
-TEST(HullDistanceTest, BorderLiesBetweenTheCells) {
+TEST(HullDistanceTest, TheBorderIsBetweenTheCells) {
   std::vector<uint8_t> half(static_cast<size_t>(kSide) * kSide * kSide);
   for (size_t i = 0; i < half.size(); ++i) half[i] = i / kSide % kSide < 30 ? 1 : 0;  // y below 30 cells
   const std::vector<float> distance = DistanceToBorder(half, {1, 1, 1});
@@ -45,7 +45,7 @@ TEST(HullDistanceTest, BorderLiesBetweenTheCells) {
   EXPECT_NEAR(distance[34 * kSide + 5], 4.5f / kSide, 1e-6);
 }
 
-TEST(HullDistanceTest, WithoutABorderAllIsFarAway) {
+TEST(HullDistanceTest, WithoutABorderAllDistancesAreLarge) {
   for (const uint8_t all : {0, 1}) {
     const std::vector<float> distance = DistanceToBorder(std::vector<uint8_t>(kSide * kSide * kSide, all), {1, 1, 1});
     for (const float d : distance) ASSERT_GT(all != 0 ? -d : d, 5.0f / kSide);

@@ -29,7 +29,7 @@ class PixelSamplerTest : public ::testing::Test {
     sampler.Build(views_);
     return sampler;
   }
-  // How often `steps` steps choose object pixels of each view.
+  // The number of object pixels of each view that `steps` steps choose.
   std::vector<int> ObjectRaysOfViews(const PixelSampler& sampler, int steps) const {
     std::vector<int> counts(views_.size());
     for (int step = 0; step < steps; ++step) {
@@ -45,7 +45,7 @@ class PixelSamplerTest : public ::testing::Test {
     return view.ray_kind.at<uint8_t>(pixel.v_px - view.roi_px.y, pixel.u_px - view.roi_px.x);
   }
 
-  testing::BallScene scene_;
+  BallScene scene_;
   NerfConfig config_;
   std::vector<ObjectView> views_;
 };
@@ -74,8 +74,8 @@ TEST_F(PixelSamplerTest, ChoosesObjectPixelsAndABandOfBackgroundButNoOccluders) 
   EXPECT_EQ(object, 50 * 140);
 }
 
-TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
-  config_.contrast_weight = 0;  // a partner comes by beside its own turn
+TEST_F(PixelSamplerTest, EveryStepSamplesAllViewsInProportionAndAllPixelsAreChosen) {
+  config_.contrast_weight = 0;  // without partners, which are chosen in addition
   const PixelSampler sampler = Build();
   std::vector<int> pixels;
   int all_pixels = 0;
@@ -86,7 +86,7 @@ TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
   const std::vector<int> of_one_step = ObjectRaysOfViews(sampler, 1);
   for (size_t v = 0; v < views_.size(); ++v) EXPECT_NEAR(of_one_step[v], 140.0 * pixels[v] / all_pixels, 1.5) << v;
 
-  // After as many draws as there are pixels by far the most have been there; drawing at random would miss 37 %.
+  // After as many draws as there are pixels, most pixels were chosen. Random draws would miss 37 %.
   std::map<std::tuple<int, int, int>, int> times;
   const int steps = all_pixels / 140 + 1;
   for (int step = 0; step < steps; ++step) {
@@ -99,36 +99,36 @@ TEST_F(PixelSamplerTest, EveryStepSeesAllViewsInProportionAndAllPixelsComeBy) {
   for (const auto& [pixel, count] : times) EXPECT_LE(count, 3);
 }
 
-TEST_F(PixelSamplerTest, WeightsSayHowOftenAViewIsChosen) {
+TEST_F(PixelSamplerTest, WeightsSetHowOftenAViewIsChosen) {
   PixelSampler sampler = Build();
   const std::vector<int> even = ObjectRaysOfViews(sampler, 100);
   sampler.Weigh(std::vector<float>{1, 0, 3, 1});
   const std::vector<int> weighed = ObjectRaysOfViews(sampler, 100);
   EXPECT_EQ(weighed[1], 0);
-  const auto often = [&](size_t v) { return static_cast<double>(weighed[v]) / even[v]; };
-  EXPECT_NEAR(often(2) / often(0), 3, 0.05);
-  EXPECT_NEAR(often(3) / often(0), 1, 0.05);
+  const auto ratio = [&](size_t v) { return static_cast<double>(weighed[v]) / even[v]; };
+  EXPECT_NEAR(ratio(2) / ratio(0), 3, 0.05);
+  EXPECT_NEAR(ratio(3) / ratio(0), 1, 0.05);
   sampler.Weigh(std::vector<float>(4, 0.0f));
-  EXPECT_EQ(ObjectRaysOfViews(sampler, 100), even) << "nothing to prefer is no preference";
+  EXPECT_EQ(ObjectRaysOfViews(sampler, 100), even) << "if all weights are 0, all views weigh the same";
 }
 
-TEST_F(PixelSamplerTest, IsTheSameForTheSameSeedAndAnotherForAnother) {
+TEST_F(PixelSamplerTest, DependsOnlyOnTheSeed) {
   const PixelSampler a = Build(), b = Build();
   PixelSampler other(config_, 6);
   other.Build(views_);
   int differ = 0;
   for (int i = 0; i < config_.rays_per_step; ++i) {
-    const auto place = [&](const PixelSampler& sampler) {
+    const auto pixel_of = [&](const PixelSampler& sampler) {
       const TrainingPixel pixel = sampler.At(3, i).pixel;
       return std::tuple(pixel.view, pixel.u_px, pixel.v_px);
     };
-    EXPECT_EQ(place(a), place(b));
-    differ += place(a) != place(other) ? 1 : 0;
+    EXPECT_EQ(pixel_of(a), pixel_of(b));
+    differ += pixel_of(a) != pixel_of(other) ? 1 : 0;
   }
   EXPECT_GT(differ, config_.rays_per_step / 2);
 }
 
-TEST_F(PixelSamplerTest, DepthThatCannotBeIsNone) {
+TEST_F(PixelSamplerTest, InvalidDepthIsUnknown) {
   const float inf = std::numeric_limits<float>::infinity();
   for (ObjectView& view : views_) {
     view.depth_mu = cv::Mat(view.roi_px.size(), CV_32FC1, cv::Scalar(2));
@@ -150,7 +150,7 @@ TEST_F(PixelSamplerTest, DepthThatCannotBeIsNone) {
   }
 }
 
-TEST_F(PixelSamplerTest, MapPointsGetRaysAsLongAsTheyAreNotFew) {
+TEST_F(PixelSamplerTest, MapPointsGetRaysUnlessThereAreFew) {
   for (int i = 0; i < 200; ++i) {
     const float shift = static_cast<float>(i % 10);
     views_[0].sparse_depth.emplace_back(30 + shift, 31 + shift, 1.5f);
@@ -165,7 +165,7 @@ TEST_F(PixelSamplerTest, MapPointsGetRaysAsLongAsTheyAreNotFew) {
   EXPECT_EQ(Build().At(0, config_.rays_per_step - 1).pixel.z_mu, 0);
 }
 
-TEST_F(PixelSamplerTest, ObjectPixelsComeInPairsOfOneViewSomePixelsApart) {
+TEST_F(PixelSamplerTest, PairedObjectPixelsAreOfOneViewAtTheConfiguredDistance) {
   for (ObjectView& view : views_) view.depth_mu = cv::Mat(view.roi_px.size(), CV_32FC1, cv::Scalar(2));
   const PixelSampler sampler = Build();
   int paired = 0, object = 0;
@@ -179,11 +179,11 @@ TEST_F(PixelSamplerTest, ObjectPixelsComeInPairsOfOneViewSomePixelsApart) {
     const PixelSampler::Choice other = sampler.At(7, i + partner);
     EXPECT_EQ(other.partner, -partner);
     EXPECT_EQ(other.pixel.view, pixel.view);
-    const double apart_px = std::hypot(pixel.u_px - other.pixel.u_px, pixel.v_px - other.pixel.v_px);
+    const double distance_px = std::hypot(pixel.u_px - other.pixel.u_px, pixel.v_px - other.pixel.v_px);
     const int mask_px = cv::countNonZero(views_[pixel.view].ray_kind == static_cast<int>(RayKind::kObject));
     const double wanted_px = 0.1 * std::sqrt(mask_px);
-    EXPECT_GE(apart_px, 0.5 * wanted_px - 1);
-    EXPECT_LE(apart_px, 1.5 * wanted_px + 1);
+    EXPECT_GE(distance_px, 0.5 * wanted_px - 1);
+    EXPECT_LE(distance_px, 1.5 * wanted_px + 1);
     EXPECT_EQ(KindAt(pixel), static_cast<uint8_t>(RayKind::kObject));
     const cv::Vec3b& bgr = views_[pixel.view].color_bgr.at<cv::Vec3b>(pixel.v_px, pixel.u_px);
     EXPECT_EQ(pixel.rgb, (std::array<uint8_t, 3>{bgr[2], bgr[1], bgr[0]}));

@@ -1,5 +1,3 @@
-// How an object's field puts right the poses of its views.
-
 #include "server/nerf/pose_refiner.h"
 
 #include <gtest/gtest.h>
@@ -13,25 +11,26 @@ namespace romap::nerf {
 namespace {
 
 using testing::BallScene;
+using testing::SmallFieldConfig;
 
-NerfConfig FastConfig() {
-  NerfConfig config = testing::SmallFieldConfig();
+NerfConfig ShortConfig() {
+  NerfConfig config = SmallFieldConfig();
   config.full_budget_steps = 200;
   config.max_extra_steps = 0;
   return config;
 }
 
-testing::BallScene Scene() { return {.views = 14, .size_px = 120}; }
+BallScene Scene() { return {.views = 14, .size_px = 120}; }
 
-// The view with its camera turned so that the object appears shifted.
-ObjectView Off(ObjectView view, double right_px, double down_px) {
+// The view with its camera rotated so that the object appears shifted.
+ObjectView Shifted(ObjectView view, double right_px, double down_px) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(-right_px / view.camera.fx_px, Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(down_px / view.camera.fy_px, Eigen::Vector3d::UnitX()));
   view.T_world_camera = {view.T_world_camera.rotation() * turn, view.T_world_camera.translation()};
   return view;
 }
 
-ObjectField Trained(const testing::BallScene& scene, const std::vector<ObjectView>& views, const NerfConfig& config,
+ObjectField Trained(const BallScene& scene, const std::vector<ObjectView>& views, const NerfConfig& config,
                     int steps = 200) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
@@ -40,8 +39,8 @@ ObjectField Trained(const testing::BallScene& scene, const std::vector<ObjectVie
   return field;
 }
 
-// How far from the truth each view of the field puts the object's middle.
-std::vector<double> Errors_px(const testing::BallScene& scene, const ObjectField& field) {
+// The distance, in each view of the field, of the object's center from its true image position.
+std::vector<double> Errors_px(const BallScene& scene, const ObjectField& field) {
   std::vector<double> errors_px;
   const std::vector<TrainingCamera> cameras = field.Snapshot().cameras;
   for (size_t i = 0; i < cameras.size(); ++i) {
@@ -59,39 +58,39 @@ double Rms(const std::vector<double>& values) {
   return std::sqrt(square / static_cast<double>(values.size()));
 }
 
-// Errors of two pixels that have nothing in common.
-std::vector<ObjectView> ShakenViews(const testing::BallScene& scene) {
+// Uncorrelated errors of two pixels.
+std::vector<ObjectView> NoisyViews(const BallScene& scene) {
   std::vector<ObjectView> views;
   for (int i = 0; i < scene.views; ++i) {
-    views.push_back(Off(scene.View(i), i % 2 == 0 ? 1.5 : -1.5, i % 4 < 2 ? 1.3 : -1.3));
+    views.push_back(Shifted(scene.View(i), i % 2 == 0 ? 1.5 : -1.5, i % 4 < 2 ? 1.3 : -1.3));
   }
   return views;
 }
 
-TEST(PoseRefinerTest, PutsRightViewsThatAreAllALittleOff) {
-  const testing::BallScene scene = Scene();
-  NerfConfig config = FastConfig();
-  const std::vector<double> refined_px = Errors_px(scene, Trained(scene, ShakenViews(scene), config));
+TEST(PoseRefinerTest, CorrectsSmallErrorsOfAllViews) {
+  const BallScene scene = Scene();
+  NerfConfig config = ShortConfig();
+  const std::vector<double> refined_px = Errors_px(scene, Trained(scene, NoisyViews(scene), config));
   config.pose_prior_px = 0;
-  const std::vector<double> given_px = Errors_px(scene, Trained(scene, ShakenViews(scene), config));
+  const std::vector<double> given_px = Errors_px(scene, Trained(scene, NoisyViews(scene), config));
   ASSERT_EQ(refined_px.size(), 14u);
-  EXPECT_NEAR(Rms(given_px), std::hypot(1.5, 1.3), 0.1) << "switched off";
+  EXPECT_NEAR(Rms(given_px), std::hypot(1.5, 1.3), 0.1) << "refinement is disabled";
   EXPECT_LT(Rms(refined_px), 0.4 * Rms(given_px));
 }
 
-TEST(PoseRefinerTest, PutsRightOneViewAndLeavesTheOthers) {
-  const testing::BallScene scene = Scene();
+TEST(PoseRefinerTest, CorrectsOneViewAndKeepsTheOthers) {
+  const BallScene scene = Scene();
   std::vector<ObjectView> views = scene.Views();
-  views[5] = Off(views[5], 2.5, -1);
-  const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, FastConfig()));
+  views[5] = Shifted(views[5], 2.5, -1);
+  const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, ShortConfig()));
   ASSERT_EQ(errors_px.size(), 14u);
   for (size_t i = 0; i < errors_px.size(); ++i) EXPECT_LT(errors_px[i], i == 5 ? 1.5 : 0.5) << i;
 }
 
-TEST(PoseRefinerTest, NeverMovesAllViewsAlike) {
-  const testing::BallScene scene = Scene();
-  const std::vector<ObjectView> views = ShakenViews(scene);
-  const FieldSnapshot snapshot = Trained(scene, views, FastConfig(), 50).Snapshot();
+TEST(PoseRefinerTest, DoesNotMoveAllViewsTogether) {
+  const BallScene scene = Scene();
+  const std::vector<ObjectView> views = NoisyViews(scene);
+  const FieldSnapshot snapshot = Trained(scene, views, ShortConfig(), 50).Snapshot();
   Eigen::Vector3d shift = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
   double growth = 0, moved = 0;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -109,25 +108,25 @@ TEST(PoseRefinerTest, NeverMovesAllViewsAlike) {
   EXPECT_NEAR(growth, 0, 1e-6);
 }
 
-TEST(PoseRefinerTest, ACorrectionKeepsWhatWasFoundIfItIsSmall) {
-  const testing::BallScene scene = Scene();
-  const std::vector<ObjectView> views = ShakenViews(scene);
-  ObjectField field = Trained(scene, views, FastConfig());
+TEST(PoseRefinerTest, ASmallCorrectionKeepsTheRefinement) {
+  const BallScene scene = Scene();
+  const std::vector<ObjectView> views = NoisyViews(scene);
+  ObjectField field = Trained(scene, views, ShortConfig());
   const std::vector<double> before_px = Errors_px(scene, field);
-  ASSERT_TRUE(field.CorrectView({views[3].keyframe, Off(views[3], 0.2, 0).T_world_camera}).ok());
+  ASSERT_TRUE(field.CorrectView({views[3].keyframe, Shifted(views[3], 0.2, 0).T_world_camera}).ok());
   EXPECT_NEAR(Errors_px(scene, field)[3], before_px[3], 0.25);
-  const ObjectView far = Off(views[3], 8, 0);
+  const ObjectView far = Shifted(views[3], 8, 0);
   ASSERT_TRUE(field.CorrectView({far.keyframe, far.T_world_camera}).ok());
   const SE3<Camera, Object> T_far = far.T_world_camera.Inverse() * field.Snapshot().T_world_object;
   EXPECT_TRUE(field.Snapshot().cameras[3].T_camera_object.Matrix().isApprox(T_far.Matrix(), 1e-9));
 }
 
-TEST(PoseRefinerTest, FewViewsAreTakenAsTheyAre) {
-  testing::BallScene scene = Scene();
+TEST(PoseRefinerTest, FewViewsAreNotRefined) {
+  BallScene scene = Scene();
   scene.views = 5;
   std::vector<ObjectView> views = scene.Views();
-  views[1] = Off(views[1], 2, 0);
-  const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, FastConfig(), 100));
+  views[1] = Shifted(views[1], 2, 0);
+  const std::vector<double> errors_px = Errors_px(scene, Trained(scene, views, ShortConfig(), 100));
   EXPECT_NEAR(errors_px[1], 2, 0.05);
   EXPECT_LT(errors_px[0], 1e-6);
 }

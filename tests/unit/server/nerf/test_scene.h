@@ -10,7 +10,7 @@
 
 namespace romap::testing {
 
-// A striped ball of radius `radius_mu` seen by a ring of cameras, drawn exactly: every test makes its own data.
+// A striped ball of radius `radius_mu` seen by a ring of cameras, rendered exactly.
 struct BallScene {
   double radius_mu = 0.5;
   int views = 12;
@@ -25,11 +25,12 @@ struct BallScene {
   std::vector<ObjectView> Views() const;
 };
 
-// Small enough to learn the ball quickly.
+// A small field that learns the ball in little time.
 nerf::NerfConfig SmallFieldConfig();
 
-// Mean distance, in radii, of the learned surface (where raw first exceeds the surface level on the way from outside to
-// the centre, within the hull) from the ball, over evenly spread directions. A direction without surface counts as 1.
+// The mean distance, in radii, of the learned surface from the ball, over evenly distributed directions. The surface is
+// where raw first exceeds the surface level on a line from outside to the center, inside the hull. A direction without
+// surface counts as 1.
 double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot);
 
 // Raw values on a regular grid of 1000 points, from -reach to +reach of the box.

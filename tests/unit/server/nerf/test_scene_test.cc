@@ -31,14 +31,14 @@ cv::Vec3b Stripes(const Eigen::Vector3d& normal) {
   return {byte(std::sin(5 * azimuth)), byte(std::cos(7 * height)), byte(std::sin(4 * (azimuth + height)))};
 }
 
-// Length along the unit direction to the ball, < 0: missed.
+// The distance to the ball along the unit direction; < 0: no intersection.
 double HitBall(const Eigen::Vector3d& origin_to_center, const Eigen::Vector3d& direction, double radius) {
   const double along = origin_to_center.dot(direction);
   const double square = radius * radius - (origin_to_center.squaredNorm() - along * along);
   return square < 0 ? -1 : along - std::sqrt(square);
 }
 
-TEST(BallSceneTest, DrawsTheBallWhereTheCameraModelPutsIt) {
+TEST(BallSceneTest, RendersTheBallWhereTheCameraModelProjectsIt) {
   const BallScene scene;
   const ObjectView view = scene.View(0);
   const Eigen::Vector3d center_camera = view.T_world_camera.Inverse() * scene.Center();

@@ -7,7 +7,7 @@
 namespace romap::nerf {
 namespace {
 
-TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
+TEST(TrainingPlanTest, RateDecreasesOverThePlanAndALateViewRaisesIt) {
   NerfConfig config;
   const auto full = static_cast<uint64_t>(config.full_budget_steps);
   TrainingPlan plan(config);
@@ -26,25 +26,25 @@ TEST(TrainingPlanTest, RateFallsWithThePlanAndALateViewWarmsItUp) {
   EXPECT_EQ(plan.AllowedSteps(40, false), full + static_cast<uint64_t>(config.max_refine_steps));
 }
 
-TEST(TrainingPlanTest, StepsBeyondThePlanAreEarnedByTheLoss) {
+TEST(TrainingPlanTest, ADecreasingLossExtendsThePlan) {
   NerfConfig config;
   config.min_loss_decrease = 0.1;
   config.max_extra_steps = 120;
   const auto full = static_cast<uint64_t>(config.full_budget_steps);
   TrainingPlan plan(config);
-  plan.OnFulfilled(full - 1, 0.5);
-  EXPECT_EQ(plan.AllowedSteps(5, true), full) << "it is not fulfilled";
-  plan.OnFulfilled(full, std::nullopt);
-  plan.OnFulfilled(full, 0.09);
+  plan.OnEvaluation(full - 1, 0.5);
+  EXPECT_EQ(plan.AllowedSteps(5, true), full) << "the planned steps are not done";
+  plan.OnEvaluation(full, std::nullopt);
+  plan.OnEvaluation(full, 0.09);
   EXPECT_EQ(plan.AllowedSteps(5, true), full);
-  plan.OnFulfilled(full, 0.11);
+  plan.OnEvaluation(full, 0.11);
   EXPECT_EQ(plan.AllowedSteps(5, true), full + 50);
   EXPECT_LT(plan.LearningRate(full), 1.6 * config.final_learning_rate);
-  for (int i = 0; i < 10; ++i) plan.OnFulfilled(full + 1000, 0.5);
+  for (int i = 0; i < 10; ++i) plan.OnEvaluation(full + 1000, 0.5);
   EXPECT_EQ(plan.AllowedSteps(5, true), full + 120);
-  plan.OnNewView(full + 120);  // something new earns anew
+  plan.OnNewView(full + 120);  // resets the number of extra steps
   const uint64_t planned = plan.AllowedSteps(5, true);
-  plan.OnFulfilled(planned, 0.5);
+  plan.OnEvaluation(planned, 0.5);
   EXPECT_EQ(plan.AllowedSteps(5, true), planned + 50);
 }
 

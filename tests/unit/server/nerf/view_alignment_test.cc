@@ -9,12 +9,12 @@ namespace {
 
 constexpr double kFocal_px = 500, kDistance_mu = 2;
 
-// A smooth pattern on an ellipse, facing the camera, over the whole plane.
-struct Picture {
+// A smooth pattern on a plane facing the camera; the object is an ellipse in it.
+struct TestImage {
   Eigen::Vector2d center_px{330, 250};
   bool textured = true;
 
-  bool Holds(const Eigen::Vector2d& p) const {
+  bool Contains(const Eigen::Vector2d& p) const {
     const Eigen::Vector2d q = (p - center_px).cwiseQuotient(Eigen::Vector2d(40, 28));
     return q.squaredNorm() < 1;
   }
@@ -43,7 +43,7 @@ struct Picture {
         for (int c = 0; c < 3; ++c) {
           view.color_bgr.at<cv::Vec3b>(y, x)[c] = static_cast<uint8_t>(std::lround(255 * bgr[static_cast<size_t>(c)]));
         }
-        view.ray_kind.at<uint8_t>(y, x) = static_cast<uint8_t>(Holds(p) ? RayKind::kObject : RayKind::kBackground);
+        view.ray_kind.at<uint8_t>(y, x) = static_cast<uint8_t>(Contains(p) ? RayKind::kObject : RayKind::kBackground);
       }
     }
     return view;
@@ -54,15 +54,15 @@ struct Picture {
   }
 };
 
-// What a field shows that would have to undergo `shift_px` and then `roll_rad` about its middle to look as in the view.
-std::vector<RenderedPixel> Render(const Picture& picture, const ObjectView& view, const Eigen::Vector2d& shift_px,
+// A rendering that matches the view after a motion by `shift_px` and a rotation by `roll_rad` about the center.
+std::vector<RenderedPixel> Render(const TestImage& image, const ObjectView& view, const Eigen::Vector2d& shift_px,
                                   double roll_rad = 0, float brighter = 0, size_t pixels = 150) {
   std::vector<RenderedPixel> rendered;
   for (const cv::Point& at : ViewAlignment(view).Pixels(pixels, 3)) {
-    const Eigen::Vector2d arm = Eigen::Vector2d(at.x, at.y) - picture.center_px;
-    const Eigen::Vector2d source = picture.center_px + Eigen::Rotation2Dd(roll_rad) * arm + shift_px;
-    RenderedPixel pixel{at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), picture.Bgr(source),
-                        picture.Holds(source) ? 1.0f : 0.0f};
+    const Eigen::Vector2d arm = Eigen::Vector2d(at.x, at.y) - image.center_px;
+    const Eigen::Vector2d source = image.center_px + Eigen::Rotation2Dd(roll_rad) * arm + shift_px;
+    RenderedPixel pixel{at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), image.Bgr(source),
+                        image.Contains(source) ? 1.0f : 0.0f};
     for (float& channel : pixel.bgr) channel += brighter;
     rendered.push_back(pixel);
   }
@@ -71,7 +71,7 @@ std::vector<RenderedPixel> Render(const Picture& picture, const ObjectView& view
 
 Eigen::Vector2d Shift_px(const ObjectMotion& motion) { return motion.segment<2>(3) * kFocal_px / kDistance_mu; }
 
-TEST(ViewAlignmentTest, MotionsAreWhatTakesAPoseToAnother) {
+TEST(ViewAlignmentTest, MotionBetweenInvertsMoved) {
   const SE3<Camera, Object> T(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())),
                               {0.1, -0.2, 2});
   ObjectMotion motion;
@@ -79,58 +79,58 @@ TEST(ViewAlignmentTest, MotionsAreWhatTakesAPoseToAnother) {
   const SE3<Camera, Object> T_moved = Moved(T, motion);
   EXPECT_TRUE(MotionBetween(T, T_moved).isApprox(motion, 1e-9));
   EXPECT_TRUE(MotionBetween(T, T).isZero(1e-9));
-  EXPECT_TRUE((T_moved * Eigen::Vector3d::Zero()).isApprox(Eigen::Vector3d(0.2, 0, 1.9), 1e-9)) << "about its centre";
+  EXPECT_TRUE((T_moved * Eigen::Vector3d::Zero()).isApprox(Eigen::Vector3d(0.2, 0, 1.9), 1e-9)) << "about its center";
 }
 
-TEST(ViewAlignmentTest, FindsAPlantedShiftAndRoll) {
-  const Picture picture;
-  const ObjectView view = picture.View();
+TEST(ViewAlignmentTest, FindsAGivenShiftAndRoll) {
+  const TestImage image;
+  const ObjectView view = image.View();
   const ViewAlignment alignment(view);
   for (const Eigen::Vector2d& shift_px :
        {Eigen::Vector2d(2, 0), Eigen::Vector2d(-1, 1.5), Eigen::Vector2d(0.4, -0.3)}) {
     const ObjectMotion motion =
-        alignment.Align(Render(picture, view, shift_px), picture.Pose(view), ObjectMotion::Zero(), 8);
+        alignment.Align(Render(image, view, shift_px), image.Pose(view), ObjectMotion::Zero(), 8);
     EXPECT_LT((Shift_px(motion) - shift_px).norm(), 0.1 + 0.1 * shift_px.norm()) << Shift_px(motion).transpose();
   }
   const ObjectMotion rolled =
-      alignment.Align(Render(picture, view, {0, 0}, 0.02), picture.Pose(view), ObjectMotion::Zero(), 8);
+      alignment.Align(Render(image, view, {0, 0}, 0.02), image.Pose(view), ObjectMotion::Zero(), 8);
   EXPECT_NEAR(rolled[2], 0.02, 0.006);
   EXPECT_LT(Shift_px(rolled).norm(), 0.1);
 }
 
-TEST(ViewAlignmentTest, TheOutlineAloneTellsShifts) {
-  Picture picture;
-  picture.textured = false;
-  const ObjectView view = picture.View();
-  const ObjectMotion motion = ViewAlignment(view).Align(Render(picture, view, {-1.5, 1}, 0, 0, 2000),
-                                                        picture.Pose(view), ObjectMotion::Zero(), 8);
+TEST(ViewAlignmentTest, FindsShiftsFromTheOutlineAlone) {
+  TestImage image;
+  image.textured = false;
+  const ObjectView view = image.View();
+  const ObjectMotion motion =
+      ViewAlignment(view).Align(Render(image, view, {-1.5, 1}, 0, 0, 2000), image.Pose(view), ObjectMotion::Zero(), 8);
   EXPECT_LT((Shift_px(motion) - Eigen::Vector2d(-1.5, 1)).norm(), 0.6) << Shift_px(motion).transpose();
 }
 
-TEST(ViewAlignmentTest, LeavesAPoseThatIsRightEvenInOtherLight) {
-  const Picture picture;
-  const ObjectView view = picture.View();
+TEST(ViewAlignmentTest, KeepsACorrectPoseUnderOtherLighting) {
+  const TestImage image;
+  const ObjectView view = image.View();
   for (const float brighter : {0.0f, 0.15f}) {
-    const ObjectMotion motion = ViewAlignment(view).Align(Render(picture, view, {0, 0}, 0, brighter),
-                                                          picture.Pose(view), ObjectMotion::Zero(), 8);
+    const ObjectMotion motion =
+        ViewAlignment(view).Align(Render(image, view, {0, 0}, 0, brighter), image.Pose(view), ObjectMotion::Zero(), 8);
     EXPECT_LT(Shift_px(motion).norm(), 0.05);
   }
 }
 
-TEST(ViewAlignmentTest, AnOccluderIsNoOutline) {
-  Picture picture;
-  picture.textured = false;
-  ObjectView view = picture.View();
-  const std::vector<RenderedPixel> whole = Render(picture, view, {0, 0});
+TEST(ViewAlignmentTest, IgnoresTheOutlineOfAnOccluder) {
+  TestImage image;
+  image.textured = false;
+  ObjectView view = image.View();
+  const std::vector<RenderedPixel> whole = Render(image, view, {0, 0});
   view.ray_kind.colRange(0, 50).setTo(static_cast<int>(RayKind::kOccluder));
-  const ObjectMotion motion = ViewAlignment(view).Align(whole, picture.Pose(view), ObjectMotion::Zero(), 8);
+  const ObjectMotion motion = ViewAlignment(view).Align(whole, image.Pose(view), ObjectMotion::Zero(), 8);
   EXPECT_LT(Shift_px(motion).norm(), 0.1);
 }
 
-TEST(ViewAlignmentTest, WhatNothingHoldsGoesBackToThePoseThatWasGiven) {
-  Picture picture;
-  picture.textured = false;
-  ObjectView view = picture.View();
+TEST(ViewAlignmentTest, WithoutEvidenceReturnsToTheGivenPose) {
+  TestImage image;
+  image.textured = false;
+  ObjectView view = image.View();
   view.ray_kind.setTo(static_cast<int>(RayKind::kObject));
   std::vector<RenderedPixel> rendered;
   for (const cv::Point& at : ViewAlignment(view).Pixels(100, 1)) {
@@ -138,9 +138,9 @@ TEST(ViewAlignmentTest, WhatNothingHoldsGoesBackToThePoseThatWasGiven) {
   }
   ObjectMotion so_far = ObjectMotion::Zero();
   so_far[3] = 0.01;
-  const ObjectMotion motion = ViewAlignment(view).Align(rendered, picture.Pose(view), so_far, 2);
+  const ObjectMotion motion = ViewAlignment(view).Align(rendered, image.Pose(view), so_far, 2);
   EXPECT_TRUE(motion.isApprox(-so_far, 1e-6)) << motion.transpose();
-  EXPECT_TRUE(ViewAlignment(view).Align({}, picture.Pose(view), so_far, 2).isZero()) << "nothing was rendered";
+  EXPECT_TRUE(ViewAlignment(view).Align({}, image.Pose(view), so_far, 2).isZero()) << "no rendering";
 }
 
 }  // namespace

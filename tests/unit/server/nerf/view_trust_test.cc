@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace romap::nerf {
 namespace {
 
@@ -15,71 +17,70 @@ ViewTrust WithViews(size_t views) {
   return trust;
 }
 
-TEST(ViewTrustTest, AnOddOutlineOrColourIsLeftOutAndComesBackWhenItFits) {
-  for (const ViewResidual odd : {ViewResidual{0.02f, 0.6f, 0.0f}, {0.02f, 0.0f, 0.6f}, {0.5f, 0.05f, 0.01f}}) {
+TEST(ViewTrustTest, AnOutlierIsUntrustedUntilItsResidualIsNormal) {
+  for (const ViewResidual outlier : {ViewResidual{0.02f, 0.6f, 0.0f}, {0.02f, 0.0f, 0.6f}, {0.5f, 0.05f, 0.01f}}) {
     ViewTrust trust = WithViews(10);
     ProbeReport report = Report(10);
-    report.views[3] = odd;
-    EXPECT_TRUE(trust.Judge(report, 50));
+    report.views[3] = outlier;
+    EXPECT_TRUE(trust.Update(report, 50));
     for (size_t i = 0; i < 10; ++i) EXPECT_EQ(trust.trusted(i), i != 3);
-    EXPECT_EQ(trust.distrusted(), 1u);
     EXPECT_EQ(trust.Weights()[3], 0.0f);
     EXPECT_EQ(trust.Weights()[4], 1.0f);
-    EXPECT_FALSE(trust.Judge(report, 75)) << "nothing new";
-    EXPECT_TRUE(trust.Judge(Report(10), 100));
-    EXPECT_EQ(trust.distrusted(), 0u);
+    EXPECT_FALSE(trust.Update(report, 75)) << "unchanged";
+    EXPECT_TRUE(trust.Update(Report(10), 100));
+    EXPECT_TRUE(trust.trusted(3));
   }
 }
 
-TEST(ViewTrustTest, WhereAllAreHardToMeetNoneIsOdd) {
+TEST(ViewTrustTest, LimitsFollowTheMedianResidual) {
   ViewTrust trust = WithViews(10);
   ProbeReport report = Report(10, {0.1f, 0.2f, 0.05f});
   report.views[3] = {0.25f, 0.45f, 0.1f};
-  EXPECT_FALSE(trust.Judge(report, 50));
+  EXPECT_FALSE(trust.Update(report, 50));
 }
 
-TEST(ViewTrustTest, AVerdictDoesNotFlicker) {
+TEST(ViewTrustTest, TrustHasHysteresis) {
   ViewTrust trust = WithViews(10);
   ProbeReport report = Report(10);
   report.views[3].missing = 0.36f;  // the limit is 0.15 + 3 * 0.06
-  EXPECT_TRUE(trust.Judge(report, 50));
+  EXPECT_TRUE(trust.Update(report, 50));
   report.views[3].missing = 0.3f;
-  EXPECT_FALSE(trust.Judge(report, 75));
+  EXPECT_FALSE(trust.Update(report, 75));
   EXPECT_FALSE(trust.trusted(3));
 }
 
-TEST(ViewTrustTest, NewViewsAreNotJudgedAtOnce) {
+TEST(ViewTrustTest, NewViewsAreTrustedForSomeSteps) {
   ViewTrust trust = WithViews(10);
   ProbeReport report = Report(11);
   report.views[10] = {0.8f, 0.8f, 0.0f};
   trust.OnView(10, 100);
-  EXPECT_FALSE(trust.Judge(report, 125));
-  EXPECT_TRUE(trust.Judge(report, 150));
+  EXPECT_FALSE(trust.Update(report, 125));
+  EXPECT_TRUE(trust.Update(report, 150));
   EXPECT_FALSE(trust.trusted(10));
   trust.OnView(10, 150);  // its pose was corrected
   EXPECT_TRUE(trust.trusted(10));
 }
 
-TEST(ViewTrustTest, FewViewsOrManyOddOnesSayNothing) {
+TEST(ViewTrustTest, FewViewsOrManyOutliersChangeNothing) {
   ViewTrust few = WithViews(5);
   ProbeReport report = Report(5);
   report.views[1] = {0.8f, 0.8f, 0.0f};
-  EXPECT_FALSE(few.Judge(report, 500));
+  EXPECT_FALSE(few.Update(report, 500));
   ViewTrust many = WithViews(9);
   report = Report(9);
   for (size_t i = 0; i < 4; ++i) report.views[i] = {0.8f, 0.8f, 0.0f};
-  EXPECT_FALSE(many.Judge(report, 500));
-  EXPECT_EQ(many.distrusted(), 0u);
+  EXPECT_FALSE(many.Update(report, 500));
+  EXPECT_EQ(many.Weights(), std::vector<float>(9, 1.0f));
 }
 
-TEST(ViewTrustTest, AFieldThatForgotForgives) {
+TEST(ViewTrustTest, RestartTrustsAllViews) {
   ViewTrust trust = WithViews(10);
   ProbeReport report = Report(10);
   report.views[3].missing = 1;
-  EXPECT_TRUE(trust.Judge(report, 50));
+  EXPECT_TRUE(trust.Update(report, 50));
   trust.Restart();
-  EXPECT_EQ(trust.distrusted(), 0u);
-  EXPECT_FALSE(trust.Judge(report, 25));
+  EXPECT_TRUE(trust.trusted(3));
+  EXPECT_FALSE(trust.Update(report, 25));
 }
 
 }  // namespace

@@ -51,9 +51,9 @@ std::vector<float> Train(const NerfConfig& config, int steps) {
   return testing::RawOnGrid(field.Snapshot(), 0.7f);
 }
 
-void WaitUntilIdle(TrainingPool& pool, uint64_t client) {
+void WaitUntilIdle(TrainingPool& pool, TrainingPool::SessionId session) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
-  while (!pool.Idle(client)) {
+  while (!pool.IsIdle(session)) {
     ASSERT_LT(std::chrono::steady_clock::now(), end) << "the pool did not become idle within two minutes";
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
@@ -78,31 +78,31 @@ TEST_F(ObjectsOnDeviceTest, TrainingTimeIsLimited) {
   config.max_training_time_s = 0.001;
   config.max_training_time_per_view_s = 0;
   TrainingPool pool(config, 1);
-  const uint64_t client = pool.Register([](FieldSnapshot) {});
+  const TrainingPool::SessionId session = pool.AddSession([](FieldSnapshot) {});
   const testing::BallScene scene = TinyScene(1);
-  pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
-  pool.Finish(client);
-  WaitUntilIdle(pool, client);
-  EXPECT_EQ(pool.GetProgress(client).steps, 4u) << "one slice takes more than that";
-  pool.Unregister(client);
+  pool.Offer(session, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
+  pool.Finish(session);
+  WaitUntilIdle(pool, session);
+  EXPECT_EQ(pool.GetProgress(session).steps, 4u) << "one slice takes more than that";
+  pool.RemoveSession(session);
 }
 
 TEST_F(ObjectsOnDeviceTest, APoolFinishesEveryObjectAfterADeviceFailure) {
   std::mutex mutex;
   std::map<ObjectId, FieldSnapshot> last;
   TrainingPool pool(TinyConfig(), 2);
-  const uint64_t client = pool.Register([&](FieldSnapshot snapshot) {
+  const TrainingPool::SessionId session = pool.AddSession([&](FieldSnapshot snapshot) {
     std::lock_guard lock(mutex);
     last[snapshot.object] = std::move(snapshot);
   });
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 14});  // of 48
   for (uint64_t object = 1; object <= 2; ++object) {
     const testing::BallScene scene = TinyScene(object);
-    pool.Offer(client, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
+    pool.Offer(session, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   }
-  pool.Finish(client);
-  WaitUntilIdle(pool, client);
-  pool.Unregister(client);
+  pool.Finish(session);
+  WaitUntilIdle(pool, session);
+  pool.RemoveSession(session);
   EXPECT_EQ(DeviceStatus().code(), absl::StatusCode::kUnavailable) << "the device has not failed";
   ASSERT_EQ(last.size(), 2u);
   for (const auto& [object, snapshot] : last) {

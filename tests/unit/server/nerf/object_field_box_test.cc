@@ -1,4 +1,4 @@
-// What becomes of a field when its object's cuboid grows, shrinks or turns: it goes on over the new box.
+// ObjectField after changes of the cuboid: the learned field is transferred to the new box.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,14 +24,14 @@ NerfConfig ShortConfig() {
   return config;
 }
 
-ObjectField MakeField(const testing::BallScene& scene, const Cuboid& box, uint64_t seed = 1) {
+ObjectField MakeField(const BallScene& scene, const Cuboid& box, uint64_t seed = 1) {
   ObjectField field(ShortConfig(), scene.object, seed);
   EXPECT_TRUE(field.SetBox(box).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   return field;
 }
 
-// The ball's box scaled along its axes and turned, both about its centre.
+// Scales the box of the ball along its axes and rotates it, about its center.
 struct Change {
   std::string name;
   Eigen::Vector3d scale{1, 1, 1};
@@ -47,23 +47,23 @@ struct Change {
   }
 };
 
-class ChangedBoxTest : public ::testing::TestWithParam<Change> {};
+class ObjectFieldBoxChangeTest : public ::testing::TestWithParam<Change> {};
 
-TEST_P(ChangedBoxTest, FieldIsKeptAndSoonAsGoodAsOneOfTheRightBox) {
-  const testing::BallScene scene;
+TEST_P(ObjectFieldBoxChangeTest, TransferredFieldBecomesAsGoodAsOneOfTheRightBox) {
+  const BallScene scene;
   const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());
   const double new_loss = right.Train(1, 1).color_loss;
   right.Train(whole - 1, 1);
-  const double right_error = testing::BallSurfaceError(scene, right.Snapshot());
+  const double right_error = BallSurfaceError(scene, right.Snapshot());
 
   ObjectField field = MakeField(scene, GetParam().Apply(scene.Box()));
   field.Train(99, 1);
   const double loss_before = field.Train(1, 1).color_loss;
-  const double error_before = testing::BallSurfaceError(scene, field.Snapshot());
+  const double error_before = BallSurfaceError(scene, field.Snapshot());
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   EXPECT_EQ(field.steps(), 100u);
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), error_before + 0.02);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), error_before + 0.02);
   const double loss_after = field.Train(1, 1).color_loss;
   EXPECT_LT(loss_after, 0.4 * new_loss);
   EXPECT_LT(loss_after, 2.5 * loss_before + 0.01);
@@ -71,11 +71,11 @@ TEST_P(ChangedBoxTest, FieldIsKeptAndSoonAsGoodAsOneOfTheRightBox) {
   const auto rest = static_cast<int>(field.AllowedSteps(true) - field.steps());
   EXPECT_LE(rest, whole);
   field.Train(rest, 1);
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 1.2 * right_error + 0.01);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.2 * right_error + 0.01);
 }
 
-TEST_P(ChangedBoxTest, SnapshotIsOfTheNewBoxAtOnce) {
-  const testing::BallScene scene;
+TEST_P(ObjectFieldBoxChangeTest, SnapshotHasTheNewBoxImmediately) {
+  const BallScene scene;
   ObjectField field = MakeField(scene, GetParam().Apply(scene.Box()));
   field.Train(10, 1);
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
@@ -84,22 +84,22 @@ TEST_P(ChangedBoxTest, SnapshotIsOfTheNewBoxAtOnce) {
   if (snapshot.box_half_extents.isApprox(right.box_half_extents, 1e-5f)) {
     EXPECT_TRUE(snapshot.T_world_object.Matrix().isApprox(right.T_world_object.Matrix(), 1e-12));
     ObjectField trained = MakeField(scene, scene.Box());
-    trained.Train(1, 1);  // views count from the first step on
+    trained.Train(1, 1);  // views are used from the first step on
     const std::vector<uint8_t>& hull = trained.Snapshot().hull.bits;
     int differ = 0;
     for (size_t i = 0; i < hull.size(); ++i) differ += hull[i] != snapshot.hull.bits[i];
     EXPECT_LT(differ, static_cast<int>(hull.size() / 500));  // layers may be trimmed once steps were done
   } else {
-    EXPECT_THAT(GetParam().name, ::testing::EndsWith("10Percent")) << "only a box that still fits stays";
+    EXPECT_THAT(GetParam().name, ::testing::EndsWith("10Percent")) << "only a box that still fits is kept";
   }
   std::vector<float> raw(1);
   const Eigen::Vector3f corner = 0.999f * snapshot.box_half_extents;
   snapshot.field->Sample(std::vector<Eigen::Vector3f>{corner}, raw, {});
-  EXPECT_GT(raw[0], -100) << "the whole new box can be asked";
+  EXPECT_GT(raw[0], -100) << "the field is defined in the whole new box";
 }
 
-// "Grows" means that the field's first box was so much too small.
-INSTANTIATE_TEST_SUITE_P(Boxes, ChangedBoxTest,
+// "Grows30Percent": the first box of the field is too small by that much.
+INSTANTIATE_TEST_SUITE_P(Boxes, ObjectFieldBoxChangeTest,
                          ::testing::Values(Change{"Grows10Percent", {1 / 1.1, 1, 1}},
                                            Change{"Grows30Percent", {1, 1 / 1.3, 1}},
                                            Change{"Grows60Percent", {1, 1, 1 / 1.6}},
@@ -108,8 +108,8 @@ INSTANTIATE_TEST_SUITE_P(Boxes, ChangedBoxTest,
                                            Change{"TurnsAndGrows", {0.8, 1, 0.9}, -0.4}),
                          [](const auto& info) { return info.param.name; });
 
-TEST(ChangedBoxSpaceTest, WhatIsLearnedStaysWhereItIs) {
-  const testing::BallScene scene;
+TEST(ObjectFieldBoxTest, TransferKeepsTheFieldInPlace) {
+  const BallScene scene;
   ObjectField field = MakeField(scene, scene.Box());
   field.Train(60, 1);
   const FieldSnapshot before = field.Snapshot();
@@ -134,8 +134,8 @@ TEST(ChangedBoxSpaceTest, WhatIsLearnedStaysWhereItIs) {
   for (size_t i = 0; i < raw_new.size(); ++i) EXPECT_NEAR(raw_new[i], raw_old[i], 0.02) << i;
 }
 
-TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
-  const testing::BallScene scene;
+TEST(ObjectFieldBoxTest, CorrectionsComposeWithBoxChanges) {
+  const BallScene scene;
   const Eigen::AngleAxisd turn(0.35, Eigen::Vector3d(0.1, -0.1, 1).normalized());
   const Sim3<World, World> S(1.3, Eigen::Quaterniond(turn), {2.0, -1.0, 0.5});
   const Cuboid small = Change{"", {0.75, 1, 1}}.Apply(scene.Box());
@@ -151,13 +151,13 @@ TEST(ChangedBoxSpaceTest, CorrectionsComposeWithChangesOfTheBox) {
   EXPECT_EQ(a.steps, 20u);
   EXPECT_TRUE(a.T_world_object.Matrix().isApprox(S.Moved(b.T_world_object).Matrix(), 1e-9));
   EXPECT_TRUE(a.box_half_extents.isApprox(1.3f * b.box_half_extents, 1e-5f));
-  const std::vector<float> raw_a = testing::RawOnGrid(a, 0.98F), raw_b = testing::RawOnGrid(b, 0.98F);
+  const std::vector<float> raw_a = RawOnGrid(a, 0.98F), raw_b = RawOnGrid(b, 0.98F);
   for (size_t i = 0; i < raw_a.size(); ++i) EXPECT_NEAR(raw_a[i], raw_b[i], 0.05) << i;
 }
 
-// A thing that is seen from more and more sides gets many boxes; its field must outlive them all.
-TEST(ChangedBoxSpaceTest, ManyBoxesOneAfterAnotherDoNotWearTheFieldOut) {
-  const testing::BallScene scene;
+// An object gets many boxes while the camera moves around it.
+TEST(ObjectFieldBoxTest, ManyBoxChangesDoNotDegradeTheField) {
+  const BallScene scene;
   const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());
   right.Train(whole, 1);
@@ -169,12 +169,11 @@ TEST(ChangedBoxSpaceTest, ManyBoxesOneAfterAnotherDoNotWearTheFieldOut) {
   }
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   field.Train(static_cast<int>(field.AllowedSteps(true) - field.steps()), 1);
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()),
-            1.5 * testing::BallSurfaceError(scene, right.Snapshot()) + 0.02);
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 1.5 * BallSurfaceError(scene, right.Snapshot()) + 0.02);
 }
 
-TEST(ChangedBoxSpaceTest, IsDeterministic) {
-  const testing::BallScene scene;
+TEST(ObjectFieldBoxTest, IsDeterministic) {
+  const BallScene scene;
   const auto train = [&](int threads) {
     ObjectField field = MakeField(scene, Change{"", {0.7, 1, 1}}.Apply(scene.Box()));
     field.Train(12, threads);
@@ -182,7 +181,7 @@ TEST(ChangedBoxSpaceTest, IsDeterministic) {
     field.Train(12, threads);
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     field.Train(12, threads);
-    return testing::RawOnGrid(field.Snapshot());
+    return RawOnGrid(field.Snapshot());
   };
   EXPECT_EQ(train(1), train(1));
   EXPECT_EQ(train(2), train(2));

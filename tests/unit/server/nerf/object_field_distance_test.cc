@@ -1,10 +1,10 @@
-// Objects whose fields hold signed distances.
+// ObjectField with a signed-distance field.
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "server/nerf/field_surface.h"
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
@@ -22,59 +22,59 @@ NerfConfig DistanceConfig() {
   return config;
 }
 
-ObjectField MakeField(const testing::BallScene& scene, const NerfConfig& config) {
+ObjectField MakeField(const BallScene& scene, const NerfConfig& config) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   return field;
 }
 
-TEST(DistanceFieldTest, StartsWithTheHullAndLearnsTheBall) {
-  const testing::BallScene scene;
+TEST(ObjectFieldDistanceTest, StartsFromTheHullAndLearnsTheBall) {
+  const BallScene scene;
   ObjectField field = MakeField(scene, DistanceConfig());
   field.Train(1, 1);
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.15) << "the hull is there from the first step on";
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.15) << "initialized with the hull";
   const TrainStats stats = field.Train(199, 1);
   EXPECT_LT(stats.color_loss, 0.05);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.04);
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.04);
   EXPECT_EQ(snapshot.surface_level, 0);
 }
 
-TEST(DistanceFieldTest, RawValuesAreDistances) {
-  const testing::BallScene scene;
+TEST(ObjectFieldDistanceTest, RawValuesAreDistances) {
+  const BallScene scene;
   ObjectField field = MakeField(scene, DistanceConfig());
   field.Train(200, 1);
   const FieldSnapshot snapshot = field.Snapshot();
   const float unit_mu = 2 * snapshot.box_half_extents.maxCoeff();
-  for (const float off : {-0.05f, -0.02f, 0.0f}) {  // radii; outside the hull raw values are nobody's business
+  for (const float offset : {-0.05f, -0.02f, 0.0f}) {  // radii; raw values outside the hull are not trained
     double sum = 0;
     int count = 0;
     for (int i = 0; i < 60; ++i) {
       const float azimuth = 0.1f * static_cast<float>(i), z = 0.5f * std::sin(0.37f * static_cast<float>(i));
       const Eigen::Vector3f direction(std::sqrt(1 - z * z) * std::cos(azimuth),
                                       std::sqrt(1 - z * z) * std::sin(azimuth), z);
-      const std::vector<Eigen::Vector3f> point = {direction * static_cast<float>(scene.radius_mu) * (1 + off)};
+      const std::vector<Eigen::Vector3f> point = {direction * static_cast<float>(scene.radius_mu) * (1 + offset)};
       std::vector<float> raw(1);
       snapshot.field->Sample(point, raw, {});
-      sum += -raw[0] * nerf::kDistancePerRaw * unit_mu / scene.radius_mu;
+      sum += -raw[0] * kDistancePerRaw * unit_mu / scene.radius_mu;
       ++count;
     }
-    EXPECT_NEAR(sum / count, off, 0.02) << "mean distance in radii";
+    EXPECT_NEAR(sum / count, offset, 0.02) << "mean distance in radii";
   }
 }
 
-TEST(DistanceFieldTest, DependsOnNothingButItsInputs) {
-  const testing::BallScene scene;
+TEST(ObjectFieldDistanceTest, IsDeterministic) {
+  const BallScene scene;
   ObjectField first = MakeField(scene, DistanceConfig()), second = MakeField(scene, DistanceConfig());
   first.Train(30, 2);
   second.Train(10, 2);
   second.Train(20, 2);
-  EXPECT_EQ(testing::RawOnGrid(first.Snapshot()), testing::RawOnGrid(second.Snapshot()));
+  EXPECT_EQ(RawOnGrid(first.Snapshot()), RawOnGrid(second.Snapshot()));
 }
 
-TEST(DistanceFieldTest, GoesOnInAnotherBoxAndWithMoreViews) {
-  const testing::BallScene scene;
+TEST(ObjectFieldDistanceTest, ContinuesInAnotherBoxAndWithMoreViews) {
+  const BallScene scene;
   ObjectField field(DistanceConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   ASSERT_TRUE(field.SetBox(box).ok());
@@ -85,12 +85,12 @@ TEST(DistanceFieldTest, GoesOnInAnotherBoxAndWithMoreViews) {
   ASSERT_TRUE(field.SetBox(box).ok());
   for (size_t i = 6; i < views.size(); ++i) ASSERT_TRUE(field.AddView(views[i]).ok());
   field.Train(static_cast<int>(field.AllowedSteps(true) - field.steps()), 1);
-  EXPECT_GT(field.steps(), 100u) << "it was not started anew";
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.05);
+  EXPECT_GT(field.steps(), 100u) << "training did not restart";
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.05);
 }
 
-TEST(DistanceFieldTest, SurfaceGetsSharperAsThePlanIsFulfilled) {
-  const testing::BallScene scene;
+TEST(ObjectFieldDistanceTest, TheSurfaceSharpensOverThePlan) {
+  const BallScene scene;
   const NerfConfig config = DistanceConfig();
   ObjectField field = MakeField(scene, config);
   field.Train(20, 1);
@@ -98,28 +98,7 @@ TEST(DistanceFieldTest, SurfaceGetsSharperAsThePlanIsFulfilled) {
   field.Train(180, 1);
   const SurfaceOptics late = field.Snapshot().optics;
   EXPECT_GT(late.surface_density_per_mu, 5 * early.surface_density_per_mu);
-  EXPECT_NEAR(late.raw_per_efold, 1 / (config.final_sharpness * nerf::kDistancePerRaw), 1e-4);
-}
-
-TEST(FieldSurfaceTest, DensityIsMeasuredPerMapUnitAndDistancesByTheirSharpness) {
-  NerfConfig config;
-  TrainingBox box;
-  box.unit_mu = 2;
-  nerf::FieldModel model(config, 1);
-  FieldSnapshot snapshot;
-  DescribeSurface(config, model, box, snapshot);
-  EXPECT_FLOAT_EQ(snapshot.surface_level, static_cast<float>(config.surface_level));
-  EXPECT_FLOAT_EQ(snapshot.connect_level, static_cast<float>(config.surface_level - 2));
-  EXPECT_NEAR(snapshot.optics.surface_density_per_mu, std::exp(config.surface_level) / 2, 1e-4);
-  EXPECT_EQ(snapshot.optics.raw_per_efold, 1);
-  config.field = "sdf";
-  model = nerf::FieldModel(config, 1);
-  model.sharpness = 100;
-  DescribeSurface(config, model, box, snapshot);
-  EXPECT_EQ(snapshot.surface_level, 0);
-  EXPECT_FLOAT_EQ(snapshot.optics.surface_density_per_mu, 25);
-  EXPECT_FLOAT_EQ(snapshot.optics.raw_per_efold, 0.1f);
-  EXPECT_LT(snapshot.connect_level, 0);
+  EXPECT_NEAR(late.raw_per_efold, 1 / (config.final_sharpness * kDistancePerRaw), 1e-4);
 }
 
 }  // namespace

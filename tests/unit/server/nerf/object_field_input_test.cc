@@ -1,4 +1,4 @@
-// What a field makes of input that is not as it should be, and what it says about it.
+// Invalid and wrong input of ObjectField, and its warnings.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,18 +20,19 @@ using testing::BallSurfaceError;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::RawOnGrid;
+using testing::SmallFieldConfig;
 
 NerfConfig SmallConfig() {
-  NerfConfig config = testing::SmallFieldConfig();
+  NerfConfig config = SmallFieldConfig();
   config.full_budget_steps = 150;
   return config;
 }
 
-// Learns well enough to tell a right shape from a wrong one.
+// Learns well enough to distinguish a correct shape from a wrong one.
 NerfConfig ShapeConfig() {
   NerfConfig config;
   config.full_budget_steps = 120;
-  config.contrast_weight = 0;  // pays only after more steps
+  config.contrast_weight = 0;  // helps only after more steps
   config.max_extra_steps = 0;
   return config;
 }
@@ -42,7 +43,7 @@ void TrainToTheEnd(ObjectField& field) {
   }
 }
 
-ObjectField TrainedOn(const testing::BallScene& scene, const std::vector<ObjectView>& views,
+ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& views,
                       const NerfConfig& config = ShapeConfig()) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
@@ -56,60 +57,60 @@ void Turn(ObjectView& view, double angle_deg) {
   view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
 }
 
-TEST(FieldLifeTest, AViewWithAWrongPoseIsLeftOutAndNamed) {
-  testing::BallScene scene;
+TEST(ObjectFieldInputTest, ExcludesAViewWithAWrongPose) {
+  BallScene scene;
   scene.views = 16;
   std::vector<ObjectView> views = scene.Views();
   const ObjectField right = TrainedOn(scene, views);
-  EXPECT_EQ(right.Concern(), "");
+  EXPECT_EQ(right.Warning(), "");
   Turn(views[6], 5);
   ObjectField field = TrainedOn(scene, views);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("keyframe/7 contradicts"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("contradict the others: keyframe/7"));
   EXPECT_EQ(snapshot.cameras.size(), 15u);
-  const double right_error = testing::BallSurfaceError(scene, right.Snapshot());
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
+  const double right_error = BallSurfaceError(scene, right.Snapshot());
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 1.5 * right_error + 0.03);
 
-  // Its pose is corrected: it counts again.
+  // After a correction of its pose, the view is trusted again.
   ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
-  EXPECT_EQ(field.Concern(), "");
+  EXPECT_EQ(field.Warning(), "");
   TrainToTheEnd(field);
-  EXPECT_EQ(field.Concern(), "");
+  EXPECT_EQ(field.Warning(), "");
   EXPECT_EQ(field.Snapshot().cameras.size(), 16u);
 }
 
-TEST(FieldLifeTest, AViewWithTheMaskOfSomethingElseIsLeftOutAndNamed) {
-  testing::BallScene scene;
+TEST(ObjectFieldInputTest, ExcludesAViewWithTheMaskOfAnotherObject) {
+  BallScene scene;
   scene.views = 16;
   std::vector<ObjectView> views = scene.Views();
   ObjectView& wrong = views[4];
   wrong.ray_kind = cv::Mat(wrong.roi_px.size(), CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kBackground)));
   wrong.ray_kind(cv::Rect(0, 0, 20, 24)).setTo(static_cast<int>(RayKind::kObject));
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("keyframe/5 contradicts"));
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
+  EXPECT_THAT(snapshot.warning, HasSubstr("contradict the others: keyframe/5"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
 }
 
-TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
-  // The lower half of the ball is not of the object, as the revised masks say.
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, NewMasksOfTheSameKeyframesChangeTheField) {
+  // The new masks exclude the lower part of the ball.
+  const BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   ObjectField field = TrainedOn(scene, views);
   const Eigen::Vector3d eye_below = scene.Box().T_world_object.Inverse() * scene.View(1).T_world_camera.translation();
-  // The highest raw value that the hull leaves, near the surface that a low view looks at.
+  // The highest raw value inside the hull near the surface that faces a low camera.
   const auto raw_below = [&] {
     const FieldSnapshot snapshot = field.Snapshot();
     const int n = snapshot.hull.resolution;
-    std::vector<Eigen::Vector3f> places;
+    std::vector<Eigen::Vector3f> points;
     for (double share = 0.85; share < 1; share += 0.02) {
-      const Eigen::Vector3f place = (share * scene.radius_mu * eye_below.normalized()).cast<float>();
+      const Eigen::Vector3f point = (share * scene.radius_mu * eye_below.normalized()).cast<float>();
       const Eigen::Vector3i cell =
-          ((place.cwiseQuotient(snapshot.box_half_extents).array() + 1) * 0.5f * n).cast<int>();
+          ((point.cwiseQuotient(snapshot.box_half_extents).array() + 1) * 0.5f * n).cast<int>();
       if (snapshot.hull.bits[static_cast<size_t>((cell.z() * n + cell.y()) * n + cell.x())] != 0)
-        places.push_back(place);
+        points.push_back(point);
     }
-    std::vector<float> raw(places.size());
-    snapshot.field->Sample(places, raw, {});
+    std::vector<float> raw(points.size());
+    snapshot.field->Sample(points, raw, {});
     return raw.empty() ? -1e4f : *std::ranges::max_element(raw);
   };
   const float level = field.Snapshot().surface_level;
@@ -127,22 +128,22 @@ TEST(FieldLifeTest, ARevisedMaskMovesTheField) {
     }
     ASSERT_TRUE(field.AddView(view).ok());
   }
-  EXPECT_EQ(field.views(), scene.views) << "they replace those of the same keyframes";
+  EXPECT_EQ(field.views(), scene.views) << "they replace the views of the same keyframes";
   TrainToTheEnd(field);
   EXPECT_LT(raw_below(), level);
 }
 
-TEST(FieldLifeTest, BlackImagesStillGiveAShapeAndAreNamed) {
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, LearnsTheShapeFromBlackImages) {
+  const BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("black in 12 of its 12 views"));
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.12);
+  EXPECT_THAT(snapshot.warning, HasSubstr("black in 12 of 12 views"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.12);
 }
 
-TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, WarnsOfABoxThatMissesTheObject) {
+  const BallScene scene;
   ObjectField field(ShapeConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   box.T_world_object = {box.T_world_object.rotation(),
@@ -151,101 +152,80 @@ TEST(FieldLifeTest, ABoxThatMissesTheObjectIsSaidToAndNothingBreaks) {
   for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
   TrainToTheEnd(field);
   const FieldSnapshot snapshot = field.Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("its box misses"));
-  for (float raw : testing::RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  EXPECT_THAT(snapshot.warning, HasSubstr("miss the object's box"));
+  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   TrainToTheEnd(field);
-  EXPECT_THAT(field.Concern(), Not(HasSubstr("its box misses")));
-  EXPECT_LT(testing::BallSurfaceError(scene, field.Snapshot()), 0.06);
+  EXPECT_THAT(field.Warning(), Not(HasSubstr("miss the object's box")));
+  EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.06);
 }
 
-TEST(FieldLifeTest, WhatIsRefusedIsSaid) {
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, WarnsOfRejectedInput) {
+  const BallScene scene;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ObjectField field(SmallConfig(), scene.object, 1);
   Cuboid box = scene.Box();
   box.half_extents.x() = nan;
   EXPECT_FALSE(field.SetBox(box).ok());
-  EXPECT_THAT(field.Concern(), HasSubstr("half extents must be positive and finite"));
+  EXPECT_THAT(field.Warning(), HasSubstr("half extents must be positive and finite"));
   EXPECT_FALSE(field.AddView(scene.View(0)).ok());
-  EXPECT_THAT(field.Concern(), HasSubstr("a view came before the box"));
+  EXPECT_THAT(field.Warning(), HasSubstr("set the box before adding views"));
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
   ObjectView view = scene.View(0);
   view.ray_kind = cv::Mat::zeros(view.roi_px.size(), CV_8UC1);
   EXPECT_FALSE(field.AddView(view).ok());
-  EXPECT_EQ(field.Concern(), "2 views were refused, the last: view of object/7 in keyframe/1: its mask is empty");
+  EXPECT_EQ(field.Warning(), "2 views rejected, the last one: view of object/7 in keyframe/1: mask is empty");
   view.ray_kind.at<uint8_t>(30, 30) = static_cast<uint8_t>(RayKind::kObject);
   EXPECT_FALSE(field.AddView(view).ok());
-  EXPECT_THAT(field.Concern(), HasSubstr("its mask has only 1 px"));
+  EXPECT_THAT(field.Warning(), HasSubstr("mask has 1 px, at least 16 px are needed"));
   view = scene.View(0);
   view.camera.cx_px = nan;
   EXPECT_FALSE(field.AddView(view).ok());
   EXPECT_EQ(field.views(), 0);
   field.Move({nan, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()});
-  EXPECT_THAT(field.Concern(), HasSubstr("a correction of the map that is no motion was passed over"));
+  EXPECT_THAT(field.Warning(), HasSubstr("ignored a map correction that is not finite"));
   ASSERT_TRUE(field.AddView(scene.View(0)).ok());
   EXPECT_TRUE(field.Snapshot().T_world_object.IsFinite());
 }
 
-TEST(FieldLifeTest, NoNumbersInDepthLeaveNoTrace) {
-  testing::BallScene scene;
+TEST(ObjectFieldInputTest, IgnoresInvalidDepthValues) {
+  BallScene scene;
   scene.with_depth = true;
   std::vector<ObjectView> views = scene.Views();
   const float inf = std::numeric_limits<float>::infinity();
-  const std::array<float, 6> odd = {NAN, inf, -inf, 0, -1, std::numeric_limits<float>::max()};
+  const std::array<float, 6> invalid = {NAN, inf, -inf, 0, -1, std::numeric_limits<float>::max()};
   for (ObjectView& view : views) {
     for (int v = 0; v < scene.size_px; v += 2) {
-      for (int u = 0; u < scene.size_px; ++u) view.depth_mu.at<float>(v, u) = odd[static_cast<size_t>(u) % odd.size()];
+      for (int u = 0; u < scene.size_px; ++u)
+        view.depth_mu.at<float>(v, u) = invalid[static_cast<size_t>(u) % invalid.size()];
     }
     view.sparse_depth = {{30, 30, NAN}, {NAN, 30, 1}, {30, 30, inf}, {1e30f, 30, 1}, {30, 30, -1}};
   }
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
   EXPECT_TRUE(std::isfinite(snapshot.loss));
-  for (float raw : testing::RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.08);
+  for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.08);
 }
 
-TEST(FieldLifeTest, DepthOfAWrongScaleIsNotUsed) {
-  testing::BallScene scene;
+TEST(ObjectFieldInputTest, IgnoresDepthOfAWrongScale) {
+  BallScene scene;
   scene.with_depth = true;
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.depth_mu = view.depth_mu * 1.1;
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("depth images do not agree"));
-  EXPECT_LT(testing::BallSurfaceError(scene, snapshot), 0.06);
+  EXPECT_THAT(snapshot.warning, HasSubstr("depth images contradict the masks"));
+  EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
 }
 
-TEST(FieldLifeTest, DepthCarvesWhatMasksCannot) {
-  // A dent that no outline shows: what one view measured lies behind the ball's surface.
-  testing::BallScene scene;
-  scene.with_depth = true;
-  const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
-  const Eigen::Vector3d eye = box.T_world_object.Inverse() * scene.View(0).T_world_camera.translation();
-  const Eigen::Vector3d place = 0.9 * scene.radius_mu * eye.normalized();  // in the Object frame
-  const auto kept = [&](double dent_mu, bool use_depth) {
-    VisualHull hull(NerfConfig{});
-    hull.Reset(box, use_depth);
-    for (ObjectView view : scene.Views()) {
-      cv::add(view.depth_mu, dent_mu, view.depth_mu, view.depth_mu > 0);
-      hull.Add(view);
-    }
-    const Eigen::Vector3i cell = ((place.cwiseQuotient(box.half_extents).array() + 1) * 32).cast<int>();
-    return hull.Carve()[static_cast<size_t>((cell.z() * 64 + cell.y()) * 64 + cell.x())] != 0;
-  };
-  EXPECT_TRUE(kept(0, true)) << "true depth leaves the ball";
-  EXPECT_FALSE(kept(0.5 * scene.radius_mu, true));
-  EXPECT_TRUE(kept(0.5 * scene.radius_mu, false));
-}
-
-TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
-  // Rounding differs, hence not to the last bit.
+TEST(ObjectFieldInputTest, DoesNotDependOnTheMapUnit) {
+  // Equal except for rounding.
   std::vector<std::vector<float>> raws;
   std::vector<std::vector<uint8_t>> hulls;
   for (const double scale : {1.0, 0.01, 100.0}) {
-    testing::BallScene scene;
+    BallScene scene;
     scene.radius_mu = 0.5 * scale;
     const FieldSnapshot snapshot = TrainedOn(scene, scene.Views(), SmallConfig()).Snapshot();
-    raws.push_back(testing::RawOnGrid(snapshot, 0.98f));
+    raws.push_back(RawOnGrid(snapshot, 0.98f));
     hulls.push_back(snapshot.hull.bits);
     EXPECT_NEAR(snapshot.box_half_extents.x(), 0.55 * scale, 1e-5 * scale);
   }
@@ -255,15 +235,15 @@ TEST(FieldLifeTest, DoesNotDependOnTheUnitOfTheMapAtAll) {
   }
 }
 
-TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, TrainsBeyondThePlanWhileTheLossDecreases) {
+  const BallScene scene;
   NerfConfig config = SmallConfig();
-  config.full_budget_steps = 40;  // far too few
+  config.full_budget_steps = 40;  // too few to converge
   config.min_loss_decrease = 0.05;
   config.max_extra_steps = 2000;
-  const ObjectField eager = TrainedOn(scene, scene.Views(), config);
-  EXPECT_GT(eager.steps(), 60u);
-  EXPECT_LT(eager.steps(), 2040u) << "it has converged";
+  const ObjectField extended = TrainedOn(scene, scene.Views(), config);
+  EXPECT_GT(extended.steps(), 60u);
+  EXPECT_LT(extended.steps(), 2040u) << "it converges before";
   config.max_extra_steps = 70;
   EXPECT_LE(TrainedOn(scene, scene.Views(), config).steps(), 110u);
   config.max_extra_steps = 0;
@@ -273,8 +253,8 @@ TEST(FieldLifeTest, AFieldWhoseLossFallsGoesOnAndThenStops) {
   EXPECT_EQ(TrainedOn(scene, scene.Views(), config).steps(), 40u);
 }
 
-TEST(FieldLifeTest, LooksDoNotDependOnHowTrainingIsSliced) {
-  const testing::BallScene scene;
+TEST(ObjectFieldInputTest, EvaluationsDoNotDependOnTheSlices) {
+  const BallScene scene;
   std::vector<ObjectView> views = scene.Views();
   Turn(views[5], 5);
   const auto train = [&](int slice) {
@@ -282,7 +262,7 @@ TEST(FieldLifeTest, LooksDoNotDependOnHowTrainingIsSliced) {
     EXPECT_TRUE(field.SetBox(scene.Box()).ok());
     for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
     for (int done = 0; done < 120; done += slice) field.Train(slice, 1);
-    return testing::RawOnGrid(field.Snapshot());
+    return RawOnGrid(field.Snapshot());
   };
   EXPECT_EQ(train(120), train(8));
 }

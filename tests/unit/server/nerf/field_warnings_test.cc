@@ -1,0 +1,41 @@
+#include "server/nerf/field_warnings.h"
+
+#include <gtest/gtest.h>
+
+namespace romap::nerf {
+namespace {
+
+TEST(FieldWarningsTest, IsEmptyWithoutProblems) {
+  FieldWarnings warnings;
+  warnings.OnBox(absl::OkStatus());
+  warnings.OnViewChecks({.views = 5});
+  EXPECT_EQ(warnings.Text(0, {}), "");
+}
+
+TEST(FieldWarningsTest, ListsAllProblems) {
+  FieldWarnings warnings;
+  warnings.OnInvalidCorrection();
+  warnings.OnBox(absl::InvalidArgumentError("cuboid: pose is not finite"));
+  warnings.OnRejectedView(absl::InvalidArgumentError("first"));
+  warnings.OnRejectedView(absl::InvalidArgumentError("second"));
+  warnings.OnViewChecks({.views = 9, .black_views = 2, .depth_consistent = false, .share_meeting_box = 0.4});
+  EXPECT_EQ(warnings.Text(3, {KeyframeId{4}, KeyframeId{7}}),
+            "training diverged 3 times; paused until new data arrives; "
+            "ignored a map correction that is not finite; "
+            "cuboid: pose is not finite; "
+            "2 views rejected, the last one: second; "
+            "the object is black in 2 of 9 views; "
+            "depth images contradict the masks and are ignored; "
+            "most rays through the masks miss the object's box; "
+            "views excluded because they contradict the others: keyframe/4, keyframe/7");
+}
+
+TEST(FieldWarningsTest, AValidBoxClearsTheWarningOfTheLastOne) {
+  FieldWarnings warnings;
+  warnings.OnBox(absl::InvalidArgumentError("cuboid: pose is not finite"));
+  warnings.OnBox(absl::OkStatus());
+  EXPECT_EQ(warnings.Text(0, {}), "");
+}
+
+}  // namespace
+}  // namespace romap::nerf
