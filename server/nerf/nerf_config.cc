@@ -70,8 +70,6 @@ void RayFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("min_samples_per_ray", &c.min_samples_per_ray, {.min = 1, .max = 64, .help = "Fewest samples per ray"});
   fields.Add("min_sample_spacing", &c.min_sample_spacing,
              {.unit = "box sides", .min = 1e-4, .max = 1, .help = "Samples are not set closer, down to the fewest"});
-  fields.Add("max_views", &c.max_views,
-             {.unit = "views", .min = 3, .max = 1000, .help = "Views kept per object; then the most redundant goes"});
 }
 
 void LossFields(NerfConfig& c, ConfigFields& fields) {

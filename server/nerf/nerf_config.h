@@ -43,7 +43,6 @@ struct NerfConfig {
   int max_samples_per_ray = 16;
   int min_samples_per_ray = 4;
   double min_sample_spacing = 0.01;
-  int max_views = 80;
 
   // Loss.
   double opacity_weight_object = 0.5;

@@ -88,7 +88,7 @@ struct ObjectsConfig {
                {.unit = "deg", .min = 1, .max = 90, .help = "The same for the first views of an object"});
     fields.Add("first_views", &first_views,
                {.unit = "views", .min = 0, .max = 100, .help = "So many views count as the first"});
-    fields.Add("max_views", &max_views, {.unit = "views", .min = 2, .max = 500, .help = "Training views per object"});
+    fields.Add("max_views", &max_views, {.unit = "views", .min = 2, .max = 255, .help = "Training views per object"});
   }
 };
 

@@ -1,13 +1,13 @@
-// Trains the objects of a sequence with true cuboids, poses and masks, and says what it cost:
+// Trains the objects of a sequence with true cuboids, poses and masks, and prints the cost:
 //   field_bench SEQUENCE [OUT] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0] [--steps 0] [--threads 2]
 //               [--loosen 0] [--seed 1] [--depth] [--masks mask.txt]
 //               [--first-steps 0] [--first-scale 1 1 1] [--first-yaw-deg 0]
 //               [--pose-noise-deg 0] [--pose-noise-cm 0] [--mask-noise-px 0] [--noise-seed 1]
-// Every `every`-th frame becomes a view. `loosen` 0.2 makes the cuboids 20 % longer. `steps` 0 = the plan's full
-// budget. `first-steps` are done in a box that is scaled along its axes, its lowest corner staying, and turned, before
-// the right one replaces it; the rows then tell of the last step in the wrong box, the next one, and the rest. Noise
-// is on every view: see frame_noise.h. With OUT, meshes go to OUT/objects/<id>_<name>.ply in the World frame, for an
-// evaluator.
+// Every `every`-th frame becomes a view. `loosen` 0.2 makes the cuboids 20 % longer. `steps` 0 = all planned steps.
+// `first-steps` are done in a wrong box, scaled along its axes from its lowest corner and rotated, before the correct
+// box replaces it; then the rows show the last step in the wrong box, the first step in the correct one, and the
+// remaining steps. The noise applies to every view: see frame_noise.h. With OUT, meshes are written to
+// OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -79,8 +79,8 @@ absl::Status BenchObject(const bench::TrueFrames& frames, files::ObjectRecord ob
   object.half_extents *= 1.0 + options.loosen;
   nerf::ObjectField field(options.nerf, ObjectId{static_cast<uint64_t>(object.id)},
                           static_cast<uint64_t>(options.seed));
-  const Cuboid right{object.T_world_object, object.half_extents, 1.0};
-  ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : right));
+  const Cuboid correct{object.T_world_object, object.half_extents, 1.0};
+  ROMAP_RETURN_IF_ERROR(field.SetBox(options.first_steps > 0 ? FirstBox(object, options) : correct));
   const auto start = std::chrono::steady_clock::now();
   for (ObjectView& view : bench::MakeTrueViews(frames, object, options.depth)) {
     ROMAP_RETURN_IF_ERROR(field.AddView(std::move(view)));
@@ -91,9 +91,9 @@ absl::Status BenchObject(const bench::TrueFrames& frames, files::ObjectRecord ob
     if (options.first_steps > 1) field.Train(options.first_steps - 1, options.threads);
     PrintRow("wrong box", field.views(), field.Train(1, options.threads), setup_s);
     const auto change = std::chrono::steady_clock::now();
-    ROMAP_RETURN_IF_ERROR(field.SetBox(right));
+    ROMAP_RETURN_IF_ERROR(field.SetBox(correct));
     setup_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - change).count();
-    PrintRow("right box", field.views(), field.Train(1, options.threads), setup_s);
+    PrintRow("correct box", field.views(), field.Train(1, options.threads), setup_s);
   }
   const int steps = options.steps > 0 ? options.steps : static_cast<int>(field.AllowedSteps(true) - field.steps());
   PrintRow(object.name, field.views(), field.Train(steps, options.threads), setup_s);
@@ -121,7 +121,7 @@ absl::Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   romap::measure::Options options;
-  CLI::App app("Trains the objects of a sequence and reports cost");
+  CLI::App app("Trains the objects of a sequence and prints the cost");
   app.add_option("sequence", options.sequence)->required();
   app.add_option("out", options.out);
   app.add_option("--set", options.assignments)->allow_extra_args(false);

@@ -1,10 +1,11 @@
-// What becomes of fields whose input is not as it should be: trains the objects of a sequence with true cuboids, poses
-// and masks, but for what a scenario spoils, and writes the meshes for an evaluator (romap eval objects):
+// The effect of wrong input on fields: trains the objects of a sequence with true cuboids, poses and masks, except for
+// the damage of a scenario, and writes the meshes for an evaluator (romap eval objects):
 //   field_life_bench SEQUENCE OUT [--scenario NAME ..] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0]
 //                    [--seed 1] [--threads 2] [--depth]
-// Meshes go to OUT/<scenario>/objects. Scenarios: clean; pose (one view turned by 5 degrees about its vertical axis);
-// mask (one view has the mask of another object); black (one view is black); depth_scale (depths 20 % too large);
-// depth_noise (a third of the depths lost, a tenth anything at all); arrivals (views come one by one while training).
+// Meshes are written to OUT/<scenario>/objects. Scenarios: clean; pose (one view is rotated by 5 degrees about its
+// vertical axis); mask (one view has the mask of another object); black (one view is black); depth_scale (depths are 20
+// % too large); depth_noise (a third of the depths is missing, a tenth is random); arrivals (views arrive one by one
+// during training).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -35,16 +36,16 @@ struct Options {
 };
 
 using Views = std::vector<ObjectView>;
-// Spoils the views of one object; `other` are those of another one.
-using Spoiler = std::function<void(Views& views, const Views& other)>;
+// Damages the views of one object. `other`: the views of another object.
+using Damage = std::function<void(Views& views, const Views& other)>;
 
-void TurnOne(Views& views, const Views&) {
+void RotateOneView(Views& views, const Views&) {
   ObjectView& view = views[views.size() / 2];
   const Eigen::AngleAxisd turn(5 * M_PI / 180, Eigen::Vector3d::UnitY());
   view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
 }
 
-void SwapMaskOfOne(Views& views, const Views& other) {
+void SwapMaskOfOneView(Views& views, const Views& other) {
   ObjectView& view = views[views.size() / 2];
   for (const ObjectView& wrong : other) {
     if (wrong.keyframe != view.keyframe) continue;
@@ -54,7 +55,7 @@ void SwapMaskOfOne(Views& views, const Views& other) {
   }
 }
 
-void BlackenOne(Views& views, const Views&) {
+void BlackenOneView(Views& views, const Views&) {
   ObjectView& view = views[views.size() / 2];
   view.color_bgr = cv::Mat::zeros(view.color_bgr.size(), CV_8UC3);
 }
@@ -65,26 +66,26 @@ void ScaleDepth(Views& views, const Views&) {
   }
 }
 
-void SpoilDepth(Views& views, const Views&) {
+void AddDepthNoise(Views& views, const Views&) {
   cv::RNG random(1);
   for (ObjectView& view : views) {
     for (int y = 0; y < view.depth_mu.rows; ++y) {
       for (int x = 0; x < view.depth_mu.cols; ++x) {
         float& z_mu = view.depth_mu.at<float>(y, x);
-        const float dice = random.uniform(0.0f, 1.0f);
-        if (dice < 0.33f) z_mu = dice < 0.1f ? NAN : 0;
-        if (dice > 0.9f) z_mu *= random.uniform(0.3f, 3.0f);
+        const float draw = random.uniform(0.0f, 1.0f);
+        if (draw < 0.33f) z_mu = draw < 0.1f ? NAN : 0;
+        if (draw > 0.9f) z_mu *= random.uniform(0.3f, 3.0f);
       }
     }
   }
 }
 
-const std::map<std::string, Spoiler> kSpoilers = {{"clean", [](Views&, const Views&) {}},
-                                                  {"pose", TurnOne},
-                                                  {"mask", SwapMaskOfOne},
-                                                  {"black", BlackenOne},
+const std::map<std::string, Damage> kScenarios = {{"clean", [](Views&, const Views&) {}},
+                                                  {"pose", RotateOneView},
+                                                  {"mask", SwapMaskOfOneView},
+                                                  {"black", BlackenOneView},
                                                   {"depth_scale", ScaleDepth},
-                                                  {"depth_noise", SpoilDepth},
+                                                  {"depth_noise", AddDepthNoise},
                                                   {"arrivals", [](Views&, const Views&) {}}};
 
 absl::Status WriteMesh(const FieldSnapshot& snapshot, const files::ObjectRecord& object, const std::string& dir,
@@ -96,7 +97,7 @@ absl::Status WriteMesh(const FieldSnapshot& snapshot, const files::ObjectRecord&
   return files::WritePly(fmt::format("{}/{}_{}.ply", dir, object.id, object.name), mesh);
 }
 
-// Gives the field all it is allowed, as the pool does.
+// Trains all allowed steps in slices, as the training pool does.
 void TrainAllowed(nerf::ObjectField& field, bool complete, const Options& options) {
   while (field.AllowedSteps(complete) > field.steps()) {
     const uint64_t left = field.AllowedSteps(complete) - field.steps();
@@ -135,7 +136,7 @@ absl::Status Run(const Options& options) {
       };
       Views views = views_of(objects[i]);
       if (views.empty()) continue;
-      kSpoilers.at(scenario)(views, views_of(objects[(i + 1) % objects.size()]));
+      kScenarios.at(scenario)(views, views_of(objects[(i + 1) % objects.size()]));
       ROMAP_RETURN_IF_ERROR(TrainObject(objects[i], views, scenario, options));
     }
   }
@@ -147,9 +148,9 @@ absl::Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   romap::measure::Options options;
-  CLI::App app("Trains fields on input that is not as it should be");
+  CLI::App app("Trains fields on wrong input");
   std::vector<std::string> names;
-  for (const auto& [name, spoiler] : romap::measure::kSpoilers) names.push_back(name);
+  for (const auto& [name, damage] : romap::measure::kScenarios) names.push_back(name);
   options.scenarios = names;
   app.add_option("sequence", options.sequence)->required();
   app.add_option("out", options.out)->required();

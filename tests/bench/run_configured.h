@@ -7,8 +7,8 @@
 
 namespace romap::measure {
 
-// Runs a bench of fields and meshes whose `options` hold their configuration in `nerf` and `mesh`, after the
-// `assignments` of the command line. Returns the exit status; an error is one line on stderr.
+// Applies the `assignments` of the command line to the configurations `nerf` and `mesh` in `options`, then runs the
+// benchmark. Returns the exit status; errors are printed on stderr.
 template <class Options>
 int RunConfigured(Options& options, absl::Status (*run)(const Options&)) {
   ConfigFields fields;

@@ -9,16 +9,16 @@
 
 namespace romap::measure {
 
-// Frames and true cuboids that benches of fields and meshes work on.
+// Frames and true cuboids for the benchmarks of fields and meshes.
 struct TrainingScene {
   bench::TrueFrames frames;
   std::vector<files::ObjectRecord> objects;
 };
 
-// A made world seen in 25 pictures of 640x480 px. Needs no data.
+// A synthetic world in 25 images of 640x480 px. Needs no data.
 TrainingScene SyntheticTrainingScene();
 
-// Every fourth frame of a sequence, or the synthetic scene when `path` is empty. Errors: see LoadTrueFrames.
+// Every fourth frame of a sequence, or the synthetic scene if `path` is empty. Errors: see LoadTrueFrames.
 absl::StatusOr<TrainingScene> LoadTrainingScene(const std::string& path);
 
 }  // namespace romap::measure

@@ -2,7 +2,7 @@
 
 namespace romap::measure {
 
-// CPU time that this process has spent outside the kernel [s]: what benchmarks on shared machines compare.
+// CPU time of this process in user mode, in seconds. Unlike wall time, it is comparable on a shared machine.
 double UserSeconds();
 
 }  // namespace romap::measure
