@@ -8,7 +8,7 @@
 namespace romap::nerf {
 namespace {
 
-ObjectViews UpdateOf(uint64_t object) { return {.object = ObjectId{object}}; }
+ObjectViews UpdateOf(uint64_t object) { return {.object = ObjectId{object}, .cuboid = {}}; }
 
 struct TrainingQueueTest : public ::testing::Test {
   std::optional<TrainingQueue::Lease> Next() { return queue.Next(TrainingJob::Clock::now()); }
