@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/nerf/model/step_source.h"
-#include "server/nerf/model/occupancy.h"
 #include "server/nerf/cpu/ray_renderer.h"
+#include "server/nerf/model/occupancy.h"
+#include "server/nerf/model/step_source.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
 #include "server/nerf/trainer.h"
