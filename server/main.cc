@@ -8,18 +8,13 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <cerrno>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/config.h"
-#include "common/file_status.h"
 #include "common/status.h"
 #include "common/version.h"
 #include "server/session/local_mapping_service.h"
@@ -36,18 +31,24 @@ constexpr int kExitUsage = 2;
 struct Flags {
   std::string config_file;
   std::vector<std::string> assignments;  // section.field=value, in the order they take effect
-  std::string log_level = "info";
   bool dump_config = false;
+  bool expert = false;
 };
 
 struct Config {
-  session::ServerConfig server;
   transport::TransportConfig transport;
+  std::string log_level = "info";
+  session::ServerConfig server;
 
   ConfigFields Fields() {
     ConfigFields fields;
     fields.Section("transport");
     transport.Fields(fields);
+    fields.Section("log");
+    fields.Add("level", &log_level,
+               {.choices = {"trace", "debug", "info", "warning", "error", "critical", "off"},
+                .audience = Audience::kOperator,
+                .help = "Minimum severity of logged messages"});
     server.Fields(fields);
     return fields;
   }
@@ -58,18 +59,20 @@ void PrintError(const std::string& message) { fmt::print(stderr, "romap-server: 
 // The flags, or the exit status if the program must end (--help, --version, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
-  std::string listen_address;
+  std::optional<std::string> listen_address, log_level;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
-  app.add_option("--listen", listen_address, "HOST:PORT to serve on (default 127.0.0.1:50051; port 0 = any free port)");
-  app.add_option("--config", flags.config_file, "YAML file with the configuration");
-  app.add_option("--set", flags.assignments, "section.field=value; overrides the file; may be repeated")
+  app.add_option("--listen", listen_address,
+                 "HOST:PORT of the gRPC service; port 0 = any free port. Same as --set transport.listen_address=..");
+  app.add_option("--config", flags.config_file, "YAML file with settings");
+  app.add_option("--set", flags.assignments, "Setting section.field=value, overrides the file; may be repeated")
       ->allow_extra_args(false);
-  app.add_flag("--dump-config", flags.dump_config, "Print the effective configuration and exit");
-  app.add_option("--log-level", flags.log_level, "Minimum severity of log messages")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "critical", "off"}))
-      ->capture_default_str();
-  app.add_option("--threads", threads, "Training threads (default: one per core)");
+  auto* dump = app.add_flag("--dump-config", flags.dump_config,
+                            "Print the settings for operators and those that were set, with unit, range and meaning, "
+                            "and exit");
+  app.add_flag("--expert", flags.expert, "With --dump-config: print all settings")->needs(dump);
+  app.add_option("--log-level", log_level, "Minimum severity of logged messages. Same as --set log.level=..");
+  app.add_option("--threads", threads, "Number of training threads. Same as --set nerf.training_threads=..");
   app.set_version_flag("--version", fmt::format("romap-server {}", Version()));
   try {
     app.parse(argc, argv);
@@ -79,28 +82,14 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
     PrintError(fmt::format("{} (see romap-server --help)", e.what()));
     return kExitUsage;
   }
-  if (!listen_address.empty()) flags.assignments.push_back("transport.listen_address=" + listen_address);
+  if (listen_address) flags.assignments.push_back("transport.listen_address=" + *listen_address);
+  if (log_level) flags.assignments.push_back("log.level=" + *log_level);
   if (threads) flags.assignments.push_back(fmt::format("nerf.training_threads={}", *threads));
   return flags;
 }
 
-absl::Status Load(const Flags& flags, ConfigFields fields) {
-  if (!flags.config_file.empty()) {
-    errno = 0;
-    std::ifstream file(flags.config_file);
-    if (!file) return FileError(flags.config_file, "read the configuration");
-    // A folder can be opened like a file, but reading from it throws.
-    if (std::filesystem::is_directory(flags.config_file)) {
-      return FileError(flags.config_file, "read the configuration", EISDIR);
-    }
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text, flags.config_file));
-  }
-  return fields.Set(flags.assignments);
-}
-
 void SetUpLogging(const std::string& level) {
-  // To standard error: scripts read the address of the server from standard output.
+  // Scripts read the address from standard output, so the log goes to standard error.
   spdlog::set_default_logger(spdlog::stderr_color_mt("romap-server"));
   spdlog::set_level(spdlog::level::from_str(level));
   transport::RouteGrpcLogToSpdlog();
@@ -130,16 +119,17 @@ int Main(int argc, char** argv) {
   const Flags& flags = std::get<Flags>(parsed);
 
   Config config;
-  if (const absl::Status status = Load(flags, config.Fields()); !status.ok()) {
+  ConfigFields fields = config.Fields();
+  if (const absl::Status status = fields.Load(flags.config_file, flags.assignments); !status.ok()) {
     PrintError(Message(status));
     return kExitUsage;
   }
   if (flags.dump_config) {
-    fmt::print("{}", config.Fields().DumpYaml());
+    fmt::print("{}", fields.DumpYaml(flags.expert ? Audience::kExpert : Audience::kOperator));
     return 0;
   }
 
-  SetUpLogging(flags.log_level);
+  SetUpLogging(config.log_level);
   const sigset_t signals = BlockStopSignals();
   session::LocalMappingService service(config.server);
   auto server = transport::GrpcServer::Start(&service, config.transport);

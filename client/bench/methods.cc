@@ -40,8 +40,9 @@ absl::StatusOr<EngineConfig> Configure(const BenchMethod& method, const std::vec
   config.nerf.Fields(fields);
   fields.Section("mesh");
   config.mesh.Fields(fields);
-  ROMAP_RETURN_IF_ERROR(fields.Set(base));
-  ROMAP_RETURN_IF_ERROR(fields.Set(method.settings));
+  std::vector<std::string> assignments = base;
+  assignments.insert(assignments.end(), method.settings.begin(), method.settings.end());
+  ROMAP_RETURN_IF_ERROR(fields.Load("", assignments));
   return config;
 }
 

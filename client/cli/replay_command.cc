@@ -106,8 +106,11 @@ absl::Status RunReplay(ReplayOptions options) {
                recording.lost_bytes(), recording.frames());
   }
   options.service.local = true;
-  // Inserted first, so that --set overrides it.
-  if (!options.threads) options.service.settings.insert(options.service.settings.begin(), "session.single_thread=true");
+  if (!options.threads) {
+    // Inserted in front, so that the user's settings take precedence.
+    options.service.settings.insert(options.service.settings.begin(),
+                                    {"session.single_thread=true", "nerf.training_threads=0"});
+  }
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
   SessionOptions session = recording.options();
   session.mode = FrameMode::kReplay;  // the recording contains no dropped frames

@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "client/files/text_file.h"
 #include "client/sdk/remote_mapping_service.h"
 #include "common/status.h"
 #include "server/session/local_mapping_service.h"
@@ -14,11 +13,10 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
   session::ServerConfig config;
   ConfigFields fields;
   config.Fields(fields);
-  if (!options.config_file.empty()) {
-    ROMAP_ASSIGN_OR_RETURN(const std::string text, files::ReadFile(options.config_file));
-    ROMAP_RETURN_IF_ERROR(fields.LoadYaml(text, options.config_file));
-  }
-  ROMAP_RETURN_IF_ERROR(fields.Set(options.settings));
+  // A file may be shared with romap-server, which has these sections in addition.
+  fields.IgnoreSection("transport");
+  fields.IgnoreSection("log");
+  ROMAP_RETURN_IF_ERROR(fields.Load(options.config_file, options.settings));
   return config;
 }
 

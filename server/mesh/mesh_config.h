@@ -4,7 +4,7 @@
 
 namespace romap::mesh {
 
-// How a trained field becomes a triangle mesh.
+// Extraction of a triangle mesh from a trained field.
 struct MeshConfig {
   int resolution = 64;
   bool adapt_resolution = true;
@@ -18,27 +18,54 @@ struct MeshConfig {
   double trim_confidence = 0.1;
 
   void Fields(ConfigFields& fields) {
-    fields.Add(
-        "resolution", &resolution,
-        {.unit = "nodes", .min = 8, .max = 256, .help = "Grid nodes along the longest side of the object's box"});
+    GridFields(fields);
+    SurfaceFields(fields);
+    fields.AddRules([this](ConfigRules& rules) { Validate(rules); });
+  }
+
+  void Validate(ConfigRules& rules) const { rules.RequireAtMost(&min_side_nodes, &resolution); }
+
+ private:
+  void GridFields(ConfigFields& fields) {
+    fields.Add("resolution", &resolution,
+               {.unit = "nodes",
+                .min = 8,
+                .max = 256,
+                .audience = Audience::kOperator,
+                .help = "Number of grid nodes along the longest side of the object's box"});
     fields.Add("adapt_resolution", &adapt_resolution,
-               {.help = "Half to (when training is done) twice as many nodes, by the size in the views"});
+               {.audience = Audience::kOperator,
+                .help = "Scale the resolution with the size of the object in its views, by 0.5 to 1 during training "
+                        "and by 0.5 to 2 when it is completed"});
     fields.Add("pixels_per_node", &pixels_per_node,
-               {.unit = "px", .min = 0.5, .max = 50, .help = "Size in a good view that earns a node, when adapting"});
+               {.unit = "px",
+                .min = 0.5,
+                .max = 50,
+                .help = "Spacing of the grid nodes in a good view, with adapt_resolution"});
     fields.Add("min_side_nodes", &min_side_nodes,
-               {.unit = "nodes", .min = 2, .max = 256, .help = "Least nodes along the short sides of flat boxes"});
+               {.unit = "nodes",
+                .min = 2,
+                .max = 256,
+                .help = "Minimum number of grid nodes along the shorter sides of the box"});
+  }
+
+  void SurfaceFields(ConfigFields& fields) {
     fields.Add("min_confirmed_share", &min_confirmed_share,
-               {.min = 0, .max = 1, .help = "Where a smaller share of the views shows the object there is nothing"});
+               {.min = 0,
+                .max = 1,
+                .help = "Minimum share of the views that must show the object at a point; elsewhere space is empty"});
     fields.Add("fill_unseen", &fill_unseen,
-               {.help = "Empty space that no training view can see becomes solid (undersides, insides)"});
+               {.help = "Make empty space solid if no training view can see it (undersides, insides)"});
     fields.Add("cut_below_support", &cut_below_support,
-               {.help = "The object ends at the lowest height where a training view sees its surface"});
+               {.help = "End the object at the lowest height where a training view sees its surface"});
     fields.Add("min_component_share", &min_component_share,
-               {.min = 0, .max = 1, .help = "A separate piece smaller than this share of the largest is a floater"});
+               {.min = 0,
+                .max = 1,
+                .help = "Minimum size of a separate piece, as a share of the largest one; smaller ones are removed"});
     fields.Add("trim_unseen", &trim_unseen,
-               {.help = "Leave out surface that no training view saw; the mesh is then open"});
+               {.help = "Remove surface that no training view sees; the mesh is then open"});
     fields.Add("trim_confidence", &trim_confidence,
-               {.min = 0, .max = 1, .help = "Confidence below which trim_unseen takes a vertex for unseen"});
+               {.min = 0, .max = 1, .help = "Minimum confidence of a vertex that trim_unseen keeps"});
   }
 };
 

@@ -6,12 +6,12 @@
 
 namespace romap::nerf {
 
-// One object's field and its training. The defaults are the fast recipe measured on two CPU cores; where the paper
-// gives a number of its own, `help` names it.
+// The field of one object and its training. The defaults are the fast preset, measured on two CPU cores; the help texts
+// give the paper's values.
 struct NerfConfig {
   std::string preset = "fast";  // see presets.h
 
-  // Field: what it holds, encoding and MLP.
+  // Field: output, encoding and MLP.
   std::string field = "density";
   std::string encoding = "hash";
   int levels = 8;
@@ -21,6 +21,7 @@ struct NerfConfig {
   int hidden_width = 32;
   int hidden_layers = 1;
   double density_bias = 2.0;
+  double surface_level = 3.0;
 
   // Box, hull and occupancy.
   double box_enlargement = 0.1;
@@ -56,7 +57,7 @@ struct NerfConfig {
   double eikonal_weight = 0.01;
   double curvature_weight = 0.001;
 
-  // Optimiser.
+  // Optimizer.
   double learning_rate = 0.02;
   double final_learning_rate = 0.002;
   double adam_beta1 = 0.8;
@@ -84,9 +85,8 @@ struct NerfConfig {
   double max_training_time_per_view_s = 0.3;
   double pose_prior_px = 8.0;
 
-  double surface_level = 3.0;
-
   void Fields(ConfigFields& fields);
+  void Validate(ConfigRules& rules) const;
 };
 
 }  // namespace romap::nerf

@@ -21,12 +21,6 @@ namespace {
 
 constexpr int kMaxDivergences = 3;
 
-// Kernels process hidden neurons in blocks of 16.
-NerfConfig WithPaddedWidth(NerfConfig config) {
-  config.hidden_width = (config.hidden_width + 15) / 16 * 16;
-  return config;
-}
-
 bool IsBlack(const ObjectView& view) {
   constexpr double kMaxBlack = 4;  // mean 8-bit value over the object's pixels
   const cv::Scalar mean = cv::mean(view.color_bgr, view.ray_kind == static_cast<int>(RayKind::kObject));
@@ -36,12 +30,7 @@ bool IsBlack(const ObjectView& view) {
 }  // namespace
 
 ObjectField::ObjectField(const NerfConfig& config, ObjectId id, uint64_t seed)
-    : config_(WithPaddedWidth(config)),
-      id_(id),
-      field_(config_, seed),
-      views_(config_),
-      rays_(config_, seed),
-      plan_(config_) {}
+    : config_(config), id_(id), field_(config_, seed), views_(config_), rays_(config_, seed), plan_(config_) {}
 
 absl::Status ObjectField::SetBox(const Cuboid& cuboid) {
   const absl::Status status = FitBox(cuboid);

@@ -9,7 +9,7 @@
 
 namespace romap::session {
 
-// The whole configuration of a mapping service, one struct per stage. Frozen once the service is made.
+// The configuration of a mapping service, one struct per stage. It does not change after the service is made.
 struct ServerConfig {
   slam::SlamConfig slam;
   objects::ObjectsConfig objects;
@@ -27,10 +27,22 @@ struct ServerConfig {
     objects.Fields(fields);
     fields.Section("nerf");
     fields.Add("training_threads", &training_threads,
-               {.unit = "threads", .min = 0, .max = 1024, .help = "Workers of the training pool; 0 = one per core"});
+               {.unit = "threads",
+                .min = 0,
+                .max = 1024,
+                .audience = Audience::kOperator,
+                .help = "Number of threads that train fields; 0 = one per core"});
     nerf.Fields(fields);
     fields.Section("mesh");
     mesh.Fields(fields);
+    fields.AddRules([this](ConfigRules& rules) { Validate(rules); });
+  }
+
+  // The rules between stages; those within a stage belong to its struct.
+  void Validate(ConfigRules& rules) const {
+    rules.RequireAtMost(&nerf.min_views, &objects.max_views);
+    rules.Forbid(session.single_thread && training_threads > 0, &training_threads, "has no effect with",
+                 &session.single_thread, "leave one of them at its default");
   }
 };
 

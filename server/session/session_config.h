@@ -17,23 +17,35 @@ struct SessionConfig {
 
   void Fields(ConfigFields& fields) {
     fields.Add("max_sessions", &max_sessions,
-               {.unit = "sessions", .min = 1, .max = 10000, .help = "Sessions kept at once, finished ones included"});
+               {.unit = "sessions",
+                .min = 1,
+                .max = 10000,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of sessions, including finished ones"});
     fields.Add("frame_queue", &frame_queue,
-               {.unit = "frames", .min = 1, .max = 1024, .help = "Frames waiting for tracking before pushing back"});
-    fields.Add("mapping_queue", &mapping_queue,
-               {.unit = "frames", .min = 1, .max = 1024, .help = "Tracked frames waiting for mapping"});
+               {.unit = "frames",
+                .min = 1,
+                .max = 1024,
+                .help = "Maximum number of frames waiting for tracking; above it, replay sessions wait and live "
+                        "sessions drop the oldest frame"});
+    fields.Add(
+        "mapping_queue", &mapping_queue,
+        {.unit = "frames", .min = 1, .max = 1024, .help = "Maximum number of tracked frames waiting for mapping"});
     fields.Add("subscriber_queue", &subscriber_queue,
-               {.unit = "events",
+               {.unit = "acknowledgements",
                 .min = 16,
                 .max = 1 << 20,
-                .help = "Acknowledgements kept for a client that does not read; the oldest are dropped beyond it"});
+                .help = "Maximum number of acknowledgements waiting for a client that does not read; the oldest ones "
+                        "above it are dropped"});
     fields.Add("statistics_period_s", &statistics_period_s,
                {.unit = "s", .min = 0.05, .max = 60, .help = "Time between two statistics messages"});
     fields.Add("record_dir", &record_dir,
-               {.help = "Folder for <session id>.romaprec, what each session was fed, for romap replay; empty = none"});
-    fields.Add(
-        "single_thread", &single_thread,
-        {.help = "One thread per session does all in a fixed order: slower, but the same frames give the same map"});
+               {.audience = Audience::kOperator,
+                .help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "
+                        "replay; empty = no recording"});
+    fields.Add("single_thread", &single_thread,
+               {.help = "Run every session on one thread in a fixed order: slower, but the same input gives the same "
+                        "map"});
   }
 };
 

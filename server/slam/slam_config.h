@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
+
 #include "common/config.h"
 
 namespace romap::slam {
 
-// When a frame becomes a keyframe, and how keyframes become a sparse map.
+// Tracking and sparse mapping.
 struct SlamConfig {
   double keyframe_rotation_deg = 3.0;
   double keyframe_translation_ratio = 0.04;
@@ -34,62 +36,111 @@ struct SlamConfig {
     KeyframeFields(fields);
     FeatureFields(fields);
     MapFields(fields);
+    UncertaintyFields(fields);
+    fields.AddRules([this](ConfigRules& rules) { Validate(rules); });
   }
 
-  // For the random samples of one call; `call` tells calls apart.
+  void Validate(ConfigRules& rules) const {
+    rules.RequireAtMost(&scene_fast_min_threshold, &scene_fast_threshold);
+    rules.RequireAtMost(&matched_keyframes, &max_keyframes);
+    rules.RequireAtMost(&window_keyframes, &max_keyframes);
+  }
+
+  // Seed of the random samples of one call; `call` distinguishes calls.
   uint64_t Seed(uint64_t call) const { return static_cast<uint64_t>(seed) * 1000003 + call; }
 
  private:
   void KeyframeFields(ConfigFields& fields) {
     fields.Add("keyframe_rotation_deg", &keyframe_rotation_deg,
-               {.unit = "deg", .min = 0.1, .max = 90, .help = "Turn since the last keyframe that makes a new one due"});
+               {.unit = "deg", .min = 0.1, .max = 90, .help = "Camera rotation that makes the next keyframe due"});
     fields.Add("keyframe_translation_ratio", &keyframe_translation_ratio,
-               {.min = 0.001, .max = 1, .help = "Way since the last keyframe, over the scene's depth, that does so"});
+               {.min = 0.001,
+                .max = 1,
+                .help = "Camera translation that makes the next keyframe due, as a share of the scene depth"});
     fields.Add(
         "keyframe_max_gap_frames", &keyframe_max_gap_frames,
-        {.unit = "frames", .min = 1, .max = 10000, .help = "A moving camera gets a keyframe at least this often"});
+        {.unit = "frames", .min = 1, .max = 10000, .help = "Maximum gap between keyframes while the camera moves"});
   }
 
   void FeatureFields(ConfigFields& fields) {
     fields.Add("scene_features", &scene_features,
-               {.min = 50, .max = 10000, .help = "ORB features per frame, spread over the whole image"});
+               {.min = 50,
+                .max = 10000,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of ORB features per frame, spread over the whole image"});
     fields.Add("object_features", &object_features,
-               {.min = 0, .max = 10000, .help = "Further ORB features, spread over the instance masks only"});
+               {.min = 0,
+                .max = 10000,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of additional ORB features per frame inside the instance masks"});
     fields.Add("scene_fast_threshold", &scene_fast_threshold,
-               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner anywhere"});
+               {.unit = "gray levels", .min = 1, .max = 100, .help = "FAST corner threshold"});
     fields.Add("scene_fast_min_threshold", &scene_fast_min_threshold,
-               {.unit = "grey levels", .min = 1, .max = 100, .help = "The same where nothing has as much contrast"});
+               {.unit = "gray levels",
+                .min = 1,
+                .max = 100,
+                .help = "FAST corner threshold in regions without corners above scene_fast_threshold"});
     fields.Add("object_fast_threshold", &object_fast_threshold,
-               {.unit = "grey levels", .min = 1, .max = 100, .help = "Contrast of a corner inside an instance mask"});
-    fields.Add("mask_erosion_px", &mask_erosion_px,
-               {.unit = "px",
-                .min = 0,
-                .max = 10,
-                .help = "A feature so close to its mask's border, times its octave's scale, gets no label"});
+               {.unit = "gray levels", .min = 1, .max = 100, .help = "FAST corner threshold inside instance masks"});
+    fields.Add(
+        "mask_erosion_px", &mask_erosion_px,
+        {.unit = "px",
+         .min = 0,
+         .max = 10,
+         .help = "Features closer to the border of their mask get no label; multiplied by their octave's scale"});
   }
 
   void MapFields(ConfigFields& fields) {
     fields.Add("matched_keyframes", &matched_keyframes,
-               {.min = 1, .max = 20, .help = "Earlier keyframes that a new one is matched with to find new points"});
-    fields.Add("window_keyframes", &window_keyframes,
-               {.min = 2, .max = 60, .help = "Keyframes whose poses local bundle adjustment refines"});
+               {.unit = "keyframes",
+                .min = 1,
+                .max = 20,
+                .help = "Maximum number of earlier keyframes a new one is matched with to triangulate points; twice as "
+                        "many if few points are known"});
+    fields.Add(
+        "window_keyframes", &window_keyframes,
+        {.unit = "keyframes", .min = 2, .max = 60, .help = "Maximum number of keyframes in local bundle adjustment"});
     fields.Add("max_keyframes", &max_keyframes,
-               {.min = 10, .max = 100000, .help = "Keyframes in the map; beyond, the least needed go"});
-    fields.Add("close_loops", &close_loops, {.help = "Correct the map when a known place is seen again"});
+               {.unit = "keyframes",
+                .min = 10,
+                .max = 100000,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of keyframes in the map; the most redundant ones above it are removed"});
+    fields.Add("close_loops", &close_loops,
+               {.audience = Audience::kOperator, .help = "Correct the map when the camera returns to a known place"});
     fields.Add("refine_lens", &refine_lens,
-               {.help = "Find what the client's calibration leaves of the lens; for poses that come from images"});
-    fields.Add("max_points", &max_points, {.min = 100, .max = 1e6, .help = "Map points; beyond, the stalest go"});
+               {.help = "Estimate the lens distortion that the client's calibration leaves, if the camera is tracked "
+                        "from images"});
+    fields.Add("max_points", &max_points,
+               {.unit = "points",
+                .min = 100,
+                .max = 1e6,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of map points; those observed least recently are removed above it"});
     fields.Add("min_parallax_deg", &min_parallax_deg,
-               {.unit = "deg", .min = 0.1, .max = 30, .help = "Angle between two rays that makes a point of them"});
+               {.unit = "deg", .min = 0.1, .max = 30, .help = "Minimum angle between the rays of a new map point"});
+    fields.Add("seed", &seed,
+               {.min = 0, .max = 1e9, .help = "Seed of all random samples; the same input and seed give the same map"});
+  }
+
+  void UncertaintyFields(ConfigFields& fields) {
     fields.Add("pixel_sigma_px", &pixel_sigma_px,
-               {.unit = "px", .min = 0.1, .max = 10, .help = "Standard deviation of a feature of the finest octave"});
+               {.unit = "px",
+                .min = 0.1,
+                .max = 10,
+                .help = "Standard deviation of the position of a feature in the finest octave"});
     fields.Add("depth_sigma_ratio", &depth_sigma_ratio,
-               {.min = 0.0001, .max = 1, .help = "Standard deviation of a depth image over the depth"});
-    fields.Add("seed", &seed, {.min = 0, .max = 1e9, .help = "Of all random samples; same input, same seed, same map"});
+               {.min = 0.0001, .max = 1, .help = "Standard deviation of depth images, as a share of the depth"});
     fields.Add("prior_sigma_rad", &prior_sigma_rad,
-               {.unit = "rad", .min = 1e-6, .max = 3, .help = "Standard deviation of a pose that is taken as a prior"});
+               {.unit = "rad",
+                .min = 1e-6,
+                .max = 3,
+                .help = "Standard deviation of the orientation of client poses that are used as priors"});
     fields.Add("prior_sigma_mu", &prior_sigma_mu,
-               {.unit = "mu", .min = 1e-9, .max = 1e6, .help = "The same of its position"});
+               {.unit = "map units",
+                .min = 1e-9,
+                .max = 1e6,
+                .help = "Standard deviation of the position of client poses that are used as priors"});
   }
 };
 

@@ -14,15 +14,28 @@ struct TransportConfig {
   double shutdown_grace_s = 2;
 
   void Fields(ConfigFields& fields) {
-    fields.Add("listen_address", &listen_address, {.help = "HOST:PORT of the gRPC service; port 0 takes any free one"});
+    fields.Add("listen_address", &listen_address,
+               {.audience = Audience::kOperator, .help = "HOST:PORT of the gRPC service; port 0 = any free port"});
     fields.Add("max_message_bytes", &max_message_bytes,
-               {.unit = "bytes", .min = 1 << 16, .max = 1 << 30, .help = "Largest message in either direction"});
+               {.unit = "bytes",
+                .min = 1 << 16,
+                .max = 1 << 30,
+                .audience = Audience::kOperator,
+                .help = "Maximum size of a message in either direction"});
     fields.Add("max_calls", &max_calls,
-               {.unit = "calls", .min = 1, .max = 4096, .help = "Calls and streams served at once, each has a thread"});
+               {.unit = "calls",
+                .min = 1,
+                .max = 4096,
+                .audience = Audience::kOperator,
+                .help = "Maximum number of simultaneous calls and streams; each one has a thread"});
     fields.Add("keepalive_s", &keepalive_s,
-               {.unit = "s", .min = 1, .max = 3600, .help = "A client silent for so long is pinged, then dropped"});
+               {.unit = "s",
+                .min = 1,
+                .max = 3600,
+                .help = "Time without traffic after which a client is pinged, and then disconnected if it is silent "
+                        "for the same time"});
     fields.Add("shutdown_grace_s", &shutdown_grace_s,
-               {.unit = "s", .min = 0, .max = 60, .help = "How long a stop waits for clients to take what is written"});
+               {.unit = "s", .min = 0, .max = 60, .help = "Time for clients to read pending messages at shutdown"});
   }
 };
 

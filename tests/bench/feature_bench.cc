@@ -221,7 +221,7 @@ int Main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--every") == 0) every = std::stoul(argv[i + 1]);
     if (std::strcmp(argv[i], "--set") == 0) assignments.emplace_back(argv[i + 1]);
   }
-  const absl::Status status = fields.Set(assignments);
+  const absl::Status status = fields.Load("", assignments);
   const auto sequence = files::Sequence::Open(argv[1], {.use_depth = true});
   if (!status.ok() || !sequence.ok()) {
     std::fprintf(stderr, "feature_bench: %s\n", Message(status.ok() ? sequence.status() : status).c_str());

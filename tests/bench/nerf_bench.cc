@@ -191,7 +191,7 @@ absl::Status Run(const Options& options) {
     ConfigFields fields;
     fields.Section("nerf");
     config->Fields(fields);
-    ROMAP_RETURN_IF_ERROR(fields.Set(options.assignments));
+    ROMAP_RETURN_IF_ERROR(fields.Load("", options.assignments));
   }
   std::printf("times in ns of CPU per sample\n");
   if (options.preset != "paper") BenchPreset("fast", fast, 200, subjects, options);

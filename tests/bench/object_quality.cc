@@ -235,8 +235,9 @@ absl::Status MeasureAll(const Options& options) {
   ConfigFields fields;
   fields.Section("slam");
   base.slam.Fields(fields);
+  fields.Section("objects");
   base.objects.Fields(fields);
-  ROMAP_RETURN_IF_ERROR(fields.Set(options.assignments));
+  ROMAP_RETURN_IF_ERROR(fields.Load("", options.assignments));
   Measurement measurement(options, base);
   ROMAP_RETURN_IF_ERROR(measurement.Open());
   if (options.poses != "none") ROMAP_RETURN_IF_ERROR(measurement.Measure(PoseUse::kGiven));

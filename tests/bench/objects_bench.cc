@@ -100,6 +100,7 @@ int Main(int argc, char** argv) {
   ConfigFields fields;
   fields.Section("slam");
   run_options.slam.Fields(fields);
+  fields.Section("objects");
   run_options.objects.Fields(fields);
   files::SequenceOptions options;
   std::vector<std::string> assignments;
@@ -118,7 +119,7 @@ int Main(int argc, char** argv) {
       dir = argv[i];
     }
   }
-  if (absl::Status status = fields.Set(assignments); !status.ok()) {
+  if (absl::Status status = fields.Load("", assignments); !status.ok()) {
     std::fprintf(stderr, "%s\n", Message(status).c_str());
     return 2;
   }

@@ -16,7 +16,7 @@ int RunConfigured(Options& options, absl::Status (*run)(const Options&)) {
   options.nerf.Fields(fields);
   fields.Section("mesh");
   options.mesh.Fields(fields);
-  absl::Status status = fields.Set(options.assignments);
+  absl::Status status = fields.Load("", options.assignments);
   if (status.ok()) status = run(options);
   if (!status.ok()) std::fprintf(stderr, "error: %s\n", Message(status).c_str());
   return status.ok() ? 0 : 1;

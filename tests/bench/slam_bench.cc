@@ -164,7 +164,7 @@ int Main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--sensor-depth") == 0) sensor_depth = true;
     if (std::strcmp(argv[i], "--set") == 0 && i + 1 < argc) assignments.emplace_back(argv[++i]);
   }
-  absl::Status status = fields.Set(assignments);
+  absl::Status status = fields.Load("", assignments);
   if (status.ok()) status = Bench(argv[1], config, sensor_depth);
   if (!status.ok()) std::fprintf(stderr, "slam_bench: %s\n", Message(status).c_str());
   return status.ok() ? 0 : 1;

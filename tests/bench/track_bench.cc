@@ -97,7 +97,7 @@ Options Parse(int argc, char** argv) {
       options.sequence = arg;
     }
   }
-  if (const absl::Status status = fields.Set(sets); !status.ok()) {
+  if (const absl::Status status = fields.Load("", sets); !status.ok()) {
     std::fprintf(stderr, "track_bench: %s\n", Message(status).c_str());
     std::exit(2);
   }

@@ -34,9 +34,14 @@ void MakeSmallSequence(const std::string& dir) {
 
 std::vector<std::string> BenchPaper(const testing_support::TemporaryFolder& folder,
                                     const std::vector<std::string>& more) {
-  std::vector<std::string> command = {
-      ROMAP_CLIENT, "bench", "paper", folder / "sequence",         "--out", folder / "out",
-      "--threads",  "1",     "--set", "nerf.full_budget_steps=60", "--set", "mesh.resolution=32"};
+  std::vector<std::string> command = {ROMAP_CLIENT, "bench",
+                                      "paper",      folder / "sequence",
+                                      "--out",      folder / "out",
+                                      "--threads",  "1",
+                                      "--set",      "nerf.full_budget_steps=60",
+                                      "--set",      "nerf.first_budget_steps=60",
+                                      "--set",      "mesh.resolution=32",
+                                      "--set",      "mesh.min_side_nodes=32"};
   command.insert(command.end(), more.begin(), more.end());
   return command;
 }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "client/eval/trajectory_eval.h"
 #include "client/synth/synth.h"
@@ -19,6 +20,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 using testing_support::BackgroundProcess;
 using testing_support::ProcessResult;
 using testing_support::RunProcess;
@@ -138,7 +140,7 @@ TEST(ProgramsTest, InterruptWritesThePartialMap) {
   EXPECT_LT(summary["frames"]["sent"], 60);
 }
 
-TEST(ProgramsTest, DeployedConfigurationMatchesTheDefaults) {
+TEST(ProgramsTest, DeployedConfigurationIsTheDefaultDumpForOperators) {
   std::ifstream file(ROMAP_SOURCE_DIR "/deploy/server.yaml");
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   EXPECT_EQ(testing_support::RunProcess({ROMAP_SERVER, "--dump-config"}).out, text)
@@ -147,6 +149,19 @@ TEST(ProgramsTest, DeployedConfigurationMatchesTheDefaults) {
       testing_support::RunProcess({ROMAP_SERVER, "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--dump-config"})
           .out,
       text);
+  const std::regex setting("\n  [a-z]");
+  EXPECT_LE(std::distance(std::sregex_iterator(text.begin(), text.end(), setting), std::sregex_iterator()), 24);
+}
+
+TEST(ProgramsTest, DumpOfAllSettingsReadsBack) {
+  const testing_support::TemporaryFolder folder;
+  const testing_support::ProcessResult dump = testing_support::RunProcess(
+      {ROMAP_SERVER, "--dump-config", "--expert", "--set", "nerf.preset=paper", "--log-level", "error"});
+  EXPECT_THAT(dump.out, AllOf(HasSubstr("\n  levels: 16\n"), HasSubstr("\n  level: \"error\"\n")));
+  std::ofstream(folder / "all.yaml") << dump.out;
+  EXPECT_EQ(
+      testing_support::RunProcess({ROMAP_SERVER, "--dump-config", "--expert", "--config", folder / "all.yaml"}).out,
+      dump.out);
 }
 
 // ------------------------------------------------------------------------------------------------ invalid input
@@ -209,6 +224,23 @@ TEST(InvalidInputTest, UnknownFlagCommandAndConfigKey) {
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "bad.yaml"}), 2,
                 "bad.yaml:2: unknown key 'mesh.resolutoin', did you mean 'mesh.resolution'?");
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--frobnicate"}), 2, "frobnicate");
+}
+
+TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
+  const testing_support::TemporaryFolder folder;
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "missing.yaml"}), 2,
+                "missing.yaml: cannot read: No such file or directory");
+  std::ofstream(folder / "conflict.yaml") << "nerf:\n  backend: cuda\n  field: sdf\n";
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "conflict.yaml"}), 2,
+                "conflict.yaml:2: nerf.backend = cuda does not support nerf.field = sdf");
+  MakeSmallSequence(folder / "sequence");
+  // The sections of the server in its configuration are no fault of a local mapping.
+  const testing_support::ProcessResult run =
+      Romap({"run", folder / "sequence", "--local", "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--set",
+             "mesh.min_side_nodes=65", "--out", folder / "map"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, MatchesRegex("romap: --set: mesh.min_side_nodes = 65 must not exceed mesh.resolution = 64 "
+                                    "\\(.*server.yaml:[0-9]+\\)\n"));
 }
 
 TEST(InvalidInputTest, NoServerAndPortInUse) {

@@ -1,7 +1,5 @@
 #include "server/nerf/model/step_parameters.h"
 
-#include <algorithm>
-
 namespace romap::nerf {
 namespace {
 
@@ -25,7 +23,7 @@ ShapeWeights MakeShapeWeights(const NerfConfig& config) {
 
 SampleBudget MakeSampleBudget(const NerfConfig& config) {
   return {.finest_step = static_cast<float>(config.min_sample_spacing),
-          .least = std::min(config.min_samples_per_ray, config.max_samples_per_ray),
+          .least = config.min_samples_per_ray,
           .most = config.max_samples_per_ray,
           .skip_empty = config.sampling == "occupied"};
 }

@@ -25,9 +25,14 @@ PaperBenchOptions TinyBench(const testing::TinySequence& data) {
   options.threads = 1;
   options.tables = {"1"};
   options.methods = {"fast", "hull"};
-  options.settings = {"nerf.levels=4",          "nerf.log2_table_entries=10",
-                      "nerf.rays_per_step=256", "nerf.full_budget_steps=40",
-                      "nerf.max_extra_steps=0", "mesh.resolution=24"};
+  options.settings = {"nerf.levels=4",
+                      "nerf.log2_table_entries=10",
+                      "nerf.rays_per_step=256",
+                      "nerf.full_budget_steps=40",
+                      "nerf.first_budget_steps=7",
+                      "nerf.max_extra_steps=0",
+                      "mesh.resolution=24",
+                      "mesh.min_side_nodes=24"};
   return options;
 }
 

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/config.h"
+#include "common/status.h"
+
+namespace romap::testing_support {
+
+// The message about the faults of a stage's settings after `assignments`; empty if there are none.
+template <class Config>
+std::string FaultsOf(const std::string& section, const std::vector<std::string>& assignments) {
+  Config config;
+  ConfigFields fields;
+  fields.Section(section);
+  config.Fields(fields);
+  return Message(fields.Load("", assignments));
+}
+
+}  // namespace romap::testing_support
