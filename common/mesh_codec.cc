@@ -24,20 +24,20 @@ bool IsDegenerate(const std::array<uint32_t, 3>& triangle) {
 
 absl::Status ValidateOptions(const DracoOptions& options) {
   if (options.position_bits < 1 || options.position_bits > 30) {
-    return InvalidArgument("position_bits {} must be 1..30", options.position_bits);
+    return InvalidArgument("position_bits must be 1..30, got {}", options.position_bits);
   }
   if (options.normal_bits < 2 || options.normal_bits > 30) {
-    return InvalidArgument("normal_bits {} must be 2..30", options.normal_bits);
+    return InvalidArgument("normal_bits must be 2..30, got {}", options.normal_bits);
   }
-  if (options.speed < 0 || options.speed > 10) return InvalidArgument("speed {} must be 0..10", options.speed);
+  if (options.speed < 0 || options.speed > 10) return InvalidArgument("speed must be 0..10, got {}", options.speed);
   return absl::OkStatus();
 }
 
 absl::Status ValidateMesh(const Mesh& mesh) {
   const size_t vertices = mesh.vertices.size();
   if (mesh.triangles.size() > kMaxCodecTriangles || vertices > 3 * kMaxCodecTriangles) {
-    return InvalidArgument("mesh of {} triangles and {} vertices, at most {} triangles can be encoded",
-                           mesh.triangles.size(), vertices, kMaxCodecTriangles);
+    return InvalidArgument("mesh has {} triangles and {} vertices; the limits are {} and {}", mesh.triangles.size(),
+                           vertices, kMaxCodecTriangles, 3 * kMaxCodecTriangles);
   }
   if (!mesh.normals.empty() && mesh.normals.size() != vertices) {
     return InvalidArgument("mesh has {} normals for {} vertices", mesh.normals.size(), vertices);
@@ -51,7 +51,8 @@ absl::Status ValidateMesh(const Mesh& mesh) {
   }
   for (size_t i = 0; i < mesh.triangles.size(); ++i) {
     for (const uint32_t index : mesh.triangles[i]) {
-      if (index >= vertices) return InvalidArgument("triangle {} names vertex {} of {}", i, index, vertices);
+      if (index >= vertices)
+        return InvalidArgument("triangle {} uses vertex {}, but the mesh has {} vertices", i, index, vertices);
     }
   }
   return absl::OkStatus();
@@ -81,7 +82,8 @@ void FillDraco(const Mesh& mesh, draco::Mesh& target) {
   if (!mesh.colors.empty()) AddAttribute(GeometryAttribute::COLOR, draco::DT_UINT8, mesh.colors, target);
 }
 
-// Draco allocates by the counts in the stream before it looks whether the data can be there, so they are read first.
+// Draco allocates memory for the counts in the stream before it checks whether the data can be there, so the counts are
+// checked first.
 // Layout of a 2.2 stream: "DRACO", major, minor, geometry, method, flags (2 bytes), then for edgebreaker: traversal,
 // vertex count and triangle count (varints).
 absl::Status CheckHeader(const std::string& bytes) {
@@ -92,27 +94,26 @@ absl::Status CheckHeader(const std::string& bytes) {
   uint16_t flags = 0;
   uint32_t vertices = 0, triangles = 0;
   if (!buffer.Decode(magic, sizeof(magic)) || std::string(magic, sizeof(magic)) != "DRACO") {
-    return InvalidArgument("not a Draco mesh: {} bytes that do not begin with DRACO", bytes.size());
+    return InvalidArgument("not a Draco mesh: the {} bytes do not start with DRACO", bytes.size());
   }
   const bool complete = buffer.Decode(&major) && buffer.Decode(&minor) && buffer.Decode(&geometry) &&
                         buffer.Decode(&method) && buffer.Decode(&flags) && buffer.Decode(&traversal) &&
                         draco::DecodeVarint(&vertices, &buffer) && draco::DecodeVarint(&triangles, &buffer);
-  if (!complete) return InvalidArgument("Draco mesh is cut off after {} bytes", bytes.size());
+  if (!complete) return InvalidArgument("Draco mesh is truncated after {} bytes", bytes.size());
   if (major != 2 || minor != 2 || geometry != draco::TRIANGULAR_MESH || method != draco::MESH_EDGEBREAKER_ENCODING ||
       flags != 0) {
     return InvalidArgument(
-        "Draco stream {}.{} of geometry {}, method {}, flags {}; want 2.2, 1 (mesh), 1 "
-        "(edgebreaker), 0",
+        "Draco stream has version {}.{}, geometry {}, method {}, flags {}; must be 2.2, 1 (mesh), 1 (edgebreaker), 0",
         major, minor, geometry, method, flags);
   }
   if (triangles > kMaxCodecTriangles || vertices > 3 * kMaxCodecTriangles) {
-    return InvalidArgument("Draco mesh claims {} triangles and {} vertices, at most {} triangles are read", triangles,
-                           vertices, kMaxCodecTriangles);
+    return InvalidArgument("Draco mesh claims {} triangles and {} vertices; the limits are {} and {}", triangles,
+                           vertices, kMaxCodecTriangles, 3 * kMaxCodecTriangles);
   }
   return absl::OkStatus();
 }
 
-// The values of an attribute by point; empty when the stream does not have it.
+// The values of an attribute by point; empty if the stream does not have the attribute.
 template <class Value>
 absl::StatusOr<std::vector<Value>> ReadAttribute(const draco::Mesh& source, GeometryAttribute::Type type,
                                                  draco::DataType data_type) {
@@ -120,7 +121,7 @@ absl::StatusOr<std::vector<Value>> ReadAttribute(const draco::Mesh& source, Geom
   const draco::PointAttribute* attribute = source.GetNamedAttribute(type);
   if (attribute == nullptr) return values;
   if (attribute->num_components() != 3 || attribute->data_type() != data_type) {
-    return InvalidArgument("Draco mesh: {} has {} components of type {}, want 3 of type {}",
+    return InvalidArgument("Draco mesh: {} has {} components of type {}; must be 3 of type {}",
                            GeometryAttribute::TypeToString(type), attribute->num_components(),
                            static_cast<int>(attribute->data_type()), static_cast<int>(data_type));
   }
@@ -157,7 +158,7 @@ absl::StatusOr<std::string> EncodeDraco(const Mesh& mesh, const DracoOptions& op
     draco::Mesh source;
     FillDraco(mesh, source);
     if (source.num_faces() == 0) {
-      return InvalidArgument("mesh has no triangle with three different vertices ({} triangles)",
+      return InvalidArgument("mesh has no triangle with three different vertices, in {} triangles",
                              mesh.triangles.size());
     }
     draco::Encoder encoder;

@@ -12,29 +12,29 @@
 namespace romap::mesh {
 namespace {
 
-// Size of the box in a view from which on that view counts as sharp, about what a field of this kind can resolve.
+// Length of the box in a view from which on the view counts as sharp: about the resolution of a trained field.
 constexpr float kSharpSide_px = 64.0f;
 // Sum of weights that brings confidence to 1 - 1/e.
 constexpr float kEnoughWeight = 2.0f;
-// What is so many cells in front of a vertex hides it, plus what its own surface rises over two cells; a surface that
-// is grazed more flatly than this counts as rising no more.
+// A vertex is hidden if the depth buffer is this many cells in front of it, plus the depth over which its own surface
+// extends within two cells at the viewing angle, up to a largest slope.
 constexpr float kHiddenCells = 1.5f;
 constexpr float kMostSlope = 4.0f;
-// More views than these say little more and are not asked; the weights of those that are stand for the others.
+// Of more views only this many are used, because the rest adds little; their weights are scaled up.
 constexpr size_t kMostViews = 16;
-// Of a bin of the depth buffer, so that surface which faces the view leaves no bin empty.
+// Size of a bin of the depth buffer, so that a surface that faces the view leaves no bin empty.
 constexpr float kBinCells = 2.0f;
-// Beyond, a depth buffer would only be a waste: the camera is inside the object.
+// Largest side of the depth buffer. A larger one would be needed only if the camera were inside the object.
 constexpr int kMostSide = 512;
-// Pixels farther out are in no image, and numbers of theirs might overflow.
+// Larger pixel coordinates are outside any image, and conversions to int could overflow.
 constexpr float kMostPixel = 1e6f;
 
-// So many vertices are projected at a time: what is known of them stays in the nearest cache.
+// Vertices projected at a time, few enough to stay in the L1 cache.
 constexpr Eigen::Index kBlock = 256;
 using Block = Eigen::Array<float, kBlock, 1>;
 
-// Coordinates of vertices and normals by axis, for arithmetic on many at a time; filled up to whole blocks with zeros,
-// which as normals face no view.
+// Coordinates of vertices and normals by axis, for vectorized arithmetic; padded to whole blocks with zeros, because a
+// zero normal faces no view.
 struct VertexArrays {
   std::array<Eigen::ArrayXf, 3> vertex, normal;
   Eigen::Index blocks;
@@ -81,7 +81,7 @@ struct FacingVertices {
       const Block u = (R(0, 0) * x + R(0, 1) * y + R(0, 2) * z + t.x()) * per_depth * fx_px + cx_px;
       const Block v = (R(1, 0) * x + R(1, 1) * y + R(1, 2) * z + t.y()) * per_depth * fy_px + cy_px;
       for (Eigen::Index i = 0; i < kBlock; ++i) {
-        // Whether a vertex faces the view cannot be foretold: each is written, and kept by moving on.
+        // Without a branch, which would be unpredictable: each vertex is written, and kept by advancing `count`.
         vertex[count] = static_cast<uint32_t>(block * kBlock + i);
         depth_mu[count] = depth[i];
         cosine[count] = block_cosine[i];
@@ -106,7 +106,7 @@ struct FacingVertices {
   }
 };
 
-// The nearest depth in each bin of a view's picture; a bin is about two of the mesh's cells wide.
+// The smallest depth in each bin of a view's image; a bin is about two cells of the mesh wide.
 class DepthBuffer {
  public:
   DepthBuffer(const FacingVertices& facing, float bin_px)
@@ -125,7 +125,7 @@ class DepthBuffer {
     }
   }
 
-  // Where the i-th of the facing vertices is.
+  // The smallest depth at the i-th facing vertex.
   float NearestAt(size_t i) const { return nearest_mu_[bin_[i]]; }
 
  private:
@@ -169,7 +169,7 @@ class Observation {
   const VertexArrays arrays_;
   const float longest_side_mu_;
   const float cell_mu_;
-  FacingVertices facing_;  // of the present view
+  FacingVertices facing_;  // of the current view
 };
 
 }  // namespace
@@ -178,10 +178,10 @@ void SetConfidence(std::span<const TrainingCamera> views, const Eigen::Vector3f&
                    Mesh& mesh) {
   mesh.confidence.assign(mesh.vertices.size(), 0.0f);
   Observation observation(mesh, box_half_extents, cell_mu);
-  const size_t asked = std::min(views.size(), kMostViews);
-  if (asked == 0) return;
-  for (size_t i = 0; i < asked; ++i) observation.Add(views[i * views.size() / asked], mesh.confidence);
-  const float per_weight = static_cast<float>(views.size()) / static_cast<float>(asked) / kEnoughWeight;
+  const size_t used = std::min(views.size(), kMostViews);
+  if (used == 0) return;
+  for (size_t i = 0; i < used; ++i) observation.Add(views[i * views.size() / used], mesh.confidence);
+  const float per_weight = static_cast<float>(views.size()) / static_cast<float>(used) / kEnoughWeight;
   for (float& confidence : mesh.confidence) confidence = 1.0f - std::exp(-confidence * per_weight);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,19 +12,20 @@
 #include "server/mesh/confidence.h"
 #include "server/mesh/confirmed_space.h"
 #include "server/mesh/floaters.h"
-#include "server/mesh/grid_nodes.h"
+#include "server/mesh/grid_resolution.h"
 #include "server/mesh/hidden_space.h"
 #include "server/mesh/marching_cubes.h"
 #include "server/mesh/refine_vertices.h"
 #include "server/mesh/sample_field.h"
-#include "server/mesh/support_height.h"
 #include "server/mesh/surface_probe.h"
 #include "server/mesh/vertex_normals.h"
+#include "server/mesh/visibility.h"
+#include "server/mesh/visible_base.h"
 
 namespace romap::mesh {
 namespace {
 
-constexpr float kUnseenOpticalDepth = 0.2f;  // towards a view, beyond which the view sees nothing
+constexpr float kMaxOpticalDepth = 0.2f;  // towards a view, up to which a point is visible
 
 absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   const std::string object = snapshot.object.ToString();
@@ -44,13 +46,13 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   }
   const size_t side = std::max(snapshot.hull.resolution, 0);
   if (snapshot.hull.bits.size() != side * side * side) {
-    return InvalidArgument("{}: hull has {} bits, want {}^3", object, snapshot.hull.bits.size(), side);
+    return InvalidArgument("{}: hull has {} cells, must have {}^3", object, snapshot.hull.bits.size(), side);
   }
-  if (config.resolution < 2) return InvalidArgument("mesh.resolution {} must be at least 2", config.resolution);
+  if (config.resolution < 2) return InvalidArgument("mesh.resolution must be at least 2, got {}", config.resolution);
   return absl::OkStatus();
 }
 
-// Books the time since the last booking on one phase after the other.
+// Adds the thread's CPU time since the last call to one phase after the other.
 class PhaseClock {
  public:
   explicit PhaseClock(MeshStats& stats) : stats_(stats), last_s_(ThreadCpuSeconds()) {}
@@ -66,10 +68,10 @@ class PhaseClock {
   size_t phase_ = 0;
 };
 
-SightLimits SightOf(const FieldSnapshot& snapshot, const MeshConfig& config) {
-  SightLimits limits{.view_centers = {},
-                     .surface_density_per_mu = snapshot.optics.surface_density_per_mu,
-                     .max_optical_depth = kUnseenOpticalDepth};
+VisibilityLimits LimitsOf(const FieldSnapshot& snapshot) {
+  VisibilityLimits limits{.view_centers = {},
+                          .surface_density_per_mu = snapshot.optics.surface_density_per_mu,
+                          .max_optical_depth = kMaxOpticalDepth};
   for (const TrainingCamera& view : snapshot.cameras) {
     limits.view_centers.push_back(view.T_camera_object.Inverse().translation().cast<float>());
   }
@@ -90,22 +92,22 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   PhaseClock clock(stats != nullptr ? *stats : own_stats);
   const SurfaceProbe probe(snapshot);
   const Eigen::Vector3i nodes = ChooseNodes(snapshot, config);
-  auto [grid, asked_nodes] = SampleField(snapshot, probe, nodes);
+  auto [grid, samples] = SampleField(snapshot, probe, nodes);
   clock.EndPhase();
 
   EmptyUnconfirmed(snapshot.cameras, config.min_confirmed_share, grid);
   clock.EndPhase();
-  SightTester sight(grid, SightOf(snapshot, config));
-  SightTester no_sight(grid, {});
-  FillHiddenSpace(grid, config.fill_unseen ? sight : no_sight);
+  VisibilityTester visibility(grid, LimitsOf(snapshot));
+  VisibilityTester no_views(grid, {});
+  FillHiddenSpace(grid, config.fill_unseen ? visibility : no_views);
   clock.EndPhase();
   if (config.cut_below_support) {
-    const auto height = FindSupportHeight(grid, sight);
-    if (height) CutBelow(grid, *height);
+    const std::optional<float> base = FindVisibleBase(grid, visibility);
+    if (base) CutBelow(grid, *base);
   }
   clock.EndPhase();
   if (RemoveFloaters(grid, probe.connect_value(), config.min_component_share) == 0) {
-    return FailedPrecondition("{}: no surface at this level", snapshot.object.ToString());
+    return FailedPrecondition("{}: the field is nowhere above the surface level", snapshot.object.ToString());
   }
   clock.EndPhase();
 
@@ -123,9 +125,9 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   clock.EndPhase();
   if (stats != nullptr) {
     stats->nodes = nodes;
-    stats->asked_nodes = asked_nodes;
+    stats->sampled_nodes = samples;
   }
-  if (mesh.triangles.empty()) return FailedPrecondition("{}: no view saw its surface", snapshot.object.ToString());
+  if (mesh.triangles.empty()) return FailedPrecondition("{}: no view observed the surface", snapshot.object.ToString());
   return mesh;
 }
 

@@ -7,15 +7,15 @@
 
 namespace romap::mesh {
 
-// A node that holds nothing for sure: outside the hull, outside the box, or where the field has no finite answer.
+// Value of a node that is certainly empty: outside the hull, outside the box, or where the field is not finite.
 inline constexpr float kEmpty = -1e4f;
-// A node of the ring around the box: whatever the field says inside, the surface closes at the box.
+// Value of the ring of nodes around the box, so that the surface closes at the box whatever the field is inside.
 inline constexpr float kBeyondBox = -1e30f;
-// The value of a node that is declared solid without the field saying so.
+// Value of a node that a rule made solid against the field.
 inline constexpr float kSolid = 2.0f;
 
 // The field on a regular grid over the box, with one ring of kBeyondBox nodes around it so that every surface closes
-// and every other node has all its neighbours. A value is the logarithm of the density over that at the surface: 0 on
+// and every other node has all its neighbors. A value is the logarithm of the density over that at the surface: 0 on
 // the surface, > 0 inside. Node (x, y, z) is value[Index(x, y, z)], x fastest; nodes 1 to nodes - 2 of each axis span
 // the box from face to face.
 struct FieldGrid {
@@ -23,23 +23,23 @@ struct FieldGrid {
   Eigen::Vector3f origin;                           // of node (0, 0, 0), Object frame, map units
   Eigen::Vector3f spacing;                          // between nodes, map units
   std::vector<float> value;
-  std::vector<uint8_t> edited;  // 1 = the value was decided by a rule against what the field says
+  std::vector<uint8_t> edited;  // 1 = a rule replaced the field's value
 
   size_t StrideY() const { return static_cast<size_t>(nodes.x()); }
   size_t StrideZ() const { return StrideY() * static_cast<size_t>(nodes.y()); }
   size_t Index(int x, int y, int z) const {
     return static_cast<size_t>(z) * StrideZ() + static_cast<size_t>(y) * StrideY() + static_cast<size_t>(x);
   }
-  // The (x, y, z) of a node, as the inverse of Index().
+  // The (x, y, z) of a node; the inverse of Index().
   Eigen::Vector3f NodeAt(size_t index) const {
-    // Division of 32 bits takes half as long.
+    // 32-bit division takes half as long as 64-bit division.
     const auto node = static_cast<uint32_t>(index);
     const auto stride_y = static_cast<uint32_t>(StrideY());
     const auto row = node / stride_y, rows = static_cast<uint32_t>(nodes.y());
     return {static_cast<float>(node - row * stride_y), static_cast<float>(row % rows), static_cast<float>(row / rows)};
   }
   Eigen::Vector3f Position(const Eigen::Vector3f& node) const { return origin + node.cwiseProduct(spacing); }
-  // Inverse of Position(): node coordinates of a point of the Object frame.
+  // Node coordinates of a point in the Object frame; the inverse of Position().
   Eigen::Vector3f ToNode(const Eigen::Vector3f& p_object) const { return (p_object - origin).cwiseQuotient(spacing); }
 
   void Edit(size_t index, float new_value) {

@@ -8,18 +8,18 @@
 namespace romap::mesh {
 namespace {
 
-// Neighbouring nodes of one row of the grid (along x) that hang together.
+// Consecutive connected nodes of one row of the grid (along x).
 struct Run {
-  int begin, end;   // x of the first, and behind the last
-  uint32_t parent;  // a run of the same piece, itself for the one that stands for all
-  uint32_t size;    // nodes inside the surface; of the whole piece where the run stands for it
+  int begin, end;   // x of the first node, and one past the last
+  uint32_t parent;  // a run of the same component; the root is its own parent
+  uint32_t size;    // nodes inside the surface; for the root those of the whole component
 };
 
-// The pieces of matter: runs that touch over sides, edges or corners of cells, united row by row (Rosenfeld and Pfaltz,
-// 1966).
-class Pieces {
+// The connected components of matter: runs that touch over faces, edges or corners of cells, joined row by row
+// (Rosenfeld and Pfaltz, 1966).
+class Components {
  public:
-  Pieces(const FieldGrid& grid, float connect_value) : grid_(grid), connect_value_(connect_value) {
+  Components(const FieldGrid& grid, float connect_value) : grid_(grid), connect_value_(connect_value) {
     const int rows = grid.nodes.y() * grid.nodes.z();
     first_run_.reserve(static_cast<size_t>(rows) + 1);
     for (int row = 0; row < rows; ++row) {
@@ -27,9 +27,10 @@ class Pieces {
       AddRuns(row);
     }
     first_run_.push_back(static_cast<uint32_t>(runs_.size()));
-    // The rows of the ring are empty, so that none of these is beside a row of the next or last layer.
+    // The neighboring rows in y and z. At the first and last row of a layer these wrap into another layer, which is
+    // harmless because the rows of the ring are empty.
     for (int row = grid.nodes.y() + 1; row < rows; ++row) {
-      for (const int step : {1, grid.nodes.y() - 1, grid.nodes.y(), grid.nodes.y() + 1}) Unite(row, row - step);
+      for (const int step : {1, grid.nodes.y() - 1, grid.nodes.y(), grid.nodes.y() + 1}) JoinRows(row, row - step);
     }
   }
 
@@ -39,7 +40,7 @@ class Pieces {
     return largest;
   }
 
-  // Calls visit(first node, nodes, size of its piece) for each run.
+  // Calls visit(first node, number of nodes, size of the component) for each run.
   template <class Visit>
   void ForEachRun(Visit visit) {
     for (size_t row = 0; row + 1 < first_run_.size(); ++row) {
@@ -63,8 +64,8 @@ class Pieces {
     }
   }
 
-  // Unites the pieces of runs of two rows that touch each other.
-  void Unite(int row_a, int row_b) {
+  // Joins the components of the runs of two rows that touch.
+  void JoinRows(int row_a, int row_b) {
     uint32_t a = first_run_[static_cast<size_t>(row_a)], b = first_run_[static_cast<size_t>(row_b)];
     const uint32_t end_a = first_run_[static_cast<size_t>(row_a) + 1];
     const uint32_t end_b = first_run_[static_cast<size_t>(row_b) + 1];
@@ -91,19 +92,19 @@ class Pieces {
   const FieldGrid& grid_;
   const float connect_value_;
   std::vector<Run> runs_;            // row after row, by x
-  std::vector<uint32_t> first_run_;  // by row, and where the last row ends
+  std::vector<uint32_t> first_run_;  // by row, and the end of the last row
 };
 
 }  // namespace
 
 size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share) {
-  Pieces pieces(grid, connect_value);
-  const double least = min_share * static_cast<double>(pieces.Largest());
+  Components components(grid, connect_value);
+  const double least = min_share * static_cast<double>(components.Largest());
   size_t remaining = 0;
-  pieces.ForEachRun([&](size_t first, size_t nodes, size_t size_of_piece) {
+  components.ForEachRun([&](size_t first, size_t nodes, size_t component_size) {
     for (size_t node = first; node < first + nodes; ++node) {
       if (!(grid.value[node] > 0)) continue;
-      if (static_cast<double>(size_of_piece) < least) {
+      if (static_cast<double>(component_size) < least) {
         grid.Edit(node, kEmpty);
       } else {
         ++remaining;

@@ -13,8 +13,8 @@ enum State : uint8_t { kUntouched, kOpen, kClosed };
 
 class HiddenSpace {
  public:
-  HiddenSpace(FieldGrid& grid, SightTester& sight)
-      : grid_(grid), sight_(sight), state_(grid.value.size(), kUntouched) {}
+  HiddenSpace(FieldGrid& grid, VisibilityTester& visibility)
+      : grid_(grid), visibility_(visibility), state_(grid.value.size(), kUntouched) {}
 
   void Fill() {
     Flood(grid_, OpenNodesOnBox(), [this](size_t node) { return Enter(node); });
@@ -28,7 +28,7 @@ class HiddenSpace {
 
   bool Enter(size_t node) {
     if (state_[node] != kUntouched || !IsSpace(node)) return false;
-    const bool open = grid_.value[node] == kEmpty || !sight_.has_views() || sight_.IsSeen(node);
+    const bool open = grid_.value[node] == kEmpty || !visibility_.has_views() || visibility_.IsVisible(node);
     state_[node] = open ? kOpen : kClosed;
     return open;
   }
@@ -48,12 +48,12 @@ class HiddenSpace {
   }
 
   FieldGrid& grid_;
-  SightTester& sight_;
+  VisibilityTester& visibility_;
   std::vector<uint8_t> state_;
 };
 
 }  // namespace
 
-void FillHiddenSpace(FieldGrid& grid, SightTester& sight) { HiddenSpace(grid, sight).Fill(); }
+void FillHiddenSpace(FieldGrid& grid, VisibilityTester& visibility) { HiddenSpace(grid, visibility).Fill(); }
 
 }  // namespace romap::mesh

@@ -1,15 +1,15 @@
 #pragma once
 
 #include "server/mesh/field_grid.h"
-#include "server/mesh/sight_tester.h"
+#include "server/mesh/visibility.h"
 
 namespace romap::mesh {
 
-// Makes empty space solid that is hidden: all nodes outside the surface that cannot be reached from outside the box by
-// steps over the six neighbours through space that is open to sight. A node is open when the optical depth towards some
-// view is within the limits, or when the hull has spoken (kEmpty). No colour ever told about the rest, so the field's
-// answer there is arbitrary; mostly it is the object's inside or underside. `sight` must have been made of this grid;
-// without views everything is open, and only closed cavities fill.
-void FillHiddenSpace(FieldGrid& grid, SightTester& sight);
+// Makes hidden empty space solid: all nodes outside the surface that cannot be reached from outside the box over six
+// neighbors through open nodes. A node is open if it is visible from some view, or certainly empty (kEmpty). No
+// training pixel constrains the field in hidden space, so its values there are arbitrary; most of it is the inside or
+// the underside of the object. `visibility` must have been made from this grid; without views every node is open, and
+// only closed cavities are filled.
+void FillHiddenSpace(FieldGrid& grid, VisibilityTester& visibility);
 
 }  // namespace romap::mesh

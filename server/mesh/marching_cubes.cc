@@ -13,10 +13,10 @@
 namespace romap::mesh {
 namespace {
 
-// Below, a value means "nothing here" and says nothing about where the surface is.
+// Smaller values only mean "empty"; their size does not indicate the distance to the surface.
 constexpr float kClampBelow = -6.0f;
 
-constexpr int kGroup = 8;  // nodes whose flags are looked at together, as one word with a byte for each
+constexpr int kGroup = 8;  // nodes processed together: one word with one byte per node
 
 // Calls visit(k) for each byte k of a word of flags that is 1.
 template <class Visit>
@@ -24,8 +24,8 @@ void ForEachFlag(uint64_t flags, Visit visit) {
   for (; flags != 0; flags &= flags - 1) visit(std::countr_zero(flags) / 8);
 }
 
-// One pass: at each node the vertices on the edges that end there are made, and then the triangles of the cell whose
-// last corner it is, all of whose edges end at this node or earlier ones.
+// One pass over the nodes: creates the vertices on the edges that end at a node, then the triangles of the cell whose
+// last corner it is. All edges of that cell end at this node or earlier ones.
 class Marcher {
  public:
   explicit Marcher(const FieldGrid& grid)
@@ -61,10 +61,10 @@ class Marcher {
     return flags;
   }
 
-  // The nodes (x .. x + 7, y, z), as far as the row goes.
+  // The nodes (x .. x + 7, y, z), up to the end of the row.
   void MarchGroup(int x, int y, int z) {
     const size_t node = grid_.Index(x, y, z);
-    // A flag is 0 or 1 and has room in its byte for those of all eight corners.
+    // A flag is 0 or 1, so that the flags of all eight corners fit in one byte.
     uint64_t any = 0, all = ~uint64_t{0}, pattern = 0;
     for (int corner = 0; corner < kCellCorners; ++corner) {
       const uint64_t flags = Flags(node - corner_back_[corner]);
@@ -110,10 +110,11 @@ class Marcher {
   const FieldGrid& grid_;
   const MarchingCubesTable& table_ = GetMarchingCubesTable();
   const std::array<size_t, 3> stride_;
-  std::array<size_t, kCellCorners> corner_back_;  // from a cell's last node back to its corners
-  std::array<ptrdiff_t, kCellEdges> edge_back_;   // in vertex_of_edge_, from a cell's last node's to its edges
-  std::vector<uint8_t> inside_;                   // by node; a group at the end looks beyond the last one
-  std::unique_ptr<uint32_t[]> vertex_of_edge_;    // three per node: of the edges that end there, where crossed
+  std::array<size_t, kCellCorners> corner_back_;  // index step from a cell's last node back to each corner
+  std::array<ptrdiff_t, kCellEdges> edge_back_;   // step in vertex_of_edge_ from a cell's last node to each edge
+  std::vector<uint8_t> inside_;                   // by node, padded for the group that starts at the last node
+  std::unique_ptr<uint32_t[]>
+      vertex_of_edge_;  // by node and axis: the vertex on the edge that ends at the node; unset if not crossed
   GridSurface surface_;
 };
 

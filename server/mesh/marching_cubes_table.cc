@@ -22,7 +22,7 @@ int EdgeBetween(int corner_a, int corner_b) {
     const int high = low | 1 << EdgeAxis(edge);
     if ((low == corner_a && high == corner_b) || (low == corner_b && high == corner_a)) return edge;
   }
-  assert(false && "corners of no common edge");
+  assert(false && "the corners have no common edge");
   return kNone;
 }
 
@@ -36,7 +36,7 @@ std::array<int, kCellEdges> LinkEdges(int pattern) {
   for (const auto& face : kFaceCorners) {
     for (int start = 0; start < 4; ++start) {
       if (Inside(pattern, face[start]) || !Inside(pattern, face[(start + 1) % 4])) continue;
-      // A run of inside corners begins after `start`; `last` is the corner where it ends.
+      // A run of inside corners starts after `start` and ends at `last`.
       int last = start + 1;
       while (Inside(pattern, face[(last + 1) % 4])) ++last;
       const int entry_edge = EdgeBetween(face[start], face[(start + 1) % 4]);
@@ -47,38 +47,38 @@ std::array<int, kCellEdges> LinkEdges(int pattern) {
   return next;
 }
 
-// Twice the middle of a cell edge, so that it is whole-numbered.
-Eigen::Vector3i TwiceMiddle(int edge) {
+// Twice the midpoint of a cell edge, so that its coordinates are integers.
+Eigen::Vector3i TwiceMidpoint(int edge) {
   const int corner = EdgeCorner(edge);
-  Eigen::Vector3i middle(2 * (corner & 1), 2 * (corner >> 1 & 1), 2 * (corner >> 2 & 1));
-  middle[EdgeAxis(edge)] = 1;
-  return middle;
+  Eigen::Vector3i midpoint(2 * (corner & 1), 2 * (corner >> 1 & 1), 2 * (corner >> 2 & 1));
+  midpoint[EdgeAxis(edge)] = 1;
+  return midpoint;
 }
 
 bool OnCommonFace(int edge_a, int edge_b) {
-  const Eigen::Vector3i a = TwiceMiddle(edge_a);
-  const Eigen::Vector3i b = TwiceMiddle(edge_b);
+  const Eigen::Vector3i a = TwiceMidpoint(edge_a);
+  const Eigen::Vector3i b = TwiceMidpoint(edge_b);
   for (int axis = 0; axis < 3; ++axis) {
     if (a[axis] == b[axis] && a[axis] != 1) return true;
   }
   return false;
 }
 
-// Cuts loops of cell edges into triangles with the shortest diagonals, none of which lies in a face of the cell.
-class LoopCutter {
+// Triangulates a loop of cell edges with the shortest diagonals, none of which lies in a face of the cell.
+class LoopTriangulation {
  public:
-  explicit LoopCutter(const std::vector<int>& loop) : loop_(loop) {
+  explicit LoopTriangulation(const std::vector<int>& loop) : loop_(loop) {
     const int n = static_cast<int>(loop.size());
     cost_.assign(n, std::vector<double>(n, 0.0));
     apex_.assign(n, std::vector<int>(n, kNone));
     for (int span = 2; span < n; ++span) {
-      for (int first = 0; first + span < n; ++first) CutBest(first, first + span);
+      for (int first = 0; first + span < n; ++first) TriangulatePart(first, first + span);
     }
   }
 
   void AppendTriangles(CellTriangles& triangles) const {
     const int last = static_cast<int>(loop_.size()) - 1;
-    assert(cost_[0][last] < kForbidden && "every loop has a cut that stays off the faces");
+    assert(cost_[0][last] < kForbidden && "every loop can be triangulated without diagonals in faces");
     Append(0, last, triangles);
   }
 
@@ -89,11 +89,11 @@ class LoopCutter {
     const int n = static_cast<int>(loop_.size());
     if (j - i == 1 || j - i == n - 1) return 0;  // a side of the loop
     if (OnCommonFace(loop_[i], loop_[j])) return kForbidden;
-    return (TwiceMiddle(loop_[i]) - TwiceMiddle(loop_[j])).cast<double>().norm();
+    return (TwiceMidpoint(loop_[i]) - TwiceMidpoint(loop_[j])).cast<double>().norm();
   }
 
-  // Best cut of the part of the loop from `first` to `last`, given the best cuts of all shorter parts.
-  void CutBest(int first, int last) {
+  // Best triangulation of the part of the loop from `first` to `last`, given those of all shorter parts.
+  void TriangulatePart(int first, int last) {
     double best = std::numeric_limits<double>::infinity();
     for (int apex = first + 1; apex < last; ++apex) {
       const double cost = cost_[first][apex] + cost_[apex][last];
@@ -131,7 +131,7 @@ MarchingCubesTable BuildTable() {
         next[edge] = kNone;
         edge = following;
       }
-      if (!loop.empty()) LoopCutter(loop).AppendTriangles(table[pattern]);
+      if (!loop.empty()) LoopTriangulation(loop).AppendTriangles(table[pattern]);
     }
   }
   return table;
@@ -140,7 +140,7 @@ MarchingCubesTable BuildTable() {
 }  // namespace
 
 const MarchingCubesTable& GetMarchingCubesTable() {
-  static const MarchingCubesTable& table = *new MarchingCubesTable(BuildTable());  // never destroyed, on purpose
+  static const MarchingCubesTable& table = *new MarchingCubesTable(BuildTable());  // never destroyed
   return table;
 }
 

@@ -8,7 +8,7 @@
 namespace romap::mesh {
 
 // Numbering of a grid cell. Corner c lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge e runs along axis e / 4 from corner
-// EdgeCorner(e) to the corner with that axis' bit set.
+// EdgeCorner(e) to the corner with that axis's bit set.
 inline constexpr int kCellCorners = 8;
 inline constexpr int kCellEdges = 12;
 inline constexpr int EdgeAxis(int edge) { return edge / 4; }
@@ -26,11 +26,11 @@ inline constexpr int EdgeCorner(int edge) {
   }
 }
 
-// No pattern of corners needs more: a single border crosses at most seven cell edges.
+// Enough for every pattern: a single loop crosses at most seven cell edges.
 inline constexpr size_t kMostCellTriangles = 5;
 
-// The triangles of one cell, each of which names three cell edges, counter-clockwise seen from outside. Of fixed size,
-// so that the whole table is 4 KB in one piece.
+// The triangles of one cell, each given by three cell edges, counter-clockwise seen from outside. Fixed size, so that
+// the whole table is one block of 4 KB.
 class CellTriangles {
  public:
   using Triangle = std::array<uint8_t, 3>;
@@ -53,11 +53,11 @@ class CellTriangles {
 // Triangles of a cell for each of the 256 patterns of inside corners (bit c = corner c is inside).
 using MarchingCubesTable = std::array<CellTriangles, 256>;
 
-// Built once, from first principles (Lorensen & Cline 1987 give the idea). On each face of the cell the border of each
-// run of inside corners is a segment between two cell edges; the segments link to closed loops, which are cut into
-// triangles. Where inside and outside corners of a face alternate, the inside corners are kept apart. That depends on
-// the face alone, so neighbouring cells agree, and no cut runs along a face, so that two neighbours never cut the same:
-// the surface over any grid is a closed 2-manifold.
+// Built on first use (the method is by Lorensen and Cline, 1987). On each face of the cell the border of each run of
+// inside corners is a segment between two cell edges; the segments form closed loops, which are triangulated. If inside
+// and outside corners of a face alternate, the inside corners are separated. This rule depends on the face alone, so
+// that neighboring cells agree, and no diagonal lies in a face, so that neighboring cells never share one. The surface
+// of any grid is therefore a closed 2-manifold.
 const MarchingCubesTable& GetMarchingCubesTable();
 
 }  // namespace romap::mesh

@@ -8,29 +8,30 @@ namespace romap::mesh {
 namespace {
 
 constexpr int kSteps = 2;
-// Far from the surface the size of a value says little about where the surface is.
+// Larger values are clamped, because far from the surface they do not indicate where it is.
 constexpr float kMostValue = 6.0f;
 
-// One vertex between the two ends of what is left of its edge, `at` in shares of the whole edge.
+// The interval of a vertex's edge that contains the crossing, as shares of the whole edge.
 struct Bracket {
   uint32_t vertex;
   int axis;
-  float node_at_mu;  // of the edge's lower node, along the axis
+  float node_at_mu;  // coordinate of the edge's lower node along the axis
   std::array<float, 2> at = {0.0f, 1.0f};
   std::array<float, 2> value;
-  int kept = -1;  // the end that the last step did not move
+  int kept = -1;  // the end that the last step kept; -1 before the first
 
-  float Middle() const {
+  // Where the line through both ends crosses 0.
+  float Estimate() const {
     const float clear = kNodeClearance;
     const float share = at[0] + (at[1] - at[0]) * value[0] / (value[0] - value[1]);
     return std::clamp(share, clear, 1.0f - clear);
   }
 
-  void Narrow(float middle, float middle_value) {
-    const int moved = (middle_value > 0) == (value[0] > 0) ? 0 : 1;
-    at[moved] = middle;
-    value[moved] = std::clamp(middle_value, -kMostValue, kMostValue);
-    // An end that stays time and again holds the others back; counting it half pulls them over.
+  void Narrow(float estimate, float estimate_value) {
+    const int moved = (estimate_value > 0) == (value[0] > 0) ? 0 : 1;
+    at[moved] = estimate;
+    value[moved] = std::clamp(estimate_value, -kMostValue, kMostValue);
+    // The Illinois rule: halve the value of an end that was kept twice, or the interval stops shrinking from that side.
     if (kept == 1 - moved) value[kept] *= 0.5f;
     kept = 1 - moved;
   }
@@ -61,17 +62,17 @@ void RefineVertices(const FieldGrid& grid, const SurfaceProbe& probe, GridSurfac
   std::vector<Bracket> brackets = BracketsOf(grid, surface);
   std::vector<Eigen::Vector3f> points(brackets.size());
   std::vector<float> values(brackets.size());
-  std::vector<float> middles(brackets.size());
+  std::vector<float> estimates(brackets.size());
   for (int step = 0; step <= kSteps; ++step) {
     for (size_t i = 0; i < brackets.size(); ++i) {
       const Bracket& bracket = brackets[i];
-      middles[i] = bracket.Middle();
+      estimates[i] = bracket.Estimate();
       points[i] = surface.mesh.vertices[bracket.vertex];
-      points[i][bracket.axis] = bracket.node_at_mu + middles[i] * grid.spacing[bracket.axis];
+      points[i][bracket.axis] = bracket.node_at_mu + estimates[i] * grid.spacing[bracket.axis];
     }
     if (step == kSteps) break;
     probe.Sample(points, values);
-    for (size_t i = 0; i < brackets.size(); ++i) brackets[i].Narrow(middles[i], values[i]);
+    for (size_t i = 0; i < brackets.size(); ++i) brackets[i].Narrow(estimates[i], values[i]);
   }
   for (size_t i = 0; i < brackets.size(); ++i) surface.mesh.vertices[brackets[i].vertex] = points[i];
 }

@@ -5,9 +5,10 @@
 
 namespace romap::mesh {
 
-// Moves vertices along their grid edges to where the field itself crosses the surface: between two nodes it may be far
-// from even. Two steps of false position (the Illinois variant, Dowell and Jarratt 1971), each of which asks the field
-// once for every vertex. Vertices on edges to an edited node or to the ring stay, and none leaves its edge.
+// Moves vertices along their grid edges to where the field itself crosses the surface, because the field between two
+// nodes can be far from linear. Two steps of false position (the Illinois variant, Dowell and Jarratt 1971), each of
+// which samples the field once per vertex. Vertices on edges to an edited node or to the ring stay, and no vertex
+// leaves its edge.
 void RefineVertices(const FieldGrid& grid, const SurfaceProbe& probe, GridSurface& surface);
 
 }  // namespace romap::mesh

@@ -13,16 +13,18 @@
 namespace romap::mesh {
 namespace {
 
-// Large enough for the sampler's SIMD loops, small enough to stay in the cache.
+// Large enough for the sampler's SIMD loops, small enough for the cache.
 constexpr size_t kBatchPoints = 8192;
-// Around a value below, no surface is near: e^-6 of the surface's density.
+// A node with a smaller value (e^-6 of the surface's density) is not near the surface.
 constexpr float kClearlyEmpty = -6.0f;
-// A mean over hull and box counts those as this: empty, but finite.
+// Nodes outside the hull or the box enter a mean as this value: empty, but finite.
 constexpr float kLeastForMean = -16.0f;
 
-enum State : uint8_t { kDecided, kUnknown, kGuessed, kAsked };
+// kDecided: outside the hull or in the ring.
+enum State : uint8_t { kDecided, kUnknown, kInterpolated, kSampled };
 
-// Which hull cell the nodes 1..nodes of one axis lie in. A node between two cells belongs to the upper one.
+// The hull cell that contains each of the nodes 1..nodes of one axis. A node between two cells belongs to the upper
+// one.
 std::vector<int> HullCellOfNode(int nodes, int hull_resolution) {
   std::vector<int> cell(static_cast<size_t>(nodes) + 1, 0);
   for (int node = 1; node <= nodes; ++node) {
@@ -32,19 +34,19 @@ std::vector<int> HullCellOfNode(int nodes, int hull_resolution) {
   return cell;
 }
 
-class Sampling {
+class FieldSampling {
  public:
-  Sampling(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes)
-      : probe_(probe), grid_(MakeEmptyGrid(box_nodes, snapshot.box_half_extents)), steps_(NeighbourSteps(grid_)) {
+  FieldSampling(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes)
+      : probe_(probe), grid_(MakeEmptyGrid(box_nodes, snapshot.box_half_extents)), steps_(NeighborSteps(grid_)) {
     MarkHull(snapshot.hull);
   }
 
   SampledField Run() && {
-    Ask(LatticeNodes());
-    GuessBetweenLattice();
+    Sample(LatticeNodes());
+    InterpolateBetweenLattice();
     FollowSpace();
-    FillWhatWasNotReached();
-    return {std::move(grid_), asked_};
+    FillUnreachedSpace();
+    return {std::move(grid_), samples_};
   }
 
  private:
@@ -84,11 +86,11 @@ class Sampling {
     return nodes;
   }
 
-  // Guesses the nodes between lattice nodes that are all clearly empty.
-  void GuessBetweenLattice() {
+  // Interpolates the nodes between lattice nodes that are all clearly empty.
+  void InterpolateBetweenLattice() {
     const ptrdiff_t dy = static_cast<ptrdiff_t>(grid_.StrideY()), dz = static_cast<ptrdiff_t>(grid_.StrideZ());
-    // By the axis whose coordinate is the odd one out: the lattice nodes around.
-    const std::array<std::array<ptrdiff_t, 6>, 3> around = {{
+    // The six lattice neighbors of a node, by the axis whose coordinate differs in parity from the other two.
+    const std::array<std::array<ptrdiff_t, 6>, 3> neighbors = {{
         {-1, 1, -dy - dz, dy - dz, dz - dy, dy + dz},
         {-dy, dy, -1 - dz, 1 - dz, dz - 1, 1 + dz},
         {-dz, dz, -1 - dy, 1 - dy, dy - 1, 1 + dy},
@@ -96,36 +98,36 @@ class Sampling {
     ForEachUnknown([&](int x, int y, int z, size_t node) {
       const int axis = (y & 1) == (z & 1) ? 0 : (x & 1) == (z & 1) ? 1 : 2;
       float most = kBeyondBox, sum = 0;
-      for (const ptrdiff_t step : around[axis]) {
+      for (const ptrdiff_t step : neighbors[axis]) {
         most = std::max(most, grid_.value[node + step]);
         sum += std::max(grid_.value[node + step], kLeastForMean);
       }
       if (most >= kClearlyEmpty) return;
       grid_.value[node] = sum / 6.0f;
-      state_[node] = kGuessed;
+      state_[node] = kInterpolated;
     });
   }
 
-  // Asks all nodes that can be reached from outside the hull through space, and the matter that bounds it.
+  // Samples all nodes that can be reached from outside the hull through empty space, and the matter that bounds it.
   void FollowSpace() {
     std::vector<size_t> wave = HullBorder();
     while (!wave.empty()) {
       std::vector<size_t> unknown;
       std::copy_if(wave.begin(), wave.end(), std::back_inserter(unknown),
                    [this](size_t node) { return state_[node] == kUnknown; });
-      Ask(unknown);
+      Sample(unknown);
       std::vector<size_t> next;
       for (const size_t node : wave) {
         for (const ptrdiff_t step : steps_) {
-          const size_t neighbour = node + step;
-          if (state_[neighbour] == kDecided) continue;
-          // What was guessed next to what is not clearly empty may have been guessed wrongly.
-          const bool doubtful = state_[neighbour] == kGuessed && grid_.value[node] > kClearlyEmpty;
-          if (doubtful) state_[neighbour] = kUnknown;
-          const bool enter = reached_[neighbour] == 0 && !(grid_.value[node] > 0);
+          const size_t neighbor = node + step;
+          if (state_[neighbor] == kDecided) continue;
+          // An interpolated value next to a node that is not clearly empty may be wrong.
+          const bool doubtful = state_[neighbor] == kInterpolated && grid_.value[node] > kClearlyEmpty;
+          if (doubtful) state_[neighbor] = kUnknown;
+          const bool enter = reached_[neighbor] == 0 && !(grid_.value[node] > 0);
           if (!doubtful && !enter) continue;
-          reached_[neighbour] = 1;
-          next.push_back(neighbour);
+          reached_[neighbor] = 1;
+          next.push_back(neighbor);
         }
       }
       wave = std::move(next);
@@ -146,13 +148,13 @@ class Sampling {
     return border;
   }
 
-  void FillWhatWasNotReached() {
+  void FillUnreachedSpace() {
     for (size_t node = 0; node < state_.size(); ++node) {
       if (state_[node] != kDecided && reached_[node] == 0 && !(grid_.value[node] > 0)) grid_.Edit(node, kSolid);
     }
   }
 
-  void Ask(const std::vector<size_t>& nodes) {
+  void Sample(const std::vector<size_t>& nodes) {
     std::vector<Eigen::Vector3f> points(std::min(nodes.size(), kBatchPoints));
     std::vector<float> values(points.size());
     for (size_t begin = 0; begin < nodes.size(); begin += kBatchPoints) {
@@ -161,24 +163,24 @@ class Sampling {
       probe_.Sample(std::span(points).first(count), std::span(values).first(count));
       for (size_t i = 0; i < count; ++i) {
         grid_.value[nodes[begin + i]] = values[i];
-        state_[nodes[begin + i]] = kAsked;
+        state_[nodes[begin + i]] = kSampled;
       }
     }
-    asked_ += nodes.size();
+    samples_ += nodes.size();
   }
 
   const SurfaceProbe& probe_;
   FieldGrid grid_;
   const std::array<ptrdiff_t, 6> steps_;
   std::vector<uint8_t> state_;
-  std::vector<uint8_t> reached_;  // 1 = space reaches here from outside the hull
-  size_t asked_ = 0;
+  std::vector<uint8_t> reached_;  // 1 = reached through empty space from outside the hull
+  size_t samples_ = 0;
 };
 
 }  // namespace
 
 SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes) {
-  return Sampling(snapshot, probe, box_nodes).Run();
+  return FieldSampling(snapshot, probe, box_nodes).Run();
 }
 
 }  // namespace romap::mesh

@@ -11,18 +11,19 @@ namespace romap::mesh {
 
 struct SampledField {
   FieldGrid grid;
-  size_t asked = 0;  // nodes at which the field was asked
+  size_t samples = 0;  // nodes at which the field was evaluated
 };
 
 // The field at the `box_nodes` nodes of a grid over the snapshot's box. Nodes outside the hull are empty (a hull of
-// resolution 0 has no outside). What cannot be reached from there through space, over the six neighbours, is solid
-// whatever the field says: a cavity of the object, or its inside, of which no colour ever told.
+// resolution 0 is the whole box). Space that cannot be reached from outside the hull over six neighbors is solid,
+// whatever the field is there: it is a cavity or the inside of the object, which no training pixel constrains.
 //
-// The field is asked where it counts. First at a body-centred lattice: nodes whose three coordinates are all even or
-// all odd, a quarter of all, at most 1.12 cells from any place. A node between six lattice nodes that are all clearly
-// empty gets their mean. Then space is followed inwards from the hull: each node it reaches is asked, and the matter
-// that bounds it; a node next to matter, or nearly matter, is never guessed. What is thinner than the lattice is thus
-// found where it fades into its surroundings, and followed to its end where any of it was found.
+// The field is evaluated only near the surface. First at a body-centered lattice: the nodes whose three coordinates are
+// all even or all odd, a quarter of all, at most 1.12 cells from any point. A node between six lattice nodes that are
+// all clearly empty gets their mean. Then empty space is followed inwards from the hull: each node that it reaches is
+// evaluated, and the matter that bounds it. A node next to matter or to nearly solid space is never interpolated.
+// Parts thinner than the lattice are thus found by the density around them, and followed to their ends from any point
+// that was found.
 SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes);
 
 }  // namespace romap::mesh

@@ -8,7 +8,7 @@
 namespace romap::mesh {
 namespace {
 
-// Beyond any trained value; keeps differences of values finite.
+// Larger than any trained value; keeps differences of values finite.
 constexpr float kMost = 1e4f;
 
 }  // namespace

@@ -7,17 +7,17 @@
 
 namespace romap::mesh {
 
-// Asks a snapshot's field in the terms of this folder: the logarithm of the density over that at the surface. The only
-// place that knows raw values. The snapshot must have a field and outlive the probe.
+// Samples a snapshot's field as the logarithm of the density over that at the surface, the unit that this folder works
+// in. Only this class uses raw values. The snapshot must have a field and outlive the probe.
 class SurfaceProbe {
  public:
   explicit SurfaceProbe(const FieldSnapshot& snapshot);
 
-  // values[i] at points[i] (Object frame, map units): 0 on the surface, > 0 inside, always finite; what is not a number
-  // counts as kEmpty. `colors` is empty (not asked for) or as long as `points`.
+  // values[i] at points[i] (Object frame, map units): 0 on the surface, > 0 inside, always finite; NaN becomes kEmpty.
+  // `colors` is empty (not needed) or as long as `points`.
   void Sample(std::span<const Eigen::Vector3f> points, std::span<float> values, std::span<Rgb8> colors = {}) const;
 
-  // The value above which parts hang together (FieldSnapshot::connect_level), <= 0.
+  // The value above which parts are connected (FieldSnapshot::connect_level), <= 0.
   float connect_value() const { return connect_value_; }
 
  private:

@@ -7,10 +7,10 @@
 namespace romap::mesh {
 namespace {
 
-// More passes follow the true surface a little better still, but round its edges ever wider.
+// More passes reduce the error a little further, but round off edges more and more.
 constexpr int kSmoothingPasses = 2;
 
-void Normalise(std::vector<Eigen::Vector3f>& normals) {
+void Normalize(std::vector<Eigen::Vector3f>& normals) {
   for (Eigen::Vector3f& normal : normals) {
     const float length = normal.norm();
     normal = length > 0 ? Eigen::Vector3f(normal / length) : Eigen::Vector3f::UnitZ();
@@ -23,13 +23,13 @@ void SetVertexNormals(Mesh& mesh) {
   std::vector<Eigen::Vector3f>& normals = mesh.normals;
   normals.assign(mesh.vertices.size(), Eigen::Vector3f::Zero());
   for (const auto& [a, b, c] : mesh.triangles) {
-    // Its length is twice the area: the weight comes for free.
+    // The length of the cross product is twice the area, so the sum is weighted by area.
     const Eigen::Vector3f normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
     normals[a] += normal;
     normals[b] += normal;
     normals[c] += normal;
   }
-  Normalise(normals);
+  Normalize(normals);
   std::vector<Eigen::Vector3f> rough(normals.size());
   for (int pass = 0; pass < kSmoothingPasses; ++pass) {
     std::swap(rough, normals);
@@ -40,7 +40,7 @@ void SetVertexNormals(Mesh& mesh) {
       normals[b] += sum;
       normals[c] += sum;
     }
-    Normalise(normals);
+    Normalize(normals);
   }
 }
 

@@ -4,12 +4,12 @@
 
 namespace romap::mesh {
 
-// Sets unit normals of a mesh whose triangles are counter-clockwise seen from outside: the mean of the adjoining
-// triangles' normals, weighted by area, then twice the mean over the triangles around.
+// Sets unit normals of a mesh whose triangles are counter-clockwise seen from outside: the mean of the adjacent
+// triangles' normals, weighted by area, then smoothed twice over the adjacent triangles.
 //
-// They come from the surface and not from the gradient of the field, because a trained field is noisier than its own
-// crossing: against true surfaces, normals from central differences are off by 28 degrees in the mean where these are
-// off by 20.
+// The normals come from the surface and not from the gradient of the field, because a trained field is noisier than its
+// zero crossing: compared with the true surfaces, the mean error of normals from central differences is 28 degrees, and
+// of these 20 degrees.
 void SetVertexNormals(Mesh& mesh);
 
 }  // namespace romap::mesh

@@ -4,159 +4,156 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "server/hull/grid_projection.h"
 #include "server/nerf/math/types.h"
 
 namespace romap::nerf {
 namespace {
 
-constexpr int kCells = nerf::kOccupancyResolution;
-constexpr double kDepthNoise = 0.01;  // of the depth: nearer to what was measured than this is not called empty
-constexpr int kMostReach_px = 30;     // a camera so near tells too little of a cell
+using hull::CellEvidence;
+
+constexpr double kDepthNoise = 0.01;  // share of the depth by which a measurement may be too far
+constexpr int kMostReach_px = 30;     // larger footprints: the camera is too close for depth to carve
 constexpr int kLargestBlock = 16;     // cells per side of the blocks that are tested as a whole first
 
-size_t CellIndexOf(int x, int y, int z) { return (static_cast<size_t>(z) * kCells + y) * kCells + x; }
-
-enum class Verdict { kUnknown, kEmpty, kFull, kMixed };
+enum class Coverage { kUnknown, kNone, kFull, kPartial };
 
 }  // namespace
 
-// What a view's mask holds under a footprint.
-struct VisualHull::Look {
-  Verdict matter = Verdict::kUnknown;  // pixels that are not background
-  Verdict object = Verdict::kUnknown;  // pixels that show the object itself
-  // Whether all that lies under the footprint is alike.
-  bool IsPlain() const {
-    return matter == Verdict::kEmpty ||
-           (matter == Verdict::kFull && (object == Verdict::kEmpty || object == Verdict::kFull));
+// How a view's mask covers a footprint.
+struct VisualHull::Verdict {
+  Coverage matter = Coverage::kUnknown;  // pixels that are not background
+  Coverage object = Coverage::kUnknown;  // pixels that show the object
+
+  // Whether every smaller footprint inside this one has the same evidence.
+  bool IsUniform() const {
+    return matter == Coverage::kNone ||
+           (matter == Coverage::kFull && (object == Coverage::kNone || object == Coverage::kFull));
   }
 };
 
-// One view's mask, ready to be asked about balls of the Object frame.
-struct VisualHull::Footprints {
-  SE3<Camera, Object> T_camera_object;
-  CameraModel camera;
-  cv::Rect roi_px;
-  cv::Mat matter_sum;  // integral image of "not background"
-  cv::Mat object_sum;  // the same of "object"
-  cv::Mat nearest_mu;  // least depth under a cell's footprint, 0 where one is unknown; empty without depth
-
+// One view's mask and depth, prepared for queries by balls of the Object frame.
+class VisualHull::Footprints {
+ public:
   Footprints(const ObjectView& view, const TrainingBox& box, bool use_depth, double cell_radius_mu)
-      : T_camera_object(view.T_world_camera.Inverse() * box.T_world_object), camera(view.camera), roi_px(view.roi_px) {
-    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, matter_sum, CV_32S);
-    cv::integral((view.ray_kind == static_cast<int>(RayKind::kObject)) / 255, object_sum, CV_32S);
+      : roi_px_(view.roi_px), focal_px_(std::max(view.camera.fx_px, view.camera.fy_px)) {
+    const SE3<Camera, Object> T_camera_object = view.T_world_camera.Inverse() * box.T_world_object;
+    projection_ =
+        hull::GridProjection::Of(view.camera, T_camera_object.RotationMatrix(), T_camera_object.translation());
+    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, matter_sum_, CV_32S);
+    cv::integral((view.ray_kind == static_cast<int>(RayKind::kObject)) / 255, object_sum_, CV_32S);
     if (!use_depth || view.depth_mu.empty()) return;
     const double least_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
-    if (least_z_mu <= 0) return;  // some cells' footprints have no bound
-    const int reach_px = 1 + static_cast<int>(cell_radius_mu * std::max(camera.fx_px, camera.fy_px) / least_z_mu);
+    if (least_z_mu <= 0) return;  // the footprints of some cells are unbounded
+    const int reach_px = 1 + static_cast<int>(cell_radius_mu * focal_px_ / least_z_mu);
     if (reach_px > kMostReach_px) return;
     cv::Mat known;
-    cv::compare(view.depth_mu, 0, known, cv::CMP_GT);  // false for no number too
+    cv::compare(view.depth_mu, 0, known, cv::CMP_GT);  // false for NaN too
     cv::Mat depth_mu = cv::Mat::zeros(view.depth_mu.size(), CV_32FC1);
     view.depth_mu.copyTo(depth_mu, known);
     const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px + 1, 2 * reach_px + 1});
-    cv::erode(depth_mu, nearest_mu, square);
+    cv::erode(depth_mu, nearest_mu_, square);
   }
 
-  bool KnowsDepth() const { return !nearest_mu.empty(); }
+  bool HasDepth() const { return !nearest_mu_.empty(); }
 
-  // Whether all that was measured under a ball lies behind it.
-  bool IsBeforeAll(const Eigen::Vector3d& center_object, double radius_mu) const {
-    const Eigen::Vector3d p = T_camera_object * center_object;
-    const Eigen::Vector2d pixel = camera.Project(p);
-    const int x = static_cast<int>(std::lround(pixel.x())) - roi_px.x;
-    const int y = static_cast<int>(std::lround(pixel.y())) - roi_px.y;
-    if (x < 0 || y < 0 || x >= roi_px.width || y >= roi_px.height) return false;
-    const double nearest = nearest_mu.at<float>(y, x);
-    return nearest * (1 - kDepthNoise) > p.z() + radius_mu;
+  // Whether all depth under a ball was measured behind it.
+  bool IsInFrontOfDepth(const Eigen::Vector3d& center_object, double radius_mu) const {
+    const Eigen::Vector3d q = projection_ * center_object;
+    const int x = static_cast<int>(std::lround(q.x() / q.z())) - roi_px_.x;
+    const int y = static_cast<int>(std::lround(q.y() / q.z())) - roi_px_.y;
+    if (x < 0 || y < 0 || x >= roi_px_.width || y >= roi_px_.height) return false;
+    const double nearest_mu = nearest_mu_.at<float>(y, x);
+    return nearest_mu * (1 - kDepthNoise) > q.z() + radius_mu;
   }
 
-  // The mask under a ball's footprint, taken as a square of its radius.
-  Look Ask(const Eigen::Vector3d& center_object, double radius_mu) const {
-    const Eigen::Vector3d p = T_camera_object * center_object;
-    if (p.z() <= radius_mu) return {};
-    const Eigen::Vector2d pixel = camera.Project(p);
-    const double radius_px = radius_mu * std::max(camera.fx_px, camera.fy_px) / p.z();
-    const int x0 = static_cast<int>(std::floor(pixel.x() - radius_px + 0.5)) - roi_px.x;
-    const int y0 = static_cast<int>(std::floor(pixel.y() - radius_px + 0.5)) - roi_px.y;
-    const int x1 = static_cast<int>(std::floor(pixel.x() + radius_px + 0.5)) - roi_px.x + 1;
-    const int y1 = static_cast<int>(std::floor(pixel.y() + radius_px + 0.5)) - roi_px.y + 1;
-    if (x0 < 0 || y0 < 0 || x1 > roi_px.width || y1 > roi_px.height) return {};
-    const auto judge = [&](const cv::Mat& sum) {
+  // The mask under a ball, whose footprint is taken as a square.
+  Verdict Under(const Eigen::Vector3d& center_object, double radius_mu) const {
+    const Eigen::Vector3d q = projection_ * center_object;
+    if (q.z() <= radius_mu) return {};
+    const double u_px = q.x() / q.z(), v_px = q.y() / q.z();
+    const double radius_px = radius_mu * focal_px_ / q.z();
+    const int x0 = static_cast<int>(std::floor(u_px - radius_px + 0.5)) - roi_px_.x;
+    const int y0 = static_cast<int>(std::floor(v_px - radius_px + 0.5)) - roi_px_.y;
+    const int x1 = static_cast<int>(std::floor(u_px + radius_px + 0.5)) - roi_px_.x + 1;
+    const int y1 = static_cast<int>(std::floor(v_px + radius_px + 0.5)) - roi_px_.y + 1;
+    if (x0 < 0 || y0 < 0 || x1 > roi_px_.width || y1 > roi_px_.height) return {};
+    const auto coverage = [&](const cv::Mat& sum) {
       const int count = sum.at<int>(y1, x1) - sum.at<int>(y0, x1) - sum.at<int>(y1, x0) + sum.at<int>(y0, x0);
-      if (count == 0) return Verdict::kEmpty;
-      return count == (x1 - x0) * (y1 - y0) ? Verdict::kFull : Verdict::kMixed;
+      if (count == 0) return Coverage::kNone;
+      return count == (x1 - x0) * (y1 - y0) ? Coverage::kFull : Coverage::kPartial;
     };
-    return {judge(matter_sum), judge(object_sum)};
+    return {coverage(matter_sum_), coverage(object_sum_)};
   }
+
+ private:
+  hull::GridProjection projection_;
+  cv::Rect roi_px_;
+  double focal_px_;
+  cv::Mat matter_sum_;  // integral image of "not background"
+  cv::Mat object_sum_;  // integral image of "object"
+  cv::Mat nearest_mu_;  // least depth under the footprint of a cell, 0 if part of it is unknown; empty without depth
 };
 
 VisualHull::VisualHull(const NerfConfig& config)
     : carve_(config.carve_hull),
       margin_(config.hull_margin),
-      min_votes_(config.hull_min_votes),
-      vote_share_(config.hull_vote_share),
-      show_share_(config.hull_show_share) {}
+      rule_{.min_background = config.hull_min_votes,
+            .background_share = config.hull_vote_share,
+            .min_object = config.hull_show_share > 0 ? 1 : 0,
+            .object_share = config.hull_show_share} {}
 
 void VisualHull::Reset(const TrainingBox& box, bool use_depth) {
   box_ = box;
   use_depth_ = use_depth;
-  seen_.assign(CellIndexOf(0, 0, kCells), 0);
-  against_.assign(seen_.size(), 0);
-  shown_.assign(seen_.size(), 0);
+  evidence_.Reset({box.half_extents, kOccupancyResolution});
   views_ = 0;
 }
 
-double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kCells * margin_; }
+double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kOccupancyResolution * margin_; }
 
-void VisualHull::Vote(const ObjectView& view, int sign) {
+void VisualHull::Count(const ObjectView& view, int sign) {
   views_ += sign;
   const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
-  for (int z = 0; z < kCells; z += kLargestBlock) {
-    for (int y = 0; y < kCells; y += kLargestBlock) {
-      for (int x = 0; x < kCells; x += kLargestBlock) VoteBlock(footprints, {x, y, z}, kLargestBlock, sign);
-    }
-  }
-}
-
-// Cells from `first` on, `side` along each axis. They are asked as a whole, and in halves where they are not alike.
-void VisualHull::VoteBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign) {
-  const Eigen::Vector3d cell = 2.0 * box_.half_extents / kCells;
-  const Eigen::Vector3d middle =
-      (first.cast<double>().array() + 0.5 * side).matrix().cwiseProduct(cell) - box_.half_extents;
-  const double radius_mu = side == 1 ? CellRadius_mu() : 0.5 * side * cell.norm();
-  const Look look = footprints.Ask(middle, radius_mu);
-  const bool depth_may_tell = footprints.KnowsDepth() && look.matter != Verdict::kEmpty;
-  if (side > 1 && (!look.IsPlain() || depth_may_tell)) {
-    const int half = side / 2;
-    for (int octant = 0; octant < 8; ++octant) {
-      const Eigen::Vector3i corner(octant & 1, octant >> 1 & 1, octant >> 2);
-      VoteBlock(footprints, first + half * corner, half, sign);
-    }
-    return;
-  }
-  if (look.matter == Verdict::kUnknown) return;
-  const bool empty = look.matter == Verdict::kEmpty || (depth_may_tell && footprints.IsBeforeAll(middle, radius_mu));
-  const bool shown = !empty && look.object != Verdict::kEmpty;
-  for (int z = first.z(); z < first.z() + side; ++z) {
-    for (int y = first.y(); y < first.y() + side; ++y) {
-      for (size_t i = CellIndexOf(first.x(), y, z), end = i + static_cast<size_t>(side); i < end; ++i) {
-        seen_[i] = static_cast<uint8_t>(seen_[i] + sign);
-        if (empty) against_[i] = static_cast<uint8_t>(against_[i] + sign);
-        if (shown) shown_[i] = static_cast<uint8_t>(shown_[i] + sign);
+  for (int z = 0; z < kOccupancyResolution; z += kLargestBlock) {
+    for (int y = 0; y < kOccupancyResolution; y += kLargestBlock) {
+      for (int x = 0; x < kOccupancyResolution; x += kLargestBlock) {
+        CountBlock(footprints, {x, y, z}, kLargestBlock, sign);
       }
     }
   }
 }
 
-std::vector<uint8_t> VisualHull::Carve() const {
-  if (!carve_) return std::vector<uint8_t>(seen_.size(), 1);
-  const bool asks_evidence = show_share_ > 0 && views_ > 0;
-  std::vector<uint8_t> cells(seen_.size());
-  for (size_t i = 0; i < cells.size(); ++i) {
-    const double needed = std::max<double>(min_votes_, vote_share_ * seen_[i]);
-    cells[i] = against_[i] < needed && (shown_[i] > 0 || !asks_evidence) && shown_[i] >= show_share_ * seen_[i] ? 1 : 0;
+// Counts the cells from `first` on, `side` along each axis: as a whole if their evidence is the same, else in halves.
+void VisualHull::CountBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign) {
+  const hull::VoxelGrid& grid = evidence_.grid();
+  const Eigen::Vector3d center = grid.BlockCenter(first, side);
+  const double radius_mu = side == 1 ? CellRadius_mu() : 0.5 * side * grid.CellSize().norm();
+  const Verdict verdict = footprints.Under(center, radius_mu);
+  const bool depth_may_carve = footprints.HasDepth() && verdict.matter != Coverage::kNone;
+  if (side > 1 && (!verdict.IsUniform() || depth_may_carve)) {
+    const int half = side / 2;
+    for (int octant = 0; octant < 8; ++octant) {
+      const Eigen::Vector3i corner(octant & 1, octant >> 1 & 1, octant >> 2);
+      CountBlock(footprints, first + half * corner, half, sign);
+    }
+    return;
   }
-  return cells;
+  if (verdict.matter == Coverage::kUnknown) return;
+  CellEvidence evidence = verdict.object != Coverage::kNone ? CellEvidence::kObject : CellEvidence::kOccluded;
+  if (verdict.matter == Coverage::kNone || (depth_may_carve && footprints.IsInFrontOfDepth(center, radius_mu))) {
+    evidence = CellEvidence::kBackground;
+  }
+  for (int z = first.z(); z < first.z() + side; ++z) {
+    for (int y = first.y(); y < first.y() + side; ++y) {
+      evidence_.Count(grid.Index(first.x(), y, z), static_cast<size_t>(side), evidence, sign);
+    }
+  }
+}
+
+std::vector<uint8_t> VisualHull::Carve() const {
+  if (!carve_ || views_ == 0) return std::vector<uint8_t>(evidence_.grid().size(), 1);
+  return evidence_.Carve(rule_);
 }
 
 }  // namespace romap::nerf

@@ -42,18 +42,18 @@ Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
 int MinInside(int silhouettes) { return std::max(1, silhouettes * 3 / 10); }
 
 // A few wrong masks must not remove part of the object, but each silhouette that may be wrong makes the hull wider.
-HullVotes StrictVotes(size_t silhouettes) {
+hull::CarvingRule StrictRule(size_t silhouettes) {
   constexpr int kAllRightBelow = 8;  // silhouettes; with fewer the hull is too wide if any may be wrong
   constexpr int kPerWrongOne = 20;   // silhouettes, of which one may be wrong
   const auto count = static_cast<int>(silhouettes);
-  return {.max_outside = count < kAllRightBelow ? 0 : std::max(1, count / kPerWrongOne),
-          .min_inside = MinInside(count)};
+  return {.min_background = count < kAllRightBelow ? 1 : 1 + std::max(1, count / kPerWrongOne),
+          .min_object = MinInside(count)};
 }
 
-HullVotes LenientVotes(size_t silhouettes) {
+hull::CarvingRule LenientRule(size_t silhouettes) {
   constexpr int kPerWrongOne = 4;
   const auto count = static_cast<int>(silhouettes);
-  return {.max_outside = std::max(1, count / kPerWrongOne), .min_inside = MinInside(count)};
+  return {.min_background = 1 + std::max(1, count / kPerWrongOne), .min_object = MinInside(count)};
 }
 
 // How well the evidence determines a cuboid, 0..1.
@@ -206,7 +206,7 @@ void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surrou
   constexpr double kGrowth = 1.25;          // of the hull's half extent elsewhere
   constexpr double kManySilhouettes = 2.0;  // times as many as when the hull was carved
   constexpr double kAtMaximum = 0.99;       // share of the largest half extent: no growth left
-  const Eigen::AlignedBox3d hull = hull_.Bounds(StrictVotes(silhouettes_.size()));
+  const Eigen::AlignedBox3d hull = hull_.Bounds(StrictRule(silhouettes_.size()));
   if (hull.isEmpty()) return;
   const Eigen::Vector3d& low = hull.min();
   const Eigen::Vector3d& high = hull.max();
@@ -248,7 +248,7 @@ std::vector<bool> ObjectShape::FindInliers(std::span<const Eigen::Vector3d> poin
   std::vector<size_t> inside_index;
   for (size_t i = 0; i < points_world.size(); ++i) {
     const Eigen::Vector3d p_grid = hull_.region().ToGrid(points_world[i]);
-    if (use_hull && !hull_.Contains(p_grid, LenientVotes(silhouettes_.size()))) continue;
+    if (use_hull && !hull_.Contains(p_grid, LenientRule(silhouettes_.size()))) continue;
     inside.push_back(p_grid);
     inside_index.push_back(i);
   }
@@ -335,8 +335,8 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   AddMissingVotes();
   StraightenRegion(surroundings);
   RefocusRegion(*extent, surroundings);
-  std::vector<Eigen::Vector3d> hull_cells = hull_.Cells(StrictVotes(silhouettes_.size()));
-  if (hull_cells.empty()) hull_cells = hull_.Cells(LenientVotes(silhouettes_.size()));
+  std::vector<Eigen::Vector3d> hull_cells = hull_.Cells(StrictRule(silhouettes_.size()));
+  if (hull_cells.empty()) hull_cells = hull_.Cells(LenientRule(silhouettes_.size()));
   if (hull_cells.empty()) {
     spdlog::debug("objects: the visual hull of {} silhouettes is empty; carving from scratch", silhouettes_.size());
     carve_from_scratch();

@@ -2,15 +2,15 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cstdint>
 #include <vector>
 
+#include "server/hull/evidence_grid.h"
 #include "server/objects/silhouette.h"
 
 namespace romap::objects {
 
-// An upright box of space. The Grid frame has its origin in the middle and z along up_world, from which corrections of
-// the map may tilt it a little.
+// A box in space. The Grid frame has its origin at the center of the box. Its z axis points along up_world when the
+// region is created; map corrections may tilt it slightly.
 struct HullRegion {
   Eigen::Matrix3d R_world_grid = Eigen::Matrix3d::Identity();
   Eigen::Vector3d center_world = Eigen::Vector3d::Zero();
@@ -22,49 +22,37 @@ struct HullRegion {
   Eigen::Vector3d ToWorld(const Eigen::Vector3d& p_grid) const { return center_world + R_world_grid * p_grid; }
 };
 
-// How many silhouettes must agree that a cell is part of the object.
-struct HullVotes {
-  int max_outside = 0;
-  int min_inside = 1;
-};
-
-// The space that the silhouettes of an object leave for it, as votes over a regular grid of a region. Silhouettes are
-// added and removed one at a time, each costs one pass over the grid.
-// Source: A. Laurentini, "The visual hull concept for silhouette-based image understanding", PAMI 1994.
+// The visual hull of an object from the silhouettes of its keyframes, over a regular grid of a region. A silhouette
+// shows the object or background at the pixel under a cell's center. Another mask at that pixel is background too,
+// unless its object may stand in front of the cell. Adding or removing a silhouette costs one pass over the grid.
 class SilhouetteHull {
  public:
-  // Forgets all votes. `cells` per side.
+  // Removes all silhouettes. `cells` per side.
   void Reset(const HullRegion& region, int cells);
-  void Add(const Silhouette& silhouette) { Vote(silhouette, 1); }
-  void Remove(const Silhouette& silhouette) { Vote(silhouette, -1); }
+  void Add(const Silhouette& silhouette) { Count(silhouette, 1); }
+  void Remove(const Silhouette& silhouette) { Count(silhouette, -1); }
 
-  // The region goes along with its space, and so must all silhouettes that voted: then every vote stays right.
+  // Moves the region with its space. The counts stay valid if the caller moves all added silhouettes too.
   void Move(const Sim3<World, World>& S_new_old);
 
-  bool empty() const { return cells_ == 0; }
+  bool empty() const { return evidence_.grid().cells == 0; }
   const HullRegion& region() const { return region_; }
-  Eigen::Vector3d CellSize() const { return 2.0 / cells_ * region_.half_extents; }
+  Eigen::Vector3d CellSize() const { return evidence_.grid().CellSize(); }
 
-  // Box around the cells that pass, Grid frame; empty when none does.
-  Eigen::AlignedBox3d Bounds(const HullVotes& votes) const;
-  // Centres of the cells that pass, Grid frame, z slowest.
-  std::vector<Eigen::Vector3d> Cells(const HullVotes& votes) const;
-  // Whether the cell under a point passes. False outside the region.
-  bool Contains(const Eigen::Vector3d& p_grid, const HullVotes& votes) const;
+  // Box around the cells that the rule keeps, Grid frame; empty if there are none.
+  Eigen::AlignedBox3d Bounds(const hull::CarvingRule& rule) const { return evidence_.Bounds(rule); }
+  // Centers of the cells that the rule keeps, Grid frame, z slowest.
+  std::vector<Eigen::Vector3d> Cells(const hull::CarvingRule& rule) const { return evidence_.Cells(rule); }
+  // Whether the rule keeps the cell that contains a point. False outside the region.
+  bool Contains(const Eigen::Vector3d& p_grid, const hull::CarvingRule& rule) const {
+    return evidence_.Contains(p_grid, rule);
+  }
 
  private:
-  void Vote(const Silhouette& silhouette, int weight);
-  bool Passes(size_t index, const HullVotes& votes) const {
-    return outside_[index] <= votes.max_outside && inside_[index] >= votes.min_inside;
-  }
-  Eigen::Vector3d CellCenter(int x, int y, int z) const {
-    return (2.0 * (Eigen::Vector3d(x, y, z).array() + 0.5) / cells_ - 1) * region_.half_extents.array();
-  }
+  void Count(const Silhouette& silhouette, int sign);
 
   HullRegion region_;
-  int cells_ = 0;
-  std::vector<int16_t> inside_;
-  std::vector<int16_t> outside_;
+  hull::EvidenceGrid evidence_;
 };
 
 }  // namespace romap::objects

@@ -1,10 +1,10 @@
-// What it costs to make a mesh of a trained field, phase by phase:
+// Measures the time to extract a mesh from a trained field, by phase:
 //   mesh_bench [SEQUENCE] [--set nerf.FIELD=VALUE --set mesh.FIELD=VALUE ..] [--steps 200] [--repeats 7]
-// Trains each object of SEQUENCE (true cuboids, poses, masks; every fourth frame) or, without one, of a synthetic
-// world, then meshes it `repeats` times on one thread; the fastest run counts. "all nodes" is the time to ask the field
-// at every node of a cube of mesh.resolution^3 nodes, which is what extraction would cost at least if it looked
-// everywhere; the ratio to it is what may be compared between machines and runs. "signs" is the share of nodes, of
-// those the hull leaves, whose side of the surface the sampling guessed wrongly.
+// Trains each object of SEQUENCE (true cuboids, poses and masks; every fourth frame) or, without SEQUENCE, of a
+// synthetic world. Then extracts its mesh `repeats` times on one thread and reports the fastest run. "all nodes" is the
+// time to evaluate the field at all mesh.resolution^3 nodes of a cube, a lower bound for extraction without sparse
+// sampling; only the ratio to it is comparable between machines and runs. "signs" is the share of the nodes inside the
+// hull that sampling put on the wrong side of the surface.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -39,7 +39,7 @@ double Milliseconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
-// Time to ask the field at all nodes of a cube of nodes.
+// Time to evaluate the field at all nodes of a cube.
 double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
   const mesh::FieldGrid grid = mesh::MakeEmptyGrid(Eigen::Vector3i::Constant(resolution), snapshot.box_half_extents);
   std::vector<Eigen::Vector3f> points;
@@ -54,7 +54,7 @@ double AllNodesMilliseconds(const FieldSnapshot& snapshot, int resolution) {
   return Milliseconds(std::chrono::steady_clock::now() - start);
 }
 
-// Share of the nodes within the hull that sampling put on the wrong side of the surface.
+// Share of the nodes inside the hull that sampling put on the wrong side of the surface.
 double WrongSigns(const FieldSnapshot& snapshot, const Eigen::Vector3i& nodes) {
   const mesh::SurfaceProbe probe(snapshot);
   const mesh::FieldGrid grid = mesh::SampleField(snapshot, probe, nodes).grid;
@@ -96,7 +96,7 @@ absl::Status BenchObject(const TrainingScene& scene, const files::ObjectRecord& 
   }
   const Eigen::Vector3i& nodes = best.nodes;
   std::printf("%-10s %3dx%3dx%3d %8zu %8zu %6.3f%% |", object.name.c_str(), nodes.x(), nodes.y(), nodes.z(),
-              best.asked_nodes, mesh.vertices.size(), 100 * WrongSigns(snapshot, nodes));
+              best.sampled_nodes, mesh.vertices.size(), 100 * WrongSigns(snapshot, nodes));
   for (const double phase_s : best.phase_cpu_s) std::printf(" %10.2f", 1e3 * phase_s);
   std::printf(" | %7.2f %9.2f %6.2f\n", 1e3 * best_s, all_nodes_ms, 1e3 * best_s / all_nodes_ms);
   std::fflush(stdout);
@@ -105,7 +105,7 @@ absl::Status BenchObject(const TrainingScene& scene, const files::ObjectRecord& 
 
 absl::Status Run(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(const TrainingScene scene, LoadTrainingScene(options.sequence));
-  std::printf("%-10s %11s %8s %8s %7s |", "object", "nodes", "asked", "vertices", "signs");
+  std::printf("%-10s %11s %8s %8s %7s |", "object", "nodes", "sampled", "vertices", "signs");
   for (const char* name : mesh::kMeshPhaseNames) std::printf(" %10s", name);
   std::printf(" | %7s %9s %6s  [ms]\n", "sum", "all nodes", "ratio");
   for (const files::ObjectRecord& object : scene.objects) ROMAP_RETURN_IF_ERROR(BenchObject(scene, object, options));
@@ -117,7 +117,7 @@ absl::Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   romap::measure::Options options;
-  CLI::App app("Meshes trained fields and reports cost");
+  CLI::App app("Measures the time to extract meshes from trained fields");
   app.add_option("sequence", options.sequence);
   app.add_option("--set", options.assignments)->allow_extra_args(false);
   app.add_option("--steps", options.steps)->check(CLI::PositiveNumber);

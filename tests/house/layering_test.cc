@@ -44,9 +44,10 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/slam/geometry/", {"server/slam/geometry/", "common/"}},
     {"server/slam/optimize/", {"server/slam/optimize/", "common/"}},
     {"server/slam/places/", {"server/slam/places/", "server/slam/features/", "server/slam/slam_config.h", "common/"}},
-    {"server/objects/", {"server/objects/", "common/"}},
+    {"server/hull/", {"server/hull/", "common/"}},
+    {"server/objects/", {"server/objects/", "server/hull/", "common/"}},
     {"server/objects/lines/", {"server/objects/lines/", "common/"}},
-    {"server/nerf/", {"server/nerf/", "common/"}},
+    {"server/nerf/", {"server/nerf/", "server/hull/", "common/"}},
     // The back ends share math/ and model/ and do not include each other.
     {"server/nerf/math/", {"server/nerf/math/"}},
     {"server/nerf/model/", {"server/nerf/model/", "server/nerf/math/", "server/nerf/nerf_config.h", "common/"}},

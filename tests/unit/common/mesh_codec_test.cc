@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A closed torus around z, `rings` x `rings` vertices, outward triangles, colours that name the vertex's place.
+// A closed torus around z with `rings` x `rings` vertices, outward triangles, and a color that identifies the vertex.
 Mesh Torus(int rings, float ring_radius, float tube_radius, const Eigen::Vector3f& center) {
   Mesh mesh;
   for (int i = 0; i < rings; ++i) {
@@ -68,7 +68,7 @@ std::string DecodeError(const std::string& bytes) {
   return Message(status);
 }
 
-TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimetre) {
+TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimeter) {
   const Mesh mesh = Torus(40, 0.1f, 0.05f, {0.4f, -0.2f, 0.1f});  // 30 cm across
   const Mesh decoded = RoundTrip(mesh);
   ASSERT_EQ(decoded.vertices.size(), mesh.vertices.size());
@@ -76,7 +76,7 @@ TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimetre) {
   ASSERT_EQ(decoded.colors.size(), mesh.colors.size());
   ASSERT_EQ(decoded.normals.size(), mesh.normals.size());
   for (size_t k = 0; k < decoded.vertices.size(); ++k) {
-    const size_t original = decoded.colors[k][0] * 40 + decoded.colors[k][1];  // the colour names the vertex
+    const size_t original = decoded.colors[k][0] * 40 + decoded.colors[k][1];  // the color identifies the vertex
     ASSERT_EQ(decoded.colors[k], mesh.colors[original]);
     EXPECT_LT((decoded.vertices[k] - mesh.vertices[original]).cwiseAbs().maxCoeff(), 1e-5f);
     EXPECT_GT(decoded.normals[k].dot(mesh.normals[original]), std::cos(0.7 * M_PI / 180));
@@ -118,7 +118,7 @@ TEST(MeshCodec, NormalsAndColorsAreOptional) {
   EXPECT_EQ(RoundTrip(mesh).vertices.size(), mesh.vertices.size());
 }
 
-TEST(MeshCodec, DegenerateTrianglesAndLooseVerticesGo) {
+TEST(MeshCodec, DegenerateTrianglesAndUnusedVerticesAreDropped) {
   Mesh mesh = Torus(12, 0.1f, 0.05f, {0, 0, 0});
   const size_t good = mesh.triangles.size();
   mesh.triangles.insert(mesh.triangles.begin() + 5, {7, 7, 8});
@@ -131,7 +131,7 @@ TEST(MeshCodec, DegenerateTrianglesAndLooseVerticesGo) {
   EXPECT_EQ(decoded.vertices.size(), 144u);
 }
 
-TEST(MeshCodec, TrianglesWithoutAreaAndOpenBordersSurvive) {
+TEST(MeshCodec, TrianglesWithoutAreaAndOpenBordersAreKept) {
   Mesh mesh;
   mesh.vertices = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
   mesh.triangles = {{0, 1, 2}};
@@ -141,11 +141,11 @@ TEST(MeshCodec, TrianglesWithoutAreaAndOpenBordersSurvive) {
   EXPECT_EQ(RoundTrip(mesh).triangles.size(), 3u);
 }
 
-TEST(MeshCodec, MeshesThatCannotBeEncodedAreRefusedByName) {
+TEST(MeshCodec, InvalidMeshesAreRejectedWithTheReason) {
   EXPECT_THAT(EncodeError({}), HasSubstr("no triangle"));
   Mesh mesh = Torus(6, 1.0f, 0.5f, {0, 0, 0});
   mesh.triangles[4][1] = 36;
-  EXPECT_THAT(EncodeError(mesh), HasSubstr("triangle 4 names vertex 36 of 36"));
+  EXPECT_THAT(EncodeError(mesh), HasSubstr("triangle 4 uses vertex 36, but the mesh has 36 vertices"));
   mesh = Torus(6, 1.0f, 0.5f, {0, 0, 0});
   mesh.vertices[2].y() = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(EncodeError(mesh), HasSubstr("vertex 2 is not finite"));
@@ -155,33 +155,34 @@ TEST(MeshCodec, MeshesThatCannotBeEncodedAreRefusedByName) {
   mesh = Torus(6, 1.0f, 0.5f, {0, 0, 0});
   mesh.triangles = {{1, 1, 2}};
   EXPECT_THAT(EncodeError(mesh), HasSubstr("no triangle with three different vertices"));
-  EXPECT_THAT(EncodeError(Torus(6, 1.0f, 0.5f, {0, 0, 0}), {.position_bits = 31}), HasSubstr("position_bits 31"));
+  EXPECT_THAT(EncodeError(Torus(6, 1.0f, 0.5f, {0, 0, 0}), {.position_bits = 31}),
+              HasSubstr("position_bits must be 1..30, got 31"));
 }
 
-TEST(MeshCodec, GarbageIsRefused) {
-  EXPECT_THAT(DecodeError(""), HasSubstr("not a Draco mesh: 0 bytes"));
-  EXPECT_THAT(DecodeError("hello, world"), HasSubstr("do not begin with DRACO"));
-  EXPECT_THAT(DecodeError("DRACO\x02\x02"), HasSubstr("cut off after 7 bytes"));
+TEST(MeshCodec, BytesThatAreNotADracoMeshAreRejected) {
+  EXPECT_THAT(DecodeError(""), HasSubstr("not a Draco mesh: the 0 bytes"));
+  EXPECT_THAT(DecodeError("hello, world"), HasSubstr("do not start with DRACO"));
+  EXPECT_THAT(DecodeError("DRACO\x02\x02"), HasSubstr("truncated after 7 bytes"));
   const std::string sequential("DRACO\x02\x02\x01\x00\x00\x00\x00\x10\x10", 14);
   EXPECT_THAT(DecodeError(sequential), HasSubstr("method 0"));
 }
 
-TEST(MeshCodec, ClaimedSizesAreCheckedBeforeMemoryIsTaken) {
+TEST(MeshCodec, ClaimedSizesAreCheckedBeforeAllocation) {
   std::string bytes("DRACO\x02\x02\x01\x01\x00\x00\x00", 12);
   bytes += std::string("\x10", 1) + "\xff\xff\xff\xff\x07";  // 16 vertices, 2^31 - 1 triangles
   bytes += std::string(64, '\x01');
   EXPECT_THAT(DecodeError(bytes), HasSubstr("claims 2147483647 triangles"));
 }
 
-TEST(MeshCodec, EveryCutOffStreamIsRefused) {
+TEST(MeshCodec, EveryTruncatedStreamIsRejected) {
   const std::string bytes = *EncodeDraco(Torus(8, 0.1f, 0.05f, {0, 0, 0}));
   for (size_t length = 0; length < bytes.size(); ++length) {
     EXPECT_FALSE(DecodeDraco(bytes.substr(0, length)).ok()) << length << " of " << bytes.size();
   }
 }
 
-// Whatever a flipped byte does, the answer is a mesh that can be used or an error.
-TEST(MeshCodec, DamagedStreamsNeverGiveABrokenMesh) {
+// Decoding a stream with flipped bits gives a valid mesh or an error.
+TEST(MeshCodec, DamagedStreamsGiveAValidMeshOrAnError) {
   const std::string bytes = *EncodeDraco(Torus(10, 0.1f, 0.05f, {0, 0, 0}));
   std::mt19937 random(5);
   for (int round = 0; round < 1500; ++round) {

@@ -46,7 +46,7 @@ TEST(ExtractMesh, NormalsAreUnitLengthAndPointOutwards) {
   EXPECT_GT(worst_cosine, std::cos(5.0 * kPi / 180));
 }
 
-TEST(ExtractMesh, ColorsAreTheFieldsAtTheVertices) {
+TEST(ExtractMesh, ColorsAreThoseOfTheFieldAtTheVertices) {
   const FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));
   const Mesh mesh = Extract(snapshot);
   ASSERT_EQ(mesh.colors.size(), mesh.vertices.size());
@@ -65,7 +65,7 @@ TEST(ExtractMesh, TorusKeepsItsHole) {
   EXPECT_LT(LargestDistance(mesh, torus), 0.003);
 }
 
-TEST(ExtractMesh, FlatBoxHasItsOwnVoxelShape) {
+TEST(ExtractMesh, FlatBoxesHaveFlatVoxels) {
   const InsideDistance book = [](const Eigen::Vector3f& p) {
     const Eigen::Vector3f d = Eigen::Vector3f(0.8f, 0.6f, 0.08f) - p.cwiseAbs();
     return d.minCoeff();
@@ -75,7 +75,7 @@ TEST(ExtractMesh, FlatBoxHasItsOwnVoxelShape) {
   EXPECT_NEAR(Volume(mesh), 8 * 0.8 * 0.6 * 0.08, 0.01 * 0.307);
 }
 
-TEST(ExtractMesh, MapScaleChangesNothingButTheScale) {
+TEST(ExtractMesh, ScalingTheMapScalesTheMesh) {
   const Mesh reference = Extract(SnapshotOf(Sphere(0.6f)));
   for (const float scale : {0.01f, 100.0f}) {
     const Mesh mesh = Extract(SnapshotOf(Sphere(0.6f * scale), Eigen::Vector3f::Constant(scale)));
@@ -85,23 +85,23 @@ TEST(ExtractMesh, MapScaleChangesNothingButTheScale) {
   }
 }
 
-TEST(ExtractMesh, ObjectThatLeavesTheBoxIsClosedAlongTheBox) {
+TEST(ExtractMesh, ObjectsThatLeaveTheBoxAreClosedAtTheBox) {
   const Mesh mesh = Extract(SnapshotOf([](const Eigen::Vector3f& p) { return 0.2f - p.z(); }));
   EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
   EXPECT_NEAR(Volume(mesh), 4 * 1.2, 0.02 * 4.8);
 }
 
-TEST(ExtractMesh, HullCutsWhatTheFieldSaysOutside) {
+TEST(ExtractMesh, MatterOutsideTheHullIsRemoved) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.8f));
   snapshot.hull.resolution = 8;
   for (int cell = 0; cell < 512; ++cell) snapshot.hull.bits.push_back(cell % 8 < 4);  // x < 0 only
   const Mesh mesh = Extract(snapshot);
   EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
   EXPECT_NEAR(Volume(mesh), 2.0 / 3.0 * kPi * 0.512, 0.03);
-  for (const Eigen::Vector3f& p : mesh.vertices) EXPECT_LT(p.x(), 0.04f);  // a voxel beyond the hull at most
+  for (const Eigen::Vector3f& p : mesh.vertices) EXPECT_LT(p.x(), 0.04f);  // at most a voxel beyond the hull
 }
 
-TEST(ExtractMesh, HullMayBeFinerThanTheGrid) {
+TEST(ExtractMesh, TheHullMayBeFinerThanTheGrid) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.hull.resolution = 50;
   snapshot.hull.bits.assign(50 * 50 * 50, 1);
@@ -110,15 +110,16 @@ TEST(ExtractMesh, HullMayBeFinerThanTheGrid) {
   EXPECT_NEAR(Volume(Extract(snapshot, config)), 4.0 / 3.0 * kPi * 0.125, 0.02);
 }
 
-TEST(ExtractMesh, FloatersGo) {
+TEST(ExtractMesh, FloatersAreRemoved) {
   const InsideDistance scene = Union({Sphere(0.4f), Sphere(0.15f, {0.7f, 0.7f, 0.7f})});
   const Mesh mesh = Extract(SnapshotOf(scene));
   EXPECT_EQ(CheckTopology(mesh).components, 1u);
   EXPECT_NEAR(Volume(mesh), 4.0 / 3.0 * kPi * 0.064, 0.01);
 }
 
-TEST(ExtractMesh, PiecesOfSimilarSizeStayWhenTheShareAllows) {
-  const InsideDistance scene = Union({Sphere(0.3f, {-0.5f, 0, 0}), Sphere(0.27f, {0.5f, 0, 0})});  // share 0.73
+TEST(ExtractMesh, ComponentsAboveTheMinimumShareAreKept) {
+  const InsideDistance scene =
+      Union({Sphere(0.3f, {-0.5f, 0, 0}), Sphere(0.27f, {0.5f, 0, 0})});  // the smaller has 0.73 of the volume
   MeshConfig config;
   config.min_component_share = 0.6;
   EXPECT_EQ(CheckTopology(Extract(SnapshotOf(scene), config)).components, 2u);
@@ -126,11 +127,11 @@ TEST(ExtractMesh, PiecesOfSimilarSizeStayWhenTheShareAllows) {
   EXPECT_EQ(CheckTopology(Extract(SnapshotOf(scene), config)).components, 1u);
 }
 
-// The stem dips below the surface level in the middle, as thin parts do; the blob beyond must stay.
-TEST(ExtractMesh, ThinStemBelowTheSurfaceLevelHoldsBothEnds) {
-  const InsideDistance blobs = Union({Sphere(0.35f, {-0.6f, 0, 0}), Sphere(0.15f, {0.7f, 0, 0})});
+// The stem is below the surface level, as thin parts can be; it still connects the small sphere to the large one.
+TEST(ExtractMesh, AStemBelowTheSurfaceLevelConnectsItsEnds) {
+  const InsideDistance spheres = Union({Sphere(0.35f, {-0.6f, 0, 0}), Sphere(0.15f, {0.7f, 0, 0})});
   const InsideDistance scene = [&](const Eigen::Vector3f& p) {
-    return std::max(blobs(p), Stem(-0.6f, 0.7f, 0.006f)(p));  // raw = level - 1 at the nodes next to its axis
+    return std::max(spheres(p), Stem(-0.6f, 0.7f, 0.006f)(p));  // raw = level - 1 at the nodes nearest to its axis
   };
   FieldSnapshot snapshot = SnapshotOf(scene);
   EXPECT_EQ(CheckTopology(Extract(snapshot)).components, 2u);
@@ -138,15 +139,15 @@ TEST(ExtractMesh, ThinStemBelowTheSurfaceLevelHoldsBothEnds) {
   EXPECT_EQ(CheckTopology(Extract(snapshot)).components, 1u);
 }
 
-TEST(ExtractMesh, HiddenCavityIsFilled) {
+TEST(ExtractMesh, CavitiesAreFilled) {
   const InsideDistance shell = [](const Eigen::Vector3f& p) { return 0.1f - std::abs(p.norm() - 0.6f); };
   const Mesh mesh = Extract(SnapshotOf(shell));
   EXPECT_EQ(CheckTopology(mesh).components, 1u);
   EXPECT_NEAR(Volume(mesh), 4.0 / 3.0 * kPi * 0.343, 0.01);
 }
 
-// A bowl turned over: its inside opens downwards, and all cameras look from above.
-TEST(ExtractMesh, SpaceThatNoViewSeesBecomesSolid) {
+// An upside-down bowl: its inside opens downwards, and all cameras look from above.
+TEST(ExtractMesh, InvisibleSpaceIsFilled) {
   const InsideDistance bowl = [](const Eigen::Vector3f& p) {
     return std::min(0.1f - std::abs(p.norm() - 0.6f), p.z() + 0.05f);
   };
@@ -155,7 +156,7 @@ TEST(ExtractMesh, SpaceThatNoViewSeesBecomesSolid) {
   for (int i = 0; i < 8; ++i) {
     snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 4), 4 * std::sin(i * kPi / 4), 3.0}));
   }
-  // What the hull keeps: only what lies above the rim.
+  // The hull contains only the space above the rim.
   snapshot.hull.resolution = 40;
   for (int cell = 0; cell < 64000; ++cell) snapshot.hull.bits.push_back(cell / 1600 >= 19);
   const Mesh mesh = Extract(snapshot);
@@ -170,9 +171,9 @@ TEST(ExtractMesh, SpaceThatNoViewSeesBecomesSolid) {
   EXPECT_LT(Volume(Extract(snapshot, config)), 0.65 * dome_volume);
 }
 
-// Cameras all around look down on a box that stands on a table, so the masks say nothing about what is below it.
-TEST(ExtractMesh, EndsWhereTheVisibleSurfaceEnds) {
-  const InsideDistance column = [](const Eigen::Vector3f& p) {  // the true bottom is at z = -0.6
+// Cameras all around look down on a box that stands on a table, so that the masks do not show where it ends below.
+TEST(ExtractMesh, EndsBelowWhereTheVisibleSurfaceEnds) {
+  const InsideDistance column = [](const Eigen::Vector3f& p) {  // the lower end is at z = -0.6
     return std::min({0.5f - p.head<2>().cwiseAbs().maxCoeff(), 0.5f - p.z(), p.z() + 0.6f});
   };
   FieldSnapshot snapshot = SnapshotOf(column);
@@ -194,7 +195,7 @@ TEST(ExtractMesh, EndsWhereTheVisibleSurfaceEnds) {
   EXPECT_LT(lowest(Extract(snapshot, config)), -0.7f);
 }
 
-TEST(ExtractMesh, UndersideThatAViewSeesIsNotCut) {
+TEST(ExtractMesh, AVisibleUndersideIsNotCut) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));
   const double whole = Volume(Extract(snapshot));
   for (int i = 0; i < 6; ++i) {
@@ -203,14 +204,14 @@ TEST(ExtractMesh, UndersideThatAViewSeesIsNotCut) {
   EXPECT_NEAR(Volume(Extract(snapshot)), whole, 0.01 * whole);
 }
 
-TEST(ExtractMesh, SeenFromStraightAboveNothingIsCut) {
+TEST(ExtractMesh, ViewsFromStraightAboveCutNothing) {
   FieldSnapshot snapshot = SnapshotOf([](const Eigen::Vector3f& p) { return 0.5f - p.cwiseAbs().maxCoeff(); });
   snapshot.cameras = {ViewFrom({0.1, 0, 6}), ViewFrom({0, 0.1, 6}), ViewFrom({-0.1, 0, 6})};
   EXPECT_GT(Volume(Extract(snapshot)), 1.0);
 }
 
-// The same bowl upright: cameras look into it.
-TEST(ExtractMesh, SpaceThatSomeViewSeesStaysEmpty) {
+// An upright bowl: a camera looks into it.
+TEST(ExtractMesh, VisibleSpaceStaysEmpty) {
   const InsideDistance bowl = [](const Eigen::Vector3f& p) {
     return std::min(0.1f - std::abs(p.norm() - 0.6f), 0.05f - p.z());
   };
@@ -224,7 +225,7 @@ TEST(ExtractMesh, SpaceThatSomeViewSeesStaysEmpty) {
   EXPECT_NEAR(Volume(Extract(snapshot)), hollow_volume, 0.04 * hollow_volume);
 }
 
-TEST(ExtractMesh, ValuesThatAreNotANumberCountAsEmpty) {
+TEST(ExtractMesh, NanCountsAsEmpty) {
   const InsideDistance half_nan = [](const Eigen::Vector3f& p) {
     if (p.x() > 0.05f) return std::numeric_limits<float>::quiet_NaN();
     if (p.norm() < 0.2f) return std::numeric_limits<float>::infinity();
@@ -237,37 +238,37 @@ TEST(ExtractMesh, ValuesThatAreNotANumberCountAsEmpty) {
   for (const Eigen::Vector3f& p : mesh.vertices) ASSERT_TRUE(p.allFinite());
 }
 
-TEST(ExtractMesh, EmptyFieldsSayWhichObjectHasNoSurface) {
+TEST(ExtractMesh, EmptyFieldsFailNamingTheObject) {
   const InsideDistance nowhere = [](const Eigen::Vector3f&) { return -1.0f; };
   const InsideDistance nan = [](const Eigen::Vector3f&) { return std::numeric_limits<float>::quiet_NaN(); };
   for (const InsideDistance& field : {nowhere, nan}) {
     const absl::Status status = ExtractMesh(SnapshotOf(field), {}).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
-    EXPECT_EQ(Message(status), "object/3: no surface at this level");
+    EXPECT_EQ(Message(status), "object/3: the field is nowhere above the surface level");
   }
 }
 
-TEST(ExtractMesh, SnapshotsThatCannotBeAreRefusedByName) {
-  const auto refusal = [](const FieldSnapshot& snapshot) {
+TEST(ExtractMesh, InvalidSnapshotsAreRejectedNamingTheObject) {
+  const auto error = [](const FieldSnapshot& snapshot) {
     const absl::Status status = ExtractMesh(snapshot, {}).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     return Message(status);
   };
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.field = nullptr;
-  EXPECT_THAT(refusal(snapshot), HasSubstr("object/3: the snapshot has no field"));
+  EXPECT_THAT(error(snapshot), HasSubstr("object/3: the snapshot has no field"));
   snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.box_half_extents.y() = 0;
-  EXPECT_THAT(refusal(snapshot), HasSubstr("half extents 1 0 1"));
+  EXPECT_THAT(error(snapshot), HasSubstr("half extents 1 0 1"));
   snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.hull.resolution = 4;
-  EXPECT_THAT(refusal(snapshot), HasSubstr("hull has 0 bits, want 4^3"));
+  EXPECT_THAT(error(snapshot), HasSubstr("hull has 0 cells, must have 4^3"));
   snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.surface_level = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(refusal(snapshot), HasSubstr("surface level nan"));
+  EXPECT_THAT(error(snapshot), HasSubstr("surface level nan"));
 }
 
-TEST(MeshConfig, FieldsAreListedWithTheirDefaults) {
+TEST(MeshConfig, FieldsCanBeSet) {
   MeshConfig config;
   ConfigFields fields;
   fields.Section("mesh");

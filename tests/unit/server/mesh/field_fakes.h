@@ -17,7 +17,7 @@ namespace romap::mesh {
 // Signed distance to a surface in map units at a point of the Object frame, positive inside.
 using InsideDistance = std::function<float(const Eigen::Vector3f&)>;
 
-// A field whose raw value is proportional to a signed distance: raw = level + slope * distance. Its colour is the
+// A field whose raw value is proportional to a signed distance: raw = level + slope * distance. Its color is the
 // position: 0..255 over the box on each axis.
 class DistanceField : public FieldSampler {
  public:
@@ -45,7 +45,7 @@ class DistanceField : public FieldSampler {
 
 inline constexpr float kTestLevel = 3.0f;
 
-// A view from `center` (Object frame) towards the origin that sees nothing but the object, 400 x 400 px large.
+// A view of 400 x 400 px from `center` (Object frame) towards the origin, all pixels of which show the object.
 inline TrainingCamera ViewFrom(const Eigen::Vector3d& center) {
   TrainingCamera view;
   const Eigen::Quaterniond turn = ShortestRotation(-center, Eigen::Vector3d::UnitZ());
@@ -56,8 +56,8 @@ inline TrainingCamera ViewFrom(const Eigen::Vector3d& center) {
   return view;
 }
 
-// A snapshot of object/3 over the box, seen by nobody, without a hull. Raw changes by 60 over the longest half extent,
-// as a trained field's does or faster.
+// A snapshot of object/3 over the box, without views and without a hull. Raw changes by 60 over the longest half
+// extent, at least as fast as in a trained field.
 inline FieldSnapshot SnapshotOf(InsideDistance distance,
                                 const Eigen::Vector3f& box_half_extents = Eigen::Vector3f::Ones()) {
   FieldSnapshot snapshot;

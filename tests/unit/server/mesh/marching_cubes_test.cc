@@ -49,7 +49,7 @@ TEST(MarchingCubesTable, CrossesExactlyTheEdgesWhoseCornersDiffer) {
   }
 }
 
-TEST(MarchingCubesTable, OneInsideCornerIsCutOffByOneTriangleThatFacesAway) {
+TEST(MarchingCubesTable, OneInsideCornerGivesOneOutwardTriangle) {
   const MarchingCubesTable& table = GetMarchingCubesTable();
   for (int corner = 0; corner < kCellCorners; ++corner) {
     ASSERT_EQ(table[1 << corner].size(), 1u);
@@ -82,13 +82,13 @@ TEST(MarchingCubes, RandomGridsGiveClosedManifolds) {
   }
 }
 
-// Ambiguous faces everywhere.
+// Every face of the grid is ambiguous.
 TEST(MarchingCubes, CheckerboardsGiveClosedManifolds) {
   for (const int odd : {0, 1}) {
     const FieldGrid grid = GridOf(9, [&](int x, int y, int z) { return (x + y + z) % 2 == odd ? 1.0f : -1.0f; });
     const Mesh mesh = MarchingCubes(grid).mesh;
     EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
-    EXPECT_EQ(CheckTopology(mesh).components, odd ? 365u : 364u);  // inside corners are kept apart: one blob each
+    EXPECT_EQ(CheckTopology(mesh).components, odd ? 365u : 364u);  // inside corners are separated: one component each
   }
 }
 
@@ -111,14 +111,14 @@ TEST(MarchingCubes, PlacesVerticesOfALinearFieldExactly) {
   const Mesh mesh = MarchingCubes(grid).mesh;
   size_t inner = 0;
   for (const Eigen::Vector3f& p : mesh.vertices) {
-    if (p.cwiseAbs().maxCoeff() > 1.0f) continue;  // on the cap outside the box
-    EXPECT_NEAR(normal.dot(p), -0.03f, 2e-4f);     // a crossing near a node is moved off it by a thousandth of an edge
+    if (p.cwiseAbs().maxCoeff() > 1.0f) continue;  // on the box
+    EXPECT_NEAR(normal.dot(p), -0.03f, 2e-4f);     // vertices keep a thousandth of an edge away from nodes
     ++inner;
   }
   EXPECT_GT(inner, 150u);
 }
 
-TEST(MarchingCubes, ClosesWithinAHairOfTheBoxWhenAllIsInside) {
+TEST(MarchingCubes, ClosesAtTheBoxIfAllNodesAreInside) {
   const FieldGrid grid = GridOf(8, [](int, int, int) { return 5.0f; });
   const Mesh mesh = MarchingCubes(grid).mesh;
   const Topology topology = CheckTopology(mesh);

@@ -37,7 +37,7 @@ inline size_t CountComponents(const Mesh& mesh) {
   return roots;
 }
 
-// Follows the fan of triangles around each vertex: successor[v][p] = the vertex after p around v.
+// Follows the triangle fan around each vertex: successor[v][p] is the vertex after p around v.
 inline Topology CheckTopology(const Mesh& mesh) {
   std::set<std::pair<uint32_t, uint32_t>> directed_edges;
   std::vector<std::map<uint32_t, uint32_t>> successor(mesh.vertices.size());
@@ -90,7 +90,7 @@ inline double Area(const Mesh& mesh) {
   return area;
 }
 
-// Largest |distance(p)| over vertices and triangle centres.
+// Largest |distance(p)| over vertices and triangle centers.
 template <class Distance>
 double LargestDistance(const Mesh& mesh, Distance distance) {
   double largest = 0;

@@ -1,4 +1,4 @@
-// Whatever a field, a hull, a box and views are: what comes out is a closed mesh of finite numbers, or a clear no.
+// Extraction from random fields, hulls, boxes and views gives a valid closed mesh or FAILED_PRECONDITION.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -24,7 +24,7 @@ class Dice {
   std::mt19937 random_;
 };
 
-// A number of 0..1 that a place determines and its neighbours do not.
+// A pseudorandom number in 0..1 that depends on the position only.
 float HashOf(const Eigen::Vector3f& p) {
   uint32_t hash = 2166136261u;
   for (int axis = 0; axis < 3; ++axis) hash = (hash ^ std::bit_cast<uint32_t>(p[axis])) * 16777619u;
@@ -38,23 +38,23 @@ InsideDistance RandomField(Dice& dice, float reach) {
   switch (dice.Pick(6)) {
     case 0:  // noise
       return [=](const Eigen::Vector3f& p) { return reach * (HashOf(p) - 0.5f + 0.3f * shift); };
-    case 1:  // noise of numbers that are none
+    case 1:  // noise with NaN and infinities
       return [=](const Eigen::Vector3f& p) {
         const float hash = HashOf(p);
         if (hash < 0.2f) return std::numeric_limits<float>::quiet_NaN();
         if (hash < 0.4f) return kInfinity;
         return hash < 0.6f ? -kInfinity : hash - 0.8f;
       };
-    case 2:  // the same everywhere
+    case 2:  // constant
       return [=](const Eigen::Vector3f&) { return shift; };
-    case 3:  // through the walls of the box
+    case 3:  // a plane through the sides of the box
       return [=](const Eigen::Vector3f& p) { return direction.dot(p) + 0.3f * reach * shift; };
     case 4:  // waves
       return [=](const Eigen::Vector3f& p) {
         return reach *
                (std::sin(9 * p.x() / reach) * std::cos(7 * p.y() / reach) + std::sin(8 * p.z() / reach) + shift);
       };
-    default:  // exactly at the surface's level over whole regions
+    default:  // exactly at the surface level in a whole region
       return [=](const Eigen::Vector3f& p) { return std::max(0.0f, p.norm() - 0.5f * reach); };
   }
 }
@@ -70,13 +70,13 @@ FieldSnapshot RandomSnapshot(Dice& dice) {
     for (int cell = 0; cell < cells; ++cell) snapshot.hull.bits.push_back(dice.Pick(4) != 0);
   }
   for (int view = dice.Pick(6); view > 0; --view) {
-    snapshot.cameras.push_back(ViewFrom((scale * dice.Vector(4)).cast<double>()));  // some of them inside the box
+    snapshot.cameras.push_back(ViewFrom((scale * dice.Vector(4)).cast<double>()));  // some inside the box
     if (dice.Pick(8) == 0) snapshot.cameras.back() = ViewFrom(dice.Vector(1e30f).cast<double>());
   }
   return snapshot;
 }
 
-TEST(RandomFields, GiveClosedMeshesOfFiniteNumbersOrNone) {
+TEST(RandomFields, GiveValidClosedMeshesOrNone) {
   int meshes = 0;
   for (unsigned seed = 0; seed < 120; ++seed) {
     SCOPED_TRACE(seed);
@@ -98,7 +98,7 @@ TEST(RandomFields, GiveClosedMeshesOfFiniteNumbersOrNone) {
     ASSERT_EQ(mesh->normals.size(), mesh->vertices.size());
     ASSERT_EQ(mesh->colors.size(), mesh->vertices.size());
     ASSERT_EQ(mesh->confidence.size(), mesh->vertices.size());
-    const float reach = 1.01f;  // surface that leaves the box closes a thousandth of a cell outside
+    const float reach = 1.01f;  // where the surface leaves the box, it is closed a thousandth of a cell outside
     for (size_t i = 0; i < mesh->vertices.size(); ++i) {
       ASSERT_TRUE(mesh->vertices[i].allFinite());
       ASSERT_LE(mesh->vertices[i].cwiseAbs().cwiseQuotient(snapshot.box_half_extents).maxCoeff(), reach);

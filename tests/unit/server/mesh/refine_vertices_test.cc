@@ -15,7 +15,7 @@ double LargestVertexDistance(const Mesh& mesh, const InsideDistance& distance) {
   return largest;
 }
 
-// Steep outside and flat inside, as learned densities are.
+// Steep outside and flat inside, like a trained density.
 FieldSnapshot UnevenBall() {
   return SnapshotOf([](const Eigen::Vector3f& p) {
     const float distance = Sphere(0.6f)(p);
@@ -31,12 +31,12 @@ TEST(RefineVertices, FindsTheCrossingOfAnUnevenField) {
   const double before = LargestVertexDistance(surface.mesh, Sphere(0.6f));
   RefineVertices(grid, probe, surface);
   const double after = LargestVertexDistance(surface.mesh, Sphere(0.6f));
-  EXPECT_GT(before, 0.1 * grid.spacing.x());  // else there is nothing to show here
+  EXPECT_GT(before, 0.1 * grid.spacing.x());  // the error to be reduced
   EXPECT_LT(after, before / 3);
   EXPECT_TRUE(CheckTopology(surface.mesh).IsClosedManifold());
 }
 
-TEST(RefineVertices, LeavesWhatARuleDecided) {
+TEST(RefineVertices, KeepsVerticesAtEditedNodes) {
   const FieldSnapshot snapshot = UnevenBall();
   const SurfaceProbe probe(snapshot);
   FieldGrid grid = SampleField(snapshot, probe, {24, 24, 24}).grid;
@@ -47,12 +47,12 @@ TEST(RefineVertices, LeavesWhatARuleDecided) {
   EXPECT_EQ(surface.mesh.vertices, before);
 }
 
-// Whatever the field answers on the second question, no vertex leaves its edge.
+// No vertex leaves its edge, even if the probe contradicts the grid.
 TEST(RefineVertices, KeepsVerticesOnTheirEdges) {
   const FieldSnapshot ball = UnevenBall();
   const FieldGrid grid = SampleField(ball, SurfaceProbe(ball), {24, 24, 24}).grid;
-  for (const float answer : {1e30f, -1e30f, std::numeric_limits<float>::quiet_NaN(), 0.0f}) {
-    const FieldSnapshot other = SnapshotOf([=](const Eigen::Vector3f&) { return answer; });
+  for (const float value : {1e30f, -1e30f, std::numeric_limits<float>::quiet_NaN(), 0.0f}) {
+    const FieldSnapshot other = SnapshotOf([=](const Eigen::Vector3f&) { return value; });
     GridSurface surface = MarchingCubes(grid);
     RefineVertices(grid, SurfaceProbe(other), surface);
     for (size_t i = 0; i < surface.grid_edges.size(); ++i) {

@@ -13,7 +13,7 @@ SampledField SampleOf(const FieldSnapshot& snapshot, int nodes = kNodes) {
   return SampleField(snapshot, SurfaceProbe(snapshot), Eigen::Vector3i::Constant(nodes));
 }
 
-// Nodes on the wrong side of the surface, of those whose value is the field's.
+// Unedited nodes on the wrong side of the surface.
 size_t WrongNodes(const FieldGrid& grid, const InsideDistance& distance) {
   size_t wrong = 0;
   for (size_t node = 0; node < grid.value.size(); ++node) {
@@ -23,7 +23,7 @@ size_t WrongNodes(const FieldGrid& grid, const InsideDistance& distance) {
   return wrong;
 }
 
-// A stem of 1.5 cells across, from the middle to a corner of the box.
+// A stem with a diameter of 1.5 cells, from the center to a corner of the box.
 InsideDistance Twig() {
   const Eigen::Vector3f tip(0.85f, 0.6f, 0.75f);
   const float radius = 0.75f * 2.0f / (kNodes - 1);
@@ -33,7 +33,7 @@ InsideDistance Twig() {
   };
 }
 
-TEST(SampleField, ValuesAreTheFieldsInUnitsOfTheDensity) {
+TEST(SampleField, ValuesAreLogarithmsOfTheDensity) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));  // raw = level + 60 distance
   snapshot.optics.raw_per_efold = 4;
   const FieldGrid grid = SampleOf(snapshot).grid;
@@ -47,30 +47,30 @@ TEST(SampleField, ValuesAreTheFieldsInUnitsOfTheDensity) {
   EXPECT_GT(checked, 1000u);
 }
 
-TEST(SampleField, AsksAFewNodesAndKnowsTheSideOfAll) {
+TEST(SampleField, FindsTheSideOfAllNodesFromFewSamples) {
   for (const InsideDistance& shape : {Sphere(0.6f), Torus(0.6f, 0.2f), Sphere(0.2f, {0.5f, 0.5f, -0.5f})}) {
     const SampledField sampled = SampleOf(SnapshotOf(shape));
     EXPECT_EQ(WrongNodes(sampled.grid, shape), 0u);
-    EXPECT_LT(sampled.asked, size_t{kNodes * kNodes * kNodes} / 2);
-    EXPECT_GT(sampled.asked, 1000u);
+    EXPECT_LT(sampled.samples, size_t{kNodes * kNodes * kNodes} / 2);
+    EXPECT_GT(sampled.samples, 1000u);
   }
 }
 
-TEST(SampleField, FindsStemsOfOneAndAHalfCells) {
+TEST(SampleField, FindsStemsOneAndAHalfCellsThick) {
   const InsideDistance flower = Union({Twig(), Sphere(0.3f)});
   for (const InsideDistance& shape : {flower, Twig(), Stem(-0.8f, 0.8f, 0.75f * 2 / (kNodes - 1))}) {
     EXPECT_EQ(WrongNodes(SampleOf(SnapshotOf(shape)).grid, shape), 0u);
   }
 }
 
-// At twice the slope of other tests most of the stem lies between lattice nodes that all look clearly empty.
+// At this slope most of the stem lies between lattice nodes that are all clearly empty.
 TEST(SampleField, FollowsAStemThatTheLatticeMisses) {
   const InsideDistance flower = Union({Twig(), Sphere(0.3f)});
   const InsideDistance steep = [&](const Eigen::Vector3f& p) { return 12 * flower(p); };
   EXPECT_EQ(WrongNodes(SampleOf(SnapshotOf(steep)).grid, flower), 0u);
 }
 
-TEST(SampleField, WhatSpaceDoesNotReachIsSolid) {
+TEST(SampleField, UnreachedSpaceIsSolid) {
   const InsideDistance shell = [](const Eigen::Vector3f& p) { return 0.1f - std::abs(p.norm() - 0.6f); };
   const FieldGrid grid = SampleOf(SnapshotOf(shell)).grid;
   for (size_t node = 0; node < grid.value.size(); ++node) {
@@ -84,13 +84,13 @@ TEST(SampleField, WhatSpaceDoesNotReachIsSolid) {
   }
 }
 
-TEST(SampleField, OutsideTheHullIsEmptyAndNotAsked) {
+TEST(SampleField, NodesOutsideTheHullAreEmptyAndNotSampled) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.8f));
-  const size_t all = SampleOf(snapshot).asked;
+  const size_t all = SampleOf(snapshot).samples;
   snapshot.hull.resolution = 8;
   for (int cell = 0; cell < 512; ++cell) snapshot.hull.bits.push_back(cell / 64 < 4);  // z < 0 only
   const SampledField sampled = SampleOf(snapshot);
-  EXPECT_LT(sampled.asked, 2 * all / 3);
+  EXPECT_LT(sampled.samples, 2 * all / 3);
   for (size_t node = 0; node < sampled.grid.value.size(); ++node) {
     const float z = sampled.grid.NodeAt(node).z();
     if (z < 33 || sampled.grid.value[node] == kBeyondBox) continue;

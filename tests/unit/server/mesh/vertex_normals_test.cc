@@ -34,7 +34,7 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-TEST(VertexNormals, OfABallPointOutwards) {
+TEST(VertexNormals, PointOutwardsOnABall) {
   Mesh ball = MakeBall({40, 30, 20});
   SetVertexNormals(ball);
   ASSERT_EQ(ball.normals.size(), ball.vertices.size());
@@ -44,8 +44,8 @@ TEST(VertexNormals, OfABallPointOutwards) {
   for (const Eigen::Vector3f& normal : ball.normals) EXPECT_NEAR(normal.norm(), 1, 1e-5f);
 }
 
-// As the surfaces of trained fields do. A vertex' own triangles alone would be off by 15 degrees here.
-TEST(VertexNormals, DoNotFollowARoughSurfaceIntoEveryDent) {
+// Noise as on the surface of a trained field. The mean of the adjacent triangles alone would be off by 15 degrees.
+TEST(VertexNormals, AreSmoothOnARoughSurface) {
   Mesh ball = MakeBall({40, 40, 40});
   std::mt19937 random(3);
   std::normal_distribution<float> noise(0, 0.006f);  // an eighth of a cell
@@ -54,7 +54,7 @@ TEST(VertexNormals, DoNotFollowARoughSurfaceIntoEveryDent) {
   EXPECT_LT(Mean(AnglesDeg(ball)), 6);
 }
 
-TEST(VertexNormals, OfAPlaneAreExactWhateverTheCells) {
+TEST(VertexNormals, AreExactOnAPlaneForAnyCellShape) {
   const Eigen::Vector3f up = Eigen::Vector3f(1, 2, 3).normalized();
   const FieldSnapshot snapshot = SnapshotOf([&](const Eigen::Vector3f& p) { return 0.1f - up.dot(p); });
   Mesh mesh = MarchingCubes(SampleField(snapshot, SurfaceProbe(snapshot), {40, 20, 10}).grid).mesh;
@@ -64,14 +64,14 @@ TEST(VertexNormals, OfAPlaneAreExactWhateverTheCells) {
   SetVertexNormals(mesh);
   size_t checked = 0;
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (mesh.vertices[i].cwiseAbs().maxCoeff() > 0.5f) continue;  // where the box closes the surface
+    if (mesh.vertices[i].cwiseAbs().maxCoeff() > 0.5f) continue;  // near the sides of the box
     EXPECT_GT(mesh.normals[i].dot(up), 0.9999f);
     ++checked;
   }
   EXPECT_GT(checked, 100u);
 }
 
-TEST(VertexNormals, OfTrianglesWithoutAreaAreUnitLength) {
+TEST(VertexNormals, HaveUnitLengthOnTrianglesWithoutArea) {
   Mesh mesh;
   mesh.vertices = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}};
   mesh.triangles = {{0, 1, 2}};

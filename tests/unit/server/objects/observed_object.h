@@ -55,7 +55,7 @@ inline ObservedObject ObserveObject(SyntheticShape shape, const Eigen::Vector3d&
   SilhouetteHull hull;
   hull.Reset(evidence.region, kHullCells);
   for (const Silhouette& silhouette : observed.silhouettes) hull.Add(silhouette);
-  evidence.hull_cells = hull.Cells({.max_outside = options.frames / 20, .min_inside = options.frames / 3});
+  evidence.hull_cells = hull.Cells({.min_background = 1 + options.frames / 20, .min_object = options.frames / 3});
   evidence.cell_size = hull.CellSize();
   for (const Eigen::Vector3d& p : world.SurfacePoints(0, 200)) evidence.points.push_back(evidence.region.ToGrid(p));
   for (int x = -5; x <= 5; ++x) {

@@ -18,6 +18,10 @@ constexpr uint16_t kObjectLabel = 1;
 constexpr uint16_t kNeighborLabel = 2;
 constexpr uint16_t kUnknownLabel = 3;
 
+hull::CarvingRule Rule(int min_background, int min_object) {
+  return {.min_background = min_background, .min_object = min_object};
+}
+
 HullRegion Region() {
   HullRegion region;
   region.R_world_grid = Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.1, 0.2, 1).normalized()).toRotationMatrix();
@@ -75,7 +79,8 @@ MaskHit MaskAt(const Silhouette& silhouette, const Eigen::Vector3d& p_world) {
 }
 
 // Counts the cells for which the hull differs from MaskAt() of every silhouette.
-int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& silhouettes, const HullVotes& votes) {
+int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& silhouettes,
+                     const hull::CarvingRule& rule) {
   const HullRegion& region = hull.region();
   int differences = 0;
   for (int i = 0; i < kCells * kCells * kCells; ++i) {
@@ -88,8 +93,8 @@ int CountDifferences(const SilhouetteHull& hull, const std::vector<Silhouette>& 
       inside += hit == MaskHit::kInside ? 1 : 0;
       outside += hit == MaskHit::kOutside ? 1 : 0;
     }
-    const bool expected = outside <= votes.max_outside && inside >= votes.min_inside;
-    differences += hull.Contains(p_grid, votes) != expected ? 1 : 0;
+    const bool expected = outside < rule.min_background && inside >= rule.min_object;
+    differences += hull.Contains(p_grid, rule) != expected ? 1 : 0;
   }
   return differences;
 }
@@ -107,25 +112,25 @@ TEST(SilhouetteHullTest, EqualsTheVotesOfEverySilhouetteAtEveryCell) {
       silhouettes.push_back(RandomSilhouette(random));
       hull.Add(silhouettes.back());
     }
-    for (const HullVotes votes : {HullVotes{0, 1}, HullVotes{1, 2}, HullVotes{2, 0}}) {
-      EXPECT_LE(CountDifferences(hull, silhouettes, votes), kMaxOnBorders) << "round " << round;
+    for (const hull::CarvingRule& rule : {Rule(1, 1), Rule(2, 2), Rule(3, 0)}) {
+      EXPECT_LE(CountDifferences(hull, silhouettes, rule), kMaxOnBorders) << "round " << round;
     }
   }
 }
 
 TEST(SilhouetteHullTest, RemovingASilhouetteUndoesItsVotes) {
   std::mt19937 random(8);
-  const Silhouette stays = RandomSilhouette(random);
-  const Silhouette goes = RandomSilhouette(random);
+  const Silhouette kept = RandomSilhouette(random);
+  const Silhouette removed = RandomSilhouette(random);
   SilhouetteHull hull, without;
   hull.Reset(Region(), kCells);
   without.Reset(Region(), kCells);
-  hull.Add(goes);
-  hull.Add(stays);
-  hull.Remove(goes);
-  without.Add(stays);
-  for (const HullVotes votes : {HullVotes{0, 0}, HullVotes{0, 1}, HullVotes{1, 1}}) {
-    EXPECT_EQ(hull.Cells(votes), without.Cells(votes));
+  hull.Add(removed);
+  hull.Add(kept);
+  hull.Remove(removed);
+  without.Add(kept);
+  for (const hull::CarvingRule& rule : {Rule(1, 0), Rule(1, 1), Rule(2, 1)}) {
+    EXPECT_EQ(hull.Cells(rule), without.Cells(rule));
   }
 }
 
@@ -133,16 +138,16 @@ TEST(SilhouetteHullTest, BoundsSurroundTheCells) {
   std::mt19937 random(9);
   SilhouetteHull hull;
   hull.Reset(Region(), kCells);
-  EXPECT_TRUE(hull.Bounds({0, 1}).isEmpty());
+  EXPECT_TRUE(hull.Bounds(Rule(1, 1)).isEmpty());
   hull.Add(RandomSilhouette(random));
-  const HullVotes votes{0, 1};
+  const hull::CarvingRule rule = Rule(1, 1);
   Eigen::AlignedBox3d expected;
-  for (const Eigen::Vector3d& cell : hull.Cells(votes)) {
+  for (const Eigen::Vector3d& cell : hull.Cells(rule)) {
     expected.extend(cell - hull.CellSize() / 2);
     expected.extend(cell + hull.CellSize() / 2);
   }
   ASSERT_FALSE(expected.isEmpty());
-  EXPECT_TRUE(hull.Bounds(votes).isApprox(expected, 1e-12));
+  EXPECT_TRUE(hull.Bounds(rule).isApprox(expected, 1e-12));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "server/mesh/support_height.h"
+#include "server/mesh/visible_base.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -12,18 +12,17 @@
 namespace romap::mesh {
 namespace {
 
-// Surface that is grazed more flatly than this does not count as seen: walls of what no view reached run along the
-// flattest lines of sight.
+// Surface seen at a flatter angle counts as invisible: the walls of unobserved matter run along the flattest rays.
 constexpr float kMinCosine = 0.2f;
-// Of the visible area; what is noise at the rim of the hull.
+// Share of the visible area that may lie below: noise at the border of the hull.
 constexpr double kShareBelow = 0.02;
-// Walls have normals within 30 degrees of the horizontal. Where views see hardly any, as from straight above, the
-// lowest visible height says nothing.
+// Walls have normals within 30 degrees of the horizontal. If the views see hardly any walls, as from straight above,
+// the lowest visible height is not the base.
 constexpr float kMaxWallNormalZ = 0.5f;
 constexpr double kMinWallShare = 0.05;  // of the visible area
-// Value per node spacing with which matter fades below the cut.
+// Slope of the values around the cut, per node spacing.
 constexpr float kCutSlope = 4.0f;
-// So many triangles tell the height as well as all do.
+// Of larger meshes only about this many triangles are used.
 constexpr size_t kEnoughTriangles = 6000;
 
 struct SurfacePatch {
@@ -31,7 +30,7 @@ struct SurfacePatch {
   double area;   // any unit
 };
 
-// The height below which lies `kShareBelow` of the area. A histogram, finer than any grid, spares the sorting.
+// The height below which `kShareBelow` of the area lies, from a histogram that is finer than the grid.
 float LowHeight(const FieldGrid& grid, const std::vector<SurfacePatch>& patches, double total_area) {
   constexpr int kBinsPerNode = 16;
   const float bin_mu = grid.spacing.z() / kBinsPerNode;
@@ -46,8 +45,8 @@ float LowHeight(const FieldGrid& grid, const std::vector<SurfacePatch>& patches,
   return grid.origin.z() + (static_cast<float>(bin) + 0.5f) * bin_mu;
 }
 
-// Whether a vertex lies between two nodes that hold what the field itself says.
-bool IsOfTheField(const FieldGrid& grid, const GridSurface& surface, uint32_t vertex) {
+// Whether a vertex lies between two nodes that have the field's own values.
+bool IsFieldVertex(const FieldGrid& grid, const GridSurface& surface, uint32_t vertex) {
   const std::array<size_t, 3> stride = {1, grid.StrideY(), grid.StrideZ()};
   const size_t low = surface.grid_edges[vertex] / 3;
   return grid.edited[low] == 0 && grid.edited[low + stride[surface.grid_edges[vertex] % 3]] == 0;
@@ -55,8 +54,8 @@ bool IsOfTheField(const FieldGrid& grid, const GridSurface& surface, uint32_t ve
 
 }  // namespace
 
-std::optional<float> FindSupportHeight(const FieldGrid& grid, SightTester& sight) {
-  if (!sight.has_views()) return std::nullopt;
+std::optional<float> FindVisibleBase(const FieldGrid& grid, VisibilityTester& visibility) {
+  if (!visibility.has_views()) return std::nullopt;
   const GridSurface surface = MarchingCubes(grid);
   const Mesh& mesh = surface.mesh;
   std::vector<SurfacePatch> visible;
@@ -65,15 +64,16 @@ std::optional<float> FindSupportHeight(const FieldGrid& grid, SightTester& sight
   const size_t stride = 1 + mesh.triangles.size() / kEnoughTriangles;
   for (size_t i = 0; i < mesh.triangles.size(); i += stride) {
     const auto& [a, b, c] = mesh.triangles[i];
-    if (!IsOfTheField(grid, surface, a) || !IsOfTheField(grid, surface, b) || !IsOfTheField(grid, surface, c)) continue;
+    if (!IsFieldVertex(grid, surface, a) || !IsFieldVertex(grid, surface, b) || !IsFieldVertex(grid, surface, c))
+      continue;
     const Eigen::Vector3f& p = mesh.vertices[a];
     const Eigen::Vector3f cross = (mesh.vertices[b] - p).cross(mesh.vertices[c] - p);
     const float area = cross.norm();
     if (!(area > 0)) continue;
     const Eigen::Vector3f normal = cross / area;
     const Eigen::Vector3f center = (p + mesh.vertices[b] + mesh.vertices[c]) / 3.0f;
-    // One node out, so that the nodes that make the surface do not hide it.
-    if (!sight.IsSurfaceSeen(grid.ToNode(center) + normal, normal, kMinCosine)) continue;
+    // One node outside, so that the nodes inside the surface do not hide it.
+    if (!visibility.IsSurfaceVisible(grid.ToNode(center) + normal, normal, kMinCosine)) continue;
     visible.push_back({center.z(), area});
     visible_area += area;
     if (std::abs(normal.z()) < kMaxWallNormalZ) wall_area += area;

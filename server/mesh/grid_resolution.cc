@@ -1,4 +1,4 @@
-#include "server/mesh/grid_nodes.h"
+#include "server/mesh/grid_resolution.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,12 @@
 namespace romap::mesh {
 namespace {
 
-// The sharpest views are few and the farthest tell nothing new: three quarters of the views are no better than this.
+// Quantile of the views by resolution that counts as well resolved: the few sharpest views see only parts of the
+// object, and the farthest add no detail.
 constexpr double kGoodViewShare = 0.75;
 
-// How long the box's longest side would be in a good view if it faced it, in pixels; 0 without views.
+// Length in pixels of the longest side of the box in a well-resolved view, as if parallel to the image; 0 without
+// views.
 double LongestSide_px(const FieldSnapshot& snapshot) {
   std::vector<double> sides_px;
   for (const TrainingCamera& view : snapshot.cameras) {

@@ -1,4 +1,4 @@
-#include "server/mesh/grid_nodes.h"
+#include "server/mesh/grid_resolution.h"
 
 #include <gtest/gtest.h>
 
@@ -7,17 +7,17 @@
 namespace romap::mesh {
 namespace {
 
-TEST(ChooseNodes, CellsAreCubesAboveTheFloor) {
+TEST(ChooseNodes, CellsAreCubesUnlessASideIsTooShort) {
   const FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f), {1.0f, 0.5f, 0.02f});
   MeshConfig config;
   config.resolution = 65;
   config.min_side_nodes = 12;
   EXPECT_EQ(ChooseNodes(snapshot, config), Eigen::Vector3i(65, 33, 12));
-  config.min_side_nodes = 100;  // never above the longest side's
+  config.min_side_nodes = 100;  // at most the number of the longest side
   EXPECT_EQ(ChooseNodes(snapshot, config), Eigen::Vector3i(65, 65, 65));
 }
 
-TEST(ChooseNodes, FollowTheSizeInGoodViews) {
+TEST(ChooseNodes, AdaptsToTheSizeInWellResolvedViews) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.converged = true;
   MeshConfig config;
@@ -41,7 +41,7 @@ TEST(ChooseNodes, FollowTheSizeInGoodViews) {
   EXPECT_EQ(nodes_at(10), 64);
 }
 
-TEST(ChooseNodes, ViewsThatCannotBeAreNotAsked) {
+TEST(ChooseNodes, InvalidViewsAreIgnored) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.converged = true;
   snapshot.cameras = {ViewFrom({0, 0, std::numeric_limits<float>::quiet_NaN()}), ViewFrom({0, 0, 0})};

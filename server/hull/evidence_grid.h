@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/hull/voxel_grid.h"
+
+namespace romap::hull {
+
+// What one view shows of a cell.
+enum class CellEvidence : uint8_t {
+  kObject,      // the object's mask covers the cell
+  kBackground,  // the cell is empty
+  kOccluded,    // the view contains the cell, but something may hide it
+  kNone,        // the view does not contain the cell; not counted
+};
+
+// Which cells a hull keeps. A cell that n views contain is removed if at least max(min_background, background_share *
+// n) of them show background, or fewer than max(min_object, object_share * n) show the object.
+struct CarvingRule {
+  int min_background = 1;
+  double background_share = 0;
+  int min_object = 0;
+  double object_share = 0;
+};
+
+// The visual hull of an object: for each cell of a grid, how many views show the object there, background, or neither.
+// The counts allow rules that tolerate some wrong masks, and a view to be removed again. At most 255 views.
+// Source: A. Laurentini, "The visual hull concept for silhouette-based image understanding", PAMI 1994.
+class EvidenceGrid {
+ public:
+  // Removes all views.
+  void Reset(const VoxelGrid& grid);
+  // Scales the grid after its space and all views were scaled.
+  void Scale(double factor) { grid_.half_extents *= factor; }
+
+  const VoxelGrid& grid() const { return grid_; }
+
+  // Adds (sign 1) or removes (sign -1) the evidence of one view for consecutive cells.
+  void Count(size_t first_cell, std::span<const CellEvidence> evidence, int sign);
+  // The same where all these cells have the same evidence.
+  void Count(size_t first_cell, size_t cells, CellEvidence evidence, int sign);
+
+  // Number of views with this evidence for a cell; not for kNone.
+  int Views(size_t cell, CellEvidence evidence) const { return views_[static_cast<size_t>(evidence)][cell]; }
+  bool Keeps(size_t cell, const CarvingRule& rule) const;
+
+  // 1 for each cell that the rule keeps, else 0.
+  std::vector<uint8_t> Carve(const CarvingRule& rule) const;
+  // Centers of the cells that the rule keeps, z slowest.
+  std::vector<Eigen::Vector3d> Cells(const CarvingRule& rule) const;
+  // Box around the cells that the rule keeps; empty if there are none.
+  Eigen::AlignedBox3d Bounds(const CarvingRule& rule) const;
+  // Whether the rule keeps the cell that contains a point; false outside the grid.
+  bool Contains(const Eigen::Vector3d& p_grid, const CarvingRule& rule) const;
+
+ private:
+  template <class Visit>
+  void ForEachKept(const CarvingRule& rule, Visit visit) const;
+
+  VoxelGrid grid_;
+  std::array<std::vector<uint8_t>, 3> views_;  // by CellEvidence and cell
+};
+
+}  // namespace romap::hull
