@@ -11,7 +11,7 @@ void EvidenceGrid::Reset(const VoxelGrid& grid) {
 }
 
 void EvidenceGrid::Count(size_t first_cell, std::span<const CellEvidence> evidence, int sign) {
-  std::array<uint8_t*, 3> views;
+  std::array<uint8_t*, 4> views;
   for (size_t kind = 0; kind < views.size(); ++kind) views[kind] = &views_[kind][first_cell];
   for (size_t i = 0; i < evidence.size(); ++i) {
     if (evidence[i] == CellEvidence::kNone) continue;
@@ -29,9 +29,10 @@ void EvidenceGrid::Count(size_t first_cell, size_t cells, CellEvidence evidence,
 bool EvidenceGrid::Keeps(size_t cell, const CarvingRule& rule) const {
   const int object = Views(cell, CellEvidence::kObject);
   const int background = Views(cell, CellEvidence::kBackground);
-  const int all = object + background + Views(cell, CellEvidence::kOccluded);
-  return background < std::max<double>(rule.min_background, rule.background_share * all) &&
-         object >= std::max<double>(rule.min_object, rule.object_share * all);
+  const int in_crop = object + background + Views(cell, CellEvidence::kOccluded);
+  const int in_image = in_crop + Views(cell, CellEvidence::kCropped);
+  return background < std::max<double>(rule.min_background, rule.background_share * in_crop) &&
+         object >= std::max<double>(rule.min_object, rule.object_share * in_image);
 }
 
 std::vector<uint8_t> EvidenceGrid::Carve(const CarvingRule& rule) const {

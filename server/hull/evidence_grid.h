@@ -17,11 +17,18 @@ enum class CellEvidence : uint8_t {
   kObject,      // the object's mask covers the cell
   kBackground,  // the cell is empty
   kOccluded,    // the view contains the cell, but something may hide it
-  kNone,        // the view does not contain the cell; not counted
+  kCropped,     // the image contains the cell, but the crop with the object's mask does not
+  kNone,        // the image does not contain the cell; not counted
 };
 
-// Which cells a hull keeps. A cell that n views contain is removed if at least max(min_background, background_share *
-// n) of them show background, or fewer than max(min_object, object_share * n) show the object.
+// Which cells a hull keeps. A cell is removed in two cases:
+// - It is empty. At least max(min_background, background_share * n) views show background, where n views contain the
+// cell
+//   in their crop.
+// - It is unconfirmed. Fewer than max(min_object, object_share * n) views show the object, where n views contain the
+// cell
+//   in their image. A view that shows another object is no evidence that the cell is empty; without this case, space
+//   behind other objects in nearly all views would be kept.
 struct CarvingRule {
   int min_background = 1;
   double background_share = 0;
@@ -29,7 +36,7 @@ struct CarvingRule {
   double object_share = 0;
 };
 
-// The visual hull of an object: for each cell of a grid, how many views show the object there, background, or neither.
+// The visual hull of an object: for each cell of a grid, how many views give which evidence.
 // The counts allow rules that tolerate some wrong masks, and a view to be removed again. At most 255 views.
 // Source: A. Laurentini, "The visual hull concept for silhouette-based image understanding", PAMI 1994.
 class EvidenceGrid {
@@ -64,7 +71,7 @@ class EvidenceGrid {
   void ForEachKept(const CarvingRule& rule, Visit visit) const;
 
   VoxelGrid grid_;
-  std::array<std::vector<uint8_t>, 3> views_;  // by CellEvidence and cell
+  std::array<std::vector<uint8_t>, 4> views_;  // by CellEvidence and cell
 };
 
 }  // namespace romap::hull

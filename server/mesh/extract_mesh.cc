@@ -10,7 +10,6 @@
 #include "common/status.h"
 #include "common/thread_time.h"
 #include "server/mesh/confidence.h"
-#include "server/mesh/confirmed_space.h"
 #include "server/mesh/floaters.h"
 #include "server/mesh/grid_resolution.h"
 #include "server/mesh/hidden_space.h"
@@ -95,8 +94,6 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   auto [grid, samples] = SampleField(snapshot, probe, nodes);
   clock.EndPhase();
 
-  EmptyUnconfirmed(snapshot.cameras, config.min_confirmed_share, grid);
-  clock.EndPhase();
   VisibilityTester visibility(grid, LimitsOf(snapshot));
   VisibilityTester no_views(grid, {});
   FillHiddenSpace(grid, config.fill_unseen ? visibility : no_views);

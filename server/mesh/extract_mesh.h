@@ -11,8 +11,8 @@
 
 namespace romap::mesh {
 
-inline constexpr std::array kMeshPhaseNames = {"sample", "confirm", "hidden",  "base",   "floaters",
-                                               "march",  "refine",  "normals", "colors", "confidence"};
+inline constexpr std::array kMeshPhaseNames = {"sample", "hidden",  "base",   "floaters",  "march",
+                                               "refine", "normals", "colors", "confidence"};
 
 // The cost of one extraction.
 struct MeshStats {
@@ -25,9 +25,9 @@ struct MeshStats {
 // units), oriented outwards. Where the field leaves its box, the surface is closed at the box. With config.trim_unseen
 // the surface that no view observed is removed, and the mesh is open there.
 //
-// Steps: sample the field on a grid, empty what too few views confirm, fill cavities and invisible space, cut below the
-// visible base, remove floaters, extract the snapshot's surface level by marching cubes (paper, sections "System
-// Overview" and "Implementation Details"), and move the vertices to where the field crosses that level.
+// Steps: sample the field on a grid, fill cavities and invisible space, cut below the visible base, remove floaters,
+// extract the snapshot's surface level by marching cubes (paper, sections "System Overview" and "Implementation
+// Details"), and move the vertices to where the field crosses that level.
 //
 // FAILED_PRECONDITION: the field is nowhere above its surface level, or unobserved surface is trimmed and none was
 // observed. INVALID_ARGUMENT: the snapshot is invalid (no field, box without volume, size of the hull differs from its

@@ -10,7 +10,6 @@ struct MeshConfig {
   bool adapt_resolution = true;
   double pixels_per_node = 2.5;
   int min_side_nodes = 48;
-  double min_confirmed_share = 0.25;
   bool fill_unseen = true;
   bool cut_below_support = true;
   double min_component_share = 0.35;
@@ -50,10 +49,6 @@ struct MeshConfig {
   }
 
   void SurfaceFields(ConfigFields& fields) {
-    fields.Add("min_confirmed_share", &min_confirmed_share,
-               {.min = 0,
-                .max = 1,
-                .help = "Minimum share of the views that must show the object at a point; elsewhere space is empty"});
     fields.Add("fill_unseen", &fill_unseen,
                {.help = "Make empty space solid if no training view can see it (undersides, insides)"});
     fields.Add("cut_below_support", &cut_below_support,

@@ -71,7 +71,7 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("hull_show_share", &c.hull_show_share,
              {.min = 0,
               .max = 1,
-              .help = "A hull cell is kept if the masks of at least this share of the views that see it contain it"});
+              .help = "Minimum share of the images that contain a hull cell that must show the object there"});
   fields.Add(
       "occupancy_start_step", &c.occupancy_start_step,
       {.unit = "steps", .min = 0, .max = 100000, .help = "First step after which cells without density are skipped"});

@@ -24,6 +24,7 @@ enum class Coverage { kUnknown, kNone, kFull, kPartial };
 struct VisualHull::Verdict {
   Coverage matter = Coverage::kUnknown;  // pixels that are not background
   Coverage object = Coverage::kUnknown;  // pixels that show the object
+  bool in_image = false;                 // the whole footprint, whether inside the crop or not
 
   // Whether every smaller footprint inside this one has the same evidence.
   bool IsUniform() const {
@@ -36,7 +37,9 @@ struct VisualHull::Verdict {
 class VisualHull::Footprints {
  public:
   Footprints(const ObjectView& view, const TrainingBox& box, bool use_depth, double cell_radius_mu)
-      : roi_px_(view.roi_px), focal_px_(std::max(view.camera.fx_px, view.camera.fy_px)) {
+      : image_px_(view.camera.width_px, view.camera.height_px),
+        roi_px_(view.roi_px),
+        focal_px_(std::max(view.camera.fx_px, view.camera.fy_px)) {
     const SE3<Camera, Object> T_camera_object = view.T_world_camera.Inverse() * box.T_world_object;
     projection_ =
         hull::GridProjection::Of(view.camera, T_camera_object.RotationMatrix(), T_camera_object.translation());
@@ -73,27 +76,36 @@ class VisualHull::Footprints {
     if (q.z() <= radius_mu) return {};
     const double u_px = q.x() / q.z(), v_px = q.y() / q.z();
     const double radius_px = radius_mu * focal_px_ / q.z();
-    const int x0 = static_cast<int>(std::floor(u_px - radius_px + 0.5)) - roi_px_.x;
-    const int y0 = static_cast<int>(std::floor(v_px - radius_px + 0.5)) - roi_px_.y;
-    const int x1 = static_cast<int>(std::floor(u_px + radius_px + 0.5)) - roi_px_.x + 1;
-    const int y1 = static_cast<int>(std::floor(v_px + radius_px + 0.5)) - roi_px_.y + 1;
-    if (x0 < 0 || y0 < 0 || x1 > roi_px_.width || y1 > roi_px_.height) return {};
+    const int left = static_cast<int>(std::floor(u_px - radius_px + 0.5));
+    const int top = static_cast<int>(std::floor(v_px - radius_px + 0.5));
+    const int right = static_cast<int>(std::floor(u_px + radius_px + 0.5)) + 1;
+    const int bottom = static_cast<int>(std::floor(v_px + radius_px + 0.5)) + 1;
+    const bool in_image = left >= 0 && top >= 0 && right <= image_px_.width && bottom <= image_px_.height;
+    const int x0 = left - roi_px_.x, y0 = top - roi_px_.y, x1 = right - roi_px_.x, y1 = bottom - roi_px_.y;
+    if (x0 < 0 || y0 < 0 || x1 > roi_px_.width || y1 > roi_px_.height) return {.in_image = in_image};
     const auto coverage = [&](const cv::Mat& sum) {
       const int count = sum.at<int>(y1, x1) - sum.at<int>(y0, x1) - sum.at<int>(y1, x0) + sum.at<int>(y0, x0);
       if (count == 0) return Coverage::kNone;
       return count == (x1 - x0) * (y1 - y0) ? Coverage::kFull : Coverage::kPartial;
     };
-    return {coverage(matter_sum_), coverage(object_sum_)};
+    return {coverage(matter_sum_), coverage(object_sum_), in_image};
   }
 
  private:
   hull::GridProjection projection_;
+  cv::Size image_px_;
   cv::Rect roi_px_;
   double focal_px_;
   cv::Mat matter_sum_;  // integral image of "not background"
   cv::Mat object_sum_;  // integral image of "object"
   cv::Mat nearest_mu_;  // least depth under the footprint of a cell, 0 if part of it is unknown; empty without depth
 };
+
+CellEvidence VisualHull::EvidenceOf(const Verdict& verdict, bool in_front_of_depth) {
+  if (verdict.matter == Coverage::kUnknown) return verdict.in_image ? CellEvidence::kCropped : CellEvidence::kNone;
+  if (verdict.matter == Coverage::kNone || in_front_of_depth) return CellEvidence::kBackground;
+  return verdict.object == Coverage::kNone ? CellEvidence::kOccluded : CellEvidence::kObject;
+}
 
 VisualHull::VisualHull(const NerfConfig& config)
     : carve_(config.carve_hull),
@@ -130,7 +142,8 @@ void VisualHull::CountBlock(const Footprints& footprints, const Eigen::Vector3i&
   const Eigen::Vector3d center = grid.BlockCenter(first, side);
   const double radius_mu = side == 1 ? CellRadius_mu() : 0.5 * side * grid.CellSize().norm();
   const Verdict verdict = footprints.Under(center, radius_mu);
-  const bool depth_may_carve = footprints.HasDepth() && verdict.matter != Coverage::kNone;
+  const bool depth_may_carve =
+      footprints.HasDepth() && verdict.matter != Coverage::kNone && verdict.matter != Coverage::kUnknown;
   if (side > 1 && (!verdict.IsUniform() || depth_may_carve)) {
     const int half = side / 2;
     for (int octant = 0; octant < 8; ++octant) {
@@ -139,11 +152,8 @@ void VisualHull::CountBlock(const Footprints& footprints, const Eigen::Vector3i&
     }
     return;
   }
-  if (verdict.matter == Coverage::kUnknown) return;
-  CellEvidence evidence = verdict.object != Coverage::kNone ? CellEvidence::kObject : CellEvidence::kOccluded;
-  if (verdict.matter == Coverage::kNone || (depth_may_carve && footprints.IsInFrontOfDepth(center, radius_mu))) {
-    evidence = CellEvidence::kBackground;
-  }
+  const bool in_front = depth_may_carve && footprints.IsInFrontOfDepth(center, radius_mu);
+  const CellEvidence evidence = EvidenceOf(verdict, in_front);
   for (int z = first.z(); z < first.z() + side; ++z) {
     for (int y = first.y(); y < first.y() + side; ++y) {
       evidence_.Count(grid.Index(first.x(), y, z), static_cast<size_t>(side), evidence, sign);

@@ -12,7 +12,7 @@ namespace romap::nerf {
 
 // The cells of the training box that the views leave possible. A view shows background if the whole footprint of the
 // cell is background, or if dense depth was measured behind it; it shows the object if some pixel of the footprint
-// does. A footprint that is not inside the crop is no evidence.
+// does.
 class VisualHull {
  public:
   explicit VisualHull(const NerfConfig& config);
@@ -29,6 +29,7 @@ class VisualHull {
   struct Verdict;
   class Footprints;
 
+  static hull::CellEvidence EvidenceOf(const Verdict& verdict, bool in_front_of_depth);
   double CellRadius_mu() const;  // of a footprint
   void Count(const ObjectView& view, int sign);
   void CountBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign);

@@ -31,6 +31,14 @@ TEST(EvidenceGridTest, TooFewViewsOfTheObjectRemoveACell) {
   EXPECT_TRUE(WithFirstCell(0, 0, 3).Keeps(0, CarvingRule())) << "by default a cell needs no view of the object";
 }
 
+TEST(EvidenceGridTest, CropsThatDoNotContainACellOnlyCountAgainstTheObject) {
+  EvidenceGrid grid = WithFirstCell(1, 1, 0);
+  for (int i = 0; i < 8; ++i) grid.Count(0, 1, CellEvidence::kCropped, 1);
+  EXPECT_FALSE(grid.Keeps(0, {.min_background = 2, .object_share = 0.25})) << "1 of 10 images shows the object";
+  EXPECT_TRUE(grid.Keeps(0, {.min_background = 2, .object_share = 0.1}));
+  EXPECT_FALSE(grid.Keeps(0, {.background_share = 0.5})) << "1 of 2 crops shows background";
+}
+
 TEST(EvidenceGridTest, CountsEachCellOfARow) {
   EvidenceGrid grid = WithFirstCell(0, 0, 0);
   const std::vector<CellEvidence> row = {CellEvidence::kBackground, CellEvidence::kObject};

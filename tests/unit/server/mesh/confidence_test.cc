@@ -33,7 +33,6 @@ MeshConfig UneditedConfig() {
   MeshConfig config;
   config.fill_unseen = false;
   config.cut_below_support = false;
-  config.min_confirmed_share = 0;
   return config;
 }
 
