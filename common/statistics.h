@@ -8,8 +8,8 @@
 
 namespace romap {
 
-// Quantiles by partial sorting. `values` must not be empty, and no value NaN; `share` is in 0..1. The kinds differ in
-// what they return where `share` falls between two values.
+// Quantiles by partial sorting. `values` must not be empty, and no value may be NaN; `share` is in 0..1. The functions
+// differ in the result if `share` falls between two values.
 
 // The value at `rank` in ascending order; rank 0 is the smallest.
 template <class T>
