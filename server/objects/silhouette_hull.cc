@@ -23,13 +23,13 @@ class RowEvidence {
         masks_(static_cast<size_t>(grid.cells)),
         evidence_(static_cast<size_t>(grid.cells)) {
     hiders_.reserve(silhouette.neighbors.size());
-    for (const auto& neighbour : silhouette.neighbors) {
+    for (const auto& neighbor : silhouette.neighbors) {
       hiders_.emplace_back();
-      if (!neighbour) continue;
-      const Eigen::Vector3d from = *neighbour * silhouette.CameraCenter();
+      if (!neighbor) continue;
+      const Eigen::Vector3d from = *neighbor * silhouette.CameraCenter();
       hiders_.back() = Hider{.from = from.cast<float>(),
-                             .M = (neighbour->M * region.R_world_grid).cast<float>(),
-                             .offset = (*neighbour * region.center_world - from).cast<float>()};
+                             .M = (neighbor->M * region.R_world_grid).cast<float>(),
+                             .offset = (*neighbor * region.center_world - from).cast<float>()};
     }
   }
 
@@ -81,9 +81,9 @@ class RowEvidence {
 
   // Silhouette::MayOcclude() for a point of the grid.
   bool MayOcclude(uint8_t mask, const Eigen::Vector3f& p_grid) const {
-    const size_t neighbour = static_cast<size_t>(mask) - 1;
-    if (neighbour >= hiders_.size() || !hiders_[neighbour]) return true;
-    const Hider& hider = *hiders_[neighbour];
+    const size_t neighbor = static_cast<size_t>(mask) - 1;
+    if (neighbor >= hiders_.size() || !hiders_[neighbor]) return true;
+    const Hider& hider = *hiders_[neighbor];
     const Eigen::Array3f inverse_step = (hider.M * p_grid + hider.offset).array().inverse();
     const Eigen::Array3f t0 = (-1 - hider.from.array()) * inverse_step;
     const Eigen::Array3f t1 = (1 - hider.from.array()) * inverse_step;
