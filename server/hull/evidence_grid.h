@@ -12,7 +12,7 @@
 
 namespace romap::hull {
 
-// What one view shows of a cell.
+// Evidence of one view for a cell.
 enum class CellEvidence : uint8_t {
   kObject,      // the object's mask covers the cell
   kBackground,  // the cell is empty
@@ -21,14 +21,12 @@ enum class CellEvidence : uint8_t {
   kNone,        // the image does not contain the cell; not counted
 };
 
-// Which cells a hull keeps. A cell is removed in two cases:
-// - It is empty. At least max(min_background, background_share * n) views show background, where n views contain the
-// cell
-//   in their crop.
-// - It is unconfirmed. Fewer than max(min_object, object_share * n) views show the object, where n views contain the
-// cell
-//   in their image. A view that shows another object is no evidence that the cell is empty; without this case, space
-//   behind other objects in nearly all views would be kept.
+// Rule that decides which cells a hull keeps. A cell is removed in two cases:
+// - It is empty: at least max(min_background, background_share * n) views show background, where n is the number of
+//   views whose crop contains the cell.
+// - It is unconfirmed: fewer than max(min_object, object_share * n) views show the object, where n is the number of
+//   views whose image contains the cell. A view that shows another object is no evidence that the cell is empty;
+//   without this case, space behind other objects in nearly all views would be kept.
 struct CarvingRule {
   int min_background = 1;
   double background_share = 0;
@@ -36,9 +34,9 @@ struct CarvingRule {
   double object_share = 0;
 };
 
-// The visual hull of an object: for each cell of a grid, how many views give which evidence.
-// The counts allow rules that tolerate some wrong masks, and a view to be removed again. At most 255 views.
-// Source: A. Laurentini, "The visual hull concept for silhouette-based image understanding", PAMI 1994.
+// The visual hull of an object: counts the views by kind of evidence for each cell of a grid. The counts allow rules
+// that tolerate some wrong masks, and they allow a view to be removed. At most 255 views. Source: A. Laurentini, "The
+// visual hull concept for silhouette-based image understanding", PAMI 1994.
 class EvidenceGrid {
  public:
   // Removes all views.
@@ -50,14 +48,14 @@ class EvidenceGrid {
 
   // Adds (sign 1) or removes (sign -1) the evidence of one view for consecutive cells.
   void Count(size_t first_cell, std::span<const CellEvidence> evidence, int sign);
-  // The same where all these cells have the same evidence.
+  // Adds or removes evidence that is the same for all of these cells.
   void Count(size_t first_cell, size_t cells, CellEvidence evidence, int sign);
 
   // Number of views with this evidence for a cell; not for kNone.
   int Views(size_t cell, CellEvidence evidence) const { return views_[static_cast<size_t>(evidence)][cell]; }
   bool Keeps(size_t cell, const CarvingRule& rule) const;
 
-  // 1 for each cell that the rule keeps, else 0.
+  // Returns 1 for each cell that the rule keeps, otherwise 0.
   std::vector<uint8_t> Carve(const CarvingRule& rule) const;
   // Centers of the cells that the rule keeps, z slowest.
   std::vector<Eigen::Vector3d> Cells(const CarvingRule& rule) const;

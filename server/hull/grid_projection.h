@@ -13,7 +13,7 @@ struct GridProjection {
   Eigen::Matrix3d M;
   Eigen::Vector3d offset;
 
-  // Of a camera without distortion whose pose is p_camera = R_camera_grid * p_grid + t_camera_grid.
+  // Projection of a camera without distortion whose pose is p_camera = R_camera_grid * p_grid + t_camera_grid.
   static GridProjection Of(const CameraModel& camera, const Eigen::Matrix3d& R_camera_grid,
                            const Eigen::Vector3d& t_camera_grid);
 
@@ -30,7 +30,7 @@ class RowProjector {
   // False if some cell center of the row is not in front of the camera; then u_px() and v_px() are not set.
   bool Project(int y, int z);
 
-  // Of the last row, by x.
+  // Pixel coordinates of the last row, by x.
   const Eigen::ArrayXf& u_px() const { return u_px_; }
   const Eigen::ArrayXf& v_px() const { return v_px_; }
   // Projection of the last row's first cell (see GridProjection), and the step from a cell to the next.

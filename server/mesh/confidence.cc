@@ -12,17 +12,17 @@
 namespace romap::mesh {
 namespace {
 
-// Length of the box in a view from which on the view counts as sharp: about the resolution of a trained field.
+// A view counts as sharp if the box is at least this long in it: about the resolution of a trained field.
 constexpr float kSharpSide_px = 64.0f;
 // Sum of weights that brings confidence to 1 - 1/e.
 constexpr float kEnoughWeight = 2.0f;
-// A vertex is hidden if the depth buffer is this many cells in front of it, plus the depth over which its own surface
-// extends within two cells at the viewing angle, up to a largest slope.
+// A vertex is hidden if the depth buffer is this many cells in front of it, plus the depth range of its own surface
+// within two cells at the viewing angle, limited to a maximum slope.
 constexpr float kHiddenCells = 1.5f;
 constexpr float kMostSlope = 4.0f;
-// Of more views only this many are used, because the rest adds little; their weights are scaled up.
+// At most this many views are used, because more views add little; their weights are scaled up.
 constexpr size_t kMostViews = 16;
-// Size of a bin of the depth buffer, so that a surface that faces the view leaves no bin empty.
+// Size of a bin of the depth buffer, large enough that a surface that faces the view leaves no bin empty.
 constexpr float kBinCells = 2.0f;
 // Largest side of the depth buffer. A larger one would be needed only if the camera were inside the object.
 constexpr int kMostSide = 512;
@@ -81,7 +81,7 @@ struct FacingVertices {
       const Block u = (R(0, 0) * x + R(0, 1) * y + R(0, 2) * z + t.x()) * per_depth * fx_px + cx_px;
       const Block v = (R(1, 0) * x + R(1, 1) * y + R(1, 2) * z + t.y()) * per_depth * fy_px + cy_px;
       for (Eigen::Index i = 0; i < kBlock; ++i) {
-        // Without a branch, which would be unpredictable: each vertex is written, and kept by advancing `count`.
+        // Branchless, because a branch would be unpredictable: every vertex is written, and advancing `count` keeps it.
         vertex[count] = static_cast<uint32_t>(block * kBlock + i);
         depth_mu[count] = depth[i];
         cosine[count] = block_cosine[i];

@@ -24,7 +24,7 @@
 namespace romap::mesh {
 namespace {
 
-constexpr float kMaxOpticalDepth = 0.2f;  // towards a view, up to which a point is visible
+constexpr float kMaxOpticalDepth = 0.2f;  // towards a view; a point with a larger one is invisible
 
 absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   const std::string object = snapshot.object.ToString();

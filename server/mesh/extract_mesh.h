@@ -22,16 +22,16 @@ struct MeshStats {
 };
 
 // The surface of a trained field: a closed, colored mesh with unit normals and confidence in the Object frame (map
-// units), oriented outwards. Where the field leaves its box, the surface is closed at the box. With config.trim_unseen
-// the surface that no view observed is removed, and the mesh is open there.
+// units), oriented outwards. Where the field extends beyond its box, the surface is closed at the box. With
+// config.trim_unseen the parts of the surface that no view observed are removed, so the mesh is open there.
 //
 // Steps: sample the field on a grid, fill cavities and invisible space, cut below the visible base, remove floaters,
 // extract the snapshot's surface level by marching cubes (paper, sections "System Overview" and "Implementation
 // Details"), and move the vertices to where the field crosses that level.
 //
-// FAILED_PRECONDITION: the field is nowhere above its surface level, or unobserved surface is trimmed and none was
-// observed. INVALID_ARGUMENT: the snapshot is invalid (no field, box without volume, size of the hull differs from its
-// resolution, levels or optics not finite).
+// FAILED_PRECONDITION: the field is nowhere above its surface level, or config.trim_unseen is set and no view observed
+// the surface. INVALID_ARGUMENT: the snapshot is invalid (no field, box without volume, size of the hull differs from
+// its resolution, levels or optics not finite).
 absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig& config, MeshStats* stats = nullptr);
 
 }  // namespace romap::mesh

@@ -9,9 +9,9 @@ namespace romap::mesh {
 
 // Value of a node that is certainly empty: outside the hull, outside the box, or where the field is not finite.
 inline constexpr float kEmpty = -1e4f;
-// Value of the ring of nodes around the box, so that the surface closes at the box whatever the field is inside.
+// Value of the ring of nodes around the box, so that the surface closes at the box for any field.
 inline constexpr float kBeyondBox = -1e30f;
-// Value of a node that a rule made solid against the field.
+// Value of a node that a rule made solid regardless of the field.
 inline constexpr float kSolid = 2.0f;
 
 // The field on a regular grid over the box, with one ring of kBeyondBox nodes around it so that every surface closes

@@ -10,7 +10,7 @@
 namespace romap::mesh {
 namespace {
 
-// Quantile of the views by resolution that counts as well resolved: the few sharpest views see only parts of the
+// This quantile of the views by resolution counts as well resolved: the few sharpest views see only parts of the
 // object, and the farthest add no detail.
 constexpr double kGoodViewShare = 0.75;
 

@@ -14,12 +14,12 @@ struct GridSurface {
   std::vector<uint32_t> grid_edges;  // by vertex: 3 * (index of the edge's lower node) + axis
 };
 
-// Vertices keep this share of a grid edge away from its nodes, so that no two vertices coincide.
+// Vertices stay at least this share of a grid edge away from its nodes, so that no two vertices coincide.
 inline constexpr float kNodeClearance = 1e-3f;
 
-// Where the surface crosses an edge from a node of value `from` to one of value `to`, one of which is > 0: linear
-// interpolation, as a share of the edge (0..1) clear of both nodes. Values are clamped a few units below 0, because
-// they fall without bound outside. On edges to the ring the surface lies on the box.
+// Position at which the surface crosses an edge from a node of value `from` to one of value `to`, one of which is > 0:
+// linear interpolation, as a share of the edge (0..1) clear of both nodes. Negative values are clamped to a few units
+// below 0, because they are unbounded outside. On edges to the ring the surface lies on the box.
 float EdgeCrossing(float from, float to);
 
 // The surface where the value crosses 0 (inside: > 0), as a closed, consistently oriented 2-manifold without degenerate

@@ -20,7 +20,7 @@ struct Bracket {
   std::array<float, 2> value;
   int kept = -1;  // the end that the last step kept; -1 before the first
 
-  // Where the line through both ends crosses 0.
+  // Position at which the line through both ends crosses 0.
   float Estimate() const {
     const float clear = kNodeClearance;
     const float share = at[0] + (at[1] - at[0]) * value[0] / (value[0] - value[1]);

@@ -7,8 +7,8 @@
 
 namespace romap::mesh {
 
-// Samples a snapshot's field as the logarithm of the density over that at the surface, the unit that this folder works
-// in. Only this class uses raw values. The snapshot must have a field and outlive the probe.
+// Samples a snapshot's field as the logarithm of the density over that at the surface, the unit that this folder uses.
+// Only this class uses raw values. The snapshot must have a field and outlive the probe.
 class SurfaceProbe {
  public:
   explicit SurfaceProbe(const FieldSnapshot& snapshot);

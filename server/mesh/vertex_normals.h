@@ -8,8 +8,8 @@ namespace romap::mesh {
 // triangles' normals, weighted by area, then smoothed twice over the adjacent triangles.
 //
 // The normals come from the surface and not from the gradient of the field, because a trained field is noisier than its
-// zero crossing: compared with the true surfaces, the mean error of normals from central differences is 28 degrees, and
-// of these 20 degrees.
+// zero crossing: compared with the true surfaces, the mean error is 28 degrees for normals from central differences and
+// 20 degrees for these normals.
 void SetVertexNormals(Mesh& mesh);
 
 }  // namespace romap::mesh

@@ -25,14 +25,14 @@ class VisibilityTester {
 
   bool has_views() const { return !views_.empty(); }
 
-  // Whether some view sees the node. Then all nodes on the line to that view are visible too, and are remembered.
+  // Whether the node is visible from some view. If so, all nodes on the line to that view are marked as visible too.
   bool IsVisible(size_t node);
-  // Whether some view sees a surface point (node coordinates, inside the ring) from the front: the cosine between the
-  // outward `normal` (Object frame, unit length) and the direction to the view is at least `min_cosine`.
+  // Whether a surface point (node coordinates, inside the ring) is visible from the front in some view: the cosine
+  // between the outward `normal` (Object frame, unit length) and the direction to the view is at least `min_cosine`.
   bool IsSurfaceVisible(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float min_cosine);
 
  private:
-  // Whether the line from a point to a view is clear. Then the nodes on it are in `path_`.
+  // Whether the line from a point to a view is clear. If so, `path_` contains the nodes on it.
   bool IsPathClear(const Eigen::Vector3f& view, const Eigen::Vector3f& point);
   int StepsWithinGrid(const Eigen::Vector3f& point, const Eigen::Vector3f& step, float distance_mu) const;
   size_t NearestNode(const Eigen::Vector3f& shifted) const;
@@ -48,7 +48,7 @@ class VisibilityTester {
   std::vector<uint8_t> visible_;        // by node: 1 = known to be visible
   std::vector<uint32_t> path_;          // nodes on the last clear line: the first `path_length_`
   size_t path_length_ = 0;
-  size_t last_view_ = 0;  // the last view that saw a node or point
+  size_t last_view_ = 0;  // the last view from which a node or point was visible
 };
 
 }  // namespace romap::mesh

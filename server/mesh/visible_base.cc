@@ -12,17 +12,18 @@
 namespace romap::mesh {
 namespace {
 
-// Surface seen at a flatter angle counts as invisible: the walls of unobserved matter run along the flattest rays.
+// A surface observed at a flatter angle counts as invisible, because the walls of unobserved matter are parallel to the
+// flattest rays.
 constexpr float kMinCosine = 0.2f;
-// Share of the visible area that may lie below: noise at the border of the hull.
+// Share of the visible area that may lie below the base because of noise at the border of the hull.
 constexpr double kShareBelow = 0.02;
-// Walls have normals within 30 degrees of the horizontal. If the views see hardly any walls, as from straight above,
-// the lowest visible height is not the base.
+// Walls have normals within 30 degrees of the horizontal. If the views observe almost no walls, for example from
+// straight above, the lowest visible height is not the base.
 constexpr float kMaxWallNormalZ = 0.5f;
 constexpr double kMinWallShare = 0.05;  // of the visible area
 // Slope of the values around the cut, per node spacing.
 constexpr float kCutSlope = 4.0f;
-// Of larger meshes only about this many triangles are used.
+// Only about this many triangles of a larger mesh are used.
 constexpr size_t kEnoughTriangles = 6000;
 
 struct SurfacePatch {
@@ -45,7 +46,7 @@ float LowHeight(const FieldGrid& grid, const std::vector<SurfacePatch>& patches,
   return grid.origin.z() + (static_cast<float>(bin) + 0.5f) * bin_mu;
 }
 
-// Whether a vertex lies between two nodes that have the field's own values.
+// Whether a vertex lies between two nodes with unedited field values.
 bool IsFieldVertex(const FieldGrid& grid, const GridSurface& surface, uint32_t vertex) {
   const std::array<size_t, 3> stride = {1, grid.StrideY(), grid.StrideZ()};
   const size_t low = surface.grid_edges[vertex] / 3;
@@ -72,7 +73,7 @@ std::optional<float> FindVisibleBase(const FieldGrid& grid, VisibilityTester& vi
     if (!(area > 0)) continue;
     const Eigen::Vector3f normal = cross / area;
     const Eigen::Vector3f center = (p + mesh.vertices[b] + mesh.vertices[c]) / 3.0f;
-    // One node outside, so that the nodes inside the surface do not hide it.
+    // The tested point is one node outside the surface, so that nodes inside the surface do not hide it.
     if (!visibility.IsSurfaceVisible(grid.ToNode(center) + normal, normal, kMinCosine)) continue;
     visible.push_back({center.z(), area});
     visible_area += area;

@@ -7,15 +7,15 @@
 
 namespace romap::mesh {
 
-// Height (z in the Object frame, map units) of the lowest part of the surface that some view sees from the front; a
-// small share of the visible area below it is ignored as noise. nullopt if the views see no walls, whose lower end this
-// height could be.
+// Height (z in the Object frame, map units) of the lowest part of the surface that is visible from the front in some
+// view; a small share of the visible area below it is ignored as noise. nullopt if the views observe no walls, because
+// only the lower end of a wall defines the base.
 //
-// Cameras mostly look down on an object, so that neither masks nor colors show where it ends below, and hidden space
-// extends down to the bottom of the box. But the views show the support around the object, and the visible surface of
-// the object ends at that height.
+// Cameras mostly view an object from above. Neither masks nor colors then show its lower end, and hidden space extends
+// down to the bottom of the box. The views do show the support around the object, and the visible surface of the object
+// ends at the height of the support.
 //
-// `visibility` may be older than the filling of hidden space, because invisible nodes hide nothing else.
+// `visibility` may have been made before hidden space was filled, because invisible nodes do not hide visible ones.
 std::optional<float> FindVisibleBase(const FieldGrid& grid, VisibilityTester& visibility);
 
 // Ends all matter below `height` in a flat face at that height.

@@ -80,7 +80,7 @@ struct CpuTrainer::Worker {
   std::optional<ShapeProbe> shape;  // of signed-distance fields
   AlignedBuffer<Visit> visits;      // of one step, for the occupancy; the first visit_count are in use
   size_t visit_count = 0;
-  bool timed = false;  // whether the current chunk is
+  bool timed = false;  // whether the current chunk is timed
   double last_phase_end_s = 0;
   std::array<double, static_cast<size_t>(TrainPhase::kCount)> phase_s = {};  // of timed chunks
   double render_s = 0;                                                       // of all chunks
@@ -139,7 +139,7 @@ TrainStats CpuTrainer::Run(const StepSource& source, Occupancy& occupancy, int s
   return total;
 }
 
-// Sums over the workers.
+// Returns the statistics, summed over the workers.
 TrainStats CpuTrainer::CollectStats(int threads, int steps) {
   TrainStats total;
   uint64_t object_rays = 0;
@@ -243,7 +243,7 @@ void CpuTrainer::CompositeRays(Worker& worker) {
   }
 }
 
-// Sharpness increases by the same factor with every step.
+// The sharpness increases by the same factor with every step.
 float CpuTrainer::SharpnessAt(float progress) const {
   const double first = config_.initial_sharpness;
   return static_cast<float>(first * std::pow(config_.final_sharpness / first, progress));

@@ -66,7 +66,7 @@ void EncodeGeneral(const GridLayout& layout, const float* table, int count, cons
 template <auto kEncodeBackward>
 void EncodeBackwardGeneral(const GridLayout& layout, int count, const float* x, const float* y, const float* z,
                            const float* d_features, float* gradient) {
-  if (layout.octaves > 0) return;  // it has no learned parameters
+  if (layout.octaves > 0) return;  // the frequency encoding has no learned parameters
   kEncodeBackward(layout, count, x, y, z, d_features, gradient);
 }
 

@@ -27,7 +27,7 @@ ROMAP_MATH_BEGIN
 // ----------------------------------------------------------------------------------------------------------- sampling
 
 // Finds the occupied pieces of a ray (math/sampling.h), of length `piece` from `entry` on: their numbers, ascending, in
-// occupied[kRayProbes + kMaxLanes]. Returns how many there are.
+// occupied[kRayProbes + kMaxLanes]. Returns the number of occupied pieces.
 template <class Wide>
 int FindOccupied(const RayInCells<Wide>& ray, const SamplingRule& rule, float entry, float piece, float* occupied) {
   using L = Lane<Wide>;

@@ -15,7 +15,7 @@ namespace romap::nerf {
 // their last sample, because kernels process whole vectors.
 inline constexpr int kMaxLanes = 16;
 
-// Where rays are sampled, and how densely.
+// Defines where and how densely rays are sampled.
 struct SamplingRule {
   const uint32_t* occupied_bits = nullptr;  // kOccupancyResolution^3 bits, x fastest
   std::array<float, 3> extent = {1, 1, 1};  // of the box in Unit space
@@ -75,9 +75,10 @@ struct KernelTable {
   void (*distance_opacity)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
   void (*distance_backward)(const RaySpan* spans, int ray_count, float sharpness, SampleChunk& chunk);
 
-  // Renders rays, computes their losses, and the adjoint of both (math/composite.h, math/losses.h): weight, behind and
-  // d_raw of the samples in the chunk, and `results`, one per ray, unchanged for rays without samples. A ray whose
-  // partner is not in the chunk or has no samples is treated as a ray without a partner.
+  // Renders rays and computes their losses and the adjoint of both (math/composite.h, math/losses.h). Writes weight,
+  // behind and d_raw of the samples in the chunk, and one entry of `results` per ray; the entries of rays without
+  // samples are unchanged. A ray whose partner is not in the chunk or has no samples is treated as a ray without a
+  // partner.
   void (*composite)(const Ray* rays, const RaySpan* spans, int ray_count, const LossWeights& weights,
                     SampleChunk& chunk, RayResult* results);
 
@@ -90,7 +91,8 @@ struct KernelTable {
   void (*adam)(const AdamRates& rates, size_t begin, size_t end, float* parameters, float* first, float* second,
                float* const* gradients, int gradient_count);
 
-  // The table for all encodings and MLP depths; null in that table itself. Its MLP kernels do not use `hidden`.
+  // Kernels for all encodings and MLP depths; null in the general table itself. The general MLP kernels do not use
+  // `hidden`.
   const KernelTable* general = nullptr;
 
   // The table that can run `model`.

@@ -8,9 +8,9 @@
 namespace romap::nerf {
 
 // Distributes the tasks of training steps to threads. A step has two phases; a phase starts when all tasks of the
-// previous one are finished. Tasks go in order to the next free thread, so a thread that the scheduler wakes late on a
-// busy machine delays nothing: the other threads do its work. Results do not depend on the assignment as long as each
-// task has its own memory. Waiting threads sleep.
+// previous one are finished. Tasks go in order to the next free thread, so a thread that wakes up late on a busy
+// machine does not delay the step: the other threads take its tasks. Results do not depend on the assignment as long as
+// each task has its own memory. Waiting threads sleep.
 class StepTasks {
  public:
   struct Task {

@@ -66,7 +66,7 @@ HWY_INLINE hn::VFromD<D> LoadPairs(D d, const float* table, const uint32_t* pair
   }
 }
 
-// Adds to each of these pairs in sequence, because they may be identical.
+// Adds to these pairs one after another, because they may be identical.
 template <class D>
 HWY_INLINE void AddToPairs(D d, float* table, const uint32_t* pair, hn::VFromD<D> v) {
   if constexpr (Lane<hn::VFromD<D> >::kLanes == 4) {

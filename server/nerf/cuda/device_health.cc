@@ -27,7 +27,7 @@ absl::Status Probe() {
   ROMAP_RETURN_IF_ERROR(ToStatus(cudaGetDeviceCount(&count), "count devices"));
   if (count == 0) return absl::UnavailableError("CUDA: no device found");
   ROMAP_RETURN_IF_ERROR(ToStatus(cudaSetDevice(0), "use device 0"));
-  // A device that is listed may be too old or broken to run these kernels, so a field of zeros is evaluated.
+  // A device that is listed may be too old or broken to run these kernels, so a field of zeros is evaluated as a test.
   DeviceField field{};
   field.grid.features = 16;
   field.hidden = 16;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kSteps = 16;  // per upload of rays
 
-// Destroys the stream with its owner.
+// Owns a CUDA stream.
 class Stream {
  public:
   static absl::StatusOr<Stream> Create() {
@@ -143,7 +143,7 @@ absl::Status DeviceTraining::Launch(const StepSource& source, uint64_t first_ste
   return ToStatus(cudaEventRecord(batch.done, stream), "train a field");
 }
 
-// Waits until the device has finished the batch, and sums its losses.
+// Waits until the device has finished the batch, then adds its losses to the sums.
 absl::Status DeviceTraining::CollectLosses(Batch& batch, double& loss, uint64_t& rays) const {
   if (batch.steps == 0) return absl::OkStatus();
   ROMAP_RETURN_IF_ERROR(ToStatus(cudaEventSynchronize(batch.done), "train a field"));

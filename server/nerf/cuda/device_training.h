@@ -20,7 +20,7 @@ absl::StatusOr<cudaStream_t> StreamOfThread();
 // ToStatus.
 class DeviceTraining {
  public:
-  // Allocates memory and captures the step; copies nothing.
+  // Allocates memory and captures the step without copying data.
   static absl::StatusOr<std::unique_ptr<DeviceTraining>> Create(const NerfConfig& config, const FieldModel& model,
                                                                 MlpPath path, cudaStream_t stream);
   ~DeviceTraining();

@@ -68,8 +68,8 @@ struct StepCounters {
   unsigned long long rays, samples, active_samples;
 };
 
-// First launch: from rays to gradients, that is sampling, encoding, MLP, rendering, losses, and the adjoints of all of
-// them. A block processes tiles of whole rays, one tile after another, with all intermediate values in shared memory.
+// First launch, from rays to gradients: sampling, encoding, MLP, rendering, losses, and their adjoints. A block
+// processes tiles of whole rays, one tile after another, with all intermediate values in shared memory.
 struct StepParams {
   DeviceField field;
   SliceState* slice;
@@ -126,7 +126,7 @@ struct StepLaunch {
   OccupancyParams occupancy;
 };
 
-// Number of blocks of the first launch; the same on every device, so that the order of sums is, too.
+// Number of blocks of the first launch; the same on every device, so that sums have the same order on every device.
 int StepBlocks(int rays_per_step, int most_samples);
 
 // Dynamic shared memory of a block.

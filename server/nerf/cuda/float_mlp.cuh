@@ -36,8 +36,8 @@ struct FloatMlp {
     }
   }
 
-  // The adjoint, from the derivatives in tile.raw: adds to tile.weight_gradient and `table_gradient`. Call by all
-  // threads of the block, after a barrier. The scale of TensorMlp is not needed here.
+  // The adjoint, from the derivatives in tile.raw: adds to tile.weight_gradient and `table_gradient`. All threads of
+  // the block must call it, after a barrier. The scale of TensorMlp is not needed here.
   __device__ static void Backward(const DeviceField& field, Tile<float>& tile, float, float* table_gradient) {
     const int s = threadIdx.x;
     float* out_gradient = tile.weight_gradient + tile.features * tile.hidden;

@@ -13,7 +13,7 @@ namespace romap::nerf::cuda {
 // The device arrays of one field in training, and the launches of a step on them. Errors are those of ToStatus.
 class StepBuffers {
  public:
-  // Allocates; copies nothing. Rays of `steps` steps fit into an upload.
+  // Allocates the arrays without copying data. An upload holds the rays of `steps` steps.
   static absl::StatusOr<StepBuffers> Create(const NerfConfig& config, const FieldModel& model, int steps);
 
   // Copies model, moments and occupancy to the device, and waits for the copies.

@@ -115,8 +115,8 @@ __device__ void Activate(const DeviceField& field, Tile<T>& tile) {
   tile.alpha[s] = plain::StepOpacity(tile.density[s], tile.length[s]);
 }
 
-// Renders the calling thread's ray and replaces tile.raw by the derivatives of its loss. Call by whole warps, because
-// partners exchange their color errors.
+// Renders the calling thread's ray and replaces tile.raw by the derivatives of its loss. Must be called by whole warps,
+// because partners exchange their color errors.
 template <class T>
 __device__ void RenderRay(const StepParams& p, const TileRays& in, Tile<T>& tile) {
   const int r = threadIdx.x;
@@ -176,8 +176,8 @@ __device__ float FilterDerivatives(const StepParams& p, bool used, Tile<T>& tile
   return largest;
 }
 
-// The power of two that scales the largest derivative of the block to just below kLargestScaled. Call between barriers
-// by all threads. `active`, out: number of active samples of the block.
+// The power of two that scales the largest derivative of the block to just below kLargestScaled. Must be called between
+// barriers by all threads. `active`, out: number of active samples of the block.
 template <class T>
 __device__ float DerivativeScale(float largest, Tile<T>& tile, int& active) {
   for (int delta = kWarpThreads / 2; delta > 0; delta /= 2) {

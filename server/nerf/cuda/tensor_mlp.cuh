@@ -94,7 +94,7 @@ struct TensorMlp {
     }
   }
 
-  // The adjoint, from the derivatives in tile.raw, as FloatMlp::Backward. Derivatives in half precision are multiplied
+  // The adjoint, from the derivatives in tile.raw; see FloatMlp::Backward. Derivatives in half precision are multiplied
   // by `scale`, a power of two, so that they neither underflow nor overflow.
   __device__ static void Backward(const DeviceField& field, Tile<__half>& tile, float scale, float* table_gradient) {
     const int warp = threadIdx.x / kWarpThreads;

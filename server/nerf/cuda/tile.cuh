@@ -80,7 +80,7 @@ class Arena {
   size_t bytes_ = 0;
 };
 
-// The arrays that the evaluation of points needs, too.
+// Allocates the arrays that both training and the evaluation of points need.
 template <class T>
 __host__ __device__ void LayOutMlp(const DeviceField& field, Arena& arena, Tile<T>& tile) {
   tile.features = field.grid.features;

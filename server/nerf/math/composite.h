@@ -10,8 +10,8 @@
 
 ROMAP_MATH_BEGIN
 
-// Volume rendering of one ray (paper: w_i = o_i prod_{j<i} (1 - o_j), C = sum w_i c_i, D = sum w_i d_i). losses.h has
-// the losses of the result.
+// Volume rendering of one ray (paper: w_i = o_i prod_{j<i} (1 - o_j), C = sum w_i c_i, D = sum w_i d_i). See losses.h
+// for the losses of the result.
 
 // Renders a ray. `target_depth`: t*, < 0 if unknown. Outputs: weight[count], behind[count] (transmittance after each
 // sample).

@@ -53,8 +53,8 @@ ROMAP_HD void DenseTile(const float* a, int a_stride, int k_count, const float* 
   }
 }
 
-// The weight gradient: out[R][C lane groups] += a^T b, that is out[r] += sum_s a[s][r] b[s] over `samples` rows.
-// `a_stride`: floats between rows of a; `n`: floats between rows of b and out.
+// The weight gradient: out[R][C lane groups] += a^T b, or out[r] += sum_s a[s][r] b[s] over `samples` rows. `a_stride`:
+// floats between rows of a; `n`: floats between rows of b and out.
 template <class F, int R, int C>
 ROMAP_HD void OuterTile(int samples, const float* a, int a_stride, const float* b, int n, float* out) {
   constexpr int kLanes = Lane<F>::kLanes;

@@ -62,7 +62,7 @@ struct Lane<float> {
     *to = x;
     return static_cast<int>((word >> (bit & 31u)) & 1u);
   }
-  // The same for the lanes with a > b.
+  // Like StoreWhereBit, but stores the lanes with a > b.
   static ROMAP_HD int StoreWhereGreater(float a, float b, Int x, uint32_t* to) {
     *to = x;
     return a > b ? 1 : 0;

@@ -11,12 +11,12 @@
 
 ROMAP_MATH_BEGIN
 
-// Color: |e|^2 with e = rendered color - target color, and for a ray with a partner additionally contrast |e - e'|^2
-// with the error e' of the partner.
+// Color loss: |e|^2 with e = rendered color - target color. A ray with a partner adds contrast |e - e'|^2, where e' is
+// the color error of the partner.
 //
 // The contrast term penalizes errors in the difference between two nearby pixels. Light that changes slowly over a
-// surface, as reflections do when the view changes, appears in both colors and cancels, so a field without view
-// direction has less reason to explain it by dents in the surface.
+// surface, as reflections do when the view changes, appears in both colors and cancels, so a field that does not depend
+// on the view direction is less likely to explain it by dents in the surface.
 
 // Color over which the ray is blended.
 ROMAP_HD float BackgroundColor(const RayTarget& target, const LossWeights& weights, int channel) {

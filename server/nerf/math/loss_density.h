@@ -11,7 +11,7 @@
 
 ROMAP_MATH_BEGIN
 
-// Density: density sum sigma_i on background rays (paper: L_density).
+// Density loss: weight `density` times sum sigma_i on background rays (paper: L_density).
 ROMAP_HD void AddDensityLoss(const RayResult& ray, const RayTarget& target, const LossWeights& weights, RayLoss& loss) {
   if (target.is_object) return;
   loss.value += weights.density * ray.density_sum;

@@ -11,8 +11,8 @@
 
 ROMAP_MATH_BEGIN
 
-// Depth: depth |sum w_i (t_i - t*)| on object rays with a known depth t* (paper: L_depth). An error of depth_limit or
-// more is taken for an outlier: its loss is constant and its gradient 0.
+// Depth loss: weight `depth` times |sum w_i (t_i - t*)| on object rays with a known depth t* (paper: L_depth). An error
+// of depth_limit or more is treated as an outlier: its loss is constant and its gradient 0.
 ROMAP_HD void AddDepthLoss(const RayResult& ray, const RayTarget& target, const LossWeights& weights, RayLoss& loss) {
   if (!target.is_object || target.depth < 0) return;
   const float error = std::fabs(ray.depth_error);

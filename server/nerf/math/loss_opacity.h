@@ -11,7 +11,7 @@
 
 ROMAP_MATH_BEGIN
 
-// Opacity: opacity_object (1 - sum w_i) on object rays, opacity_background sum w_i on background rays. Object rays
+// Opacity loss: opacity_object (1 - sum w_i) on object rays, opacity_background sum w_i on background rays. Object rays
 // should end inside the box, background rays should pass through it.
 ROMAP_HD void AddOpacityLoss(const RayResult& ray, const RayTarget& target, const LossWeights& weights, RayLoss& loss) {
   if (target.is_object) {

@@ -1,6 +1,6 @@
 // The training loss of a ray: a sum of terms, each with its gradient.
 //
-// A term is a function of what compositing returns for the ray (RayResult). It adds its value and its derivatives with
+// A term is a function of the result of compositing the ray (RayResult). It adds its value and its derivatives with
 // respect to the color, the opacity, the depth error and the density of the samples to a RayLoss. Both back ends call
 // LossOfRay; no kernel contains a loss term of its own.
 //
@@ -31,8 +31,8 @@
 
 ROMAP_MATH_BEGIN
 
-// All terms of a ray. `partner_error` [3]: the color error (ColorError) of its partner, null without a partner. The
-// order of the terms is that of the sums, which changes the last bits.
+// All terms of a ray. `partner_error` [3]: the color error (ColorError) of its partner, null without a partner. Terms
+// are summed in a fixed order, because the order changes the last bits.
 ROMAP_HD RayLoss LossOfRay(const RayResult& ray, const RayTarget& target, const LossWeights& weights,
                            const float* partner_error) {
   RayLoss loss{};

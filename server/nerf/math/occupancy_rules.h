@@ -1,6 +1,7 @@
 #pragma once
 
-// How the occupancy grid learns from the samples of a training step. Weights and scores are those of cells, 0..1.
+// Rules that update the occupancy grid from the samples of a training step. Weights and scores belong to cells and are
+// in 0..1.
 
 #include <cstdint>
 
@@ -14,14 +15,14 @@ ROMAP_HD float ScoreAfterVisit(float score, float weight, float decay) {
   return weight > decayed ? weight : decayed;
 }
 
-// The same after `visits` samples in any order, the largest weight among them being `weight`.
+// Score of a cell after `visits` samples in any order, where `weight` is their largest weight.
 ROMAP_HD float ScoreAfterVisits(float score, float weight, uint32_t visits, float decay) {
   // The negated comparison makes a NaN weight count as no weight.
   for (; visits > 0 && !(weight >= score); --visits) score *= decay;
   return weight > score ? weight : score;
 }
 
-// When the occupied cells are recomputed: after every `interval`-th step from step `start` on.
+// Schedule of the updates of the occupied cells: after every `interval`-th step from step `start` on.
 struct OccupancyPlan {
   uint64_t start = 0;
   uint64_t interval = 1;
@@ -32,7 +33,7 @@ ROMAP_HD bool OccupancyUpdateIsDue(const OccupancyPlan& plan, uint64_t steps_don
   return steps_done >= plan.start && steps_done % plan.interval == 0;
 }
 
-// A live cell keeps itself and its neighbors occupied, as far as they lie in the visual hull.
+// A live cell keeps itself and its neighbors occupied if they lie in the visual hull.
 ROMAP_HD bool IsLive(float score, float threshold) { return score > threshold; }
 
 // A row of cells, one bit each, with the neighbors of every set bit.

@@ -25,7 +25,7 @@ ROMAP_HD bool IntersectBox(const F* origin, const F* direction, const F* extent,
       near = far;
       far = swap;
     }
-    // A NaN (origin on a slab plane, direction parallel to it) leaves the bound unchanged.
+    // A NaN (origin on a slab plane and direction parallel to it) leaves the bound unchanged.
     if (near > entry) entry = near;
     if (far < exit) exit = far;
     if (direction[a] == 0 && (origin[a] < 0 || origin[a] > extent[a])) return false;

@@ -1,6 +1,6 @@
 #pragma once
 
-// How many samples a ray gets, and how many rays fit into a block of samples.
+// Number of samples per ray, and number of rays per block of samples.
 
 #include "server/nerf/math/target.h"
 

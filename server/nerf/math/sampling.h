@@ -11,9 +11,9 @@
 
 ROMAP_MATH_BEGIN
 
-// Where a ray is sampled. The segment of the ray inside the box is divided into kRayProbes equal pieces; a piece, which
-// is at most 1.8 cells long, is occupied if the cell at its center is. Samples are spread evenly over the occupied
-// pieces, as if these were joined into one segment. sample_budget.h has their number.
+// Positions of the samples on a ray. The segment of the ray inside the box is divided into kRayProbes equal pieces; a
+// piece, which is at most 1.8 cells long, is occupied if the cell at its center is. Samples are spread evenly over the
+// occupied pieces, as if these were joined into one segment. See sample_budget.h for the number of samples.
 
 // A ray in units of cells of the occupancy grid. `extent`: of the box in Unit space.
 template <class F>
@@ -34,7 +34,8 @@ struct RayInCells {
   }
 };
 
-// t at position `pieces` along the segment, in pieces. `piece`: length of a piece; `entry`: t where the segment begins.
+// t at position `pieces` along the segment, in pieces. `piece`: length of a piece; `entry`: t at the start of the
+// segment.
 template <class F>
 ROMAP_HD F PositionOnRay(F pieces, F piece, F entry) {
   return MulAdd(pieces, piece, entry);
@@ -46,7 +47,7 @@ ROMAP_HD F PieceCenter(F number, F piece, F entry) {
   return PositionOnRay(number + Lane<F>::Set(0.5f), piece, entry);
 }
 
-// Of the joined occupied pieces, 0..last_piece: the one that contains position `at`.
+// Index, 0..last_piece, of the joined occupied piece that contains position `at`.
 template <class F>
 ROMAP_HD F JoinedPieceAt(F at, F last_piece) {
   return Min(Floor(at), last_piece);

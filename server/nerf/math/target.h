@@ -1,6 +1,6 @@
 #pragma once
 
-// How the formulas of this folder are compiled.
+// Compilation of the formulas in this folder.
 //
 // Each formula is a function template over a lane type: `float` (one value; reference form, CUDA) or a Highway vector
 // (several rays, levels, neurons or parameters at once). Highway compiles a source file once per instruction set, each

@@ -4,7 +4,7 @@
 
 namespace romap::nerf {
 
-// Plain values that the formulas take, the same for every lane type and back end.
+// Plain data types that the formulas use, the same for every lane type and back end.
 
 inline constexpr int kFeaturesPerLevel = 2;
 inline constexpr int kMaxLevels = 16;
@@ -17,7 +17,7 @@ inline constexpr int kMaxFrequencyFeatures = (6 * kMaxOctaves + kFrequencyExtras
 inline constexpr int kMaxHiddenLayers = 6;
 inline constexpr int kMaxDeepWidth = 256;
 
-// Layout of the hash grid's levels in the table; hash_grid.h has the indexing.
+// Layout of the hash grid's levels in the table; see hash_grid.h for the indexing.
 struct GridLayout {
   int levels = 0;
   int features = 0;  // per point: outputs of the encoding, rounded up to a multiple of 16; the padding is 0
@@ -43,14 +43,14 @@ struct RaySpan {
   int count = 0;  // 0: the ray meets no occupied cell
 };
 
-// What a ray should show.
+// Training target of a ray.
 struct RayTarget {
   float rgb[3] = {0, 0, 0};         // 0..1
   float background[3] = {0, 0, 0};  // random color, used if LossWeights::random_background
   float depth = -1;                 // along the ray, in units of box side; < 0: unknown
   bool is_object = true;
-  // Object rays may come in pairs through nearby pixels: 1 = the next ray is the partner, -1 = the previous ray is,
-  // 0 = no partner.
+  // Object rays may form pairs through nearby pixels: 1 = the next ray is the partner, -1 = the previous ray is the
+  // partner, 0 = no partner.
   int partner = 0;
 };
 
@@ -81,7 +81,7 @@ struct RayResult {
   float opacity;      // sum of weights
   float depth_error;  // sum w_i (t_i - t*), 0 without depth
   float density_sum;
-  // From LossOfRay; 0 after compositing alone.
+  // Set by LossOfRay; compositing sets them to 0.
   float loss;        // all terms
   float color_loss;  // squared color error alone
 };

@@ -55,7 +55,7 @@ struct FieldModel {
   FieldModel Clone() const;
   bool IsFinite() const;
   bool IsDistance() const { return sharpness > 0; }
-  // False for a hash grid with one hidden layer; see KernelTable::general.
+  // Whether the model needs the general kernels; false for a hash grid with one hidden layer, see KernelTable::general.
   bool NeedsGeneralKernels() const { return layout.octaves > 0 || mlp.layers > 1; }
 };
 

@@ -35,17 +35,17 @@ class Occupancy {
     state.weight += weight;
     row_visited_[cell / kOccupancyResolution] = 1;
   }
-  // Loads a cell into the cache that Record() will need soon.
+  // Loads a cell into the cache before Record() accesses it.
   void Prefetch(uint32_t cell) const { hwy::Prefetch(cells_.data() + cell); }
   // Recomputes the occupied cells: hull cells that are live or have a live neighbor (IsLive). Allocates nothing.
   void Update();
 
-  // The hull without the outermost layers along each axis that received less than `share` of the weight of all
+  // Returns the hull without the outermost layers along each axis that received less than `share` of the weight of all
   // samples. In directions that no view observes, such as towards the table below an object, the hull extends to the
   // border of the box, but the object does not.
   std::vector<uint8_t> TrimmedHull(double share) const;
 
-  // Everything that training changes, for back ends that train on another device.
+  // All state that training modifies, for back ends that train on another device.
   using LayerWeights = std::array<std::array<double, kOccupancyResolution>, 3>;
   struct State {
     std::vector<float> score;    // [kOccupancyResolution^3], x fastest

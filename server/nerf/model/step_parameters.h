@@ -8,7 +8,7 @@
 
 namespace romap::nerf {
 
-// The parameters of a training step that come from the configuration. Every back end takes them from here.
+// The parameters of a training step that come from the configuration. All back ends use them.
 
 LossWeights MakeLossWeights(const NerfConfig& config);
 ShapeWeights MakeShapeWeights(const NerfConfig& config);

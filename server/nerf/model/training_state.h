@@ -8,8 +8,8 @@
 
 namespace romap::nerf {
 
-// Everything that training changes about a field. It lives in host memory; a back end that trains elsewhere copies it
-// there and back.
+// All state of a field that training modifies. It is in host memory; a back end that trains on a device copies it to
+// the device and back.
 struct TrainingState {
   TrainingState(const NerfConfig& config, uint64_t seed)
       : model(config, seed),
