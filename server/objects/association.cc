@@ -24,7 +24,7 @@ double BoxIou(const cv::Rect& a, const cv::Rect& b) {
   return either > 0 ? both / either : 0;
 }
 
-// The box of the last observation in the present image, if its corners were at depth `depth_mu`.
+// Predicts the box of the last observation in the current image, assuming that its corners are at depth `depth_mu`.
 cv::Rect PredictBox(const Landmark& landmark, const TrackedFrame& tracked, double depth_mu) {
   const CameraModel& camera = tracked.frame->camera;
   const SE3<Camera, World> T_camera_world = tracked.T_world_camera.Inverse();
@@ -34,14 +34,14 @@ cv::Rect PredictBox(const Landmark& landmark, const TrackedFrame& tracked, doubl
     const double u_px = box.x + (corner % 2 == 0 ? 0 : box.width - 1);
     const double v_px = box.y + (corner / 2 == 0 ? 0 : box.height - 1);
     const Eigen::Vector3d ray = camera.Unproject(u_px, v_px);
-    // Without a depth only the rotation is compensated: right for distant objects.
+    // Without a depth only the rotation is compensated, which is accurate for distant objects.
     corners.push_back(depth_mu > 0 ? T_camera_world * (landmark.last_T_world_camera * (depth_mu * ray))
                                    : T_camera_world.rotation() * (landmark.last_T_world_camera.rotation() * ray));
   }
   return BoundProjections(corners, camera);
 }
 
-// Where a landmark's body points project to. Shares are 0..1.
+// Projection of a landmark's body points. Shares are 0..1.
 struct BodyProjection {
   bool known = false;                      // some point is in the image
   std::vector<double> share_in_detection;  // of the points in the image, per detection
@@ -92,7 +92,7 @@ class Score {
     Add(weight, value);
     best_geometric_ = std::max(best_geometric_, value);
   }
-  // 0 without geometric overlap: class and track id alone never make a match.
+  // 0 without geometric overlap: class and track id alone are not sufficient for a match.
   double Value() const {
     constexpr double kMinOverlap = 0.2;
     return weights_ > 0 && best_geometric_ >= kMinOverlap ? sum_ / weights_ : 0;
@@ -104,8 +104,9 @@ class Score {
   double best_geometric_ = 0;
 };
 
-// Share of the visible body in the mask. Points under other masks may be occluded and count less. So an object that
-// reappears from behind another one matches as soon as a part of it is visible, if that part lies in its cuboid.
+// Adds the share of the visible body in the mask. Points under other masks may be occluded and count less. Therefore an
+// object that reappears from behind another one matches as soon as a part of it is visible, if that part lies in its
+// cuboid.
 void AddBodyCue(const BodyProjection& body, size_t d, const cv::Rect& projected, const cv::Rect& box, Score* score) {
   constexpr double kWeight = 1.5;
   constexpr double kMostlyOccluded = 0.5;   // share of the body under other masks
@@ -145,7 +146,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
   constexpr double kCuboidWeight = 0.7;
   constexpr double kClassWeight = 0.25;
   constexpr double kTrackWeight = 0.1;
-  // Part of an object that the detector split off must not win the object's mask afterwards.
+  // A part that the detector split off an object must not be matched to the object's mask later.
   constexpr double kProvisionalFactor = 0.8;
   const Landmark& landmark = *scene.landmarks[l];
   const LandmarkEvidence& known = landmark.evidence;
@@ -183,7 +184,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
 }
 
 // Whether another pair with the landmark or the detection scores almost as well. Landmarks that were never observed
-// together are not rivals: they may be one object twice, and would block each other's updates forever.
+// together are not rivals: they may be duplicates of one object, and would block each other's updates forever.
 bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::Index detection) {
   constexpr double kMargin = 0.1;
   const auto& observed_with = scene.landmarks[static_cast<size_t>(landmark)]->evidence.observed_with;
@@ -198,9 +199,9 @@ bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index
   return false;
 }
 
-// Whether the mask of detection `d`, matched to landmark `l`, covers another object too: that object has no mask, its
-// body projects into this one, and this one fits both together better than `l` alone. (An object behind `l` also
-// projects into its mask, but does not make the mask larger.)
+// Whether the mask of detection `d`, matched to landmark `l`, also covers another object: that object has no mask of
+// its own, its body projects into mask `d`, and the mask fits both objects together better than `l` alone. (An object
+// behind `l` also projects into its mask, but does not make the mask larger.)
 bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<bool>& matched) {
   const cv::Rect& box = scene.detections[d].box_px;
   if (scene.projected[l].empty()) return false;
@@ -216,7 +217,7 @@ bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<boo
 }
 
 // Whether the unmatched detection `part` was split off landmark `l`: it lies in the landmark's cuboid, and the
-// landmark's mask `d` fits the cuboid better with it.
+// landmark's mask `d` together with it fits the cuboid better than `d` alone.
 bool IsPartOf(const Scene& scene, size_t part, size_t d, size_t l) {
   constexpr double kMinShareInCuboid = 0.8;  // of the area of the detection's box
   if (scene.projected[l].empty() || scene.landmarks[l]->state == ObjectState::kProvisional) return false;
@@ -262,7 +263,7 @@ int CoveringLandmark(const Scene& scene, size_t l, const std::vector<Match>& mat
   const cv::Rect& predicted = scene.predicted[l];
   const auto covered_share = [&](size_t d) -> double {
     if (body.known) return body.share_in_image < kMinBodyInImage ? 0 : body.share_in_detection[d];
-    // A landmark without a body is compared by its predicted box.
+    // The predicted box represents a landmark without a body.
     if (predicted.empty()) return 0;
     return static_cast<double>((predicted & scene.detections[d].box_px).area()) / predicted.area();
   };
@@ -272,8 +273,8 @@ int CoveringLandmark(const Scene& scene, size_t l, const std::vector<Match>& mat
   return -1;
 }
 
-// The first stage of the paper: the boxes of the frame before, best overlap first. A detection without a match becomes
-// a new landmark, which is merged later if its points belong to an old one.
+// Implements the first stage of the paper: matches boxes greedily to those of the previous frame, best overlap first. A
+// detection without a match becomes a new landmark, which is merged later if its points belong to an old one.
 std::vector<Match> MatchGreedily(const Scene& scene) {
   constexpr double kMinIou = 0.3;
   struct Pair {

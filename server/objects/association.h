@@ -13,11 +13,11 @@
 
 namespace romap::objects {
 
-// The landmark that one detection of a frame shows.
+// Match of one detection of a frame with a landmark.
 struct Match {
-  int landmark = -1;  // index into the landmarks; -1: none of them
-  // Why the detection must not update the landmark's shape and points; nullptr if it may. A detection with a doubt but
-  // without a landmark does not create one.
+  int landmark = -1;  // index into the landmarks; -1: no match
+  // Reason why the detection must not update the landmark's shape and points; nullptr if it may. A detection with a
+  // doubt but without a landmark does not create one.
   const char* doubt = nullptr;
   // How well the mask agrees with the landmark's body and cuboid, 0..1; nullopt while these are unknown or cut off.
   std::optional<double> agreement;
@@ -43,8 +43,8 @@ struct Association {
 // together better than the matched one (the detector merged two neighbors), and if two masks together fit one landmark
 // better than the matched mask alone (the detector split an object).
 //
-// With ObjectsConfig::association = "greedy_iou" the first stage of the paper instead: the boxes of consecutive frames,
-// best overlap first.
+// ObjectsConfig::association = "greedy_iou" selects the first stage of the paper instead: the boxes of consecutive
+// frames are matched greedily, best overlap first.
 //
 // `frame_index` counts frames. `scene_depth_mu` is a typical depth for landmarks without geometry, 0 if unknown.
 Association Associate(const TrackedFrame& tracked, const std::vector<Detection>& detections,

@@ -11,8 +11,8 @@ namespace {
 // covered.
 constexpr float kFallShortWeight = 0.95F;
 constexpr float kReachFartherWeight = 1 - kFallShortWeight;
-// A corner beyond the mask by more than this share of the object's size is one that the object does not fill. Its cost
-// is bounded, otherwise boxes of round objects would be too small.
+// A corner that extends beyond the mask by more than this share of the object's size is treated as not filled by the
+// object. Its cost is bounded, otherwise boxes of round objects would be too small.
 constexpr float kFilledCornerShare = 0.07F;
 // Largest cost of one silhouette, in terms of the object's size.
 constexpr float kMaxSilhouetteCost = 0.3F;

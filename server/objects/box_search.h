@@ -29,24 +29,24 @@ struct BoxCriteria {
 };
 
 // Finds the box whose outline in each image extends as far as the object's mask. The object touches all faces of its
-// box but need not fill the corners, so an outline beyond the mask costs little and one that falls short costs much
-// (the quantile loss of R. Koenker and G. Bassett, "Regression Quantiles", Econometrica 1978). An outline beyond a mask
-// that is cut off by the image or by another object costs nothing. The cost grows at most linearly, and is bounded per
-// image, so that a few wrong masks do not matter.
+// box but does not have to fill the corners, so an outline beyond the mask costs little and one that falls short costs
+// much (the quantile loss of R. Koenker and G. Bassett, "Regression Quantiles", Econometrica 1978). An outline beyond a
+// mask that is cut off by the image or by another object costs nothing. The cost grows at most linearly, and is bounded
+// per image, so that a few wrong masks do not matter.
 //
 // All boxes of one search have the same yaw. Deterministic.
 class BoxSearch {
  public:
   BoxSearch(const BoxCriteria& criteria, const std::vector<Silhouette>& silhouettes, double yaw_rad);
 
-  // Of a box with the search's yaw, in map units times silhouettes.
+  // Cost of a box with the search's yaw, in map units times silhouettes.
   double Cost(const UprightBox& box) const;
   // The best box near `start`, by coordinate descent over its faces. `step_mu`: the first step.
   UprightBox Refine(const UprightBox& start, double step_mu) const;
   // Share of the silhouettes that the box covers in nearly all directions, 0..1: low when masks contradict each other.
   double Agreement(const UprightBox& box) const;
-  // Mean distance of the box's outline beyond the masks where these are not cut off, in terms of the object's size:
-  // large when the object does not fill the corners of its box.
+  // Mean distance by which the box's outline extends beyond the masks where these are not cut off, in terms of the
+  // object's size: large when the object does not fill the corners of its box.
   double Looseness(const UprightBox& box) const;
 
  private:

@@ -10,13 +10,13 @@
 
 namespace romap::objects {
 
-// A MapCorrection's keyframes by id. All others did not move noticeably.
+// A MapCorrection's keyframes by id. Keyframes that are not listed did not move noticeably.
 using KeyframeCorrections = std::unordered_map<KeyframeId, KeyframeCorrection>;
 
 // The motion of the space around an object according to the keyframes that observed it: the mean rotation, the mean
 // motion of the object's center and the geometric mean of the scales. It follows the keyframes and not the object's
-// points, because masks and fields depend on camera poses only. What remains of each keyframe's own motion changes the
-// views. nullopt when none of `observed_in` was corrected.
+// points, because masks and fields depend on camera poses only. The residual motion of each keyframe changes the views.
+// nullopt when none of `observed_in` was corrected.
 std::optional<Sim3<World, World>> MeanMotion(std::span<const KeyframeId> observed_in,
                                              const Eigen::Vector3d& center_world,
                                              const KeyframeCorrections& corrections);

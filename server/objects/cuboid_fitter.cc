@@ -46,7 +46,8 @@ Interval TrimmedBounds(const std::vector<Eigen::Vector3d>& points, const Eigen::
 }
 
 // The horizontal direction in which the hull is unbounded because all cameras look along it; nullopt when the cameras
-// surround the object. A camera bounds the hull across its view direction, the same from opposite sides.
+// surround the object. A camera bounds the hull perpendicular to its view direction; cameras on opposite sides bound it
+// in the same directions.
 std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence,
                                                   const std::vector<Silhouette>& silhouettes) {
   std::vector<double> azimuths;
@@ -94,7 +95,7 @@ std::vector<Eigen::Vector3d> ClipCells(const CuboidEvidence& evidence, const Int
   return cells;
 }
 
-// Heights at which the ray, inside the upright prism over the footprint, is lowest and highest; nullopt when it misses.
+// Lowest and highest height of the ray inside the upright prism over the footprint; nullopt when it misses the prism.
 std::optional<Interval> HeightsInsidePrism(const Footprint& footprint, const Eigen::Vector3d& origin,
                                            const Eigen::Vector3d& direction) {
   const Eigen::Rotation2Dd to_footprint(-footprint.yaw_rad);
@@ -142,7 +143,7 @@ std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const st
   return Interval{NearestQuantile(bottoms, kOutlinesOutside), NearestQuantile(tops, 1 - kOutlinesOutside)};
 }
 
-// The heights between which a hull is broad. Above and below, it tapers like a cone, as every visual hull does.
+// The heights between which a hull is broad. Above and below, every visual hull tapers like a cone.
 Interval BroadHeights(const std::vector<Eigen::Vector3d>& cells, double cell_height) {
   constexpr double kBroadShare = 0.2;          // of the largest layer's area
   std::vector<std::pair<double, int>> layers;  // height and number of cells; cells are ordered by layers
@@ -181,8 +182,8 @@ UprightBox Loosened(UprightBox tight, double outer_top, double looseness) {
   const Eigen::Vector2d grown = growth / 2 * (tight.high - tight.low).head<2>();
   tight.low.head<2>() -= grown;
   tight.high.head<2>() += grown;
-  constexpr double kFlatTop = 0.07;   // looseness up to which the search finds the top
-  constexpr double kRoundTop = 0.09;  // looseness from which `outer_top` is right
+  constexpr double kFlatTop = 0.07;   // looseness up to which the search determines the top correctly
+  constexpr double kRoundTop = 0.09;  // looseness from which `outer_top` is used
   const double share = std::clamp((looseness - kFlatTop) / (kRoundTop - kFlatTop), 0.0, 1.0);
   tight.high.z() += share * std::max(0.0, outer_top - tight.high.z());
   return tight;
@@ -200,7 +201,7 @@ std::optional<UprightBox> AtYaw(const std::optional<Cuboid>& cuboid, const HullR
   return UprightBox{yaw_rad, center - cuboid->half_extents, center + cuboid->half_extents};
 }
 
-// Boxes of the same yaw.
+// Smallest box around two boxes of the same yaw.
 UprightBox United(const UprightBox& a, const UprightBox& b) {
   return {.yaw_rad = a.yaw_rad, .low = a.low.cwiseMin(b.low), .high = a.high.cwiseMax(b.high)};
 }
@@ -227,7 +228,7 @@ std::optional<UprightBox> FindOuterBox(const CuboidEvidence& evidence, const std
   const Interval broad = BroadHeights(evidence.hull_cells, evidence.cell_size.z());
   const bool enough_points = HasEnoughPoints(evidence);
   const Interval points = enough_points ? TrimmedBounds(evidence.points, up) : broad;
-  // A few points may all be low on the object; many are not.
+  // A small number of points may all be low on the object; a large number is spread over its height.
   constexpr size_t kManyPoints = 3;  // times the minimum
   const bool points_reach_top = evidence.points.size() >= kManyPoints * static_cast<size_t>(evidence.min_points);
   Interval heights{support.value_or(points.low), points_reach_top ? points.high : std::max(points.high, broad.high)};
@@ -256,7 +257,7 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
   if (evidence.hull_cells.empty()) return std::nullopt;
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const Interval hull = Bounds(evidence.hull_cells, up);
-  // A surface above the lowest fifth of the object's own points cannot carry it.
+  // A surface above the lowest fifth of the object's own points cannot support the object.
   constexpr double kLowPoints = 0.2;       // quantile
   constexpr double kMaxAboveCenter = 0.1;  // without points; this and the following in terms of the object's size
   constexpr double kMaxBelowHull = 0.3;
@@ -266,7 +267,7 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
                                                    : evidence.center.z() + kMaxAboveCenter * evidence.object_size_mu;
   const double floor = std::min(hull.low, ceiling) - kMaxBelowHull * evidence.object_size_mu;
   const double layer_mu = kLayer * evidence.object_size_mu;
-  // An object below this one hides the surface around it, and its own points are not background.
+  // An object below this one hides the surface around it, and the points of that object are not background.
   std::optional<double> carrier;
   for (double top : evidence.carrier_tops) {
     if (top >= floor && top <= ceiling + layer_mu) carrier = std::max(top, carrier.value_or(top));

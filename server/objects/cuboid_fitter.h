@@ -27,22 +27,23 @@ struct CuboidEvidence {
 
 struct CuboidFit {
   Cuboid cuboid;
-  // The space that the evidence leaves for the object: at least as large as the cuboid, with the same axes. It contains
-  // thin parts that only few masks show, so fields train in it.
+  // The space that the evidence allows for the object: at least as large as the cuboid, with the same axes. It contains
+  // thin parts that are visible in only a few masks, so fields are trained in it.
   Cuboid training_box;
 };
 
-// Fits the upright cuboid around an object. The hull, the points and the support plane give an initial box, and
-// BoxSearch the box that agrees best with all of them: a hull is only an outer bound, loose where neighbors occlude the
-// object or all cameras are on one side, and cone-shaped above every flat top. The yaw is that of the straight edges,
-// else that of the smallest rectangle around the footprint; `previous` decides between equally good ones and between
-// the four equivalent yaws of a box. The confidence is the share of silhouettes that agree with the cuboid. nullopt
-// when the evidence leaves no volume.
+// Fits the upright cuboid around an object. The hull, the points and the support plane give an initial box, which
+// BoxSearch refines to the box that agrees best with all of them: a hull is only an outer bound, loose where neighbors
+// occlude the object or all cameras are on one side, and cone-shaped above every flat top. The yaw is that of the
+// straight edges, or without edges that of the smallest rectangle around the footprint; `previous` decides between
+// equally good ones and between the four equivalent yaws of a box. The confidence is the share of silhouettes that
+// agree with the cuboid. nullopt when the evidence leaves no volume.
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous);
 
-// Height of the horizontal surface that the object stands on: the top of another object below it, else the densest thin
-// layer of background points around its footprint, else the median bottom of its neighbors. nullopt without any.
+// Height of the horizontal surface that the object stands on: the top of another object below it, otherwise the densest
+// thin layer of background points around its footprint, otherwise the median bottom of its neighbors. nullopt without
+// any of these.
 std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
 
 }  // namespace romap::objects

@@ -17,7 +17,7 @@ struct Extent {
   int border_px = 0;
 };
 
-// One pass over the runs of equal labels of each row.
+// Makes one pass over the runs of equal labels of each row.
 std::map<uint16_t, Extent> MeasureLabels(const cv::Mat& labels) {
   std::map<uint16_t, Extent> extents;
   for (int v = 0; v < labels.rows; ++v) {
@@ -40,8 +40,8 @@ std::map<uint16_t, Extent> MeasureLabels(const cv::Mat& labels) {
   return extents;
 }
 
-// The time of an association grows with the square of the number of masks. This bounds it for detectors that label
-// every patch of the image.
+// The time of an association grows with the square of the number of masks. The limit bounds the time for detectors that
+// label every patch of the image.
 void KeepLargest(size_t count, uint64_t frame_id, std::vector<Detection>& detections) {
   if (detections.size() <= count) return;
   spdlog::debug("objects: frame {}: {} masks; only the {} largest are used", frame_id, detections.size(), count);

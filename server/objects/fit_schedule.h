@@ -16,7 +16,7 @@ struct FitRequest {
   uint64_t waiting_frames = 0;  // since its last fit
 };
 
-// Whether enough silhouettes changed: the more silhouettes an object has, the less each one changes its cuboid.
+// Whether enough silhouettes changed: the more silhouettes an object has, the less each silhouette changes its cuboid.
 bool IsDueForFit(const FitRequest& request);
 
 // Keys in order of urgency, the most urgent first. Urgency is the share of changed silhouettes times the waiting time,

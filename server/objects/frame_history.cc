@@ -9,7 +9,7 @@
 namespace romap::objects {
 namespace {
 
-// Ids of stand-ins must differ from those of the camera's map, which count from 1.
+// Ids of stand-in keyframes must differ from those of the camera's map, which count from 1.
 constexpr uint64_t kFirstStandIn = uint64_t{1} << 62;
 constexpr int kMaskErosion_px = 2;  // a point nearer to the rim of a mask gets no label
 
@@ -70,7 +70,7 @@ const FrameHistory::Entry* FrameHistory::NearestKeyframe(int64_t timestamp_ns) c
   return nearest;
 }
 
-// Marks the keyframes without masks up to then as replaced; returns whether there were any that were not yet.
+// Marks all keyframes without masks up to `until_ns` as replaced. Returns whether any of them was not replaced before.
 bool FrameHistory::MarkReplaced(int64_t until_ns) {
   bool any = false;
   for (Entry& entry : entries_) {

@@ -13,18 +13,18 @@ namespace romap::objects {
 
 // Keeps the newest frames for which masks may still arrive, and replaces keyframes without masks.
 //
-// Objects learn from keyframes, but a slow detector has masks for some frames only, and most of these are not keyframes
-// of the camera's map. So the first masked frame after a keyframe without masks stands in for it: it counts as a
-// keyframe for objects only. It observes the points of the nearest keyframe, and its pose is anchored to the same
-// keyframe as that of its frame, so that it follows corrections.
+// Objects are mapped from keyframes, but a slow detector provides masks for some frames only, and most of these are not
+// keyframes of the camera's map. Therefore the first masked frame after a keyframe without masks replaces it as a
+// stand-in: a keyframe for objects only. The stand-in observes the points of the nearest keyframe, and its pose is
+// anchored to the same keyframe as that of its frame, so that it follows corrections.
 class FrameHistory {
  public:
   // `patience_s`: how long a frame without masks is kept, with its image, in time of the frames.
   explicit FrameHistory(double patience_s) : patience_s_(patience_s) {}
 
-  // Every frame with a pose, in order.
+  // Adds a frame. Call for every frame with a pose, in order.
   void Add(const TrackedFrame& tracked);
-  // The keyframe made of the last added frame.
+  // Adds the keyframe made from the last added frame.
   void AddKeyframe(const KeyframeView& view);
 
   struct Masked {
@@ -34,10 +34,11 @@ class FrameHistory {
   // Adds late masks to their frame. nullopt when the frame is unknown, too old, or has masks already.
   std::optional<Masked> TakeLateMasks(const FrameMasks& masks);
 
-  // A keyframe made of a masked frame that is not a keyframe; nullopt unless it replaces one without masks.
+  // Returns a keyframe made from a masked frame that is not a keyframe; nullopt unless it replaces a keyframe without
+  // masks.
   std::optional<KeyframeView> StandIn(const TrackedFrame& masked, const PointRegistry& points);
 
-  // The map was corrected. Adds the corrections of stand-ins to `corrections`.
+  // Applies a map correction to the stored frames. Adds the corrections of stand-ins to `corrections`.
   void Correct(KeyframeCorrections* corrections);
   void Clear();
 

@@ -88,8 +88,8 @@ class TreeGrower {
   RandomStream random_;
 };
 
-// Calls `body(i)` for each i < count, on several threads if there is work for more than about a millisecond: less is
-// done before other threads have started.
+// Calls `body(i)` for each i < count, on several threads if the work takes more than about a millisecond: less work is
+// finished before other threads have started.
 template <class Body>
 void ForEach(size_t count, size_t point_steps, const Body& body) {
   constexpr size_t kMinStepsForThreads = 1'000'000;
@@ -104,7 +104,7 @@ void ForEach(size_t count, size_t point_steps, const Body& body) {
 
 double MeanPathLength(size_t n) {
   if (n <= 1) return 0;
-  if (n == 2) return 1;  // the formula approximates the harmonic number
+  if (n == 2) return 1;  // exact value; the formula approximates the harmonic number
   const auto count = static_cast<double>(n);
   constexpr double kEulerGamma = 0.57721566490153286;
   return 2 * (std::log(count - 1) + kEulerGamma) - 2 * (count - 1) / count;
@@ -120,7 +120,8 @@ IsolationForest::IsolationForest(std::span<const Eigen::Vector3d> points, const 
   std::vector<Eigen::Vector3f> centered(points.size());
   for (size_t i = 0; i < points.size(); ++i) centered[i] = (points[i] - center_).cast<float>();
 
-  // An empty side of a cut is a leaf too, so the depth bounds the number of nodes, and not the points alone.
+  // An empty side of a cut is also a leaf, so the number of nodes is bounded by the depth and not only by the number of
+  // points.
   const size_t max_nodes =
       std::min((size_t{2} << depth_limit_) - 1, 2 * sample_size_ * static_cast<size_t>(depth_limit_) + 1);
   nodes_.resize(trees * max_nodes);

@@ -14,11 +14,11 @@ namespace romap::objects {
 struct IsolationForestOptions {
   int trees = 50;
   // Points per tree, drawn without replacement (psi in the papers). The depth of a tree is limited to ceil(log2(psi)):
-  // a point that is not isolated there is no outlier.
+  // a point that is not isolated at that depth is not an outlier.
   int sample_size = 64;
-  // Axes in addition to the first one that the normal of a cut may have components of. 0: axis-aligned cuts as in Liu
-  // et al., which give low scores to empty regions beside diagonal or multiple clusters. 2: cuts of any orientation,
-  // which do not.
+  // Number of axes, in addition to the first one, along which the normal of a cut may have a component. 0: axis-aligned
+  // cuts as in Liu et al., which give low scores to empty regions beside diagonal or multiple clusters. 2: cuts of any
+  // orientation, which avoid this.
   int extension_level = 2;
   uint64_t seed = 1;
 };
@@ -47,8 +47,8 @@ class IsolationForest {
   std::vector<double> Scores(std::span<const Eigen::Vector3d> points) const;
 
  private:
-  // Adds the path lengths in all trees. Up to a block of points at once: traversing for one point would wait for memory
-  // at every step.
+  // Adds the path lengths in all trees for up to one block of points. Points are traversed together, because a
+  // traversal for one point would wait for memory at every step.
   void AddPaths(std::span<const Eigen::Vector3f> points, std::span<float> path_sums) const;
 
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();  // nodes are in single precision, relative to it

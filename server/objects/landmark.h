@@ -14,7 +14,7 @@
 
 namespace romap::objects {
 
-// What the detections say about one landmark. Frames are counted by the mapper; client frame ids may have gaps.
+// Evidence of the detections for one landmark. Frames are counted by the mapper; client frame ids may have gaps.
 struct LandmarkEvidence {
   uint64_t last_frame = 0;        // index of the frame of the last observation
   uint64_t observations = 0;      // frames with a mask of it
@@ -24,12 +24,12 @@ struct LandmarkEvidence {
   double agreement_sum = 0;       // of Match::agreement, over `agreement_count` observations
   uint64_t agreement_count = 0;
   std::map<std::string, double> class_evidence;  // sum of detection scores by class
-  // Distinguish two objects from one object that has two landmarks: frames in which both landmarks had a mask, and
-  // frames in which this one had none and the mask of the other one covered it.
+  // These counts distinguish two objects from one object that has two landmarks: frames in which both landmarks had a
+  // mask, and frames in which this one had none and the mask of the other one covered it.
   std::map<LandmarkKey, uint64_t> observed_with;
   std::map<LandmarkKey, uint64_t> covered_by;
 
-  // The class with the most evidence and its share, 0..1. Of equal ones the first in alphabetical order.
+  // The class with the most evidence and its share, 0..1. Among equal classes, the first in alphabetical order.
   std::pair<std::string, double> BestClass() const {
     std::pair<std::string, double> best{"object", 0};
     double total = 0;
@@ -42,7 +42,7 @@ struct LandmarkEvidence {
   }
 };
 
-// Where a landmark is, in the world of the newest map correction.
+// Geometry of a landmark, in the world frame of the newest map correction.
 struct LandmarkGeometry {
   std::optional<Cuboid> cuboid;             // newest fit
   std::optional<Cuboid> training_box;       // of the same fit, see CuboidFit
@@ -60,7 +60,7 @@ struct Landmark {
   LandmarkEvidence evidence;
   LandmarkGeometry geometry;
 
-  // The last observation predicts where the next one is.
+  // The last observation, used to predict the next one.
   cv::Rect last_box_px;
   SE3<World, Camera> last_T_world_camera;
   std::optional<uint64_t> last_track_id;

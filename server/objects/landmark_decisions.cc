@@ -34,7 +34,7 @@ bool MasksDisagree(const LandmarkEvidence& evidence) {
 }
 
 bool HasPlausibleProportions(const Cuboid& cuboid) {
-  constexpr double kMaxElongation = 60;  // longest to shortest side; a sheet of paper in a box of noise has less
+  constexpr double kMaxElongation = 60;  // longest to shortest side; lower for a sheet of paper with a noisy cuboid
   const Eigen::Vector3d& half_extents = cuboid.half_extents;
   return half_extents.minCoeff() > 0 && half_extents.maxCoeff() < kMaxElongation * half_extents.minCoeff();
 }
@@ -48,8 +48,8 @@ std::vector<Eigen::Vector3d> PointsOf(const Landmark& landmark, const PointRegis
   return points_world;
 }
 
-// Whether the map points on both may be those of one object seen from two sides (SamePlace); nullopt when there are too
-// few to decide.
+// Whether the map points of both landmarks may belong to one object seen from two sides (SamePlace); nullopt when there
+// are too few points to decide.
 std::optional<bool> PointsAgree(const Landmark& a, const Landmark& b, const PointRegistry& points) {
   constexpr double kAlpha = 0.05;            // significance level
   constexpr double kShiftShare = 0.25;       // of the size, between the mean points of two view directions
@@ -77,13 +77,13 @@ Decision DecideConfirmation(const LandmarkEvidence& evidence, const LandmarkGeom
   if (!HasPlausibleProportions(*geometry.cuboid)) return {false, "cuboid of implausible proportions"};
   if (DetectedTooRarely(evidence, config)) return {false, "detected in too few of the frames that should show it"};
   if (MasksDisagree(evidence)) return {false, "masks disagree with its shape"};
-  // Part of a larger object is covered by that object's mask in most frames.
+  // A part of a larger object is covered by that object's mask in most frames.
   const bool is_part = std::any_of(evidence.covered_by.begin(), evidence.covered_by.end(),
                                    [&](const auto& cover) { return cover.second > evidence.observations; });
   if (is_part) return {false, "covered by the mask of another object too often"};
   if (evidence.observations < static_cast<uint64_t>(config.confirm_frames)) return {false, "too few observations"};
   if (evidence.keyframe_observations < config.confirm_keyframes) return {false, "too few keyframes"};
-  // Without map points the masks alone determine the position, which takes a wider baseline.
+  // Without map points the masks alone determine the position, which requires a wider baseline.
   constexpr double kParallaxFactorWithoutPoints = 1.5;
   const bool has_points = geometry.points.size() >= static_cast<size_t>(config.min_object_points);
   const double min_parallax_rad =
@@ -113,7 +113,8 @@ Decision DecidePruning(ObjectState state, const LandmarkEvidence& evidence, bool
     return {true, "detected in too few of the frames that should show it"};
   }
   if (state != ObjectState::kProvisional) return {false, "confirmed"};
-  // Frames covered by another object's mask, per observation, of which at least kMinObservations are assumed.
+  // Maximum number of frames in which another object's mask covers the landmark, per observation. At least
+  // kMinObservations observations are assumed.
   constexpr uint64_t kMaxCoveredPerObservation = 3;
   constexpr uint64_t kMinObservations = 3;
   for (const auto& [key, count] : evidence.covered_by) {
@@ -123,7 +124,7 @@ Decision DecidePruning(ObjectState state, const LandmarkEvidence& evidence, bool
   }
   constexpr int kMaxMissedFrames = 40;
   if (evidence.missed_in_view >= kMaxMissedFrames) return {true, "no longer detected where it was observed"};
-  // A landmark with a cuboid had many observations; it may be out of view and come back.
+  // A landmark with a cuboid had many observations; it may be out of view and return into view later.
   constexpr uint64_t kMaxUnobservedFrames = 40;
   constexpr uint64_t kMaxUnobservedFramesWithCuboid = 400;
   if (frame_index - evidence.last_frame > (has_cuboid ? kMaxUnobservedFramesWithCuboid : kMaxUnobservedFrames)) {
@@ -147,11 +148,13 @@ CoVisibility CountCoVisibility(const Landmark& a, const Landmark& b) {
 }
 
 Decision DecideMerge(const Landmark& a, const Landmark& b, const PointRegistry& points) {
-  // Of the body points of one landmark inside the cuboid of the other one, the larger of both shares.
+  // Thresholds of the overlap: the share of one landmark's body points inside the cuboid of the other landmark, the
+  // larger of both shares.
   constexpr double kCertainOverlap = 0.7;
   constexpr double kProbableOverlap = 0.5;
   constexpr double kPossibleOverlap = 0.25;
-  // Frames in which one mask covered both, per frame in which both had one: more, and the detector splits an object.
+  // Frames in which one mask covered both landmarks, per frame in which each had its own mask. Above this ratio the
+  // detector is assumed to split one object.
   constexpr uint64_t kMaxCoveredPerTogether = 2;
 
   const auto& cuboid_a = a.geometry.cuboid;

@@ -13,39 +13,45 @@ namespace romap::objects {
 
 // The life-cycle decisions about landmarks, as pure functions of their evidence: confirm, lose, prune, merge.
 
-// A decision and its reason, in words for logs and clients. A refusal has a reason too.
+// A decision and its reason, as text for logs and clients. Negative decisions also have a reason.
 struct Decision {
   bool yes = false;
   const char* reason = "";
 };
 
-// A provisional landmark becomes an object: detected in most frames that should show it, in enough frames and
-// keyframes, from different directions, with a cuboid of plausible proportions that its masks agree with.
+// Whether a provisional landmark becomes a confirmed object: it must be detected in most frames that should show it, in
+// enough frames and keyframes and from different directions, and its cuboid must have plausible proportions and agree
+// with its masks.
 Decision DecideConfirmation(const LandmarkEvidence& evidence, const LandmarkGeometry& geometry,
                             const ObjectsConfig& config);
 
-// A provisional landmark is shown to clients before it is confirmed: it has a cuboid and a few observations.
+// Whether a provisional landmark is published to clients before it is confirmed: it must have a cuboid and a few
+// observations.
 Decision DecideAnnouncement(const LandmarkEvidence& evidence, const LandmarkGeometry& geometry);
 
-// A confirmed object is lost: too many frames in a row should have shown it and did not.
+// Whether a confirmed object is lost: it was not detected in too many frames since its last observation that should
+// have shown it.
 Decision DecideLoss(ObjectState state, const LandmarkEvidence& evidence, const ObjectsConfig& config);
 
-// A landmark is removed as a false detection. Confirmed objects never are. `frame_index` is that of the present frame.
+// Whether a landmark is removed as a false detection; never true for confirmed objects. `frame_index`: of the current
+// frame.
 Decision DecidePruning(ObjectState state, const LandmarkEvidence& evidence, bool has_cuboid, uint64_t frame_index,
                        const ObjectsConfig& config);
 
-// The same at the end of the session: what is not confirmed then never will be.
+// Whether a landmark is removed at the end of the session: true for provisional landmarks, which can no longer be
+// confirmed.
 Decision DecidePruningAtFinish(ObjectState state);
 
-// How two landmarks appeared relative to each other.
+// Counts of frames in which two landmarks were detected together, or one was covered by the other.
 struct CoVisibility {
   uint64_t together = 0;  // frames in which both had a mask
   uint64_t covered = 0;   // frames in which one had none and the mask of the other one covered it
 };
 CoVisibility CountCoVisibility(const Landmark& a, const Landmark& b);
 
-// Two landmarks are one object: they occupy the same volume and were never detected side by side. A detector that
-// splits objects shows one object as two at times; then one mask covers both in most frames.
+// Whether two landmarks are one object: they must occupy the same volume and must never have been detected side by
+// side. Exception: a detector that splits an object sometimes gives it two masks, but in most frames one mask covers
+// both landmarks.
 Decision DecideMerge(const Landmark& a, const Landmark& b, const PointRegistry& points);
 
 }  // namespace romap::objects

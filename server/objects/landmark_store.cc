@@ -11,7 +11,7 @@
 namespace romap::objects {
 namespace {
 
-// In the counts of landmark `owner`: what was counted for `from` counts for `into`.
+// Moves the count of `from` to `into` in the counts of landmark `owner`.
 void RenameKey(LandmarkKey from, LandmarkKey into, LandmarkKey owner, std::map<LandmarkKey, uint64_t>* counts) {
   const auto old = counts->find(from);
   if (old == counts->end()) return;
@@ -73,7 +73,7 @@ void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetecti
   const CameraModel& camera = view.frame->camera;
   const cv::Mat& labels = view.frame->labels;
   for (const PointObservation& observation : view.observations) {
-    // An observation near the rim of a mask has label 0 too, which is no evidence for the background.
+    // An observation near the rim of a mask also has label 0, but is no evidence for the background.
     if (observation.label == 0 && !labels.empty()) {
       const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
       const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);
@@ -85,7 +85,7 @@ void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetecti
 }
 
 void LandmarkStore::SetUp(const Eigen::Vector3d& up_world) {
-  constexpr double kMinLength = 0.5;  // a shorter vector is not a direction
+  constexpr double kMinLength = 0.5;  // a shorter vector does not define a direction
   if (up_world.allFinite() && up_world.norm() > kMinLength) up_world_ = up_world.normalized();
 }
 
@@ -150,7 +150,7 @@ std::optional<Sim3<World, World>> LandmarkStore::Correct(Landmark& landmark,
     for (Eigen::Vector3d& p : geometry.body_world) p = *S_new_old * p;
     landmark.last_T_world_camera = S_new_old->Moved(landmark.last_T_world_camera);
   }
-  // Up may change without any keyframe of this landmark.
+  // The up direction may change even if no keyframe of this landmark was corrected.
   if (geometry.cuboid) geometry.cuboid = Upright(*geometry.cuboid, up_world_);
   if (geometry.training_box) geometry.training_box = Upright(*geometry.training_box, up_world_);
   if (S_new_old) landmark.needs_fit |= landmark.shape.Correct(*S_new_old, keyframes, geometry.cuboid);

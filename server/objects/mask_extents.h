@@ -9,8 +9,8 @@
 
 namespace romap::objects {
 
-// Extents are measured in kExtentDirections directions of the image (u right, v down). Direction k has the angle
-// 2 pi k / kExtentDirections, so that opposite directions differ by half the count.
+// Extents are measured in kExtentDirections directions of the image (u right, v down). Direction k has the angle 2 pi k
+// / kExtentDirections, so the indices of opposite directions differ by kExtentDirections / 2.
 inline constexpr int kExtentDirections = 16;
 Eigen::Vector2d ExtentDirection(int k);
 

@@ -18,7 +18,7 @@ bool HasUsablePose(TrackingState state, const SE3<World, Camera>& T_world_camera
   return tracked && T_world_camera.IsFinite();
 }
 
-// The landmarks to look at after a keyframe, in the order of their keys.
+// The landmarks to process after a keyframe, in the order of their keys.
 std::vector<LandmarkKey> ChangedLandmarks(std::vector<LandmarkKey> fitted, const FrameDetections& frame) {
   std::vector<LandmarkKey> keys = std::move(fitted);
   keys.insert(keys.end(), frame.keys.begin(), frame.keys.end());
@@ -58,7 +58,7 @@ ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
   store_.UpdatePoints(view);
   if (!view.frame || !view.T_world_camera.IsFinite()) return {};
   history_.AddKeyframe(view);
-  // Not from late masks: a correction may have changed up since their frame.
+  // Late masks do not set the up direction, because a correction may have changed it since their frame.
   store_.SetUp(view.up_world);
   if (!current_.usable || view.frame->frame_id != current_.frame_id) return {};
   return ObserveMaskedKeyframe(view);
@@ -136,7 +136,7 @@ ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
 }
 
 void ObjectMapper::UpdateMissed(const Association& association, ObjectOutput* output) {
-  constexpr double kMinVisibleShare = 0.6;  // of the body, unoccluded in the image: it should have been detected
+  constexpr double kMinVisibleShare = 0.6;  // of the body, unoccluded in the image: a detection is expected
   const LandmarkStore::Landmarks& landmarks = store_.landmarks();
   std::vector<bool> matched(landmarks.size(), false);
   for (const Match& match : association.matches) {
@@ -243,7 +243,7 @@ void ObjectMapper::Confirm(const std::vector<LandmarkKey>& keys) {
     Landmark& landmark = *store_.Find(key);
     if (landmark.state != ObjectState::kProvisional) continue;
     if (!DecideConfirmation(landmark.evidence, landmark.geometry, config_).yes) continue;
-    // A duplicate of an object is merged before it would be confirmed.
+    // A duplicate of an object is not confirmed, because it will be merged.
     const bool is_duplicate = std::any_of(landmarks.begin(), landmarks.end(), [&](const auto& other) {
       return other->key != key && other->state != ObjectState::kProvisional &&
              DecideMerge(landmark, *other, store_.points()).yes;

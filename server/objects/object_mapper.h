@@ -26,24 +26,25 @@ class ObjectMapper {
  public:
   explicit ObjectMapper(const ObjectsConfig& config);
 
-  // Every frame, in order.
+  // Processes a frame. Call for every frame, in order.
   ObjectOutput ObserveFrame(const TrackedFrame& tracked);
-  // Right after ObserveFrame of the same frame, when it is a keyframe.
+  // Processes a keyframe. Call right after ObserveFrame for the same frame.
   ObjectOutput ObserveKeyframe(const KeyframeView& view);
-  // Masks of an earlier frame that had none, in the order of their frames. Ignored when they are older than
-  // ObjectsConfig::max_mask_delay_s or the frame has no pose. Not between ObserveFrame and ObserveKeyframe.
+  // Processes masks of an earlier frame that had none. Call in the order of the frames, but not between ObserveFrame
+  // and ObserveKeyframe of one frame. Masks are ignored when they are older than ObjectsConfig::max_mask_delay_s or the
+  // frame has no pose.
   ObjectOutput ObserveLateMasks(const FrameMasks& masks);
-  // The map was corrected. Each object moves with the keyframes that observed it (MeanMotion). Noticeable changes are
-  // published: the cuboid in an ObjectUpdate; in ObjectViews the motion of the object's space and the views that moved
-  // relative to the object.
+  // Applies a map correction. Each object moves with the keyframes that observed it (MeanMotion). Noticeable changes
+  // are published: the cuboid in an ObjectUpdate; in ObjectViews the motion of the object's space and the views that
+  // moved relative to the object.
   ObjectOutput Correct(const MapCorrection& correction);
-  // The map was reset, and all poses before are invalid: every object is removed. Ids are never reused.
+  // Removes every object after a reset of the map, which invalidates all earlier poses. Ids are never reused.
   ObjectOutput Reset();
-  // No more frames: the last fits, and all views and corrections that were held back.
+  // Call after the last frame. Makes the last fits and publishes all pending views and corrections.
   ObjectOutput Finish();
 
  private:
-  // Steps of a frame with masks.
+  // Steps that process a frame with masks.
   ObjectOutput ObserveMaskedFrame(const TrackedFrame& tracked);
   void UpdateMissed(const Association& association, ObjectOutput* output);
   void RecordObservations(const Association& association, const TrackedFrame& tracked, ObjectOutput* output);
@@ -51,7 +52,7 @@ class ObjectMapper {
                          ObjectOutput* output);
   void PruneFalseLandmarks(ObjectOutput* output);
 
-  // Steps of a keyframe with masks.
+  // Steps that process a keyframe with masks.
   ObjectOutput ObserveMaskedKeyframe(const KeyframeView& view);
   void Confirm(const std::vector<LandmarkKey>& keys);
   void MergeDuplicates(ObjectOutput* output);

@@ -13,7 +13,7 @@ struct ObjectOutput {
   // ObjectUpdate, ObjectRemoved and ObjectMerged, in the order in which they happened. Their revisions are 0: the
   // session's map counts revisions, because meshes get theirs from the same counter.
   std::vector<MapEvent> events;
-  // For the fields of confirmed objects. The cuboid is the box a field learns in: at least the published one.
+  // Updates for the fields of confirmed objects. Their cuboid is the training box, which contains the published cuboid.
   std::vector<ObjectViews> views;
 
   void Append(ObjectOutput&& later) {

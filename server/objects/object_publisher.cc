@@ -22,8 +22,8 @@ bool DiffersNoticeably(const Cuboid& a, const Cuboid& b) {
   return std::max(shift, growth) > kChangeShare * size || turn_rad > kTurnRad;
 }
 
-// Whether corrections moved the published cuboid enough to publish it again. `S_now_published` also turns meshes in
-// ways that an upright cuboid does not show.
+// Whether corrections moved the published cuboid enough to publish it again. `S_now_published` is tested as well,
+// because it may rotate meshes while the upright cuboid does not change.
 bool MovedNoticeably(const Cuboid& published, const Cuboid& now, const Sim3<World, World>& S_now_published) {
   constexpr double kShiftShare = 0.005;  // of the cuboid's longest side
   constexpr double kScaleShare = 0.002;  // change of scale
@@ -37,7 +37,7 @@ bool MovedNoticeably(const Cuboid& published, const Cuboid& now, const Sim3<Worl
 
 }  // namespace
 
-// How a landmark differs from what was published of it.
+// Differences between a landmark and its published state.
 struct ObjectPublisher::Change {
   bool cuboid = false;  // a new fit, or nothing was published before
   bool moved = false;   // by corrections
@@ -161,7 +161,7 @@ ObjectPublisher::Change ObjectPublisher::ChangeOf(const Landmark& landmark, cons
 void ObjectPublisher::Publish(const Landmark& landmark, When when, const LandmarkStore& store, ObjectOutput* output) {
   if (!landmark.geometry.cuboid) return;
   Publication& publication = PublicationOf(landmark.key);
-  if (!publication.last) publication.S_now_published.reset();  // clients and field start in the corrected world
+  if (!publication.last) publication.S_now_published.reset();  // the first published data are in the corrected world
   const Change change = ChangeOf(landmark, store.up_world(), publication);
   const bool is_provisional = landmark.state == ObjectState::kProvisional;
   const Cuboid& training_box = *landmark.geometry.training_box;
@@ -173,7 +173,7 @@ void ObjectPublisher::Publish(const Landmark& landmark, When when, const Landmar
   const bool views_changed = !views.new_views.empty() || !views.corrected_views.empty();
   const bool update = when == When::kAlways || change.Any();
   if (!update && !views_changed) return;
-  // Clients and field must move to the corrected world before they receive anything in it.
+  // Clients and field must move to the corrected world before they receive data in it.
   views.S_new_old = std::exchange(publication.S_now_published, std::nullopt);
   if (!publication.has_field) views.S_new_old.reset();
   if (update || views.S_new_old) {
@@ -206,7 +206,7 @@ void ObjectPublisher::Merge(const Landmark& from, const Landmark& into, bool ado
     adopted = target.views.Adopt(std::move(source.views), target.id, center);
   }
   if (source.last) {
-    // Clients must know an object before another one is merged into it.
+    // An object must be published before another one is merged into it.
     if (!target.last) Publish(into, When::kAlways, store, output);
     output->events.emplace_back(ObjectMerged{.from = source.id, .into = target.id});
     Publish(into, When::kAlways, store, output);

@@ -31,17 +31,18 @@ std::optional<CuboidFit> FitToPoints(const CuboidEvidence& evidence) {
   return CuboidFit{.cuboid = *cuboid, .training_box = *cuboid};
 }
 
-// Ray through the middle of the mask's box. It needs no object center, and is accurate enough to compare cameras.
+// Ray through the middle of the mask's box. It does not depend on the object's center and is accurate enough to compare
+// cameras.
 Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
   const double u_px = silhouette.box_px.x + silhouette.box_px.width / 2.0;
   const double v_px = silhouette.box_px.y + silhouette.box_px.height / 2.0;
   return silhouette.T_world_camera.rotation() * silhouette.camera.Unproject(u_px, v_px);
 }
 
-// How many silhouettes must contain a cell. Not all, because the cell may be occluded or outside the image in some.
+// Minimum number of silhouettes that must contain a cell. The cell may be occluded or outside the image in the others.
 int MinInside(int silhouettes) { return std::max(1, silhouettes * 3 / 10); }
 
-// A few wrong masks must not remove part of the object, but each silhouette that may be wrong makes the hull wider.
+// A few wrong masks must not remove part of the object, but tolerating more wrong silhouettes makes the hull wider.
 hull::CarvingRule StrictRule(size_t silhouettes) {
   constexpr int kAllRightBelow = 8;  // silhouettes; with fewer the hull is too wide if any may be wrong
   constexpr int kPerWrongOne = 20;   // silhouettes, of which one may be wrong
@@ -103,7 +104,8 @@ bool ObjectShape::AddSilhouette(Silhouette silhouette) {
   return true;
 }
 
-// Of the two silhouettes with the most similar directions drops the later one, or the earlier if that is cut off.
+// Drops one of the two silhouettes with the most similar directions: the earlier one if it is cut off, otherwise the
+// later one.
 void ObjectShape::DropMostRedundant() {
   std::vector<Eigen::Vector3d> directions;
   for (const Silhouette& silhouette : silhouettes_) directions.push_back(ViewDirection(silhouette).normalized());
@@ -187,7 +189,7 @@ void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundin
   AddMissingVotes();
 }
 
-// Corrections of the map tilt the grid with its object, but a fit needs it upright.
+// Map corrections tilt the grid with its object, but a fit requires an upright grid.
 void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
   constexpr double kMaxTiltRad = 0.3 * kRadPerDeg;
   HullRegion region = hull_.region();
@@ -198,7 +200,7 @@ void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
 }
 
 // Moves the grid to the hull when the hull reaches the grid's border, or when many silhouettes were added since it was
-// carved: then the hull fills only little of the grid.
+// carved: then the hull fills only a small part of the grid.
 void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surroundings) {
   constexpr double kMaxHalfExtent = 1.3;    // of the grid, in terms of the object's size
   constexpr double kBorder = 0.97;          // share of the grid's half extent from which the hull touches the border
@@ -252,7 +254,7 @@ std::vector<bool> ObjectShape::FindInliers(std::span<const Eigen::Vector3d> poin
     inside.push_back(p_grid);
     inside_index.push_back(i);
   }
-  // Of the anomaly score, 0..1. Higher than the usual 0.6, because a cuboid needs its outermost points.
+  // Threshold of the anomaly score, 0..1. Higher than the usual 0.6, because a cuboid needs its outermost points.
   constexpr double kOutlierScore = 0.65;
   const std::vector<double> scores = AnomalyScores(inside);
   std::vector<bool> is_inlier(points_world.size(), false);

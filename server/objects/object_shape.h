@@ -40,21 +40,21 @@ class ObjectShape {
   bool AddSilhouette(Silhouette silhouette);
   bool IsRedundant(const Silhouette& silhouette) const;
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
-  // Whether to detect straight edges on this mask (not redundant): not if a silhouette from about the same direction
-  // has them, nor once the yaw is certain.
+  // Whether to detect straight edges on this mask, which must not be redundant. False if a silhouette from about the
+  // same direction has edges, or once the yaw is certain.
   bool WantsSegments(const Silhouette& silhouette) const;
   // Number of silhouettes on which edges were detected.
   size_t SegmentViews() const;
   // Number of silhouettes that were added or corrected since the last Update().
   int changed_silhouettes() const { return changed_silhouettes_; }
 
-  // The map was corrected: the space around the object moved by `S_new_old`, and its keyframes have new poses.
+  // Applies a map correction: the space around the object moved by `S_new_old`, and its keyframes have new poses.
   // `cuboid`: of the object, already corrected. Returns whether the pose of a silhouette relative to the object changed
   // enough for a new fit.
   bool Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes,
                const std::optional<Cuboid>& cuboid);
 
-  // Fits the cuboid. nullopt while masks and points do not determine where the object is.
+  // Fits the cuboid. nullopt while masks and points do not determine the object's position.
   std::optional<Fit> Update(const Surroundings& surroundings, const std::optional<Cuboid>& previous);
 
  private:
@@ -85,7 +85,8 @@ class ObjectShape {
   double edge_yaw_confidence_ = 0;
   SilhouetteHull hull_;
   size_t silhouettes_when_carved_ = 0;
-  // Grown on the object's points in units of the grid's half width, so that it stays valid when the map moves.
+  // The forest is grown on the object's points in units of the grid's half width, so that it stays valid when the map
+  // moves.
   std::optional<IsolationForest> forest_;
   size_t points_when_grown_ = 0;
 };

@@ -17,14 +17,14 @@ inline constexpr LandmarkKey kBackgroundKey = 0;
 inline constexpr LandmarkKey kNoLandmark = ~LandmarkKey{0};
 
 // Assigns map points to landmarks. Every observation of a point in a keyframe is a vote: masks are wrong near their
-// rims and labels are swapped at times, but rarely for the same point in most keyframes.
+// rims and labels are sometimes swapped, but rarely for the same point in most keyframes.
 class PointRegistry {
  public:
   // Applies the new positions and removals of a keyframe. Points without a finite position are removed.
   void UpdatePositions(const KeyframeView& view);
-  // New positions after a correction. Unknown points and positions that are not finite are ignored.
+  // Sets new positions after a correction. Unknown points and positions that are not finite are ignored.
   void MovePoints(const std::vector<MapPoint>& points);
-  // The point was observed under the mask of landmark `key`, or under none (kBackgroundKey).
+  // Records that the point was observed under the mask of landmark `key`, or under no mask (kBackgroundKey).
   void Vote(MapPointId point, LandmarkKey key);
   // Moves all votes for `from` to `into`.
   void Merge(LandmarkKey from, LandmarkKey into);
@@ -47,7 +47,7 @@ class PointRegistry {
     std::optional<LandmarkKey> owner;  // with a clear majority of the votes
   };
 
-  // Index into `points_`; its size for an unknown point.
+  // Index into `points_`; points_.size() for an unknown point.
   size_t IndexOf(MapPointId point) const;
   static void UpdateOwner(Entry* entry);
 

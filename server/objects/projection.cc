@@ -7,7 +7,7 @@
 namespace romap::objects {
 namespace {
 
-constexpr double kMinDepth_mu = 1e-9;  // in front of the camera, and no division by zero
+constexpr double kMinDepth_mu = 1e-9;  // points nearer than this count as behind the camera; avoids division by zero
 
 }  // namespace
 

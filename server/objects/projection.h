@@ -15,7 +15,7 @@ namespace romap::objects {
 std::optional<cv::Point> ProjectToPixel(const Eigen::Vector3d& p_camera, const CameraModel& camera);
 
 // Bounding box of the projections of points of the camera frame, clipped to the image. Empty when a point is behind the
-// camera or all of it is outside the image.
+// camera or the whole box is outside the image.
 cv::Rect BoundProjections(std::span<const Eigen::Vector3d> points_camera, const CameraModel& camera);
 
 // Smallest and largest z depth of a cuboid's corners.

@@ -43,7 +43,7 @@ std::vector<Component> FindComponents(const Eigen::MatrixXd& scores, double min_
 
 std::vector<int> AssignByScore(const Eigen::MatrixXd& scores, double min_score) {
   std::vector<int> column_of(static_cast<size_t>(scores.rows()), -1);
-  // Each component on its own, because the time of an assignment grows with the third power of its size.
+  // Each component is solved separately, because the time of an assignment grows with the third power of its size.
   for (const Component& component : FindComponents(scores, min_score)) {
     const auto rows = static_cast<Eigen::Index>(component.rows.size());
     const auto columns = static_cast<Eigen::Index>(component.columns.size());

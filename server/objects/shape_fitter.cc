@@ -19,7 +19,7 @@ class FitPass {
     for (const PointRegistry::Member& member : background->second) background_.push_back(member.position_world);
   }
 
-  // In this order, until `max_fits` cuboids were found; returns their keys.
+  // Fits the landmarks in this order until `max_fits` cuboids were found. Returns the keys of the fitted landmarks.
   std::vector<LandmarkKey> Fit(const std::vector<LandmarkKey>& keys, size_t max_fits) const {
     std::vector<LandmarkKey> fitted;
     for (LandmarkKey key : keys) {
@@ -30,7 +30,7 @@ class FitPass {
   }
 
  private:
-  // False when the evidence does not suffice for a cuboid.
+  // Returns false when the evidence does not suffice for a cuboid.
   bool FitLandmark(Landmark& landmark) const {
     if (landmark.shape.silhouettes().empty()) return false;
     std::vector<MapPointId> ids;
@@ -101,8 +101,8 @@ void ShapeFitter::FindSegments(const KeyframeView& view, std::vector<NewSilhouet
   for (NewSilhouette& entry : *silhouettes) {
     if (entry.landmark->shape.WantsSegments(entry.silhouette)) candidates.push_back(&entry);
   }
-  // Edge detection costs more than the other work on a silhouette, so only the landmarks with the fewest searched
-  // silhouettes get it.
+  // Edge detection costs more than the other work on a silhouette, so it runs only for the landmarks with the fewest
+  // searched silhouettes.
   const auto rank = [](const NewSilhouette* entry) {
     return std::pair(entry->landmark->shape.SegmentViews(), entry->landmark->key);
   };

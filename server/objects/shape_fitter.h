@@ -16,7 +16,8 @@ namespace romap::objects {
 // Collects the silhouettes of landmarks and fits cuboids to them, a few at each keyframe (see fit_schedule.h).
 class ShapeFitter {
  public:
-  // Published cuboids of confirmed objects. They separate what hides a landmark from what is behind it.
+  // Published cuboids of confirmed objects. They distinguish objects that may occlude a landmark from objects behind
+  // it.
   using Cuboids = std::map<LandmarkKey, Cuboid>;
 
   explicit ShapeFitter(const ObjectsConfig& config) : config_(config) {}
@@ -24,7 +25,7 @@ class ShapeFitter {
   // Adds the unambiguous masks of a keyframe to the shapes of their landmarks, unless they are redundant.
   void AddSilhouettes(const KeyframeView& view, const FrameDetections& frame, const Cuboids& cuboids,
                       LandmarkStore* store) const;
-  // Fits the landmarks that need it most, at most ObjectsConfig::cuboid_fits_per_keyframe; returns their keys.
+  // Fits the most urgent landmarks, at most ObjectsConfig::cuboid_fits_per_keyframe. Returns their keys.
   std::vector<LandmarkKey> FitMostUrgent(uint64_t frame_index, const Cuboids& cuboids, LandmarkStore* store) const;
   // Fits all landmarks that changed or have no cuboid.
   void FitAll(uint64_t frame_index, const Cuboids& cuboids, LandmarkStore* store) const;

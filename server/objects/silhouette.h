@@ -31,7 +31,7 @@ inline constexpr uint8_t kOtherMask = 255;
 std::shared_ptr<const KeyframeMasks> SubsampleMasks(const cv::Mat& labels, const std::vector<Detection>& detections,
                                                     const std::vector<LandmarkKey>& keys);
 
-// A cuboid as the affine map from the world that takes its inside to the cube [-1, 1]^3.
+// A cuboid, represented by the affine map from the world frame that maps its inside to the cube [-1, 1]^3.
 struct UnitBox {
   Eigen::Matrix3d M;
   Eigen::Vector3d offset;
@@ -72,20 +72,21 @@ struct Silhouette {
   }
   // Whether the object with this index may be between the camera and the point.
   bool MayOcclude(int mask_index, const Eigen::Vector3d& p_world) const;
-  // Whether the mask ends in direction k (see ExtentDirection) where the object ends, and is not cut off by the image
-  // or by something that may occlude the object, which is at about `center_world`.
+  // Whether the end of the mask in direction k (see ExtentDirection) is the end of the object: it is not cut off by the
+  // image or by another object that may occlude this one. `center_world`: approximate center of the object.
   bool IsFreeExtent(int k, const Eigen::Vector3d& center_world) const;
   Eigen::Vector3d CameraCenter() const { return T_world_camera.translation(); }
 };
 
-// `detection_index`: of `detection` among those that `masks` was made of. Its neighbors are unknown at first.
+// `detection_index`: of `detection` among those that `masks` was made of. The neighbors are not set.
 Silhouette MakeSilhouette(const KeyframeView& view, std::shared_ptr<const KeyframeMasks> masks,
                           const Detection& detection, size_t detection_index);
 
-// Moves the silhouette with the space around its object: every point, moved likewise, projects to the same pixel.
+// Moves the silhouette with the space around its object: every point that moves with this space projects to the same
+// pixel as before.
 void Move(const Sim3<World, World>& S_new_old, Silhouette* silhouette);
 
-// Uses the corrected pose from now on.
+// Recomputes projection and rays for the corrected pose.
 void ApplyCorrectedPose(Silhouette* silhouette);
 
 // Updates the neighbors of the silhouette from the known cuboids.

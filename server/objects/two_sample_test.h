@@ -53,16 +53,16 @@ double FisherUpperP(double f, double d1, double d2);
 // nullopt for fewer than kMinTestPoints points in a set, for values that are not finite, or for a covariance that stays
 // singular because `point_sigma_mu` is 0.
 //
-// `min_shift_mu` is a tolerance: whether the means may be within this distance of each other. T^2 is then the smallest
-// value over all ways of reducing the difference by a vector of at most this length. Means that are within the
-// tolerance are rejected with at most the probability of the p-value.
+// `min_shift_mu` is a tolerance: the test is whether the means may be within this distance of each other. T^2 is then
+// the smallest value over all ways of reducing the difference by a vector of at most this length. Means that are within
+// the tolerance are rejected with at most the probability of the p-value.
 std::optional<MeanTest> HotellingTest(const PointMoments& a, const PointMoments& b, double point_sigma_mu,
                                       double min_shift_mu = 0);
 
 // Whether `a` and `b` may be points of one object: their means do not differ significantly (level `alpha`) by more than
 // `min_shift_mu`. For one object seen from two directions this should be a share of its size: a quarter for directions
-// 60 degrees apart, half for opposite ones. nullopt when there are too few points (see HotellingTest); then other
-// evidence has to decide.
+// 60 degrees apart, half for opposite ones. nullopt when there are too few points (see HotellingTest); the caller must
+// then use other evidence.
 std::optional<bool> SamePlace(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
                               double min_shift_mu, double point_sigma_mu);
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double kMinSharpnessShare = 0.6;   // of the object's median sharpness; below it a candidate is blurred
 constexpr size_t kMaxWaitingKeyframes = 24;  // kept until the object has a cuboid
 
-// Why the candidate's mask does not fit the object, or nullptr if it does.
+// Reason why the candidate's mask does not fit the object; nullptr if it fits.
 const char* FindDoubt(const ViewCandidate& candidate, const ViewContext& context) {
   constexpr double kMinInImage = 0.6;         // share of the body points
   constexpr double kMinInsidePerOutside = 3;  // body points in the mask, per point on the background
@@ -93,7 +93,7 @@ std::vector<uint16_t> LabelsBehind(const ViewCandidate& candidate, const ViewCon
   return labels;
 }
 
-// What each ray through the crop meets: CV_8UC1 of RayKind.
+// Classifies each ray through the crop: CV_8UC1 of RayKind.
 cv::Mat ClassifyRays(const ViewCandidate& candidate, const ViewContext& context, const cv::Rect& roi) {
   cv::Mat occluded = cv::Mat::zeros(candidate.frame->labels.size(), CV_8UC1);
   MarkMissedNeighbors(candidate, context, &occluded);
@@ -121,7 +121,7 @@ ObjectView MakeView(const ViewCandidate& candidate, const ViewContext& context) 
   view.camera = candidate.frame->camera;
   view.T_world_camera = candidate.T_world_camera;
   view.roi_px = CropFor(candidate, context.cuboid);
-  // Copies, because a region of an image keeps the whole image in memory.
+  // The pixels are copied, because a region of an image keeps the whole image in memory.
   view.color_bgr = candidate.frame->image_bgr(view.roi_px).clone();
   view.ray_kind = ClassifyRays(candidate, context, view.roi_px);
   if (!candidate.frame->depth_mu.empty()) view.depth_mu = candidate.frame->depth_mu(view.roi_px).clone();

@@ -44,43 +44,44 @@ struct ViewContext {
 
 // Picks the training views of one object from its keyframes. The paper picks a keyframe whose direction differs by 25
 // degrees from that of the last view. Here it must differ by ObjectsConfig::view_angle_deg from every view, or be at a
-// clearly different distance: a camera that returns adds nothing, so a smaller angle is affordable. The first few views
-// may be closer together, so that a slow camera soon gives a first shape. Keyframes are rejected if their mask
-// contradicts the object's shape, if they show too little of it, and if they are blurred while a sharper one may still
-// come. No views are picked beyond ObjectsConfig::max_views, because sent views cannot be withdrawn.
+// clearly different distance. A smaller angle is affordable, because a camera that returns to an earlier direction adds
+// no views. The first few views may be closer together, so that a slow camera soon gives a first shape. Keyframes are
+// rejected if their mask contradicts the object's shape, if they show too little of it, or if they are blurred while a
+// sharper one may still arrive. No views are picked beyond ObjectsConfig::max_views, because sent views cannot be
+// withdrawn.
 class ViewPicker {
  public:
   explicit ViewPicker(const ObjectsConfig& config) : config_(config) {}
 
-  // Keeps the candidate until the next Take(). Every second one is dropped when too many wait, which keeps their
-  // spread.
+  // Keeps the candidate until the next Take(). When too many are waiting, every second one is dropped, which preserves
+  // their distribution.
   void Offer(ViewCandidate candidate);
   // Picks views from the waiting candidates, oldest first, and drops the others.
   std::vector<ObjectView> Take(const ViewContext& context);
-  // Adds the views and candidates of an object that was merged into this one. Returns the views that were added, as
-  // views of `object`.
+  // Adds the views and candidates of an object that was merged into this one. Returns the added views as views of
+  // `object`.
   std::vector<ObjectView> Adopt(ViewPicker&& other, ObjectId object, const Eigen::Vector3d& center_world);
 
-  // The map was corrected: the space around the object moved by `S_new_old`, and keyframes have new poses.
+  // Applies a map correction: the space around the object moved by `S_new_old`, and keyframes have new poses.
   void Correct(const Sim3<World, World>& S_new_old, const KeyframeCorrections& keyframes);
   // The views whose pose relative to the object (`cuboid`, corrected) changed noticeably since it was last returned
   // here or by Take(). Smaller changes add up.
   std::vector<ViewPose> TakeCorrectedPoses(const Cuboid& cuboid);
 
-  // Landmark `from` was merged into `into`.
+  // Replaces `from` by `into` after the merge of these landmarks.
   void RenameNeighbor(LandmarkKey from, LandmarkKey into);
 
  private:
   struct Picked {
     ObjectView view;  // shares its pixels with the view that was sent
-    // The pose the receiver has after it moved the view with the object.
+    // The pose at the receiver, which moves the view with the object.
     SE3<World, Camera> sent_T_world_camera;
   };
 
   bool IsNewDirection(const Eigen::Vector3d& camera_center, const Eigen::Vector3d& object_center,
                       double angle_rad) const;
-  // Compared with the candidates measured before. Called only for new directions, because it reads all pixels of the
-  // box.
+  // Whether the candidate is sharp compared with earlier candidates. Call only for new directions, because it reads all
+  // pixels of the box.
   bool IsSharp(const ViewCandidate& candidate);
 
   ObjectsConfig config_;

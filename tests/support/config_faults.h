@@ -8,7 +8,7 @@
 
 namespace romap::testing_support {
 
-// The message about the faults of a stage's settings after `assignments`; empty if there are none.
+// Returns the error message for a stage's settings after `assignments`; empty if they are valid.
 template <class Config>
 std::string FaultsOf(const std::string& section, const std::vector<std::string>& assignments) {
   Config config;

@@ -16,14 +16,14 @@ namespace romap::testing {
 
 class FakeSession;
 
-// A mapping service without mapping, for tests of its clients. Keeps the contract of MappingService, and
-//   - acknowledges every frame within Send(): a frame with an image is accepted, one without is rejected; and late
-//   masks
-//     within SendMasks(): those of an accepted frame without masks are accepted;
-//   - creates one confirmed object per class name of the instances, and publishes an update and a mesh, with a higher
-//     revision, for every frame with an instance of that class;
-//   - finishes a session immediately.
-// Thread-safe, without threads of its own.
+// A fake of the mapping service for tests of its clients. It fulfills the contract of MappingService and does the
+// following:
+//   - Send() acknowledges every frame immediately: frames with an image are accepted, others are rejected.
+//   - SendMasks() acknowledges late masks immediately: those of an accepted frame without masks are accepted.
+//   - There is one confirmed object per class name of the instances. Every frame with an instance of that class
+//     publishes an update and a mesh with a higher revision.
+//   - A session finishes immediately.
+// Thread-safe; starts no threads.
 class FakeMappingService : public MappingService {
  public:
   FakeMappingService();

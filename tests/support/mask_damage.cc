@@ -111,7 +111,7 @@ double Gap_px(const cv::Rect& a, const cv::Rect& b) {
   return std::hypot(across, down);
 }
 
-// One of the pairs of nearest boxes becomes one instance.
+// Merges one of the pairs of nearest boxes into one instance.
 void MergeNeighbors(const MaskDamage& damage, FrameMasks& masks) {
   Random random = RandomFor(damage.seed, Fault::kMerge, masks.frame_id);
   if (!random.Chance(damage.merge_share)) return;
@@ -202,7 +202,8 @@ cv::Mat SignedDistance_px(const cv::Mat& pixels) {
   return inside - outside;
 }
 
-// Displaces the border of each mask. A pixel in two displaced masks gets the one it is deeper inside of.
+// Displaces the border of each mask. A pixel inside two displaced masks is assigned to the mask in which it is farther
+// from the border.
 void DisplaceBorders(const MaskDamage& damage, FrameMasks& masks) {
   const int margin_px = static_cast<int>(std::ceil(damage.border_px)) + 2;
   const cv::Rect image(cv::Point(), masks.labels.size());
@@ -226,7 +227,7 @@ std::string AnyOf(const std::vector<std::string>& names, Random& random) {
   return names.empty() ? "object" : names[static_cast<size_t>(random.Below(static_cast<int>(names.size())))];
 }
 
-// Adds a blob where no mask is; nothing if there is no such pixel.
+// Adds a blob at a random position, without the pixels of other masks; does nothing if no pixel remains.
 void AddBlob(FrameMasks& masks, const std::string& class_name, double radius_px, double score, Random& random) {
   const cv::Point2d center_px(random.Uniform(0, masks.labels.cols), random.Uniform(0, masks.labels.rows));
   const cv::Mat unmasked = Blob(masks.labels.size(), center_px, radius_px, random) & (masks.labels == 0);
@@ -284,7 +285,7 @@ void PermuteLabels(const MaskDamage& damage, FrameMasks& masks) {
     for (int u = 0; u < masks.labels.cols; ++u) row[u] = renamed[row[u]];
   }
   for (Instance& instance : masks.instances) instance.label = renamed[instance.label];
-  // Otherwise the order of the list would identify the objects.
+  // Sorted, because otherwise the order of the list would identify the objects.
   std::sort(masks.instances.begin(), masks.instances.end(),
             [](const Instance& a, const Instance& b) { return a.label < b.label; });
 }

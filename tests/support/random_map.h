@@ -10,7 +10,7 @@
 
 namespace romap::testing {
 
-// Applies random changes to a map, of every kind that the stages make: objects are created, changed, confirmed, lost,
+// Applies random changes of every kind that the stages make to a map: objects are created, changed, confirmed, lost,
 // merged (in chains), removed, get meshes and are moved by corrections. Some changes are late: their object was
 // removed.
 class RandomMap {

@@ -8,7 +8,7 @@
 namespace romap::objects {
 namespace {
 
-// The detector smooths, and ignores the outermost pixels of an image.
+// The detector smooths the image and ignores its outermost pixels.
 constexpr int kDetectorBorder_px = 4;
 
 std::vector<cv::Vec4f> DetectLines(const cv::Mat& gray, double min_length_px) {

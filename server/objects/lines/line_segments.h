@@ -19,7 +19,7 @@ struct LineSegment {
 struct LineSegmentOptions {
   double min_length_px = 12;      // the direction of a shorter segment is too uncertain
   double min_length_share = 0.1;  // of the diagonal of the mask's box; shorter segments are texture
-  int rim_px = 3;                 // how far an edge may be outside of the mask, because masks are not exact
+  int rim_px = 3;                 // maximum distance of an edge outside of the mask, because masks are not exact
   double min_inside_share = 0.9;  // of a segment's length, on the mask or its rim
   size_t max_segments = 24;       // the longest ones are kept
   double max_crop_px2 = 3e4;      // larger crops are downscaled to this area to bound the time

@@ -50,7 +50,7 @@ cudaError_t CheckDevice() {
   return TheMachine().lost ? Fail(cudaErrorLaunchFailure) : cudaSuccess;
 }
 
-// As IsAllocated, for the addresses of the API.
+// Checks an address that was passed to the API; see IsAllocated.
 cudaError_t CheckDevice(const void* p, size_t bytes) {
   std::lock_guard lock(TheMachine().mutex);
   if (const cudaError_t error = CheckDevice()) return error;

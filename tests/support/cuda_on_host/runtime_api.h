@@ -96,7 +96,7 @@ namespace romap::cuda_on_host {
 void LaunchBody(const void* kernel, dim3 grid, dim3 block, size_t dynamic_shared_bytes, cudaStream_t stream,
                 std::function<void()> body);
 
-// The same with copies of the arguments, as in CUDA.
+// Launches the kernel with copies of the arguments, as in CUDA.
 template <class... Params, class... Args>
 void Launch(void (*kernel)(Params...), dim3 grid, dim3 block, size_t dynamic_shared_bytes, cudaStream_t stream,
             Args&&... args) {
@@ -114,8 +114,8 @@ cudaError_t FinishAllStreams();
 struct DeviceTraits {
   int devices = 1;  // 0: every call fails with cudaErrorNoDevice
   size_t memory_bytes = size_t{1} << 32;
-  // Number of kernels that succeed; the next one fails like an invalid memory access, and so does, as on a real device,
-  // every later call. Negative: no failure.
+  // Number of kernels that succeed; the next one fails like an invalid memory access, and, as on a real device, every
+  // later call fails too. Negative: no failure.
   int kernels_before_fault = -1;
 };
 void SetDeviceTraits(const DeviceTraits& traits);

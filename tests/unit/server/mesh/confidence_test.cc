@@ -57,7 +57,7 @@ TEST(Confidence, GrowsWithTheNumberAndResolutionOfViews) {
   };
   EXPECT_NEAR(with({view}), 0.39f, 0.01f);
   EXPECT_NEAR(with({view, view, view, view, view}), 0.92f, 0.01f);
-  EXPECT_NEAR(with(std::vector<TrainingCamera>(40, view)), 1.0f, 1e-3f);  // more than are used
+  EXPECT_NEAR(with(std::vector<TrainingCamera>(40, view)), 1.0f, 1e-3f);  // more views than are used
   // At a distance of 25 from the front, a side of length 2 is 32 px long.
   EXPECT_NEAR(with({ViewFrom({25.6f, 0, 0})}), 1 - std::exp(-0.25f), 0.01f);
 }

@@ -1,4 +1,4 @@
-// ObjectField after changes of the cuboid: the learned field is transferred to the new box.
+// Tests ObjectField after changes of the cuboid: the trained field must be transferred to the new box.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

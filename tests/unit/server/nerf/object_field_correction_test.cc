@@ -1,4 +1,4 @@
-// ObjectField after map corrections: it moves with the map and keeps what it learned.
+// Tests ObjectField after map corrections: the field must move with the map and keep its trained state.
 
 #include <gtest/gtest.h>
 

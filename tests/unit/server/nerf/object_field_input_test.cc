@@ -28,7 +28,7 @@ NerfConfig SmallConfig() {
   return config;
 }
 
-// Learns well enough to distinguish a correct shape from a wrong one.
+// Trains long enough to distinguish a correct shape from a wrong one.
 NerfConfig ShapeConfig() {
   NerfConfig config;
   config.full_budget_steps = 120;

@@ -1,4 +1,4 @@
-// How much memory an object takes while it is trained.
+// Memory of an object during training.
 #include <gtest/gtest.h>
 #include <malloc.h>
 

@@ -29,7 +29,7 @@ class PixelSamplerTest : public ::testing::Test {
     sampler.Build(views_);
     return sampler;
   }
-  // The number of object pixels of each view that `steps` steps choose.
+  // Returns the number of object pixels chosen in `steps` steps, by view.
   std::vector<int> ObjectRaysOfViews(const PixelSampler& sampler, int steps) const {
     std::vector<int> counts(views_.size());
     for (int step = 0; step < steps; ++step) {

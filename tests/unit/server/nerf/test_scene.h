@@ -25,7 +25,7 @@ struct BallScene {
   std::vector<ObjectView> Views() const;
 };
 
-// A small field that learns the ball in little time.
+// Configuration of a small field that learns the ball quickly.
 nerf::NerfConfig SmallFieldConfig();
 
 // The mean distance, in radii, of the learned surface from the ball, over evenly distributed directions. The surface is

@@ -87,7 +87,7 @@ TEST(VisualHullTest, WithoutViewsAllCellsAreKept) {
   EXPECT_TRUE(all_kept());
 }
 
-// A dent that no outline shows: the depth of all views is behind the ball's surface.
+// A dent that is invisible in every outline: the depth of all views is behind the ball's surface.
 TEST(VisualHullTest, DepthCarvesWhatMasksCannot) {
   BallScene scene;
   scene.with_depth = true;

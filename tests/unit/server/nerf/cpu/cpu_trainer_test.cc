@@ -1,4 +1,4 @@
-// Properties of training besides learning: no allocation within a step, and equal results for equal input.
+// Tests that a training step allocates no memory and that equal input gives equal results.
 #include "server/nerf/cpu/cpu_trainer.h"
 
 #include <gtest/gtest.h>

@@ -146,7 +146,7 @@ TEST(DeepMlpTest, PassesGradientsToWeightsAndInputs) {
       for (uint64_t check = 0; check < 80; ++check) {
         const size_t i = RandomBits(5, 6, check) % gradient.size();
         const float before = x[i];
-        constexpr float kStep = 2e-4f;  // small, or a neuron of some point would cross zero
+        constexpr float kStep = 2e-4f;  // small enough that no neuron of any point crosses zero
         x[i] = before + kStep;
         const double above = loss();
         x[i] = before - kStep;
@@ -233,7 +233,7 @@ std::vector<int64_t> Targets() {
 INSTANTIATE_TEST_SUITE_P(Targets, GeneralKernelsTest, ::testing::ValuesIn(Targets()),
                          [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
 
-// Without learned features it has no effect; a deep MLP on a grid keeps its outputs.
+// ShrinkFeatures() has no effect without learned features; with a deep MLP on a grid it keeps the outputs.
 TEST(ShrinkFeaturesTest, KeepsTheOutputs) {
   for (const char* encoding : {"hash", "frequency"}) {
     NerfConfig config;

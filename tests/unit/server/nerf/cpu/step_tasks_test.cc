@@ -23,8 +23,8 @@ TEST(StepTasksTest, ReturnsEveryTaskInOrder) {
 
 TEST(StepTasksTest, HasNoTasksWithoutSteps) { EXPECT_FALSE(StepTasks(0, {1, 1}).Next()); }
 
-// Each task must see everything that the tasks of the previous phase wrote. Plain integers, so that the thread
-// sanitizer also reports a missing synchronization.
+// Each task must read all values that the tasks of the previous phase wrote. The values are plain integers, so that the
+// thread sanitizer also reports missing synchronization.
 TEST(StepTasksTest, PhasesDoNotOverlap) {
   constexpr uint64_t kSteps = 200, kShares = 3;
   for (const int threads : {1, 2, 4}) {

@@ -130,7 +130,7 @@ TEST_F(CudaTrainerTest, EqualStepsGiveEqualSumsOverBlocks) {
     const std::unique_ptr<Trainer> trainer = OnDevice(config);
     Occupancy cells(config);
     trainer->Run(source, cells, 3, 1);
-    if (run == 1) trainer->ReleaseScratch();  // keeps what was learned
+    if (run == 1) trainer->ReleaseScratch();  // must keep the trained state
     results.push_back(AllParameters(*trainer));
     trainer->Run(source, cells, 3, 1);
     results.push_back(AllParameters(*trainer));

@@ -1,5 +1,5 @@
-// The CUDA back end compiled as host code, replacing that of the library: the first header provides the parts of CUDA
-// that it uses.
+// The CUDA back end compiled as host code; it replaces the back end of the library. The first header provides the parts
+// of CUDA that it uses.
 // clang-format off
 #include "tests/support/cuda_on_host/cuda_on_host.h"
 

@@ -143,7 +143,7 @@ TEST_P(OptimizeKernelsTest, ParametersEqualThoseOfTheCpu) {
   }
   DeviceArray<float> device_partial = ToDevice<float>(partial);
   OptimizeOnDevice device(NoisyField(2, 16), 100, NerfConfig{});
-  // These partial sums, not those of the first launch.
+  // Uses these partial sums instead of those of the first launch.
   StepLaunch launch = device.Launch(device_table.data(), device_mlp.data(), device_partial, kBlocks);
   device.Run(launch);
 
@@ -200,7 +200,7 @@ TEST_P(OptimizeKernelsTest, ScoresAndOccupiedCellsEqualThoseOfTheCpu) {
     state.score = cells.score;
     std::ranges::fill(state.bits, 0u);
     occupancy.SetState(state);
-    for (size_t i = 0; i < kCells; ++i) {  // the largest weight last: then the order has no effect
+    for (size_t i = 0; i < kCells; ++i) {  // the largest weight comes last, so that the order has no effect
       for (uint32_t visit = 1; visit < cells.visits[i]; ++visit) occupancy.Record(static_cast<uint32_t>(i), 0.0f);
       if (cells.visits[i] > 0) occupancy.Record(static_cast<uint32_t>(i), cells.weight[i]);
     }

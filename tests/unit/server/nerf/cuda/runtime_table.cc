@@ -21,7 +21,7 @@
 namespace romap::nerf::cuda {
 namespace {
 
-// Rays at a ball, the same in every step: the host computes the rays, which is not measured here.
+// Rays at a ball, the same in every step, because the computation of rays on the host is not measured here.
 StepSource BallSource(const NerfConfig& config) {
   auto rays = std::make_shared<std::vector<Ray>>(TestRays(config.rays_per_step, 8));
   for (Ray& ray : *rays) {

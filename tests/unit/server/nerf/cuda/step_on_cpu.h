@@ -130,7 +130,7 @@ struct StepOnCpu {
                             table_gradient.data());
   }
 
-  // As Run, but with the factors of the MLP's products rounded as on tensor cores.
+  // Like Run, but with the factors of the MLP's products rounded as on tensor cores.
   void RunRounded(const FieldModel& field, const StepInput& input) {
     SampleChunk& c = chunk;
     PlainKernels().encode(field.layout, field.table.data(), c.size, c.x.data(), c.y.data(), c.z.data(),

@@ -77,7 +77,7 @@ class Scene {
       for (int i = 0; i < kChords; ++i) {
         const double a = 2 * kPi * (i + 0.5) / kChords;
         const double b = 2 * kPi * (i + 1.5) / kChords;
-        // Only where the rim's ellipse bends little, a detector finds straight segments.
+        // A detector finds straight segments only where the curvature of the rim's ellipse is low.
         const Eigen::Vector2d look = CameraCenter(view).head<2>().normalized();
         const double across = std::abs(look.dot(Eigen::Vector2d(std::cos((a + b) / 2), std::sin((a + b) / 2))));
         if (across < 0.97) continue;

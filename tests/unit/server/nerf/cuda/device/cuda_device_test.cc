@@ -1,5 +1,5 @@
-// The code compiled by nvcc on this machine: compared with the CPU if there is a device, else it must report that there
-// is none.
+// Tests the code compiled by nvcc on this machine: it must match the CPU if there is a device, and otherwise report
+// that there is none.
 #include <gtest/gtest.h>
 
 #include "server/nerf/cpu/kernels.h"

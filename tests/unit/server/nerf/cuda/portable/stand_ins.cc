@@ -7,7 +7,7 @@
 
 namespace hwy {
 
-// Highway's, for callers that bring no allocator of their own.
+// Replaces Highway's allocation, without support for custom allocators.
 void* AllocateAlignedBytes(size_t payload_size, AllocPtr, void*) {
   return std::aligned_alloc(HWY_ALIGNMENT, (payload_size + HWY_ALIGNMENT - 1) / HWY_ALIGNMENT * HWY_ALIGNMENT);
 }
