@@ -19,7 +19,7 @@ struct Match {
   // Reason why the detection must not update the landmark's shape and points; nullptr if it may. A detection with a
   // doubt but without a landmark does not create one.
   const char* doubt = nullptr;
-  // How well the mask agrees with the landmark's body and cuboid, 0..1; nullopt while these are unknown or cut off.
+  // Agreement of the mask with the landmark's body and cuboid, 0..1; nullopt while these are unknown or cut off.
   std::optional<double> agreement;
 };
 
@@ -39,9 +39,9 @@ struct Association {
 //  - overlap (IoU) of the mask's box with the projected cuboid, and with the box of the last observation transformed by
 //    the camera's motion while that observation is recent;
 //  - class and detector track id, with small weights.
-// A match gets a doubt if another one scores nearly as well, if the mask also covers a second landmark and fits both
-// together better than the matched one (the detector merged two neighbors), and if two masks together fit one landmark
-// better than the matched mask alone (the detector split an object).
+// A match is marked with a doubt if another one scores nearly as well, if the mask also covers a second landmark and
+// fits both together better than the matched one (the detector merged two neighbors), and if two masks together fit one
+// landmark better than the matched mask alone (the detector split an object).
 //
 // ObjectsConfig::association = "greedy_iou" selects the first stage of the paper instead: the boxes of consecutive
 // frames are matched greedily, best overlap first.

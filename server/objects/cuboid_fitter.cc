@@ -174,7 +174,8 @@ UprightBox BoxOver(const Footprint& footprint, const Interval& heights) {
 // box that is too small, because the outline of the true box extends beyond the masks at the corners in every view. The
 // bias grows with the looseness: boxes have a looseness of 0.01, solids of revolution of 0.1 and a bias of a tenth of
 // their width. The bottom is that of the support. The top of round objects is that of the points and outlines, because
-// few views look over it. The hull's other faces are not used: it is much wider where something occluded the object.
+// few views observe the top from above. The hull's other faces are not used: it is much wider where something occluded
+// the object.
 UprightBox Loosened(UprightBox tight, double outer_top, double looseness) {
   constexpr double kBoxLike = 0.02;  // looseness up to which a box needs no correction
   constexpr double kGrowth = 1.2;    // share of the width, per looseness

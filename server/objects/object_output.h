@@ -8,7 +8,7 @@
 
 namespace romap::objects {
 
-// What one call of the object mapper publishes.
+// Output of one call of the object mapper.
 struct ObjectOutput {
   // ObjectUpdate, ObjectRemoved and ObjectMerged, in the order in which they happened. Their revisions are 0: the
   // session's map counts revisions, because meshes get theirs from the same counter.

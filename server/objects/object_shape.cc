@@ -57,7 +57,7 @@ hull::CarvingRule LenientRule(size_t silhouettes) {
   return {.min_background = 1 + std::max(1, count / kPerWrongOne), .min_object = MinInside(count)};
 }
 
-// How well the evidence determines a cuboid, 0..1.
+// Confidence, 0..1, that the evidence determines a cuboid.
 double EvidenceConfidence(double parallax_rad, size_t silhouettes, size_t points) {
   constexpr double kFullParallaxRad = 60 * kRadPerDeg;
   constexpr double kFullSilhouettes = 10;

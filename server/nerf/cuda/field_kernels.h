@@ -28,7 +28,7 @@ inline constexpr int kCells = kOccupancyResolution * kOccupancyResolution * kOcc
 inline constexpr int kLayers = 3 * kOccupancyResolution;
 inline constexpr float kLayerUnit = 1.0f / (1 << 20);  // of StepParams::layer_weight
 
-// How the matrix products of the MLP are computed.
+// Method of the matrix products of the MLP.
 enum class MlpPath {
   kTensorCores,  // factors rounded to half precision, sums in single precision
   kFloat,        // single precision, in the same order of summation as on the CPU

@@ -1,4 +1,4 @@
-// From gradients to parameters, and from the weights of samples to occupied cells.
+// Kernels that update the parameters from the gradients, and the occupied cells from the weights of the samples.
 
 #include "server/nerf/cuda/field_kernels.h"
 #include "server/nerf/math/adam.h"

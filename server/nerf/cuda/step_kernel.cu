@@ -1,4 +1,4 @@
-// From rays to gradients in one launch, and the evaluation of a field at given points.
+// Kernels that compute the gradients of a batch of rays in one launch, and evaluate a field at given points.
 
 #include "server/nerf/cuda/field_kernels.h"
 #include "server/nerf/cuda/float_mlp.cuh"

@@ -2,7 +2,7 @@
 //
 // A term is a function of the result of compositing the ray (RayResult). It adds its value and its derivatives with
 // respect to the color, the opacity, the depth error and the density of the samples to a RayLoss. Both back ends call
-// LossOfRay; no kernel contains a loss term of its own.
+// LossOfRay; no kernel defines loss terms.
 //
 // Files to change for a new term `foo`:
 //   1. server/nerf/math/loss_foo.h            new: AddFooLoss, value and gradient, as in loss_depth.h

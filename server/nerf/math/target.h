@@ -6,7 +6,7 @@
 // (several rays, levels, neurons or parameters at once). Highway compiles a source file once per instruction set, each
 // time in another namespace, so these headers are also included once per instruction set: their include guards toggle
 // with HWY_TARGET_TOGGLE, Highway's own idiom. A source file that needs vectors defines ROMAP_MATH_SIMD before it
-// includes them; every other source file gets the plain form.
+// includes them; all other source files use the plain form.
 
 #ifdef __CUDACC__
 #define ROMAP_HD __host__ __device__ inline

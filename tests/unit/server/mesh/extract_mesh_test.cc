@@ -171,7 +171,7 @@ TEST(ExtractMesh, InvisibleSpaceIsFilled) {
   EXPECT_LT(Volume(Extract(snapshot, config)), 0.65 * dome_volume);
 }
 
-// Cameras all around look down on a box that stands on a table, so that the masks do not show where it ends below.
+// A box on a table, seen from above from all sides, so that the masks do not show its lower end.
 TEST(ExtractMesh, EndsBelowWhereTheVisibleSurfaceEnds) {
   const InsideDistance column = [](const Eigen::Vector3f& p) {  // the lower end is at z = -0.6
     return std::min({0.5f - p.head<2>().cwiseAbs().maxCoeff(), 0.5f - p.z(), p.z() + 0.6f});

@@ -195,7 +195,7 @@ TEST(UnconfirmedSpaceTest, HalfOfTheViewsConfirm) {
 }
 
 TEST(UnconfirmedSpaceTest, OutsideTheCropIsNoConfirmationButOutsideTheImageIsNoEvidence) {
-  // From y = -4 with x to the right: the wall projects to the right of column 120.
+  // Seen from y = -4 with x to the right, the wall projects to the right of column 120.
   const ObjectView whole = ViewFrom({0, -4, 0}, RayKind::kObject);
   ASSERT_GT(whole.camera.Project(whole.T_world_camera.Inverse() * Eigen::Vector3d(0.75, 0.5, 0)).x(), 120);
   ObjectView cropped = whole;

@@ -33,7 +33,7 @@ std::string ShortName(const std::string& mangled) {
   return name.substr(0, name.find('('));
 }
 
-// From the report of `ptxas -v`.
+// Parses the report of `ptxas -v`.
 std::vector<KernelUsage> ParseReport(const std::string& report) {
   std::vector<KernelUsage> all;
   std::istringstream lines(report);
