@@ -57,7 +57,9 @@ TEST(VisualHullTest, OneWrongMaskRemovesNothingIfTwoViewsMustAgree) {
   hull.Add(wrong);
   const std::vector<uint8_t> after = hull.Carve();
   for (size_t i = 0; i < after.size(); ++i) {
-    if (DistanceInRadii(i) < 0.95 && before[i] != 0) EXPECT_EQ(after[i], 1) << "cell " << i;
+    if (DistanceInRadii(i) < 0.95 && before[i] != 0) {
+      EXPECT_EQ(after[i], 1) << "cell " << i;
+    }
   }
 }
 
