@@ -127,7 +127,7 @@ struct Score {
 };
 
 void Judge(const std::vector<slam::Feature>& first, const Frame& first_frame, const std::vector<slam::Feature>& second,
-           const Frame& second_frame, const slam::SlamConfig& config, Score& score) {
+           const Frame& second_frame, Score& score) {
   std::set<std::pair<int, int>> cells;
   for (size_t i = 0; i < first.size(); ++i) {
     const std::optional<Eigen::Vector2d> true_px = TruePixel(first[i], first_frame, second_frame);
@@ -183,7 +183,7 @@ void RunPairs(const char* name, const files::Sequence& sequence, size_t every, c
     const std::vector<slam::Feature> features = cost.Of(extract, *first);
     for (const size_t gap : kGaps) {
       const std::optional<Frame> second = i + gap < sequence.size() ? LoadFrame(sequence, i + gap) : std::nullopt;
-      if (second) Judge(features, *first, cost.Of(extract, *second), *second, config, scores[gap]);
+      if (second) Judge(features, *first, cost.Of(extract, *second), *second, scores[gap]);
     }
   }
   cost.Print(name);

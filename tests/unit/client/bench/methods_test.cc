@@ -102,7 +102,9 @@ TEST(MethodsTest, MethodSettingsOverrideCommonSettings) {
   EXPECT_EQ(ConfigOf("vmap", {"nerf.hidden_width=48"}).nerf.hidden_width, 32);
   EXPECT_EQ(ConfigOf("fast", {"mesh.resolution=60"}).mesh.resolution, 60);
   EXPECT_THAT(Message(Configure(BenchMethod(), {"nerf.hiden_width=48"}).status()), HasSubstr("nerf.hidden_width"));
-  EXPECT_EQ(Message(Configure(BenchMethod{.settings = {"mesh.resolution=32"}}, {"mesh.min_side_nodes=40"}).status()),
+  EXPECT_EQ(Message(Configure(BenchMethod{.id = "m", .title = "m", .settings = {"mesh.resolution=32"}},
+                              {"mesh.min_side_nodes=40"})
+                        .status()),
             "--set: mesh.min_side_nodes = 40 must not exceed mesh.resolution = 32");
 }
 
