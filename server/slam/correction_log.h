@@ -13,9 +13,9 @@ namespace romap::slam {
 // noticeably. Motions too small to report accumulate until they are noticeable.
 class CorrectionLog {
  public:
-  // A keyframe that is handed to later stages. `scale`: see ScaledPose.
+  // Records a keyframe that is passed to later stages. `scale`: see ScaledPose.
   void Record(const KeyframeView& view, double scale);
-  // Everything that moved since it was recorded or last returned here.
+  // Returns all keyframes and points that moved noticeably since they were recorded or last returned.
   MapCorrection TakeCorrection(const SlamMap& map);
 
  private:

@@ -17,7 +17,7 @@ struct Best {
          __builtin_popcountll(a[3] ^ b[3]);
 }
 
-// Inlined into both of its callers, so that it is compiled with and without the instruction that counts bits.
+// Inlined into both of its callers, so that it is compiled with and without the popcnt instruction.
 [[gnu::always_inline]] inline void FindBestIn(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               std::vector<Best>& of_first, std::vector<Best>& of_second) {
   for (size_t i = 0; i < first.size(); ++i) {

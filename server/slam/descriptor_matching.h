@@ -13,9 +13,9 @@ struct DescriptorMatch {
   int distance = 0;
 };
 
-// All against all: pairs that are each other's best, at most `max_distance` bits apart, and whose distance is below
-// `ratio` times that of the second best of `second`. In order of `first`. Uses the processor's bit count where it has
-// one.
+// Brute-force matching: pairs of mutually nearest descriptors that are at most `max_distance` bits apart and whose
+// distance is less than `ratio` times the distance to the second nearest in `second`. In order of `first`. Uses the
+// popcnt instruction if the CPU has it.
 std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               int max_distance, double ratio);
 

@@ -11,7 +11,7 @@ namespace romap::slam {
 namespace {
 
 constexpr double kSigmas = 2.5;              // width of the search band on either side of the epipolar plane
-constexpr double kMaxParallax_rad = 0.8;     // ORB descriptors differ too much beyond
+constexpr double kMaxParallax_rad = 0.8;     // ORB descriptors differ too much at larger angles
 constexpr double kMinSineToBaseline = 0.05;  // rays closer to the baseline do not determine depth
 constexpr int kMaxOctaveDifference = 2;
 constexpr float kSameSpot_px = 4;  // per octave scale: a second candidate closer than this is the same corner
@@ -19,8 +19,8 @@ constexpr float kSameSpot_px = 4;  // per octave scale: a second candidate close
 // A ray in the polar coordinates of a pair of keyframes.
 struct EpipolarRay {
   int feature = 0;
-  double around_rad = 0;         // angle around the baseline: which epipolar plane
-  double from_baseline_rad = 0;  // angle with the baseline: where in that plane
+  double around_rad = 0;         // angle around the baseline: selects the epipolar plane
+  double from_baseline_rad = 0;  // angle with the baseline: position in that plane
   double around_sigma_rad = 0;
 };
 
@@ -44,7 +44,7 @@ std::vector<EpipolarRay> PolarRays(const MapKeyframe& keyframe, const Eigen::Mat
   return rays;
 }
 
-// Columns: two axes across the baseline, then the baseline itself.
+// Columns: two axes perpendicular to the baseline, then the baseline itself.
 Eigen::Matrix3d BaselineAxes(const Eigen::Vector3d& baseline) {
   Eigen::Matrix3d axes;
   axes.col(2) = baseline.normalized();
@@ -70,7 +70,8 @@ void Offer(const MapKeyframe& keyframe, int feature, int distance, Best& best) {
   }
 }
 
-// Calls `visit` for each ray of `sorted` (by around_rad) in the epipolar plane of `ray`, within the errors.
+// Calls `visit` for each ray of `sorted` (by around_rad) in the epipolar plane of `ray`, within the uncertainty of
+// both.
 template <class Visit>
 void VisitPlane(const EpipolarRay& ray, const std::vector<EpipolarRay>& sorted, double max_sigma_rad, Visit visit) {
   const double reach_rad = kSigmas * (ray.around_sigma_rad + max_sigma_rad);

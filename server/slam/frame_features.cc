@@ -10,7 +10,7 @@ namespace romap::slam {
 namespace {
 
 constexpr int kCell_px = 16;
-constexpr float kMaxDepthJump = 0.02F;  // over depth, in a 3x3 neighborhood
+constexpr float kMaxDepthJump = 0.02F;  // relative to the depth, in a 3x3 neighborhood
 
 // z depth at a feature; 0 where the depth image has none or is discontinuous.
 double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
@@ -54,7 +54,7 @@ void FeatureGrid::Near(const Eigen::Vector2d& pixel_px, double radius_px, std::v
   const int first_column = cell(pixel_px.x() - radius_px, columns_);
   const int last_column = cell(pixel_px.x() + radius_px, columns_);
   for (int row = cell(pixel_px.y() - radius_px, rows_); row <= cell(pixel_px.y() + radius_px, rows_); ++row) {
-    // The cells of a row lie one after the other.
+    // The cells of a row are contiguous.
     const int begin = cell_begin_[static_cast<size_t>(row * columns_ + first_column)];
     const int end = cell_begin_[static_cast<size_t>(row * columns_ + last_column + 1)];
     indices.insert(indices.end(), members_.begin() + begin, members_.begin() + end);

@@ -18,17 +18,17 @@ class FeatureGrid {
   FeatureGrid() = default;
   FeatureGrid(int width_px, int height_px, const std::vector<Feature>& features);
   // Replaces `indices` by those of the features whose cells touch the square of half side `radius_px` around
-  // `pixel_px`, in ascending order within a cell; callers check the distance.
+  // `pixel_px`, in ascending order within a cell. Callers must check the distance.
   void Near(const Eigen::Vector2d& pixel_px, double radius_px, std::vector<int>& indices) const;
 
  private:
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<int> cell_begin_;  // of `members_`, one more than there are cells
+  std::vector<int> cell_begin_;  // indices into `members_`, one more than cells
   std::vector<int> members_;
 };
 
-// The features of one frame, which slam keeps instead of the image. Immutable once made, so that threads may share it.
+// The features of one frame, which slam keeps instead of the image. Immutable, so that threads can share it.
 struct FrameFeatures {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
@@ -38,7 +38,7 @@ struct FrameFeatures {
   std::vector<Feature> features = {};                 // pixels corrected by `lens`
   std::vector<Eigen::Vector2f> image_px = {};         // per feature: its pixel in the image, before the correction
   std::vector<Eigen::Vector3d> bearings_camera = {};  // per feature: unit length
-  std::vector<double> ranges_mu = {};     // per feature: distance along the bearing by the depth image, 0 = unknown
+  std::vector<double> ranges_mu = {};     // per feature: distance along the bearing from the depth image, 0 = unknown
   std::vector<MaskZone> mask_zones = {};  // per feature
   FeatureGrid grid = {};
 
@@ -46,7 +46,7 @@ struct FrameFeatures {
   bool HasDepth() const;
 };
 
-// `features` have the pixels of the image, without the correction by `lens`.
+// `features`: with pixels of the image, before the correction by `lens`.
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
                                                        const RadialCorrection& lens = {});
 // The same frame with its features corrected by another lens. Returns `frame` itself if it has this lens.

@@ -9,7 +9,7 @@
 
 namespace romap::slam {
 
-// Tracks frames that bring their camera pose: uses Frame::T_world_camera without any check and selects the keyframes.
+// Tracks frames with a given camera pose: uses Frame::T_world_camera without any check and selects the keyframes.
 class GivenPoseTracker {
  public:
   explicit GivenPoseTracker(const SlamConfig& config) : selector_(config) {}

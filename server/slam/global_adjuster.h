@@ -8,7 +8,7 @@
 namespace romap::slam {
 
 // Global bundle adjustment: adjusts a copy of the whole map on a thread while the map keeps growing, and writes the
-// result back later. At most one run at a time. For one thread.
+// result back later. At most one run at a time. Not thread-safe.
 class GlobalAdjuster {
  public:
   // `run_inline`: Start() solves on the calling thread, so that the same frames give the same map.

@@ -7,14 +7,14 @@
 
 namespace romap::slam {
 
-// Adds a tracked frame to the map as a keyframe and makes new points with it. For one thread.
+// Adds a tracked frame to the map as a keyframe and makes new points with it. Not thread-safe.
 class KeyframeBuilder {
  public:
   explicit KeyframeBuilder(const SlamConfig& config) : config_(config), extractor_(config) {}
 
-  // `T_world_camera`: the pose of `image` in the map of this moment. `previous`: the keyframe added before, 0 = none;
-  // it becomes the parent if the new one shares no points with any other. `use_prior`: the client's pose of the frame
-  // stays as a prior.
+  // `T_world_camera`: the pose of `image` in the current map. `previous`: the keyframe added before, 0 = none; it
+  // becomes the parent if the new one shares no points with any other. `use_prior`: the client's pose of the frame is
+  // kept as a prior.
   MapKeyframe& Add(const TrackedImage& image, const SE3<World, Camera>& T_world_camera, KeyframeId previous,
                    bool use_prior, SlamMap& map);
 

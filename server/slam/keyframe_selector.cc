@@ -12,18 +12,18 @@ namespace romap::slam {
 namespace {
 
 constexpr int kMinGapFrames = 2;      // between keyframes, unless the camera is very fast
-constexpr int kMaxWaitFrames = 3;     // for which a due keyframe waits for a sharp frame with masks
-constexpr double kSharpShare = 0.75;  // of the median sharpness of the recent frames: a sharp frame reaches it
+constexpr int kMaxWaitFrames = 3;     // maximum wait of a due keyframe for a sharp frame with masks
+constexpr double kSharpShare = 0.75;  // minimum sharpness of a sharp frame, as a share of the median of recent frames
 constexpr size_t kSharpnessWindowFrames = 15;
-constexpr int kMaskMemoryFrames = 30;    // masks that last came longer ago are not waited for
-constexpr double kStandingStill = 0.15;  // progress below which passing time makes no keyframe
-constexpr double kVeryFast = 2.5;        // progress beyond which the minimum gap does not count
+constexpr int kMaskMemoryFrames = 30;    // if the last masks are older, keyframes do not wait for masks
+constexpr double kStandingStill = 0.15;  // minimum progress for a keyframe after keyframe_max_gap_frames
+constexpr double kVeryFast = 2.5;        // progress beyond which the minimum gap is ignored
 constexpr double kTooFarToWait = 1.5;
-constexpr double kRunsOut = 0.7;  // share of the newest keyframe's points below which it is time for another
-constexpr double kUrgent = 0.45;  // below which tracking is in danger
-constexpr int kBusy = 2;          // keyframes that wait to be mapped
+constexpr double kRunsOut = 0.7;  // share of the newest keyframe's points below which another keyframe is due
+constexpr double kUrgent = 0.45;  // share below which tracking may fail soon
+constexpr int kBusy = 2;          // keyframes waiting to be mapped, from which on only urgent ones are added
 constexpr int kOverwhelmed = 4;
-constexpr double kWorthMeasuring = 0.5;  // progress before which the baseline is too short to measure depth
+constexpr double kWorthMeasuring = 0.5;  // progress below which the baseline is too short to measure depth
 
 }  // namespace
 
@@ -56,7 +56,7 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
   if (quality.keyframes_waiting >= kOverwhelmed) is_due = false;
   frames_due_ = is_due ? frames_due_ + 1 : 0;
   if (!is_due) return false;
-  // A fast camera would be too far off by the time of the next sharp frame.
+  // A fast camera would move too far before the next sharp frame.
   const bool may_wait = !is_urgent && progress < kTooFarToWait && frames_due_ <= kMaxWaitFrames;
   if (!is_good && may_wait) return false;
   Take(std::move(view));

@@ -13,7 +13,7 @@ namespace romap::slam {
 struct TrackingQuality {
   double scene_depth_mu = 0;      // median over its matched points
   double tracked_share = 1;       // matched points over the points of the newest keyframe
-  int keyframes_waiting = 0;      // chosen, but not yet in the map
+  int keyframes_waiting = 0;      // selected, but not yet in the map
   bool has_unseen_depth = false;  // its depth image would add many points
 };
 
@@ -32,7 +32,7 @@ class KeyframeSelector {
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera, const TrackingQuality& quality);
 
  private:
-  // Motion since the last keyframe relative to that which makes the next one due: 1 = due.
+  // Motion since the last keyframe relative to the motion that makes the next one due; 1 = due.
   double Progress(const SE3<World, Camera>& T_world_camera) const;
   bool IsDue(const DepthView& view);
   bool IsGood(const Frame& frame, double sharpness);

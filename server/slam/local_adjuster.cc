@@ -8,14 +8,14 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kMaxIterations = 8;  // it has converged by then
+constexpr int kMaxIterations = 8;  // enough to converge
 
 }  // namespace
 
 void LocalAdjuster::Adjust(const MapKeyframe& newest, SlamMap& map) {
   const auto begin = std::chrono::steady_clock::now();
   MapProblem problem = WindowProblem(map, newest, config_);
-  // At least every second adjustment runs to its end.
+  // At least every second adjustment runs to completion.
   const std::atomic<bool>* abort = last_was_stopped_ ? nullptr : &stop_;
   const BundleSummary summary =
       AdjustBundle(problem.bundle, {.max_iterations = kMaxIterations, .dense = true, .abort = abort});

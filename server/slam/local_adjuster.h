@@ -7,7 +7,7 @@
 
 namespace romap::slam {
 
-// Local bundle adjustment around each new keyframe. For one thread, except RequestEarlyStop().
+// Local bundle adjustment around each new keyframe. Not thread-safe, except RequestEarlyStop().
 class LocalAdjuster {
  public:
   explicit LocalAdjuster(const SlamConfig& config) : config_(config) {}

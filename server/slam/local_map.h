@@ -47,7 +47,7 @@ struct LocalMap {
   std::optional<Relocalization> relocalized;
 };
 
-// Hands the newest local map from one thread to another.
+// Passes the newest local map from one thread to another.
 class LocalMapSlot {
  public:
   void Put(std::shared_ptr<const LocalMap> map) {

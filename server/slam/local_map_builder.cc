@@ -11,10 +11,10 @@ namespace {
 
 constexpr size_t kNeighbors = 20;
 constexpr size_t kSecondNeighbors = 5;          // of each of those
-constexpr uint64_t kNewestKeyframes = 60;       // whose poses tracking gets besides the neighbors
-constexpr int kMinObservationsOfGoodPoint = 3;  // or all keyframes, in a map of fewer
+constexpr uint64_t kNewestKeyframes = 60;       // their poses are included in addition to those of the neighbors
+constexpr int kMinObservationsOfGoodPoint = 3;  // or the number of keyframes if the map has fewer
 
-// The number of well-observed points among the features that an ordinary frame has too.
+// Number of well-observed points among the scene features, the kind of features that all frames have.
 int CountReferencePoints(const SlamMap& map, const MapKeyframe& reference) {
   const int min_observations = std::min(kMinObservationsOfGoodPoint, static_cast<int>(map.keyframes().size()));
   int count = 0;

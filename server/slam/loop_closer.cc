@@ -14,8 +14,9 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kStrongSharedPoints = 80;  // for an edge of the pose graph besides those to parents and loops
-constexpr double kLoopWeight = 3;        // relative to an edge between neighbors
+// Minimum for an edge of the pose graph in addition to the edges to parents and loops.
+constexpr int kStrongSharedPoints = 80;
+constexpr double kLoopWeight = 3;  // relative to an edge between neighbors
 constexpr size_t kFusedNeighbors = 12;
 
 using Similarities = std::map<KeyframeId, Sim3<World, Camera>>;
@@ -73,7 +74,7 @@ bool CorrectDrift(const LoopMatch& loop, bool fix_scale, const std::vector<MapKe
     nodes.push_back({.S_world_camera = before.at(id), .fixed = keyframe.pose_given || id == loop.old});
   }
   const std::vector<PoseGraphEdge> edges = Edges(map, before, loop, node_of);
-  // The optimization starts with the new side where the loop puts it.
+  // Start the optimization with the new side at its pose according to the loop.
   const Sim3<World, Camera> S_world_newest = before.at(loop.old) * loop.S_old_newest;
   const Sim3<World, World> S_new_old = S_world_newest * before.at(loop.newest).Inverse();
   for (const MapKeyframe* keyframe : new_side) {

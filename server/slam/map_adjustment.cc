@@ -28,7 +28,7 @@ class ProblemBuilder {
         {.T_world_camera = keyframe.T_world_camera(), .fixed = fixed || keyframe.pose_given, .prior = keyframe.prior});
   }
 
-  // The point and its observations from keyframes that were added.
+  // Adds the point with its observations from keyframes that were added.
   void AddPoint(const PointTrack& track) {
     const auto point = static_cast<int>(problem_.points.size());
     bool seen = false;
@@ -92,7 +92,8 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   std::sort(holding.rbegin(), holding.rend());
   if (holding.size() > kMaxHoldingKeyframes) holding.resize(kMaxHoldingKeyframes);
 
-  // A small map has no keyframes outside the window: its oldest one is fixed. The scale is free; damping keeps it.
+  // A small map has no keyframes outside the window: its oldest one is fixed. The observations do not determine the
+  // scale; damping keeps it.
   KeyframeId held;
   if (holding.empty()) {
     held = (*std::min_element(window.begin(), window.end(), [](auto* a, auto* b) { return a->id < b->id; }))->id;
@@ -134,7 +135,7 @@ void ApplyWindow(const MapProblem& problem, SlamMap& map) {
 
 void ApplyGlobal(const MapProblem& problem, SlamMap& map) {
   if (problem.bundle.lens) map.CorrectLens(problem.bundle.lens->correction);
-  // The similarity that the space around each keyframe underwent.
+  // Transformation of the space around each keyframe.
   std::map<KeyframeId, Sim3<World, World>> moved;
   for (size_t i = 0; i < problem.keyframes.size(); ++i) {
     const SE3<World, Camera>& after = problem.bundle.cameras[i].T_world_camera;
@@ -143,7 +144,7 @@ void ApplyGlobal(const MapProblem& problem, SlamMap& map) {
   for (auto& [id, keyframe] : map.keyframes()) {
     auto it = moved.find(id);
     if (it == moved.end()) {
-      // Parents are older than their children, so theirs is known.
+      // Parents are older than their children, so the parent's transformation is already known.
       const auto parent = moved.find(keyframe.parent);
       it = moved.emplace(id, parent == moved.end() ? Sim3<World, World>() : parent->second).first;
     }

@@ -9,15 +9,15 @@
 
 namespace romap::slam {
 
-// Assigns masks to map points when they arrive after their frame or belong to a frame that is no keyframe, which is
-// common with slow detectors. Masks of a keyframe label its features. Masks of another frame count as votes
+// Assigns masks to map points if the masks arrive after their frame or belong to a frame that is not a keyframe. Both
+// are common with slow detectors. Masks of a keyframe label its features. Masks of another frame count as votes
 // (PointTrack::votes) for the points of its reference keyframe, unless that keyframe has masks, because the votes would
 // repeat them.
 class MaskVoter {
  public:
   explicit MaskVoter(const SlamConfig& config) : config_(config) {}
 
-  // A frame that was tracked against the map and is no keyframe. Frames come in order.
+  // A frame that was tracked against the map and is not a keyframe. Call in the order of frames.
   void ObserveFrame(const TrackedFrame& tracked, SlamMap& map);
   // Masks of an earlier frame that had none. Ignored if the frame is no longer stored.
   void ObserveMasks(const FrameMasks& masks, SlamMap& map);

@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kShrink = 8;           // factor between the masks and the smaller image for kNear
+constexpr int kShrink = 8;           // downscaling factor of the image for kNear
 constexpr double kNearShare = 0.08;  // of the image's width
 constexpr double kBorder_px = 3;     // for the finest octave
 

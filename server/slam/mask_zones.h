@@ -9,23 +9,23 @@ namespace romap::slam {
 // Where a pixel lies relative to the instance masks of its image.
 enum class MaskZone : uint8_t {
   kUnknown,  // no detector ran on the image
-  kFar,      // outside of all masks, close to none
+  kFar,      // outside of all masks and not close to one
   kNear,     // outside of all masks, but close to one
-  kBorder,   // too close to a mask's border to tell, because masks are inaccurate there
+  kBorder,   // close to the border of a mask, where masks are inaccurate
   kInside,
 };
 
 // Classifies pixels of one mask image.
 class MaskZones {
  public:
-  // `labels`: CV_16UC1, 0 = nothing. Empty: no detector ran. Must not change while this exists.
+  // `labels`: CV_16UC1, 0 = background. Empty: no detector ran. Must not change while this exists.
   explicit MaskZones(const cv::Mat& labels);
-  // The zone of a feature `octave_scale` px wide, to which the masks give `label` (see LabelAt).
+  // The zone of a feature with a width of `octave_scale` px. `label`: the feature's label from the masks (see LabelAt).
   MaskZone At(const Eigen::Vector2f& pixel_px, double octave_scale, uint16_t label) const;
 
  private:
   cv::Mat labels_;
-  cv::Mat around_;  // CV_8UC1, shrunk: not 0 in and around masks
+  cv::Mat around_;  // CV_8UC1, downscaled: nonzero in and around masks
 };
 
 // Counts of the zones of one point in several images.

@@ -17,12 +17,12 @@ constexpr int kMaxOctave = 3;          // coarser corners are too inaccurate
 constexpr double kSearchShare = 0.08;  // of the image's width, around the last pixel of a feature
 constexpr int kMaxDistance = 60;       // Hamming, bits
 constexpr double kRatio = 0.85;
-constexpr double kMinMotionShare =
-    0.012;                           // of the image's width: least median motion of the features to try SolveTwoView
-constexpr int kMaxWait_frames = 90;  // a view is dropped after this
+// Minimum median motion of the features for SolveTwoView, as a share of the image's width.
+constexpr double kMinMotionShare = 0.012;
+constexpr int kMaxWait_frames = 90;       // a view is dropped after this
 constexpr double kMinParallax_deg = 1.5;  // median over the points of the two first views
 constexpr double kMinKeptShare = 0.15;    // of the first view's features must still be followed
-constexpr double kSpacingShare = 0.03;    // of the image's width: motion after which one more view is followed
+constexpr double kSpacingShare = 0.03;    // of the image's width: motion after which another view is followed
 constexpr size_t kMaxFollowed = 4;
 
 }  // namespace

@@ -31,7 +31,7 @@ class MonocularInitializer {
  public:
   explicit MonocularInitializer(const SlamConfig& config) : config_(config) {}
 
-  // The next frame. Without a result, `reason` tells people why.
+  // Processes the next frame. Without a result, `reason` is the reason in words for users.
   std::optional<InitialViews> Offer(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
   void Reset() { followed_.clear(); }
 

@@ -11,21 +11,21 @@ namespace romap::slam {
 // The pose of the last tracked frame and the motion that led to it; predicts the pose of the next frame.
 class MotionModel {
  public:
-  // The last pose is unknown from now on.
+  // Forgets the last pose and the motion.
   void Reset();
-  // The last pose is known, but not how the camera moves.
+  // The last pose remains known, but the motion becomes unknown.
   void ForgetMotion() { motion_.reset(); }
   void RestartAt(const SE3<World, Camera>& T_world_camera);
-  // A tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame is
-  // usable, which it is not after a loss.
+  // Records a tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame
+  // is usable; false after a loss of tracking.
   void Update(const SE3<World, Camera>& T_world_camera, const std::optional<SE3<World, Camera>>& prior,
               int64_t timestamp_ns, bool is_continuous);
   // The map around a keyframe was corrected: the last pose and the motion move with it.
   void Correct(const ScaledPose& before, const ScaledPose& after);
 
   const std::optional<SE3<World, Camera>>& last_pose() const { return last_pose_; }
-  // The pose of `frame`, assuming constant velocity; the last pose where nothing better is known. `use_prior`: the
-  // motion between the client's poses comes first. Requires a last pose.
+  // The pose of `frame`, assuming constant velocity; the last pose if the motion is unknown. `use_prior`: the motion
+  // between the client's poses takes precedence. Requires a last pose.
   SE3<World, Camera> Predict(const Frame& frame, bool use_prior) const;
 
  private:

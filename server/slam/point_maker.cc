@@ -17,7 +17,7 @@ namespace romap::slam {
 namespace {
 
 constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
-constexpr double kMaxSizeRatio = 1.9;        // between the sizes of one point by two features
+constexpr double kMaxSizeRatio = 1.9;        // between the sizes of a point according to two features
 constexpr double kSearchRadius_px = 4;       // around the projection of a known point
 constexpr double kFuseRadius_px = 2.5;
 constexpr int kFuseDistance = 50;  // Hamming, bits

@@ -10,8 +10,8 @@ namespace romap::slam {
 
 LocalPoint MakeLocalPoint(const PointTrack& track);
 
-// Finds known points in a new keyframe and makes new ones. Given poses are exact: there, points are checked against all
-// their observations at once. With estimated poses, bundle adjustment and culling remove bad observations later.
+// Finds known points in a new keyframe and makes new ones. Given poses are exact, so points are checked against all
+// their observations immediately. With estimated poses, bundle adjustment and culling remove bad observations later.
 class PointMaker {
  public:
   PointMaker(const SlamConfig& config, SlamMap* map) : config_(config), map_(map) {}

@@ -11,13 +11,13 @@
 
 namespace romap::slam {
 
-// How far and how strictly known points are searched around their projections.
+// Parameters of the search for known points around their projections.
 struct ProjectionSearch {
-  double radius_px = 4;   // times the octave scale expected, up to three
+  double radius_px = 4;   // multiplied by the expected octave scale, clamped to 1..3
   int max_distance = 60;  // Hamming, bits
-  double ratio = 0.9;     // best over second best distance; rivals at the same spot do not count
-  double min_view_cosine =
-      0.7;  // between the ray and the mean ray of the point; ORB descriptors differ too much beyond
+  double ratio = 0.9;     // best over second best distance; candidates at the same spot do not count
+  // Between the ray and the mean ray of the point. ORB descriptors differ too much at larger angles.
+  double min_view_cosine = 0.7;
 };
 
 // The feature that matches a point.
@@ -32,7 +32,7 @@ struct PointMatch {
   int distance = 0;
 };
 
-// Finds points in one frame with a known pose. Reuses its buffers; for one thread.
+// Finds points in one frame with a known pose. Reuses its buffers; not thread-safe.
 class ProjectionMatcher {
  public:
   ProjectionMatcher(const FrameFeatures& frame, const SE3<World, Camera>& T_world_camera);

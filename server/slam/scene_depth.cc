@@ -16,14 +16,14 @@ namespace {
 constexpr int kWidth_px = 160;
 constexpr int kBlock_px = 16;
 constexpr int kDepths = 24;
-// The parallax (baseline over depth) of the planes, evenly spaced on a log scale. Less than the first is not measurable
+// The parallax (baseline over depth) of the planes, evenly spaced on a log scale. A smaller parallax is not measurable
 // at this image size.
 constexpr double kFirstParallax = 0.008;
 constexpr double kLastParallax = 0.4;
 constexpr int kMinVotes = 8;       // blocks
-constexpr float kDistinct = 0.6F;  // best cost of a block over its mean cost
+constexpr float kDistinct = 0.6F;  // maximum ratio of the best cost of a block to its mean cost
 
-// Maps pixels of one view to pixels of another one by the plane z = depth_mu in the first camera.
+// Maps pixels of one view to pixels of another one via the plane z = depth_mu in the first camera.
 cv::Matx33d PlaneHomography(const DepthView& first, const DepthView& second, double depth_mu) {
   const SE3<Camera, Camera> T_second_first = second.T_world_camera.Inverse() * first.T_world_camera;
   Eigen::Matrix3d K_first_inverse, K_second;
@@ -70,7 +70,7 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
   return Median(std::move(depths));
 }
 
-// At half the image's size, which keeps strong motion blur but averages noise.
+// Measured at half the image's size, which preserves strong motion blur but averages out noise.
 double Sharpness(const cv::Mat& image_bgr) {
   cv::Mat half, gray, laplacian;
   cv::resize(image_bgr, half, {}, 0.5, 0.5, cv::INTER_AREA);

@@ -26,7 +26,7 @@ struct MapKeyframe {
   std::shared_ptr<const FrameFeatures> frame;
   bool pose_given = false;              // by the client: it is never moved
   std::optional<PosePrior> prior = {};  // the client's estimate of its pose
-  size_t scene_features = 0;            // number of the first features that an ordinary frame has too
+  size_t scene_features = 0;            // number of scene features, which come before additional object features
   std::vector<MapPointId> points = {};  // one per feature, 0 = none
   KeyframeId parent = {};               // the keyframe it shared most points with when it was added; 0 for the first
   std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, by place recognition
@@ -56,19 +56,19 @@ struct FeatureRef {
   int feature = 0;
 };
 
-// A map point with what is needed to match it and to refine its position.
+// A map point with the data for matching it and for refining its position.
 struct PointTrack {
   MapPoint point;
   std::vector<FeatureRef> observations = {};                   // by keyframe
   Descriptor descriptor{};                                     // of the observation that differs least from all others
   Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
-  double size_mu = 0;          // width of one pixel of the feature's own octave at the point: size that does not change
-  uint64_t born_keyframe = 0;  // number of the keyframe that made it
+  double size_mu = 0;            // width of one pixel of the feature's octave at the point; similar in all keyframes
+  uint64_t born_keyframe = 0;    // number of the keyframe that made it
   uint64_t latest_keyframe = 0;  // number of the newest keyframe that observes it
-  MaskVotes votes = {};          // of masked frames that are no keyframes
+  MaskVotes votes = {};          // from frames with masks that are not keyframes
 };
 
-// The keyframes and points of one session. For one thread. Ids are never used twice.
+// The keyframes and points of one session. Not thread-safe. Ids are never reused.
 //
 // Invariant: keyframe k lists point p at feature f if and only if p lists the observation (k, f).
 class SlamMap {
@@ -79,13 +79,13 @@ class SlamMap {
 
   MapKeyframe& AddKeyframe(std::shared_ptr<const FrameFeatures> frame, const SE3<World, Camera>& T_world_camera);
   PointTrack& AddPoint(const Eigen::Vector3d& position_world);
-  // The feature observes the point. False, and nothing changes, if the feature already observes a point or the keyframe
-  // already observes this one.
+  // Records that the feature observes the point. Returns false and changes nothing if the feature already observes a
+  // point or the keyframe already observes this one.
   bool AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature);
-  // Also removes a point that keeps fewer than two observations, or none with depth.
+  // Also removes the point if neither two observations nor one with depth are left.
   void RemoveObservation(MapPointId point, KeyframeId keyframe);
   void RemovePoint(MapPointId point);
-  // Removes `from` and moves its observations to `into` where that is possible.
+  // Removes `from` and moves its observations to `into` where possible.
   void MergePoints(MapPointId from, MapPointId into);
   // Its children get its parent, and its pose relative to the parent is kept (see KeyframePose).
   void RemoveKeyframe(KeyframeId keyframe);

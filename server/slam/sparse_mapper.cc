@@ -175,7 +175,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   SlamMap& map = current_->map;
   if (map.keyframes().empty()) {
     ++generation_;
-    // Only a frame that brings its pose can be the first keyframe without initial views.
+    // Only a frame with a given pose can be the first keyframe without initial views.
     current_->world_is_given = true;
   }
   MapKeyframe& keyframe =
@@ -214,7 +214,7 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
     return;
   }
   if (current.map.keyframe_count() < current.next_global_adjustment) return;
-  // Priors determine the scale of the whole map; local adjustment alone learns it too late.
+  // Priors determine the scale of the whole map; local adjustment alone would adopt it too late.
   current.next_global_adjustment +=
       current.world_is_given ? kGlobalPeriodWithPriors_keyframes : current.next_global_adjustment;
   if (!global_adjuster_.IsPending()) StartGlobalAdjustment();
@@ -224,8 +224,8 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
 
 void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current_->map, MayFindLens()); }
 
-// From few views, lens distortion cannot be separated from the shape of the scene. Poses that the client gives were
-// made with the client's calibration.
+// From few views, lens distortion cannot be separated from the shape of the scene. The client computed its poses with
+// its own calibration.
 bool SparseMapper::MayFindLens() const {
   return config_.refine_lens && !current_->world_is_given &&
          current_->map.keyframes().size() >= kMinKeyframesToFindLens;

@@ -24,16 +24,16 @@ struct MappedFrame {
   TrackedFrame tracked;                          // with its pose in the current world
   std::optional<MapCorrection> correction = {};  // of earlier results; apply it before `view`
   std::optional<KeyframeView> view = {};         // only for a keyframe
-  bool was_reset = false;                        // all earlier results are void; apply it before the rest
+  bool was_reset = false;                        // all earlier results are invalid; apply it before the other fields
 };
 
 // The mapping half of slam: builds the sparse map from tracked frames, keeps it consistent (local and global bundle
 // adjustment, loop closing, gravity), relocalizes a lost camera, and publishes the part of the map around the camera
-// for tracking. For one thread, except RequestEarlyStop().
+// for tracking. Not thread-safe, except RequestEarlyStop().
 //
-// The labels of a point's observations, one per keyframe that observes it, tell which object it lies on. They are
-// evidence: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without masks or whose
-// masks have not arrived.
+// The labels of a point's observations, one per keyframe that observes it, indicate which object it lies on. Single
+// labels are not reliable: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without
+// masks or whose masks have not arrived.
 class SparseMapper {
  public:
   // `local_map` outlives the mapper. `inline_adjustment`: global bundle adjustment runs inside Process() instead of on
@@ -41,10 +41,10 @@ class SparseMapper {
   SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment = false);
 
   MappedFrame Process(const TrackedImage& image);
-  // Masks that arrive after their frame, in the order of their frames. They tell which points lie on objects, which
-  // WorldUp needs. Ignored if the frame is no longer stored.
+  // Masks that arrive after their frame, in the order of their frames. They show which points lie on objects, which
+  // WorldUp requires. Ignored if the frame is no longer stored.
   void ObserveMasks(const FrameMasks& masks);
-  // No more frames follow: runs a last global adjustment and returns what it moved.
+  // Call after the last frame. Runs a final global adjustment and returns the resulting correction.
   MapCorrection Finish();
   // From any thread: `stop` makes local bundle adjustment end early, because keyframes are waiting.
   void RequestEarlyStop(bool stop) { local_adjuster_.RequestEarlyStop(stop); }

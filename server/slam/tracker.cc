@@ -16,7 +16,8 @@ constexpr double kWideRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
 constexpr int kMinDepthsToInitialize = 150;
 constexpr int kFewInliers = 100;  // below which the depth image would add many points
-// The errors of the priors that a map is initialized with stay in the map until it has enough of them to average out.
+// A map that is initialized with priors inherits their errors. Priors are used as poses until the map has enough points
+// and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
 constexpr uint64_t kKeyframesToLeavePriors = 12;
 
@@ -62,7 +63,7 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
   if (waiting_since_generation_ && newest.generation > *waiting_since_generation_) {
     waiting_since_generation_.reset();
     if (!newest.points.empty()) {
-      // The camera was at the newer of the initial views a moment ago.
+      // The newer initial view is the last known pose of the camera.
       motion_.RestartAt(newest.keyframes.find(newest.reference)->second.T_world_camera);
       status_.OnMapInitialized();
     } else {
@@ -81,7 +82,7 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
 
 bool Tracker::UsesGivenPose(const Frame& frame) const {
   if (!frame.T_world_camera || pose_use_ == PoseUse::kIgnore || waiting_since_generation_) return false;
-  // A map that was initialized from images has another world than the client.
+  // A map that was initialized from images has a different world frame than the client.
   if (HasMap() && !world_is_given_) return false;
   const bool map_suffices = pose_use_ == PoseUse::kPrior && HasMap() &&
                             map_->keyframes_done >= kKeyframesToLeavePriors &&
@@ -219,7 +220,7 @@ void Tracker::Lose(const std::string& why, TrackedImage& image) {
 }
 
 bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image) {
-  // The pose of a camera that was just relocalized may be wrong: the map must not grow from it yet.
+  // The pose of a camera that was just relocalized may be wrong: do not extend the map with it yet.
   if (status_.frames_since_recovery() < 2 && map_->keyframes_done > 4) return false;
   const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
   TrackingQuality quality;

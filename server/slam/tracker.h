@@ -26,13 +26,13 @@ struct TrackedImage {
   std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is no keyframe
   std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
-  bool pose_given = false;                             // by the client: nothing may correct it
+  bool pose_given = false;                             // by the client; must not be corrected
   int generation = 0;                                  // of the local map it was tracked against
 };
 
-// Finds the camera pose of each frame: takes the pose that comes with it, or tracks the camera from the image against
-// the local map. Frames come in the order of their time stamps, from one thread, which never waits for mapping: it uses
-// the newest local map available.
+// Finds the camera pose of each frame: uses the given pose, or tracks the camera from the image against the local map.
+// Frames come in the order of their time stamps, from one thread, which never waits for mapping: it uses the newest
+// local map available.
 //
 // Tracking from images: the motion of the last frames predicts the pose; the points of the last frame are searched
 // around their projections; if that fails, in a wider area and then by descriptors alone (P3P). Then all points of the
@@ -43,7 +43,7 @@ class Tracker {
   // `local_map` outlives the tracker.
   Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot* local_map);
 
-  // Never rejects a decoded frame. Without a pose, `tracked.reason` tells people why.
+  // Never rejects a decoded frame. Without a pose, `tracked.reason` is the reason in words for users.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
 
  private:
@@ -79,7 +79,7 @@ class Tracker {
   std::vector<MapPointId> last_points_;  // matched in the last tracked frame
   bool world_is_given_ = false;          // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
-  // Of the local map at the time when initial views were sent to mapping; set while waiting for the map they give.
+  // Generation of the local map when initial views were sent to mapping; set while the initialized map is pending.
   std::optional<int> waiting_since_generation_;
 };
 

@@ -6,7 +6,7 @@
 
 namespace romap::slam {
 
-// Whether tracking works, and since when: initializing -> tracking <-> lost.
+// State of tracking: initializing -> tracking <-> lost.
 class TrackingStatus {
  public:
   bool IsLost() const { return state_ == TrackingState::kLost; }
@@ -15,7 +15,7 @@ class TrackingStatus {
   bool NeedsConfirmation() const { return IsLost() || frames_since_recovery_ < kConfirmationFrames; }
   // Frames tracked since the map was initialized or the camera relocalized.
   int frames_since_recovery() const { return frames_since_recovery_; }
-  // The frame with which the current loss began; only while lost.
+  // The first frame of the current loss; valid only while lost.
   uint64_t lost_since_frame() const { return lost_since_frame_; }
 
   void OnMapReset() { state_ = TrackingState::kInitializing; }

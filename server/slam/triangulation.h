@@ -32,7 +32,7 @@ double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector
 std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b);
 
 // The point that fits all rays best: Gauss-Newton on the errors of bearings and ranges with Huber weights (at the
-// bounds above), poses held fixed. Starts at and falls back to `p_world` when a step fails to improve.
+// bounds above), poses held fixed. Starts at and falls back to `p_world` if a step does not reduce the cost.
 Eigen::Vector3d RefinePoint(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
 }  // namespace romap::slam

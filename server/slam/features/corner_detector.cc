@@ -7,11 +7,12 @@
 namespace romap::slam {
 namespace {
 
-// Each cell of the image of this size keeps at least this many corners, because with weak structure the camera pose
-// depends on corners in all parts of the image.
+// Each image cell of kCell_px keeps at least kMinInCell corners, because in scenes with little structure the camera
+// pose depends on corners in all parts of the image.
 constexpr int kCell_px = 80;
 constexpr int kMinInCell = 8;
-// Detected corners per wanted corner. A larger choice spreads them better, but weak corners are matched less often.
+// Number of candidates per requested corner. More candidates spread the corners better, but weak corners are matched
+// less often.
 constexpr double kChoice = 3;
 constexpr int kCircleRadius_px = 3;  // of FAST's test
 
@@ -37,7 +38,7 @@ class CellGrid {
   }
 
  private:
-  // The first pixel p whose (p - begin) * cells / length is `cell`.
+  // The first pixel p with (p - begin) * cells / length == `cell`.
   static int Edge(int begin, int length, int cell, int cells) { return begin + (cell * length + cells - 1) / cells; }
 
   cv::Rect part_;
@@ -45,7 +46,7 @@ class CellGrid {
   int rows_;
 };
 
-// Keeps the strongest corners and the best few of each cell, even if weak.
+// Keeps the `count` strongest corners of the image and the kMinInCell strongest corners of each cell.
 void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
   std::stable_sort(corners.begin(), corners.end(), Stronger);
   const CellGrid grid(cv::Rect(cv::Point(), image_size));
@@ -59,8 +60,9 @@ void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
   corners.resize(kept);
 }
 
-// Takes corners in order, each unless an earlier one lies within about `distance_px`: it covers the square of that half
-// side around it, in cells of half that size. Stops when more than `limit` are taken. Returns indices.
+// Takes corners in order and skips those within about `distance_px` of a taken corner: each taken corner covers a
+// square of that half side around it, in cells of half that size. Stops when more than `limit` are taken. Returns
+// indices.
 std::vector<size_t> TakeApart(const Corners& corners, const cv::Size& image_size, float distance_px, size_t limit) {
   constexpr int kReach_cells = 2;
   const float cell_px = distance_px / kReach_cells;
@@ -111,7 +113,8 @@ Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count) 
   if (corners.size() <= count) return corners;
   if (count == 0) return {};
   KeepChoice(corners, image_size, static_cast<size_t>(kChoice * static_cast<double>(count)));
-  // At twice the distance of a square lattice of `count` corners not as many fit; at one pixel all do.
+  // Bisection: fewer than `count` corners fit at twice the spacing of a square lattice of `count` corners; all fit at
+  // one pixel.
   float near_px = 1;
   float far_px = 2 * std::sqrt(static_cast<float>(image_size.area()) / static_cast<float>(count));
   std::vector<size_t> taken = TakeApart(corners, image_size, near_px, count);

@@ -8,17 +8,17 @@ namespace romap::slam {
 
 using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST score in gray levels
 
-// FAST-9 corners (Rosten and Drummond, ECCV 2006) of the part of a CV_8UC1 image, with coordinates of the whole image,
-// row by row. Only the strongest of adjacent ones counts.
+// Detects FAST-9 corners (Rosten and Drummond, ECCV 2006) in a part of a CV_8UC1 image. Coordinates are those of the
+// whole image; the order is row by row. Only the strongest of adjacent corners is kept.
 Corners DetectCorners(const cv::Mat& image, const cv::Rect& part, int threshold);
 
-// The same, but cells that have no corner at `threshold` are searched again at `min_threshold`: in a dim or blurred
-// part of the image, weak corners are better than none.
+// The same, but cells with few corners at `threshold` are searched again at `min_threshold`, because in a dim or
+// blurred part of the image weak corners are better than none.
 Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int threshold, int min_threshold);
 
-// `count` of the corners, or all if there are not as many, evenly spread: strong corners that keep a distance from each
-// other, which is made as large as the count allows (suppression by square covering, Bailo et al., Pattern Recognition
-// Letters 2018). Strongest first.
+// Selects at most `count` corners, spread evenly over the image: takes strong corners first and keeps a minimum
+// distance between corners, which is as large as `count` allows (suppression via square covering, Bailo et al., Pattern
+// Recognition Letters 2018). Strongest first.
 Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count);
 
 }  // namespace romap::slam

@@ -33,7 +33,7 @@ inline int HammingDistance(const Descriptor& a, const Descriptor& b) {
   return static_cast<int>((sums_of_16 * 0x0001000100010001) >> 48);
 }
 
-// Each octave of the image pyramid is this much smaller than the one before.
+// Ratio of the sizes of successive octaves of the image pyramid.
 inline constexpr double kOctaveFactor = 1.2;
 inline constexpr int kOctaves = 8;
 inline constexpr double kMaxOctaveScale = 3.58;  // kOctaveFactor ^ (kOctaves - 1)
@@ -43,7 +43,7 @@ struct Feature {
   Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, for every lens
   int octave = 0;            // pyramid level it was found on, 0 = full size
   double octave_scale = 1;   // kOctaveFactor ^ octave
-  float angle_rad = 0;       // of its patch: from the image's +x towards +y (clockwise as seen), -pi..pi
+  float angle_rad = 0;       // of its patch, from the image's +x axis toward +y (clockwise), -pi..pi
   uint16_t label = 0;        // of the mask under it; 0 = none, or too close to the mask's border
   Descriptor descriptor{};
 };

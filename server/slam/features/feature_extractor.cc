@@ -14,7 +14,7 @@ namespace romap::slam {
 namespace {
 
 constexpr int kMinImageSide_px = 2 * kPatchBorder_px + 8;
-// Corners of one octave that are closer than this, in its pixels, count as one.
+// Corners of one octave closer to each other than this (pixels of the octave) are duplicates.
 constexpr double kSameCorner_px = 2;
 
 const std::array<double, kOctaves> kOctaveScales = [] {
@@ -27,7 +27,7 @@ cv::Rect Describable(const cv::Mat& image) {
   return {kPatchBorder_px, kPatchBorder_px, image.cols - 2 * kPatchBorder_px, image.rows - 2 * kPatchBorder_px};
 }
 
-// False for NaN too.
+// Also false for NaN.
 bool IsInside(const CameraModel& camera, const Eigen::Vector2f& pixel_px) {
   return pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() <= static_cast<float>(camera.width_px - 1) &&
          pixel_px.y() <= static_cast<float>(camera.height_px - 1);
@@ -48,8 +48,8 @@ void Occupy(cv::Mat& free, const Feature& feature) {
   free(around & cv::Rect(cv::Point(), free.size())).setTo(0);
 }
 
-// The number of features of `octave` when `left` are distributed over it and all finer octaves, in proportion to the
-// sides of their images: coarse corners are fewer, but visible from farther away.
+// Number of features of `octave` if `left` features are distributed over it and all finer octaves, in proportion to the
+// side lengths of their images. Coarse corners are fewer, but visible from farther away.
 size_t Share(size_t left, int octave) {
   double sum = 0;
   for (int i = 0; i <= octave; ++i) sum += 1 / kOctaveScales[static_cast<size_t>(i)];

@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-// The blur of the ORB paper's tests, which are on patches of 5 x 5 pixels.
+// Corresponds to the ORB paper, whose tests compare patches of 5 x 5 pixels.
 constexpr int kSmoothingSide_px = 7;
 constexpr double kSmoothingSigma_px = 2;
 
@@ -39,8 +39,8 @@ const cv::Mat& ImagePyramid::smooth(int octave) {
   return smooth_[i];
 }
 
-// cv::resize makes the outer edges of both images meet, not the centers of their first pixels; sizes are whole pixels,
-// so that the ratio is not quite that of the octaves.
+// cv::resize aligns the outer edges of both images, not the centers of their first pixels. Sizes are rounded to whole
+// pixels, so their ratio differs slightly from kOctaveFactor.
 Eigen::Vector2f ImagePyramid::ToFullSize(int octave, const cv::Point2f& pixel_px) const {
   const cv::Mat& full = sharp_[0];
   const cv::Mat& level = sharp(octave);

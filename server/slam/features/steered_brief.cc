@@ -7,8 +7,8 @@ namespace {
 
 constexpr size_t kTests = 256;
 
-// Half the width of each row of the circle of radius kPatchRadius_px, rows and columns alike: a circle that is wider
-// than high would pull all directions to one axis.
+// Half the width of each row of a circle of radius kPatchRadius_px. The circle is as high as it is wide, because
+// otherwise all directions would be biased toward one axis.
 std::array<int, kPatchRadius_px + 1> CircleRows() {
   constexpr double kRadius_px = kPatchRadius_px + 0.5;
   std::array<int, kPatchRadius_px + 1> half_width_px{};
@@ -18,7 +18,8 @@ std::array<int, kPatchRadius_px + 1> CircleRows() {
   return half_width_px;
 }
 
-// The tests' points by coordinate, all first points before all second ones: what the compiler can turn four at a time.
+// The points of the tests in separate coordinate arrays, all first points before all second points, so that the
+// compiler can vectorize their rotation.
 struct TestPoints {
   std::array<float, 2 * kTests> x_px;
   std::array<float, 2 * kTests> y_px;
@@ -36,8 +37,8 @@ TestPoints MakeTestPoints() {
   return points;
 }
 
-// Nearest integer for |x| < 2^22 without a call, so that loops of it become SIMD: the sum has no bits left for
-// fractions.
+// Nearest integer for |x| < 2^22 without a function call, so that the compiler can vectorize loops. The sum has no bits
+// left for a fraction.
 inline float Round(float x) {
   constexpr float kNoFraction = 12582912.0F;  // 1.5 * 2^23
   return (x + kNoFraction) - kNoFraction;

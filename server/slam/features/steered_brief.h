@@ -8,8 +8,8 @@
 
 namespace romap::slam {
 
-// Radius of the patch that orientation and descriptor use; corners closer than kPatchBorder_px, which includes
-// rounding, to the image's edge cannot be described.
+// Radius of the patch for orientation and descriptor. Corners closer to the image's edge than kPatchBorder_px, which
+// includes a margin for rounding, have no descriptor.
 inline constexpr int kPatchRadius_px = 15;
 inline constexpr int kPatchBorder_px = kPatchRadius_px + 1;
 
@@ -19,8 +19,8 @@ struct PatchDirection {
   float sine = 0;
 };
 
-// From the corner to the centroid of the gray values in the circle around it (intensity centroid, Rosin 1999, as used
-// by Rublee et al., ICCV 2011). `image` is CV_8UC1; the pixel lies at least kPatchBorder_px inside it.
+// Direction from the corner to the centroid of the gray values in the circle around it (intensity centroid, Rosin 1999,
+// as used by Rublee et al., ICCV 2011). `image` is CV_8UC1; the pixel lies at least kPatchBorder_px inside it.
 PatchDirection IntensityCentroid(const cv::Mat& image, int x_px, int y_px);
 
 // One binary test: the bit is set when the gray value at the first point is less than that at the second. Offsets from
@@ -36,8 +36,8 @@ struct BriefTest {
 // 64 of its word i / 64.
 const std::array<BriefTest, 256>& BriefTests();
 
-// The tests' results with the pattern turned into the patch's direction (steered BRIEF, Rublee et al., ICCV 2011).
-// `smooth` is CV_8UC1, blurred; the pixel lies at least kPatchBorder_px inside it.
+// Results of the tests with the pattern rotated to the direction of the patch (steered BRIEF, Rublee et al., ICCV
+// 2011). `smooth` is CV_8UC1, blurred; the pixel lies at least kPatchBorder_px inside it.
 Descriptor SteeredBrief(const cv::Mat& smooth, int x_px, int y_px, const PatchDirection& direction);
 
 }  // namespace romap::slam

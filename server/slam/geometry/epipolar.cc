@@ -14,18 +14,17 @@ namespace {
 
 constexpr int kRefineRounds = 4;
 constexpr int kIterationsPerRound = 6;
-// The first round listens to matches this many times further off than the bound: the start comes from five noisy
-// points.
+// Factor on the distance bound in the first round, because the start was computed from only five noisy matches.
 constexpr double kFirstRoundReach = 4;
-// Parallax over the angle of a pixel's noise from which on a depth is known to about a third.
+// Minimum ratio of the parallax to the angular pixel noise. At this ratio, the depth is accurate to about a third.
 constexpr double kSignificantParallax = 4;
 
-// The epipolar constraint of one match and its slope.
+// The epipolar constraint of one match and its derivatives.
 struct EpipolarLines {
   double algebraic = 0;          // second^T * E * first
-  Eigen::Vector3d first_slope;   // its derivative by the first pixel, over the focal lengths once more: in rays per px
-  Eigen::Vector3d second_slope;  // and by the second pixel
-  double slope2 = 0;             // squared length of its derivative by all four pixel coordinates
+  Eigen::Vector3d first_slope;   // derivative by the first pixel, divided by the focal lengths (rays per px)
+  Eigen::Vector3d second_slope;  // the same for the second pixel
+  double slope2 = 0;             // squared norm of the derivative with respect to all four pixel coordinates
 };
 
 EpipolarLines LinesOf(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
@@ -48,7 +47,7 @@ Eigen::Matrix<double, 3, 2> AxesAcross(const Eigen::Vector3d& direction) {
   return axes;
 }
 
-// Derivatives of the essential matrix by the parameters of Moved.
+// Derivatives of the essential matrix with respect to the parameters of Moved.
 std::array<Eigen::Matrix3d, 5> EssentialDerivatives(const Motion& motion) {
   std::array<Eigen::Matrix3d, 5> derivatives;
   for (int k = 0; k < 3; ++k) {
@@ -64,7 +63,8 @@ double AngleSigma_rad(const Eigen::MatrixXd& covariance) {
   return largest >= 0 ? std::sqrt(largest) : std::numeric_limits<double>::infinity();
 }
 
-// Standard deviations by the information of the inliers; noise that is larger than the matches claim counts.
+// Computes the standard deviations from the information matrix of the inliers, scaled up if the residuals exceed the
+// given noise.
 void SetSigmas(const MotionEquations& equations, int inliers, RefinedMotion& refined) {
   refined.rotation_sigma_rad = refined.direction_sigma_rad = std::numeric_limits<double>::infinity();
   const Eigen::LDLT<MotionEquations::Matrix> information(equations.hessian);
@@ -135,7 +135,7 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
   MotionEquations equations;
   for (const RayMatch& match : matches) {
     const EpipolarLines lines = LinesOf(camera, essential, match);
-    if (!(lines.slope2 > 0)) continue;  // both points at the epipoles: any motion along this direction explains them
+    if (!(lines.slope2 > 0)) continue;  // both points are at the epipoles and agree with any rotation
     const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
     const double error = lines.algebraic * scale;
     MotionEquations::Vector derivative;
@@ -172,7 +172,8 @@ RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::
     const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
     equations = Minimize<5>(kIterationsPerRound, linearize, move, refined.motion);
   }
-  // The errors are equal for both directions; the points must be in front of both cameras.
+  // A direction and its opposite have the same Sampson errors. Choose the one with more points in front of both
+  // cameras.
   const Motion opposite{refined.motion.rotation, -refined.motion.direction};
   const double opposite_support = Support(camera, opposite, matches);
   refined.support = Support(camera, refined.motion, matches);

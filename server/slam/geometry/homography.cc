@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kPolishRounds = 5;
 constexpr int kTurnRounds = 5;
-// Below this share of the distance to the plane, a motion is no motion but rounding.
+// Translations below this share of the distance to the plane are rounding errors.
 constexpr double kNoTranslation = 1e-9;
 
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
@@ -33,7 +33,7 @@ std::vector<RayMatch> ExplainedBy(const CameraModel& camera, const Eigen::Matrix
   return explained;
 }
 
-// Squared distance in pixels of the points through which two rays pass; infinite for a ray that points backwards.
+// Squared pixel distance between the projections of two rays; infinite if `mapped` points backward.
 double Distance2_px(const CameraModel& camera, const Eigen::Vector3d& mapped, const Eigen::Vector3d& seen) {
   if (!(mapped.z() > 0)) return std::numeric_limits<double>::infinity();
   return (camera.Project(mapped) - camera.Project(seen)).squaredNorm();
@@ -60,7 +60,7 @@ std::optional<Eigen::Matrix3d> FitHomography(std::span<const RayMatch> matches) 
   Eigen::Matrix3d homography = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(smallest.data());
   const double determinant = homography.determinant();
   if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
-  return homography / std::cbrt(determinant);  // determinant 1, so that points before the camera stay there
+  return homography / std::cbrt(determinant);  // determinant 1, so that points stay in front of the camera
 }
 
 double TransferChi2(const CameraModel& camera, const Eigen::Matrix3d& homography, const Eigen::Matrix3d& inverse,
@@ -106,7 +106,7 @@ std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography) {
   try {
     cv::decomposeHomographyMat(matrix, cv::Matx33d::eye(), rotations, translations, cv::noArray());
   } catch (const cv::Exception&) {
-    return motions;  // a homography that no motion causes
+    return motions;  // no motion produces this homography
   }
   for (size_t i = 0; i < rotations.size(); ++i) {
     // OpenCV's matrices are row-major.

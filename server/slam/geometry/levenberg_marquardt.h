@@ -12,11 +12,11 @@ namespace romap::slam {
 inline double HuberCost(double chi2, double bound) {
   return chi2 <= bound ? chi2 : 2 * std::sqrt(bound * chi2) - bound;
 }
-// Its weight in the normal equations: d cost / d chi2.
+// Weight of the error in the normal equations: d HuberCost / d chi2.
 inline double HuberWeight(double chi2, double bound) { return chi2 <= bound ? 1.0 : std::sqrt(bound / chi2); }
 
-// Sums over the errors e of a problem with N parameters and Jacobian rows J: J^T W J, J^T W e, and the robust cost, of
-// which the gradient is half the derivative.
+// Normal equations of a problem with N parameters, errors e, Jacobian rows J and weights W: hessian = J^T W J, gradient
+// = J^T W e, and the robust cost. The gradient is half the derivative of the cost.
 template <int N>
 struct NormalEquations {
   using Vector = Eigen::Matrix<double, N, 1>;
@@ -26,7 +26,7 @@ struct NormalEquations {
   Vector gradient = Vector::Zero();
   double cost = 0;
 
-  // One error with its derivative, both already divided by the standard deviation.
+  // Adds one error and its derivative, both divided by the standard deviation.
   void Add(const Vector& derivative, double error, double weight) {
     hessian.noalias() += (weight * derivative) * derivative.transpose();
     gradient.noalias() += (weight * error) * derivative;
@@ -34,8 +34,8 @@ struct NormalEquations {
 };
 
 // Levenberg-Marquardt for few parameters (Marquardt 1963: damping scales the diagonal), without allocation. `linearize`
-// makes NormalEquations<N> of a State, `move` a new State of a State and a step. `state` ends at the best found; the
-// equations there are returned. A step with a negligible expected gain ends the loop.
+// computes NormalEquations<N> at a State; `move` applies a step to a State. Sets `state` to the best state found and
+// returns the equations at it. Stops when the expected gain of a step is negligible.
 template <int N, class State, class Linearize, class Move>
 NormalEquations<N> Minimize(int max_iterations, const Linearize& linearize, const Move& move, State& state) {
   constexpr double kNegligibleGain = 1e-6;          // of the cost

@@ -11,14 +11,14 @@ namespace romap::slam {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180;
-// Two starts that led this near to each other found the same minimum.
+// Refined motions closer to each other than this are the same minimum.
 constexpr double kSameRotation_rad = 0.02 * kDegree_rad;
 constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
-// Minima that are this near to each other do not contradict each other.
+// Minima closer to each other than this are not rivals.
 constexpr double kNearRotation_rad = 1 * kDegree_rad;
 constexpr double kNearDirection_rad = 10 * kDegree_rad;
 constexpr double kMedianChi2 = 0.4549;  // of chi-square with one degree of freedom
-constexpr double kLeastNoise = 0.25;    // of the given noise
+constexpr double kLeastNoise = 0.25;    // lower limit, as a share of the given noise
 
 std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const Motion> starts,
                                      std::span<const RayMatch> matches) {
@@ -35,8 +35,9 @@ std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const 
   return refined;
 }
 
-// The noise of the agreeing matches over what they claim, by the median: a claim that is too large hides how much
-// better one motion is than another. Never more than 1: matches that scatter more than they claim may be wrong.
+// Ratio of the actual noise of the agreeing matches (from their median error) to their sigma_px. A sigma_px that is too
+// large hides how much better one motion is than another. The ratio is at most 1, because matches with a larger scatter
+// may be wrong.
 double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
   const Eigen::Matrix3d essential = motion.Essential();
   std::vector<double> chi2s;
@@ -48,7 +49,7 @@ double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span
   return std::clamp(std::sqrt(Median(std::move(chi2s)) / kMedianChi2), kLeastNoise, 1.0);
 }
 
-// Along the axes and halfway between them; a direction and its opposite are one start.
+// Adds starts along the axes and halfway between them. RefineMotion also tries the opposite directions.
 void AddAllDirections(const Eigen::Matrix3d& rotation, std::vector<Motion>& starts) {
   static const Eigen::Vector3d kDirections[] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0}, {1, -1, 0},
                                                 {1, 0, 1}, {1, 0, -1}, {0, 1, 1}, {0, 1, -1}};

@@ -8,18 +8,18 @@
 
 namespace romap::slam {
 
-// All motions that could explain the matches, refined, best first, no two the same.
+// The candidate motions for a set of matches: refined, without duplicates, best first.
 struct MotionRanking {
   std::vector<RefinedMotion> motions;
-  std::vector<RayMatch> matches;  // with the noise estimated from them, where that is less than given
+  std::vector<RayMatch> matches;  // with sigma_px reduced if they scatter less than given
 
-  // The support of the best motion that is not near the first; 0: none.
+  // Support of the best motion that clearly differs from the first one; 0 if there is none.
   double RivalSupport() const;
 };
 
-// Refines what RANSAC found, the motions of its homography, and starts in all directions about the best: errors of two
-// views have several minima (forward and sideways motion, the two solutions of a plane), and a missed one may give a
-// wrong map.
+// Refines the motions found by RANSAC, the motions of its homography, and motions in all directions with the best
+// rotation. The error of two views has several minima (forward and sideways motion, the two solutions of a plane), and
+// missing one can result in a wrong map.
 MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches);
 
 }  // namespace romap::slam

@@ -16,9 +16,9 @@ namespace {
 
 constexpr int kSampleSize = 5;
 constexpr size_t kMaxMotions = 6;
-// Models that explain at least this share of what the best explains are kept as its rivals.
+// Models with at least this share of the best model's support are kept.
 constexpr double kRivalShare = 0.6;
-// Motions from five noisy matches that are this near to each other lead to the same when refined.
+// Motions from five noisy matches that are closer to each other than this converge to the same motion.
 constexpr double kAlikeRotation_rad = 0.03;
 constexpr double kAlikeDirection_rad = 0.25;
 
@@ -35,7 +35,7 @@ std::vector<Eigen::Matrix3d> EssentialsOf(const Sample& sample) {
   std::vector<Eigen::Matrix3d> essentials;
   cv::Mat stacked;
   try {
-    // Of five matches OpenCV returns all solutions of its minimal solver, one below the other, without a search.
+    // For exactly five matches, OpenCV returns all solutions of its minimal solver, stacked vertically, without RANSAC.
     stacked = cv::findEssentialMat(first, second, cv::Matx33d::eye(), cv::RANSAC);
   } catch (const cv::Exception&) {
     return essentials;  // a degenerate sample
@@ -63,8 +63,8 @@ Score ScoreOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::
   return score;
 }
 
-// Of the four motions of an essential matrix (Hartley and Zisserman, result 9.19) the one that puts most matches before
-// both cameras.
+// Returns the one of the four motions of an essential matrix (Hartley and Zisserman, result 9.19) with the most matches
+// in front of both cameras.
 Motion MotionOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d quarter_turn;
@@ -85,10 +85,10 @@ Motion MotionOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std
   return best;
 }
 
-// The best motions so far, no two alike.
+// The best motions so far, without near duplicates.
 class Shortlist {
  public:
-  // The support that a motion needs to be listed.
+  // Minimum support of a motion to be added.
   double Threshold() const {
     const double share = entries_.empty() ? 0.0 : kRivalShare * entries_.front().support;
     return entries_.size() < kMaxMotions ? share : std::max(share, entries_.back().support);

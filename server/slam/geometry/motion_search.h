@@ -12,14 +12,14 @@ namespace romap::slam {
 
 // The result of RANSAC: approximate models from minimal samples.
 struct MotionSearch {
-  std::vector<Motion> motions;                // the best by five matches, best first, no two alike
-  double essential_support = 0;               // of the best, sides of the camera aside
-  std::optional<Eigen::Matrix3d> homography;  // the best by four matches, refined
+  std::vector<Motion> motions;                // from five matches each, best first, without near duplicates
+  double essential_support = 0;               // of the best essential matrix; points behind a camera count
+  std::optional<Eigen::Matrix3d> homography;  // the best one from four matches, refined
   double homography_support = 0;
 };
 
-// Fits essential matrices (to five matches, Nister 2004) and homographies (to four of them) to the same samples, for
-// at most `max_iterations` or until a sample without outliers is all but certain.
+// RANSAC: fits essential matrices (five matches, Nister 2004) and homographies (four of these matches) to the same
+// samples. Stops after `max_iterations`, or when a sample without outliers has almost certainly been drawn.
 MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
                            uint64_t seed);
 

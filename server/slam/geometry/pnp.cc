@@ -17,8 +17,8 @@ constexpr int kSampleSize = 3;
 
 using Sample = std::array<PoseObservation, kSampleSize>;
 
-// The up to four poses from which three points look as they were seen. OpenCV's solver works on rays here, so that the
-// camera is the identity.
+// The up to four poses that agree with three observations. OpenCV's solver gets rays here, hence the identity camera
+// matrix.
 std::vector<CameraFromWorld> PosesOf(const CameraModel& camera, const Sample& sample) {
   std::array<cv::Point3d, kSampleSize> points;
   std::array<cv::Point2d, kSampleSize> rays;
@@ -48,7 +48,7 @@ std::vector<CameraFromWorld> PosesOf(const CameraModel& camera, const Sample& sa
 }
 
 struct Score {
-  double support = 0;  // inliers, each counted by how well it agrees (MSAC, Torr and Zisserman 2000)
+  double support = 0;  // inliers, weighted from 1 (exact) to 0 (at the bound): MSAC, Torr and Zisserman 2000
   int inliers = 0;
 };
 
@@ -85,8 +85,8 @@ std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const 
       const Score score = ScoreOf(camera, pose, observations);
       if (score.support <= best_support) continue;
       best_support = score.support;
-      // Three noisy points place the camera roughly and miss inliers; refined at once (Chum et al. 2003), the pose
-      // tells better how many more samples are needed.
+      // A pose from three noisy points is inaccurate and misses inliers. Immediate refinement (Chum et al. 2003) gives
+      // a better estimate of the number of samples that are still needed.
       PoseEstimate refined = RefinePose(camera, WorldFromCamera(pose), observations, {.start_is_close = true});
       if (best && refined.inliers < best->inliers) continue;
       best = std::move(refined);

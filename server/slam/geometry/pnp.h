@@ -14,8 +14,8 @@ struct PnpOptions {
   uint64_t seed = 1;
 };
 
-// The camera pose from points that may be wrongly matched: P3P in RANSAC (preemptive adaptive stop), then RefinePose on
-// the inliers. nullopt when no pose has `min_inliers`. The same input and seed give the same result.
+// Estimates the camera pose from matches with outliers: P3P in RANSAC with an adaptive number of iterations, then
+// RefinePose. nullopt if no pose has `min_inliers`. Deterministic for the same input and seed.
 std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const PoseObservation> observations,
                                      const PnpOptions& options);
 

@@ -14,8 +14,9 @@ bool IsUsable(const PoseObservation& observation) {
   return observation.sigma_px > 0 && observation.p_world.allFinite() && observation.pixel_px.allFinite();
 }
 
-// Marks what may take part in the first round: all that a pose not far from `pose` could bring into the picture. A
-// point that projects further away is a wrong match, and one near the camera's plane would outweigh all others.
+// Marks the observations for the first round: those with a reprojection error below the image's width + height. A point
+// that projects farther away is a wrong match, and a point near the camera plane would dominate all others. Returns the
+// number of marked observations.
 int MarkPlausible(const CameraModel& camera, const CameraFromWorld& pose, std::span<const PoseObservation> observations,
                   std::vector<uint8_t>& active) {
   const double reach_px = camera.width_px + camera.height_px;
@@ -31,7 +32,7 @@ int MarkPlausible(const CameraModel& camera, const CameraFromWorld& pose, std::s
   return count;
 }
 
-// Marks the observations that agree with the pose.
+// Marks the observations that agree with the pose and returns their number.
 int MarkInliers(const CameraModel& camera, const CameraFromWorld& pose, std::span<const PoseObservation> observations,
                 std::vector<uint8_t>& inlier) {
   int count = 0;

@@ -8,7 +8,7 @@
 
 namespace romap::slam {
 
-// K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
+// Draws K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
 // libraries and the same seed must give the same map everywhere.
 template <int K>
 std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
@@ -22,14 +22,14 @@ std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
   return sample;
 }
 
-// Number of samples of `size` matches RANSAC needs until one of them is free of outliers with 99.9 % certainty
-// (Fischler and Bolles 1981), at most `limit`.
+// Number of samples of `size` matches that RANSAC needs for a 99.9 % chance of one sample without outliers (Fischler
+// and Bolles 1981), at most `limit`.
 inline int SamplesNeeded(double inlier_share, int size, int limit) {
   constexpr double kLogOfMissing = -6.907755;  // log(0.001)
   const double clean = std::pow(inlier_share, size);
   if (clean >= 1) return 1;
   const double needed = std::ceil(kLogOfMissing / std::log1p(-clean));
-  return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also when clean is 0: needed is infinite
+  return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also if clean is 0 and needed is infinite
 }
 
 }  // namespace romap::slam

@@ -7,8 +7,8 @@
 namespace romap::slam {
 namespace {
 
-// What a point costs that a step takes behind the camera: more than any step gains by it, but finite, so that one wrong
-// match near the camera cannot forbid all movement.
+// Cost of a point that a step moves behind the camera: more than any step can gain, but finite, so that one wrong match
+// near the camera does not block all steps.
 constexpr double kCostBehindCamera = 1e4;
 
 }  // namespace

@@ -19,7 +19,7 @@ inline bool HasDepth(const PoseObservation& observation) {
   return observation.depth_mu > 0 && observation.depth_sigma_mu > 0;
 }
 
-// 95 % bounds of chi-square with two degrees of freedom, and with three where depth was measured, too.
+// 95 % bound of chi-square: two degrees of freedom, or three if depth was measured.
 inline double Chi2Bound(const PoseObservation& observation) { return HasDepth(observation) ? 7.815 : 5.991; }
 
 // Residual of an observation for a pose: pixels and depth in units of their standard deviations.
@@ -27,7 +27,7 @@ struct ObservationError {
   Eigen::Vector3d p_camera;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double depth = 0;
-  double chi2 = std::numeric_limits<double>::infinity();  // stays so behind the camera
+  double chi2 = std::numeric_limits<double>::infinity();  // remains infinite behind the camera
 };
 
 inline ObservationError ErrorOf(const CameraModel& camera, const CameraFromWorld& pose,
@@ -46,8 +46,8 @@ inline ObservationError ErrorOf(const CameraModel& camera, const CameraFromWorld
 
 using PoseEquations = NormalEquations<6>;
 
-// Adds one observation to the normal equations of the pose, with Huber's weight at its bound. Parameters: shift, then
-// turn, of the camera's frame, as in Moved.
+// Adds one observation to the normal equations of the pose, with the Huber weight for its Chi2Bound. Parameters:
+// translation, then rotation of the camera's frame (see Moved).
 void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, const PoseObservation& observation,
                     PoseEquations& equations);
 

@@ -5,14 +5,14 @@
 
 namespace romap::slam {
 
-// The matrix that takes the cross product: Skew(a) * b = a x b.
+// Matrix of the cross product: Skew(a) * b = a x b.
 inline Eigen::Matrix3d Skew(const Eigen::Vector3d& a) {
   Eigen::Matrix3d skew;
   skew << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
   return skew;
 }
 
-// Turn about the axis of a vector by its length in radians (the exponential map of SO(3)).
+// Rotation about the axis `turn_rad` by its length in radians (the exponential map of SO(3)).
 inline Eigen::Matrix3d ExpRotationMatrix(const Eigen::Vector3d& turn_rad) {
   const double angle_rad = turn_rad.norm();
   if (angle_rad == 0) return Eigen::Matrix3d::Identity();

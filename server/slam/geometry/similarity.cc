@@ -15,8 +15,8 @@ namespace {
 constexpr int kSampleSize = 3;
 constexpr int kRefineRounds = 5;
 constexpr int kIterationsPerRound = 8;
-// Of the singular values of the points' correlation, the second over the first: below, the points lie on a line (to a
-// hundredth of its length), and any turn about it fits.
+// Minimum ratio of the second to the first singular value of the points' correlation. Below it, the points are
+// collinear (to a hundredth of their extent), and the rotation about the line is undetermined.
 constexpr double kLineShare = 1e-4;
 
 Similarity FromSim3(const Sim3<Camera, Camera>& S) {
@@ -97,7 +97,8 @@ std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std
     const int inliers = MarkInliers(camera, FromSim3(*start), matches, options, inlier);
     if (inliers <= most_inliers) continue;
     most_inliers = inliers;
-    // Refined at once (Chum et al. 2003): three points with noisy depths miss many that agree.
+    // Refined immediately (Chum et al. 2003), because a similarity from three points with noisy depths misses many
+    // inliers.
     SimilarityEstimate refined = RefineSimilarity(camera, *start, matches, options);
     if (best && refined.inliers <= best->inliers) continue;
     best = std::move(refined);

@@ -11,7 +11,7 @@
 
 namespace romap::slam {
 
-// p_to = scale * rotation * p_from + translation, without the names of the frames.
+// p_to = scale * rotation * p_from + translation, without frame types.
 struct PointAlignment {
   double scale = 1;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
@@ -20,8 +20,8 @@ struct PointAlignment {
 std::optional<PointAlignment> AlignPointSets(std::span<const Eigen::Vector3d> p_from,
                                              std::span<const Eigen::Vector3d> p_to, bool fix_scale);
 
-// Least-squares similarity p_to = S * p_from (Umeyama 1991) of points that correspond by index. `fix_scale`: scale
-// is 1. nullopt: fewer than three points, different counts, or all on a line.
+// Least-squares similarity p_to = S * p_from (Umeyama 1991) of points that correspond by index. `fix_scale`: scale is
+// 1. nullopt: fewer than three points, different counts, or collinear points.
 template <class To, class From>
 std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_from,
                                           std::span<const Eigen::Vector3d> p_to, bool fix_scale) {
@@ -32,8 +32,8 @@ std::optional<Sim3<To, From>> AlignPoints(std::span<const Eigen::Vector3d> p_fro
 
 // A point that two keyframes observe, with its position in the map of each.
 struct SimilarityMatch {
-  Eigen::Vector3d p_first = Eigen::Vector3d::Zero();   // in the first camera's frame, by the first's map
-  Eigen::Vector3d p_second = Eigen::Vector3d::Zero();  // in the second camera's frame, by the second's map
+  Eigen::Vector3d p_first = Eigen::Vector3d::Zero();   // in the first camera's frame, from its map
+  Eigen::Vector3d p_second = Eigen::Vector3d::Zero();  // in the second camera's frame, from its map
   Eigen::Vector2d first_px = Eigen::Vector2d::Zero();
   Eigen::Vector2d second_px = Eigen::Vector2d::Zero();
   double first_sigma_px = 1;
@@ -54,13 +54,14 @@ struct SimilarityEstimate {
   int inliers = 0;
 };
 
-// The similarity between two cameras' maps from matches that may be wrong: AlignPoints on three matches in RANSAC,
-// inliers by reprojection into both cameras, then Levenberg-Marquardt on both reprojection errors of the inliers (seven
-// parameters; Huber), repeated until the inliers stay. nullopt when there are fewer than `min_inliers`.
+// Estimates the similarity between the maps of two cameras from matches with outliers: AlignPoints on three matches in
+// RANSAC, inliers by reprojection into both cameras, then Levenberg-Marquardt on both reprojection errors of the
+// inliers (seven parameters; Huber), repeated until the set of inliers no longer changes. nullopt if there are fewer
+// than `min_inliers`.
 std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std::span<const SimilarityMatch> matches,
                                                   const SimilarityOptions& options);
 
-// The refinement alone, from a known start. Inliers are selected by the bound.
+// Only the refinement, from a known start. The bound selects the inliers.
 SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera, Camera>& start,
                                     std::span<const SimilarityMatch> matches, const SimilarityOptions& options);
 

@@ -7,14 +7,14 @@
 namespace romap::slam {
 namespace {
 
-// What a match costs that a step takes behind a camera: see reprojection.cc.
+// Cost of a match that a step moves behind a camera; see reprojection.cc.
 constexpr double kCostBehindCamera = 1e4;
-// Keeps the normal equations regular if the scale is fixed.
+// Keeps the normal equations nonsingular if the scale is fixed.
 constexpr double kIdleInformation = 1;
 
 using PointDerivative = Eigen::Matrix<double, 3, 7>;
 
-// Derivative of the pixel by the point, over the standard deviation.
+// Derivative of the pixel with respect to the point, divided by the standard deviation.
 Eigen::Matrix<double, 2, 3> ProjectionDerivative(const CameraModel& camera, const Eigen::Vector3d& p, double sigma_px) {
   const double inverse_z = 1 / p.z();
   const double fx = camera.fx_px * inverse_z / sigma_px;
@@ -53,7 +53,8 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
     equations.cost += kCostBehindCamera;
     return;
   }
-  // The step moves the point of the second in the first camera's frame; on the point of the first, it acts backwards.
+  // The step moves the second camera's point in the first camera's frame. The inverse of the step moves the first
+  // camera's point.
   PointDerivative moved_first;
   moved_first << Eigen::Matrix3d::Identity(), -Skew(errors.second_in_first), errors.second_in_first;
   PointDerivative moved_back;

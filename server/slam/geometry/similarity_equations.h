@@ -15,22 +15,22 @@ struct Similarity {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 };
 
-// Residuals of a match for a similarity, in units of the pixels' standard deviations: the second's point in the
-// first camera, and the first's in the second.
+// Residuals of a match for a similarity, in units of the pixels' standard deviations: the second camera's point
+// projected into the first camera, and vice versa.
 struct SimilarityErrors {
   Eigen::Vector3d second_in_first;  // the points, each in the other camera's frame
   Eigen::Vector3d first_in_second;
   Eigen::Vector2d first = Eigen::Vector2d::Zero();
   Eigen::Vector2d second = Eigen::Vector2d::Zero();
-  bool is_in_front_of_both = false;  // else there are no errors
+  bool is_in_front_of_both = false;  // false: the errors are not set
 };
 
 SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match);
 
 using SimilarityEquations = NormalEquations<7>;
 
-// Adds both errors of a match, each with Huber's weight at the options' bound. With a fixed scale the seventh parameter
-// has no effect. Parameters as in MovedSimilarity.
+// Adds both errors of a match, each with the Huber weight for options.chi2_bound. With a fixed scale, the seventh
+// parameter has no effect. For the parameters, see MovedSimilarity.
 void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match,
                          const SimilarityOptions& options, SimilarityEquations& equations);
 

@@ -13,11 +13,11 @@ namespace romap::slam {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180;
-// The homography's share of the support of both models from which on the scene counts as planar (Mur-Artal et al.
+// The scene counts as planar if the homography has more than this share of the support of both models (Mur-Artal et al.
 // 2015).
 constexpr double kPlanarShare = 0.45;
 
-// Fills in the points, their number and the parallax; returns the number of matches that agree with the motion.
+// Sets the points, their number and the parallax of `result`. Returns the number of matches that agree with the motion.
 int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches,
                 TwoViewResult& result) {
   const Eigen::Matrix3d essential = motion.Essential();
@@ -37,7 +37,7 @@ int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const
   return static_cast<int>(parallaxes_rad.size());
 }
 
-// How much of the matches a camera explains that only turned.
+// Support of a pure rotation.
 double TurnSupport(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches) {
   return search.homography ? TransferSupport(camera, FitTurn(camera, *search.homography, matches), matches) : 0;
 }

@@ -30,7 +30,7 @@ struct ObservationError {
   bool beyond_bound = true;
 };
 
-// The default applies to invalid numbers and to points behind the camera.
+// Returns the default values for invalid numbers and for points behind the camera.
 ObservationError Measure(const BundleProblem& problem, const BundleObservation& observation) {
   ObservationError error;
   if (!IsSound(problem, observation)) return error;
@@ -68,7 +68,7 @@ double RmsPx(const BundleProblem& problem, const std::vector<uint8_t>& use) {
   return weights > 0 ? std::sqrt(sum / weights) : 0;
 }
 
-// The observations to use: no outliers, in front of the camera and, if requested, within the bound.
+// Selects the observations to use: not marked as outliers, in front of the camera and, if requested, within the bound.
 std::vector<uint8_t> Select(const BundleProblem& problem, bool within_bound) {
   std::vector<uint8_t> use(problem.observations.size(), 0);
   for (size_t i = 0; i < use.size(); ++i) {

@@ -12,7 +12,7 @@
 
 namespace romap::slam {
 
-// What is believed of a pose from elsewhere (a client's tracker): a soft constraint.
+// A pose estimate from another source (the client's tracker), used as a soft constraint.
 struct PosePrior {
   SE3<World, Camera> T_world_camera;
   double rotation_sigma_rad = 0.01;
@@ -37,19 +37,19 @@ struct BundleObservation {
   double sigma_px = 1;
   double depth_mu = 0;  // measured z depth, 0 = unknown
   double depth_sigma_mu = 0;
-  bool outlier = false;  // in: left out of the problem. out: its error is beyond the 95 % bound
+  bool outlier = false;  // in: ignored. out: the error exceeds the 95 % bound
 };
 
-// A lens to be found along with the rest.
+// Lens distortion to be estimated.
 struct BundleLens {
-  RadialCorrection correction = {};  // in: the start. out: what fits
-  double sigma = 0.03;               // standard deviation of its k1 around 0 before anything is seen
+  RadialCorrection correction = {};  // in: initial value. out: estimate
+  double sigma = 0.03;               // standard deviation of the prior of k1, whose mean is 0
 };
 
 struct BundleProblem {
   CameraModel camera;  // of all cameras; pinhole
-  std::optional<BundleLens>
-      lens;  // of all cameras; then pixels are as the picture shows them, else as the pinhole does
+  // Of all cameras. If set, observations are pixels of the uncorrected image, else of the pinhole image.
+  std::optional<BundleLens> lens;
   std::vector<BundleCamera> cameras;
   std::vector<BundlePoint> points;
   std::vector<BundleObservation> observations;
@@ -57,18 +57,19 @@ struct BundleProblem {
 
 struct BundleOptions {
   int max_iterations = 10;
-  // A relative fall of the cost per iteration below which the map no longer changes visibly. Where all of a map bends
-  // together, or with the lens, many small falls add up.
+  // Stops when an iteration reduces the cost by less than this share. The default is sufficient for local changes. If
+  // the whole map bends, or with a lens, many small reductions add up, and a smaller value is needed.
   double function_tolerance = 1e-4;
-  bool reject_outliers = true;  // after half of the iterations, beyond the bound; they may come back at the end
+  bool reject_outliers = true;  // those beyond the bound, after half of the iterations; all are reclassified at the end
   bool dense = false;           // few cameras: DENSE_SCHUR instead of SPARSE_SCHUR
   int threads = 1;
-  const std::atomic<bool>* abort = nullptr;  // looked at in every iteration; what was reached is kept
+  const std::atomic<bool>* abort = nullptr;  // checked in every iteration; the state reached is kept
 };
 
 struct BundleSummary {
   int iterations = 0;
-  // Root mean square reprojection error over the observations used (at last only the inliers), weighted by 1 / sigma^2.
+  // Root mean square reprojection error, weighted by 1 / sigma^2, over the observations used (in the end only the
+  // inliers).
   double initial_rms_px = 0;
   double final_rms_px = 0;
   int outliers = 0;
@@ -78,13 +79,14 @@ struct BundleSummary {
 
 // Bundle adjustment (Triggs et al. 2000) with Ceres: reprojection errors (and inverse-depth errors where depth was
 // measured), Huber loss at the 95 % bound, analytic Jacobians, right-multiplied SE3 increments, points eliminated by
-// the Schur complement. With `lens` the cameras' common rest of a lens is found too (self-calibration: Triggs et al.,
-// section 6.3); orbits and hands turn and tilt enough to tell it from the scene. Deterministic with one thread. The
-// caller fixes the gauge through `fixed` cameras (two for a monocular map, or the far end of the window).
+// the Schur complement. With `lens`, the remaining distortion of the cameras' common lens is estimated too
+// (self-calibration: Triggs et al., section 6.3). Hand-held and orbiting cameras rotate enough to separate it from the
+// shape of the scene. Deterministic with one thread. The caller fixes the gauge through `fixed` cameras (two for a
+// monocular map, or the far end of the window).
 //
-// Left out, and left as they are: points that no free camera sees, points that one camera sees without depth, and
-// observations that make no sense (index out of range, numbers not finite, sigma not positive, point behind the
-// camera). At the end all observations are judged, also those left out, unless the result is not usable.
+// Ignored and left unchanged: points that no free camera observes, points that a single camera observes without depth,
+// and invalid observations (index out of range, numbers not finite, sigma not positive, point behind the camera). At
+// the end, `outlier` is set for all observations, including ignored ones, unless the result is not usable.
 BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace romap::slam

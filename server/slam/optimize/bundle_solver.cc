@@ -20,7 +20,7 @@ class AbortCallback : public ceres::IterationCallback {
  public:
   explicit AbortCallback(const std::atomic<bool>* abort) : abort_(abort) {}
 
-  // Termination "with success" makes Ceres keep what was reached.
+  // SOLVER_TERMINATE_SUCCESSFULLY makes Ceres keep the state reached.
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*summary*/) override {
     if (abort_ == nullptr || !abort_->load(std::memory_order_relaxed)) return ceres::SOLVER_CONTINUE;
     aborted_ = true;
@@ -38,8 +38,8 @@ bool IsUsable(const PosePrior& prior) {
          std::isfinite(prior.rotation_sigma_rad) && std::isfinite(prior.translation_sigma_mu);
 }
 
-// A bundle problem in the form of Ceres. Lengths are divided by the typical distance from camera to point, so that
-// tolerances and damping mean the same whatever the map's unit.
+// Solves a bundle problem with Ceres. Lengths are divided by the typical distance from camera to point, so that the
+// effect of tolerances and damping does not depend on the map's unit.
 class BundleSolver {
  public:
   BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& use);
@@ -67,7 +67,7 @@ class BundleSolver {
   std::vector<std::array<double, 3>> points_;
   std::vector<uint8_t> varied_cameras_;  // per camera: has a free parameter block in the Ceres problem
   std::vector<uint8_t> varied_points_;   // per point
-  double lens_k1_ = 0;                   // of RadialCorrection, where the problem has a lens
+  double lens_k1_ = 0;                   // of RadialCorrection, if the problem has a lens
 
   RefreshCameras refresh_{&cameras_};
   ceres::HuberLoss loss_{std::sqrt(kChi2Bound2)};
@@ -79,7 +79,7 @@ class BundleSolver {
   std::deque<LensedCost<ReprojectionDepthCost>> lensed_depth_costs_;
   std::deque<PosePriorCost> prior_costs_;
   std::unique_ptr<ceres::NormalPrior> lens_prior_;
-  ceres::Problem ceres_;  // last: it refers to all the others
+  ceres::Problem ceres_;  // last, because it refers to the other members
 };
 
 ceres::Problem::Options BundleSolver::ProblemOptions(RefreshCameras* refresh) {
@@ -142,7 +142,7 @@ void BundleSolver::SelectPoints() {
     if (!problem_.cameras[observation.camera].fixed) point.from_free_camera = true;
   }
   for (size_t i = 0; i < use_.size(); ++i) {
-    if (!use_[i]) continue;  // its indices may be wrong
+    if (!use_[i]) continue;  // its indices may be invalid
     const Observations& point = observations_of[problem_.observations[i].point];
     const bool fixed = problem_.points[problem_.observations[i].point].fixed;
     use_[i] = point.from_free_camera && (fixed || point.constraints >= 2);
@@ -172,7 +172,7 @@ void BundleSolver::AddObservations() {
   }
 }
 
-// The newest of `costs`, with the lens where it is to be found.
+// Adds the last entry of `costs` as a residual, with the lens if the problem has one.
 template <class Cost>
 void BundleSolver::AddResidual(const BundleObservation& observation, std::deque<Cost>& costs,
                                std::deque<LensedCost<Cost>>& lensed, ceres::LossFunction* loss) {
@@ -214,9 +214,9 @@ ceres::Solver::Options BundleSolver::SolverOptions(const BundleOptions& options,
   solver.num_threads = std::max(1, options.threads);
   solver.linear_solver_type = options.dense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.logging_type = ceres::SILENT;
-  // In the solver's own unit the columns are of like size already, and the damping follows their norms.
+  // In the unit of the solver, the columns already have similar norms, and the damping is scaled by these norms.
   solver.jacobi_scaling = false;
-  // The points are eliminated first; given here, because Ceres would have to search for independent sets.
+  // The points are eliminated first. Without this ordering, Ceres would have to search for independent sets.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (size_t i = 0; i < points_.size(); ++i) {
     if (varied_points_[i]) ordering->AddElementToGroup(points_[i].data(), 0);
@@ -250,7 +250,7 @@ void BundleSolver::Run(const BundleOptions& options, int max_iterations, BundleR
   run.usable = begun && summary.IsSolutionUsable() && WriteBack();
 }
 
-// False, and nothing written, when a number is not finite.
+// Returns false and writes nothing if a number is not finite.
 bool BundleSolver::WriteBack() const {
   if (!std::isfinite(lens_k1_)) return false;
   for (size_t i = 0; i < cameras_.size(); ++i) {

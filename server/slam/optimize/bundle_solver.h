@@ -18,14 +18,14 @@ inline bool HasDepth(const BundleObservation& observation) {
 // One run of Ceres on a bundle problem.
 struct BundleRun {
   int iterations = 0;
-  bool usable = false;     // false: the problem is as it was
+  bool usable = false;     // false: the problem is unchanged
   bool converged = false;  // more iterations would not change it
   bool aborted = false;
-  double trust_region_radius = 1e4;  // in: to start with; out: reached
+  double trust_region_radius = 1e4;  // in: initial value. out: final value
 };
 
 // Moves the free cameras and points of `problem` so that the observations with `use` != 0 fit best. These must be
-// sound: indices in range, finite numbers, sigmas > 0, depths finite.
+// valid: indices in range, finite numbers, sigmas > 0, depths finite.
 void RunBundle(BundleProblem& problem, const std::vector<uint8_t>& use, const BundleOptions& options,
                int max_iterations, BundleRun& run);
 

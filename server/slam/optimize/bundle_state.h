@@ -10,15 +10,16 @@
 
 namespace romap::slam {
 
-// A camera in the optimization: a start and an increment on it, R = R_start * Exp(w), t = t_start + R_start * v.
-// The increment is what Ceres varies. Being a plain vector of six it needs no Manifold, by whose Jacobian Ceres would
-// multiply (with sizes known only at run time) that of each of thousands of observations; and all that the observations
-// of a camera have in common is computed once per evaluation (Refresh) instead of once for each.
+// A camera in the optimization: a start pose and an increment, R = R_start * Exp(w), t = t_start + R_start * v. Ceres
+// varies the increment. It is a plain vector of size 6 and needs no Manifold. With a Manifold, Ceres would multiply the
+// Jacobian of each of thousands of observations by the Jacobian of the Manifold, with sizes known only at run time.
+// Values that the observations of a camera share are computed once per evaluation (Refresh) instead of once per
+// observation.
 struct CameraState {
-  // `start` in the lengths of the optimization.
+  // `start`: lengths in the unit of the optimization.
   explicit CameraState(const SE3<World, Camera>& start);
 
-  // Brings what follows `increment` up to date.
+  // Recomputes the members that depend on `increment`.
   void Refresh();
   SE3<World, Camera> Pose() const;
 
@@ -31,8 +32,8 @@ struct CameraState {
   // At the current increment:
   Eigen::Matrix3d R_camera_world;
   Eigen::Vector3d t_world_camera;
-  Eigen::Matrix3d rotation_jacobian;     // right Jacobian at w: turn of the camera, in its own frame, by change of w
-  Eigen::Matrix3d translation_jacobian;  // Exp(-w): shift of the camera, in its own frame, by change of v
+  Eigen::Matrix3d rotation_jacobian;  // right Jacobian at w: rotation of the camera, in its own frame, per change of w
+  Eigen::Matrix3d translation_jacobian;  // Exp(-w): translation of the camera, in its own frame, per change of v
 };
 
 // Refreshes all cameras before Ceres evaluates.

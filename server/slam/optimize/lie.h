@@ -9,17 +9,17 @@
 
 namespace romap::slam {
 
-// Exponentials of rotations and similarities and what optimization needs of them (Sola et al., "A micro Lie theory for
-// state estimation in robotics", 2018; Strasdat, "Local accuracy and global consistency for efficient visual SLAM",
-// 2012, for sim(3)). Increments are right-multiplied: X * Exp(d).
+// Exponentials, logarithms and Jacobians of rotations and similarities (Sola et al., "A micro Lie theory for state
+// estimation in robotics", 2018; Strasdat, "Local accuracy and global consistency for efficient visual SLAM", 2012, for
+// sim(3)). Increments are right-multiplied: X * Exp(d).
 
 // Vector of sim(3): rotation vector (rad), translation (units of the frame), logarithm of the scale.
 using Sim3Vector = Eigen::Matrix<double, 7, 1>;
 using Sim3Matrix = Eigen::Matrix<double, 7, 7>;
 
 // phi_1(A) = sum of A^n / (n + 1)!, the integral of exp(s A) over s in [0, 1]. The translation part of every
-// exponential and every Jacobian here is this one entire function, so there are no cases to tell near zero angle or
-// unit scale. Accurate to rounding for eigenvalues up to about ten; A finite.
+// exponential and every Jacobian here uses this function. It is entire, so zero angle and unit scale need no special
+// cases. Accurate to rounding for eigenvalues up to about ten. Requires a finite A.
 template <int N>
 Eigen::Matrix<double, N, N> IntegratedExponential(const Eigen::Matrix<double, N, N>& a) {
   constexpr int kMaxTerms = 200;
@@ -36,7 +36,7 @@ Eigen::Matrix<double, N, N> IntegratedExponential(const Eigen::Matrix<double, N,
 // The matrix of the cross product: Hat(a) * b = a x b.
 Eigen::Matrix3d Hat(const Eigen::Vector3d& a);
 
-// Rotation by |w| (rad) about w, and back; the logarithm's length is at most pi.
+// Rotation by |w| (rad) about w, and its inverse. The length of the logarithm is at most pi.
 Eigen::Quaterniond ExpRotation(const Eigen::Vector3d& rotation_rad);
 Eigen::Vector3d LogRotation(const Eigen::Quaterniond& rotation);
 
@@ -52,7 +52,7 @@ Sim3<Frame, Frame> ExpSim3(const Sim3Vector& v) {
   return {std::exp(v[6]), ExpRotation(v.head<3>()), IntegratedExponential<3>(generator) * v.segment<3>(3)};
 }
 
-// Inverse of ExpSim3 for rotations up to pi. S finite, scale > 0.
+// Inverse of ExpSim3 for rotations up to pi. Requires a finite S with scale > 0.
 template <class Frame>
 Sim3Vector LogSim3(const Sim3<Frame, Frame>& S) {
   Sim3Vector v;

@@ -48,7 +48,7 @@ bool HangsTogether(const std::vector<PoseGraphNode>& nodes, const std::vector<Po
   return true;
 }
 
-// Median length of the edges, 1 if that is 0.
+// Median length of the edges; 1 if the median is 0.
 double TypicalLengthMu(const std::vector<PoseGraphEdge>& edges) {
   std::vector<double> lengths_mu;
   for (const PoseGraphEdge& edge : edges) lengths_mu.push_back(edge.S_a_b.translation().norm());
@@ -61,13 +61,13 @@ Sim3<To, From> WithLengthsTimes(double factor, const Sim3<To, From>& S) {
   return {S.scale(), S.rotation(), factor * S.translation()};
 }
 
-// A pose graph in the form of Ceres.
+// Solves a pose graph with Ceres.
 class PoseGraphSolver {
  public:
   PoseGraphSolver(const std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges, bool fix_scale);
 
   PoseGraphSummary Run(int max_iterations);
-  // False, and nothing written, when a number is not finite.
+  // Returns false and writes nothing if a number is not finite.
   bool WriteBack(std::vector<PoseGraphNode>& nodes) const;
 
  private:
@@ -78,7 +78,7 @@ class PoseGraphSolver {
   RefreshNodes refresh_{&states_};
   ceres::SubsetManifold scale_held_{7, {kScaleComponent}};
   std::deque<RelativePoseCost> costs_;  // costs cannot be moved, hence no vector
-  ceres::Problem ceres_;                // last: it refers to all the others
+  ceres::Problem ceres_;                // last, because it refers to the other members
 };
 
 ceres::Problem::Options PoseGraphSolver::ProblemOptions(RefreshNodes* refresh) {

@@ -16,7 +16,7 @@ struct PoseGraphEdge {
   int a = 0;
   int b = 0;
   Sim3<Camera, Camera> S_a_b;
-  double weight = 1;  // times the squared residual
+  double weight = 1;  // factor of the squared residual
 };
 
 struct PoseGraphOptions {

@@ -30,8 +30,8 @@ bool RelativePoseCost::Evaluate(double const* const* /*parameters*/, double* res
   if (jacobians == nullptr) return true;
 
   using Jacobian = Eigen::Map<Eigen::Matrix<double, 7, 7, Eigen::RowMajor>>;
-  // The logarithm by a right-multiplied increment. An increment d on b is one on the argument; on a it is
-  // -Adjoint(S_a_b^-1) * d.
+  // Derivative of the logarithm with respect to a right-multiplied increment of its argument. An increment d of b is an
+  // increment d of the argument; an increment d of a is an increment -Adjoint(S_a_b^-1) * d of the argument.
   const Sim3Matrix by_argument = root_weight_ * RightJacobianOfSim3(error).inverse();
   if (jacobians[0] != nullptr) {
     Jacobian by_a(jacobians[0]);

@@ -10,19 +10,19 @@
 
 namespace romap::slam {
 
-// A node in the optimization: a start and an increment on it, S = S_start * Exp(increment). Values that edges share are
+// A node in the optimization: a start and an increment, S = S_start * Exp(increment). Values that edges share are
 // computed once per evaluation (Refresh).
 struct NodeState {
-  // `start` in the lengths of the optimization.
+  // `start`: lengths in the unit of the optimization.
   explicit NodeState(const Sim3<World, Camera>& start);
 
-  // Brings S_world_camera and the Jacobian up to date with the increment.
+  // Recomputes S_world_camera and the Jacobian from the increment.
   void Refresh();
 
   std::array<double, 7> increment{};  // of sim(3)
   Sim3<World, Camera> start;
   Sim3<World, Camera> S_world_camera;  // at the increment
-  Sim3Matrix increment_jacobian;       // of the increment, to a right-multiplied one at S_world_camera
+  Sim3Matrix increment_jacobian;       // from the increment to a right-multiplied increment at S_world_camera
 };
 
 // Refreshes all nodes before Ceres evaluates.
@@ -36,8 +36,8 @@ class RefreshNodes : public ceres::EvaluationCallback {
   std::vector<NodeState>* nodes_;
 };
 
-// Residual sqrt(weight) * log(S_a_b^-1 * S_world_a^-1 * S_world_b) with analytic Jacobians by the increments of a and
-// b. Reads the states, which must have been refreshed and must outlive the cost.
+// Residual sqrt(weight) * log(S_a_b^-1 * S_world_a^-1 * S_world_b) with analytic Jacobians with respect to the
+// increments of a and b. Reads the states, which must have been refreshed and must outlive the cost.
 class RelativePoseCost final : public ceres::SizedCostFunction<7, 7, 7> {
  public:
   RelativePoseCost(const NodeState* a, const NodeState* b, const Sim3<Camera, Camera>& S_a_b, double weight);

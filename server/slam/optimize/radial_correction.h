@@ -6,9 +6,9 @@
 
 namespace romap::slam {
 
-// Lens distortion that the client's calibration does not model. Many cameras are calibrated as plain pinholes although
-// they are none, which bends the whole map. Brown's first radial term models most of it: a point that a pinhole images
-// at m = (p - c) / f is in the image at m (1 + k1 |m|^2).
+// Lens distortion that the client's calibration does not model. Many cameras are calibrated as pinhole cameras although
+// their lenses have distortion, which bends the whole map. Brown's first radial term models most of it: a point at m =
+// (p - c) / f in a pinhole image is at m (1 + k1 |m|^2) in the actual image.
 struct RadialCorrection {
   double k1 = 0;
 

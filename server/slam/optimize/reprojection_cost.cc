@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-// In units of sigma, per residual; far beyond any bound, and Huber's loss makes it grow only linearly.
+// In units of sigma, per residual. Far beyond any bound, where the Huber loss is linear.
 constexpr double kResidualWithoutImage = 100;
 
 Eigen::Vector3d PointInCamera(const CameraState& state, const double* p_world) {
@@ -21,8 +21,8 @@ void SetWithoutImage(int rows, double* residuals, double** jacobians) {
   if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 3 * rows, 0.0);
 }
 
-// Row `row` of the Jacobians from the derivative of its residual by the point in the camera's frame: when the camera
-// turns, that point moves by Hat(p_camera) times the turn, when it shifts, by minus the shift.
+// Sets row `row` of the Jacobians from `by_p_camera`, the derivative of the residual with respect to the point in the
+// camera's frame. A rotation w of the camera moves that point by Hat(p_camera) * w, a translation v by -v.
 void SetJacobianRow(int row, const CameraState& state, const Eigen::Vector3d& p_camera,
                     const Eigen::RowVector3d& by_p_camera, double** jacobians) {
   if (jacobians[0] != nullptr) {

@@ -12,11 +12,11 @@
 namespace romap::slam {
 
 // Residuals of bundle adjustment, each divided by its standard deviation, with analytic Jacobians. Parameters: the
-// camera's increment (6, see CameraState) and the point (3, world). Each reads its camera's state, which must have been
-// refreshed for the increment and must outlive the cost. Lengths are those of the optimization.
+// camera's increment (6, see CameraState) and the point (3, world). Each cost reads the state of its camera, which must
+// have been refreshed for the increment and must outlive the cost. Lengths are in the unit of the optimization.
 
-// A point nearer to the image plane than this has no usable image: its residual is a constant large one without
-// Jacobian, so that a step that takes a point behind a camera costs, but does not fail.
+// A point with a smaller z depth than this has no usable projection. Its residual is a large constant with zero
+// Jacobian, so that a step that moves a point behind a camera is penalized but does not fail.
 inline constexpr double kMinBundleDepth = 1e-3;
 
 // Pixel error (x, y).
@@ -52,9 +52,9 @@ class ReprojectionDepthCost final : public ceres::SizedCostFunction<3, 6, 3> {
   double weight_;    // 1 / sigma of the inverse depth
 };
 
-// One of the costs above, with a third parameter: k1 of the lens (see RadialCorrection). `cost` uses the pixel in
-// the image and outlives this one. The error is measured in the image, because in the corrected image it would
-// decrease with the size of that image.
+// One of the costs above, with a third parameter: k1 of the lens (see RadialCorrection). `cost` uses the pixel of the
+// uncorrected image and must outlive this object. The error is measured in the uncorrected image, because in the
+// corrected image it could be reduced by shrinking that image.
 template <class Cost>
 class LensedCost final : public ceres::SizedCostFunction<Cost::kResiduals, 6, 3, 1> {
  public:

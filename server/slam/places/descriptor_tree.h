@@ -45,7 +45,7 @@ class DescriptorTree {
   size_t bytes() const;  // of all arrays
 
  private:
-  // Small leaves cost fewer comparisons and lose more neighbors across their borders.
+  // Smaller leaves need fewer comparisons but lose more neighbors across their borders.
   static constexpr size_t kLeafEntries = 256;
 
   struct Node {

@@ -6,10 +6,10 @@
 namespace romap::slam {
 namespace {
 
-// ORB features of one corner differ by some 10-20 % of their 256 bits between views, those of different corners by
-// half.
+// ORB features of one corner differ in about 10-20 % of their 256 bits between views, those of different corners in
+// about half.
 constexpr int kMaxDistanceBits = 50;
-// Number of words searched per feature. With one, most neighbors beyond its border would be lost.
+// Number of words searched per feature. With only one word, most neighbors across its border would be lost.
 constexpr int kLeavesPerFeature = 2;
 
 // The votes of one query.
@@ -17,7 +17,7 @@ class Votes {
  public:
   explicit Votes(size_t slots) : votes_(slots, 0.0), nearest_(slots, kNone) {}
 
-  // Another descriptor of `slot` that is similar to the current feature.
+  // Records a descriptor of `slot` that is similar to the current feature.
   void See(uint32_t slot, int distance) {
     if (nearest_[slot] == kNone) seen_.push_back(slot);
     nearest_[slot] = std::min(nearest_[slot], distance);
@@ -27,7 +27,7 @@ class Votes {
   double Count(double keyframes) {
     const double weight = std::log((keyframes + 1) / (static_cast<double>(seen_.size()) + 0.5));
     for (const uint32_t slot : seen_) {
-      // Wrong neighbors are mostly far, true ones near.
+      // True neighbors mostly have a smaller distance than wrong ones.
       votes_[slot] += weight * (1 - static_cast<double>(nearest_[slot]) / (kMaxDistanceBits + 1));
       nearest_[slot] = kNone;
     }

@@ -17,8 +17,8 @@ struct PlaceMatch {
   double score = 0;  // 0..1, comparable between queries
 };
 
-// Finds keyframes that show the same place, by their binary descriptors alone and without a vocabulary file. For one
-// thread at a time.
+// Finds keyframes that show the same place, by their binary descriptors alone and without a vocabulary file. Not
+// thread-safe.
 //
 // An inverted index whose words are the leaves of a tree that grows with the keyframes. A word stores whole
 // descriptors, so that a feature votes only for keyframes with a similar descriptor (Hamming embedding: Jegou et al.,
@@ -31,14 +31,15 @@ class PlaceIndex {
   // Replaces the features of a keyframe that was added before.
   void Add(KeyframeId keyframe, std::span<const Feature> features);
   void Remove(KeyframeId keyframe);  // ignored if unknown
-  // The `max_results` best, best first. Features that match many keyframes score less. The same image scores about 1;
-  // on hand-held video, other views of the same place score 0.005 to 0.04, and those of other places up to 0.01.
+  // At most `max_results` matches, best first. Features that match many keyframes score less. The same image scores
+  // about 1; on hand-held video, other views of the same place score 0.005 to 0.04, and views of other places up to
+  // 0.01.
   std::vector<PlaceMatch> Query(std::span<const Feature> features, int max_results) const;
   size_t size() const { return slots_of_.size(); }
   size_t bytes() const;  // approximate, for statistics
 
  private:
-  // A keyframe, by DescriptorTree::Entry::owner.
+  // A keyframe. DescriptorTree::Entry::owner is the index of its slot.
   struct Slot {
     KeyframeId keyframe;  // none: removed, or free
     size_t features = 0;

@@ -7,9 +7,9 @@
 namespace romap::slam {
 namespace {
 
-// Height over base of the flattest triangle with a usable normal.
+// Minimum ratio of height to base of a triangle with a usable normal.
 constexpr double kMinTriangleHeight = 0.1;
-// Least spread across a line of points, relative to the spread along it.
+// Minimum spread of the points across their main axis, relative to the spread along it.
 constexpr double kMinSpreadRatio = 1e-3;
 
 }  // namespace
@@ -48,8 +48,8 @@ std::optional<PlaneFit> FitPlane(std::span<const Eigen::Vector3d> points, std::s
   fit.plane.normal = axes.eigenvectors().col(0);
   if (fit.plane.normal.dot(up) < 0) fit.plane.normal = -fit.plane.normal;
   fit.plane.offset_mu = fit.plane.normal.dot(mean);
-  // Tilt towards an in-plane axis is the slope of the heights along it: a separate one-parameter fit, because
-  // the axes are the principal ones.
+  // The tilt toward an in-plane axis is the slope of the heights along it: a separate one-parameter fit, because the
+  // axes are the principal ones.
   double variance = 0;
   for (int axis = 1; axis < 3; ++axis) {
     double noise = 0;

@@ -32,7 +32,7 @@ constexpr double kInlierSigmas = 2.5;
 constexpr double kFarWeight = 0.3;
 constexpr double kReach = 0.25;  // distance around an object in which its support is searched
 constexpr double kMinCamerasAbove = 0.9;
-// The estimated deviation covers scatter only; maps are also bent, and tables are not exactly flat.
+// Minimum standard deviation: the estimate covers only scatter, but maps are also bent and tables are not exactly flat.
 constexpr double kSigmaFloor_rad = 0.3 * kDegree;
 constexpr double kMinConfidence = 0.05;
 constexpr size_t kMaxObjectPoints = 300;
@@ -143,11 +143,11 @@ double Support(const Scene& scene, const Plane& plane) {
   return support;
 }
 
-// Refits the plane and reselects its points in turns: Tukey's biweight with the scale of the residuals, because the
-// given uncertainties are often wrong by a factor. nullopt: no plane fits.
+// Alternates between reweighting the points and refitting the plane. The weights are Tukey's biweight, with a scale
+// estimated from the residuals because the given uncertainties are often wrong by a factor. nullopt: no plane fits.
 std::optional<PlaneFit> Refine(const Scene& scene, const Plane& start) {
   PlaneFit fit{.plane = start, .sigma_rad = 0};
-  double scale = 1;  // of a residual, in the points' own sigmas
+  double scale = 1;  // of the residuals, in units of the points' sigmas
   for (int round = 0; round < kRefinements; ++round) {
     std::vector<double> near;
     std::vector<double> weights(scene.points.size(), 0.0);
@@ -181,8 +181,8 @@ double Score(const Scene& scene, const Plane& plane) {
   return IsLevel(scene, plane) ? Support(scene, plane) * ObjectsStandOn(scene, plane) : 0;
 }
 
-// Promising planes through three points drawn by their weights, best first (RANSAC with the score of MSAC:
-// Torr and Zisserman, 2000).
+// Promising planes through three points drawn in proportion to their weights, best first (RANSAC with the score of
+// MSAC: Torr and Zisserman, 2000).
 std::vector<Candidate> SearchPlanes(const Scene& scene, uint64_t seed) {
   std::mt19937_64 random(seed);
   std::discrete_distribution<size_t> draw(scene.weights.begin(), scene.weights.end());
@@ -206,8 +206,8 @@ struct FoundPlane {
   double score = 0;
 };
 
-// How likely `other` would be as good as `best` with another sample of points from the same surfaces: 1 if it is as
-// good, and less the more points contradict it. Points that agree with both do not count.
+// Likelihood that `other` would score as high as `best` with another sample of points from the same surfaces: 1 if the
+// scores are equal, and smaller the more points contradict `other`. Points that agree with both do not count.
 double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlane& other) {
   const double best_stands = ObjectsStandOn(scene, best.fit.plane);
   const double other_stands = ObjectsStandOn(scene, other.fit.plane);
@@ -220,8 +220,8 @@ double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlan
   return worse_by > 0 ? std::exp(-worse_by * worse_by / (2 * variance)) : 1;
 }
 
-// The best of the candidates after refinement. Other planes may explain the points about as well, as with few points
-// and clutter next to the support; the deviation accounts for them. nullopt: no candidate is plausible.
+// The best of the candidates after refinement. With few points or clutter next to the support, other planes may explain
+// the points about as well; the standard deviation accounts for them. nullopt: no candidate is plausible.
 std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidate> candidates) {
   std::vector<FoundPlane> refined;
   for (const Candidate& candidate : candidates) {
