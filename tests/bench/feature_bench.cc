@@ -2,10 +2,11 @@
 //
 //   feature_bench DIR [--every N] [--set slam.FIELD=VALUE]...
 //
-// Prints the user time per image, and for frames 1, 5, 10 and 20 apart: the matches (mutually nearest descriptors
-// within kMaxMatchDistance_bits that pass kMaxMatchRatio), how many of those whose depth is
-// known are correct, the share of the features that should be seen again and are matched correctly (recall), and how
-// evenly correct matches lie (cells of 40 x 40 pixels that hold one). Every N-th frame is the first of a pair.
+// Prints the user time per image, and for pairs of frames that are 1, 5, 10 and 20 frames apart: the number of matches
+// (mutually nearest descriptors within kMaxMatchDistance_bits that pass kMaxMatchRatio); the share of correct matches
+// among those with known depth (precision); the share of correctly matched features among those visible in both frames
+// (recall); and the number of 40 x 40 pixel cells with a correct match, which shows how evenly matches are distributed.
+// Every N-th frame is the first of a pair.
 
 #include <algorithm>
 #include <array>
@@ -33,7 +34,7 @@ namespace romap::measure {
 namespace {
 
 constexpr std::array<size_t, 4> kGaps{1, 5, 10, 20};
-constexpr double kCorrect_px = 4;  // true depth and pose are good to a pixel or two
+constexpr double kCorrect_px = 4;  // true depth and pose are accurate to a pixel or two
 constexpr int kCell_px = 40;
 
 cv::Mat Decode(const std::string& bytes, int flags) {
@@ -55,7 +56,7 @@ std::optional<Frame> LoadFrame(const files::Sequence& sequence, size_t index) {
   return frame;
 }
 
-// OpenCV's own, as the yardstick.
+// OpenCV's ORB, as the reference.
 std::vector<slam::Feature> OpenCvOrb(const Frame& frame, const slam::SlamConfig& config) {
   static const cv::Ptr<cv::ORB> orb =
       cv::ORB::create(config.scene_features, static_cast<float>(slam::kOctaveFactor), slam::kOctaves, 31, 0, 2,
@@ -95,7 +96,8 @@ Nearest FindNearest(const slam::Feature& feature, const std::vector<slam::Featur
   return nearest;
 }
 
-// Where a feature of `from` is in `to`; none where its depth is unknown, or outside, or hidden.
+// The true pixel of a feature of `from` in `to`; nullopt if its depth is unknown, or if it is outside the image or
+// hidden.
 std::optional<Eigen::Vector2d> TruePixel(const slam::Feature& feature, const Frame& from, const Frame& to) {
   const cv::Rect image(0, 0, from.depth_mu.cols, from.depth_mu.rows);
   const auto depth_at = [&](const Frame& frame, double u, double v) -> double {
@@ -194,7 +196,7 @@ void RunPairs(const char* name, const files::Sequence& sequence, size_t every, c
   }
 }
 
-// What a keyframe costs on top of its scene features.
+// Measures the cost of the additional object features of a keyframe.
 void RunObjects(const files::Sequence& sequence, size_t every, slam::FeatureExtractor& extractor) {
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {

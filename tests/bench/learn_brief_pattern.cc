@@ -1,12 +1,12 @@
-// Chooses the 256 binary tests of server/slam/features/brief_pattern.cc and prints them as the rows of its table. Takes
-// half a minute.
+// Chooses the 256 binary tests of server/slam/features/brief_pattern.cc and prints them as the rows of its table. Runs
+// for about half a minute.
 //
 //   learn_brief_pattern
 //
-// Random tests are tried on corners of generated pictures (dead leaves: Lee, Mumford and Huang, IJCV 2001), each corner
-// seen twice, the second time with other noise and a little warped. Tests that differ much between corners and little
-// between two views of one corner come first; from the top of that list, those are taken that are correlated with none
-// taken before (the greedy search of Rublee et al., ICCV 2011).
+// Evaluates random tests on corners of generated images (dead leaves: Lee, Mumford and Huang, IJCV 2001). Each corner
+// has two views; the second has different noise and a small random warp. Ranks first the tests whose results differ
+// often between corners and rarely between the two views of a corner. Then takes tests from the top of the list that
+// are not correlated with a test already taken (the greedy search of Rublee et al., ICCV 2011).
 
 #include <algorithm>
 #include <array>
@@ -34,8 +34,8 @@ constexpr size_t kCandidates = 20000;
 constexpr double kNoise = 4;               // gray levels
 constexpr double kWarp = 0.12;             // of the second view's affine map, standard deviation
 constexpr double kShift_px = 0.7;          // of the second view's corner
-constexpr double kMaxImbalance = 0.1;      // of a test's share of ones from a half
-constexpr double kFirstCorrelation = 0.1;  // allowed between two tests; raised until there are enough
+constexpr double kMaxImbalance = 0.1;      // maximum deviation of a test's share of ones from one half
+constexpr double kFirstCorrelation = 0.1;  // maximum between two tests; raised until enough tests are found
 constexpr double kCorrelationStep = 0.02;
 
 // Uniform in [0, 1), the same with every standard library.
@@ -46,7 +46,7 @@ double Normal(std::mt19937& random) {
   return radius * std::cos(2 * std::numbers::pi * Uniform(random));
 }
 
-// Random ellipses and rectangles that hide each other, many small and few large, each with a shade and a slope of gray.
+// Random ellipses and rectangles that occlude each other, many small and few large, each with one gray level.
 cv::Mat DeadLeaves(std::mt19937& random) {
   cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < kLeaves; ++i) {
@@ -77,7 +77,7 @@ cv::Mat WithNoise(const cv::Mat& picture, uint64_t seed) {
   return noisy;
 }
 
-// The gray values around a corner, turned upright.
+// The gray values around a corner, rotated upright.
 constexpr int kSide_px = 2 * slam::kPatchRadius_px + 1;
 using Patch = std::array<uint8_t, kSide_px * kSide_px>;
 
@@ -127,7 +127,7 @@ void AddViews(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Views
   }
 }
 
-// Two different points of the circle.
+// Draws a test with two different points of the circle.
 slam::BriefTest DrawTest(std::mt19937& random) {
   const auto draw = [&](int8_t& x_px, int8_t& y_px) {
     do {
@@ -170,8 +170,8 @@ struct Candidate {
   double merit = 0;
 };
 
-// Sorted by how well the test alone tells same from different corners: distance of the means of the two outcomes, in
-// standard deviations.
+// Sorted by how well the test alone distinguishes different corners from views of the same corner: distance of the
+// means of the two outcomes, in standard deviations.
 std::vector<Candidate> RankCandidates(const Views& views, std::mt19937& random) {
   const size_t count = views.first.size();
   const Bits zeros((count + 63) / 64, 0);

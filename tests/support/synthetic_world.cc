@@ -42,7 +42,7 @@ double IntersectSolid(const SyntheticObject& object, const Eigen::Vector3d& orig
   return near <= far && near > 0 ? near : kMiss;
 }
 
-// A speckle that gives every surface features: constant in cells of 2 cm-like size, different for each object.
+// A random texture that gives every surface features: constant in cells of 0.02 map units, different for each object.
 cv::Vec3b Texture(const Eigen::Vector3d& p, int object) {
   uint64_t hash = 0x9E3779B97F4A7C15ull * static_cast<uint64_t>(object + 2);
   for (int axis = 0; axis < 3; ++axis) {
@@ -103,7 +103,7 @@ void SyntheticWorld::MakePoints() {
     const Eigen::Vector3d surface = R_world_scene_ * p_scene;
     Eigen::Vector3d mapped = surface;
     for (int axis = 0; axis < 3; ++axis) mapped[axis] += options_.point_noise_mu * normal(random);
-    // A wrongly triangulated point slides along the ray of some camera.
+    // An outlier is displaced along the ray of a random camera, like a wrongly triangulated point.
     const double slide = (uniform(random) - 0.5) * options_.orbit_radius_mu;
     const int seen_from = static_cast<int>(random() % static_cast<uint64_t>(options_.frames));
     if (uniform(random) < options_.outlier_share) {
@@ -243,7 +243,7 @@ KeyframeView SyntheticWorld::MakeKeyframe(int index, const TrackedFrame& tracked
     if (u < 0 || v < 0 || u >= options_.width_px || v >= options_.height_px) continue;
     const Eigen::Vector3d direction =
         R_world_scene_.transpose() * (points_[i].surface_world - tracked.T_world_camera.translation());
-    // The ray ends at the point, so that anything noticeably before parameter 1 hides it.
+    // The point is at ray parameter 1. Any surface clearly before it hides the point.
     if (Cast(origin, direction).depth_mu < 0.995) continue;
     const MapPointId id{i + 1};
     view.observations.push_back({id, pixel.cast<float>(), tracked.frame->labels.at<uint16_t>(v, u)});

@@ -1,7 +1,8 @@
 #pragma once
 
-// A small world with exact answers for the tests of every stage: boxes and ellipsoids on a table, seen by a camera on
-// an orbit, with instance masks by ray casting and sparse map points. Everything that makes real input hard has a dial.
+// A small synthetic world with known ground truth for the tests of every stage: boxes and ellipsoids on a table, seen
+// by a camera on an orbit, with instance masks by ray casting and sparse map points. All difficulties of real input are
+// adjustable.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -40,27 +41,27 @@ struct SyntheticWorldOptions {
   double elevation_deg = 35;
   double start_azimuth_deg = 0;
   double sweep_deg = 360;                        // azimuth covered by all frames together
-  std::vector<std::pair<int, int>> away_frames;  // [first, last): the camera looks away from the table
-  Eigen::Vector3d up_world{0, 0, 1};             // the scene is turned so that its z axis points here
+  std::vector<std::pair<int, int>> away_frames;  // [first, last): the camera points away from the table
+  Eigen::Vector3d up_world{0, 0, 1};             // the scene is rotated so that its z axis points here
   int points_per_object = 60;                    // sparse map points on each surface
   int points_on_table = 250;                     // sparse map points on the table
   std::vector<int> textureless;                  // indices of objects without map points
   double pixel_noise_px = 0;                     // standard deviation of observations
   double point_noise_mu = 0;                     // standard deviation of map point positions
-  double outlier_share = 0;                      // share of the points that stand off their surface, along a ray
+  double outlier_share = 0;                      // share of the points displaced from their surface along a ray
   int mask_jitter_px = 0;                        // each frame's masks grow or shrink by up to this much
   double dropped_mask_share = 0;                 // share of the masks the detector misses
   double wrong_class_share = 0;                  // share of the detections with another class name
   bool permute_labels = true;                    // labels are shuffled from frame to frame
   bool with_depth = false;                       // frames carry exact dense depth
-  std::vector<std::pair<int, cv::Rect>> ghosts;  // (frame, rectangle): masks of things that are not there
+  std::vector<std::pair<int, cv::Rect>> ghosts;  // (frame, rectangle): masks of objects that do not exist
   uint64_t seed = 1;
 };
 
 // A book, a cup, a ball and a carton, apart from each other.
 std::vector<SyntheticObject> DefaultSyntheticObjects();
 
-// Deterministic in its options. Frames may be asked for in any order.
+// Deterministic for the same options. Frames may be requested in any order.
 class SyntheticWorld {
  public:
   explicit SyntheticWorld(SyntheticWorldOptions options);
@@ -96,8 +97,8 @@ class SyntheticWorld {
   void DetectInto(int index, const cv::Mat& object_index, Frame* frame) const;
 
   struct SparsePoint {
-    Eigen::Vector3d surface_world;  // where it is seen
-    Eigen::Vector3d mapped_world;   // where the map believes it is
+    Eigen::Vector3d surface_world;  // true position
+    Eigen::Vector3d mapped_world;   // position in the map
   };
 
   SyntheticWorldOptions options_;
@@ -106,7 +107,7 @@ class SyntheticWorld {
   std::vector<SparsePoint> points_;
 };
 
-// Intersection over union of two cuboids by counting grid samples (about 1 % exact).
+// Intersection over union of two cuboids by counting grid samples (accurate to about 1 %).
 double CuboidIou(const Cuboid& a, const Cuboid& b);
 
 // Share of `points_world` inside the cuboid whose half extents are multiplied by `enlargement`.

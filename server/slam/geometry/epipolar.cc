@@ -135,7 +135,7 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
   MotionEquations equations;
   for (const RayMatch& match : matches) {
     const EpipolarLines lines = LinesOf(camera, essential, match);
-    if (!(lines.slope2 > 0)) continue;  // both points are at the epipoles and agree with any rotation
+    if (!(lines.slope2 > 0)) continue;  // both points are at the epipoles and give no constraint
     const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
     const double error = lines.algebraic * scale;
     MotionEquations::Vector derivative;

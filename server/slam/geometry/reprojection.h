@@ -9,7 +9,7 @@
 
 namespace romap::slam {
 
-// A camera's pose in the form that the inner loops use: p_camera = rotation * p_world + translation.
+// A camera's pose in the form used by the inner loops: p_camera = rotation * p_world + translation.
 struct CameraFromWorld {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();

@@ -8,7 +8,7 @@
 
 namespace romap::slam {
 
-// A similarity in the form that the inner loops use: p_first = scale * rotation * p_second + translation.
+// A similarity in the form used by the inner loops: p_first = scale * rotation * p_second + translation.
 struct Similarity {
   double scale = 1;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();

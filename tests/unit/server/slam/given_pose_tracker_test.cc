@@ -101,7 +101,7 @@ TEST(GivenPoseTracker, AnAbsurdJumpIsAccepted) {
 
 TEST(GivenPoseTracker, ADueKeyframeWaitsForASharpFrameButNotForEver) {
   const TexturedWorld world;
-  std::vector<std::shared_ptr<Frame>> frames;  // stands still, then turns by more than the threshold
+  std::vector<std::shared_ptr<Frame>> frames;  // stands still, then rotates by more than the threshold
   for (int i = 0; i < 16; ++i) {
     frames.push_back(world.Render(static_cast<uint64_t>(i), TexturedWorld::OrbitPose(i < 10 ? 0 : 4 + 0.1 * i)));
     if (i >= 10) cv::blur(frames.back()->image_bgr, frames.back()->image_bgr, {15, 1});

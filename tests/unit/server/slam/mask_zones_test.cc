@@ -22,7 +22,7 @@ TEST(MaskZones, WithoutMasksNothingIsKnown) {
 TEST(MaskZones, TellsInsideBorderNearAndFar) {
   const MaskZones zones(Labels());
   EXPECT_EQ(zones.At({250, 200}, 1, kLabel), MaskZone::kInside);
-  EXPECT_EQ(zones.At({299, 200}, 1, 0), MaskZone::kBorder);  // inside, but too close to the rim to have a label
+  EXPECT_EQ(zones.At({299, 200}, 1, 0), MaskZone::kBorder);  // inside, but too close to the border to have a label
   EXPECT_EQ(zones.At({301, 200}, 1, 0), MaskZone::kBorder);
   EXPECT_EQ(zones.At({320, 200}, 1, 0), MaskZone::kNear);
   EXPECT_EQ(zones.At({500, 200}, 1, 0), MaskZone::kFar);

@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-// Straight down from 3 mu above the floor, moved along x.
+// Looks straight down from 3 mu above the floor, shifted along x.
 SE3<World, Camera> PoseAbove(double x_mu) { return TexturedWorld::LookAt({x_mu, 0.9, 3}, {x_mu, 0.9, 0}); }
 
 TEST(SceneDepth, MeasuresTheDistanceOfAPlane) {

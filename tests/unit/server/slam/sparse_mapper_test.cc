@@ -14,7 +14,7 @@
 namespace romap::slam {
 namespace {
 
-// A keyframe whose pose the client gave.
+// A keyframe with a pose given by the client.
 TrackedImage Keyframe(std::shared_ptr<const Frame> frame) {
   TrackedImage image;
   image.pose_given = true;
@@ -39,7 +39,7 @@ class Mapper {
   SparseMapper mapper_;
 };
 
-// The map as a receiver of the views knows it.
+// The map as reconstructed from the views alone.
 struct KnownPoints {
   std::map<MapPointId, MapPoint> points;
   std::map<MapPointId, std::map<uint16_t, int>> labels;

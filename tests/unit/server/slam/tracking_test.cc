@@ -55,7 +55,8 @@ class TrackingTest : public ::testing::Test {
     return state;
   }
 
-  // Feeds the frames 0..end-1. Once tracking works it must not be lost; returns the number of frames before that.
+  // Feeds the frames 0..end-1 and returns the number of frames until initialization. Expects that tracking is not lost
+  // afterward.
   int Follow(int end) {
     int initializing = 0;
     for (int i = 0; i < end; ++i) {
@@ -136,7 +137,7 @@ class TrackingTest : public ::testing::Test {
 TEST_F(TrackingTest, TracksFromImagesAlone) {
   EXPECT_LT(Follow(90), 25);
   const auto [worst, scale] = Error();
-  EXPECT_LT(worst, 0.02);  // of a path of two units
+  EXPECT_LT(worst, 0.02);  // for a path of two units
   EXPECT_GT(map().keyframe_count(), 5U);
 }
 
@@ -177,7 +178,7 @@ TEST_F(TrackingTest, RecoversFromACoveredLens) {
 
 TEST_F(TrackingTest, RelocalizesAMovedCameraInTheSameMap) {
   Follow(110);
-  // Unrelated images, then a pose from long ago: the last frames do not help.
+  // Unrelated images, then a much earlier pose, so that the last frames do not help.
   for (int i = 110; i < 113; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(i + 1), Pose(i));
     cv::Mat noise(frame->image_bgr.size(), CV_8UC3);

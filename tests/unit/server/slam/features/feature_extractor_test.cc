@@ -95,11 +95,11 @@ TEST(FeatureExtractor, ABlackOrTinyImageHasNone) {
 
   const TexturedWorld tiny(16, 16);
   EXPECT_TRUE(FeatureExtractor(SlamConfig{}).Extract(*tiny.Render(1, TexturedWorld::OrbitPose(0))).empty());
-  const TexturedWorld small(48, 48);  // just large enough to look at, too small for the upper octaves
+  const TexturedWorld small(48, 48);  // just large enough for the finest octave, too small for the coarse ones
   FeatureExtractor(SlamConfig{}).Extract(*small.Render(1, TexturedWorld::OrbitPose(0)));
 }
 
-// The frame as it would be had its pinhole image come from a camera with this lens.
+// The frame as a camera with this lens would have captured it.
 Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
   Frame frame = pinhole;
   frame.source_camera = source_camera;
@@ -118,10 +118,11 @@ Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
 
 struct Agreement {
   int matches = 0;
-  int near = 0;  // within a pixel of their octave of where they should be
+  int near = 0;  // within a pixel of their octave of the expected position
 };
 
-// Of the fine features, whose positions are good to a pixel: how many look like one of `others`, and are where it is.
+// Compares the fine features, whose positions are accurate to a pixel. Counts those with a similar descriptor in
+// `others`, and those of them that are also at the same position.
 Agreement Compare(const std::vector<Feature>& features, const std::vector<Feature>& others) {
   Agreement agreement;
   for (const Feature& feature : features) {
@@ -174,10 +175,10 @@ TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
   cv::cvtColor(frame.image_bgr, frame.source_gray, cv::COLOR_BGR2GRAY);
   frame.source_camera = frame.camera;
   frame.source_camera.lens = LensModel::kFisheye;
-  frame.source_camera.fx_px = frame.source_camera.fy_px = 100;  // sees twice as far to all sides
+  frame.source_camera.fx_px = frame.source_camera.fy_px = 100;  // much larger field of view
   frame.camera = frame.source_camera.Pinhole();
   const std::vector<Feature> features = FeatureExtractor(SlamConfig{}).ExtractScene(frame);
-  EXPECT_GT(features.size(), 500);  // the places of those dropped are filled
+  EXPECT_GT(features.size(), 500);  // dropped features are replaced by others
   for (const Feature& feature : features) {
     EXPECT_TRUE(cv::Rect2f(0, 0, 319, 239).contains({feature.pixel_px.x(), feature.pixel_px.y()}));
   }
@@ -207,7 +208,7 @@ TEST(FeatureExtractor, TurnsItsAnglesAndPositionsWithTheImage) {
   frame.image_bgr = turned_bgr;
   std::vector<Feature> turned = extractor.ExtractScene(frame);
   for (Feature& feature : turned) {
-    feature.pixel_px = {feature.pixel_px.y(), 399 - feature.pixel_px.x()};  // turned back
+    feature.pixel_px = {feature.pixel_px.y(), 399 - feature.pixel_px.x()};  // rotated back
   }
   int same = 0, turned_along = 0, described_alike = 0;
   for (const Feature& feature : upright) {

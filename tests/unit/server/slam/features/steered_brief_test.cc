@@ -25,7 +25,7 @@ cv::Mat SmoothNoise(uint64_t seed) {
 
 cv::Mat Turned(const cv::Mat& image, double angle_rad) {
   cv::Mat turned;
-  // OpenCV counts angles against the clock; here they go from x to y, which is with it.
+  // OpenCV's angles are counterclockwise. Angles here are from x to y, which is clockwise.
   const cv::Mat turn = cv::getRotationMatrix2D({kCenter_px, kCenter_px}, -angle_rad * 180 / std::numbers::pi, 1);
   cv::warpAffine(image, turned, turn, image.size(), cv::INTER_CUBIC);
   return turned;

@@ -12,7 +12,7 @@ namespace {
 
 Motion TestMotion() { return {Turn(3, -5, 8).toRotationMatrix(), Eigen::Vector3d(0.8, -0.1, 0.3).normalized()}; }
 
-// A match of a point before both cameras, `off_px` from the truth in the second picture.
+// A match of a point in front of both cameras, with an error of `off_px` in the second image.
 RayMatch MatchOf(const CameraModel& camera, const Eigen::Vector3d& p_first, const Eigen::Vector2d& off_px) {
   const Motion motion = TestMotion();
   const Eigen::Vector2d first_px = camera.Project(p_first);
@@ -58,7 +58,7 @@ TEST(Epipolar, GradientAgreesWithDifferencesOfTheCost) {
   const CameraModel camera = TestCamera();
   const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
   for (const Eigen::Vector2d& off_px :
-       {Eigen::Vector2d(1, -2), Eigen::Vector2d(-6, 12)}) {  // within Huber's bound, beyond
+       {Eigen::Vector2d(1, -2), Eigen::Vector2d(-6, 12)}) {  // within Huber's bound, beyond it
     const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, off_px);
     const auto linearize = [&](const Motion& at) { return EpipolarEquations(camera, at, {&match, 1}); };
     ExpectGradientOfCost<5>(linearize, move, TestMotion());
@@ -77,7 +77,7 @@ TEST(Epipolar, SigmasTellTheErrorsThatNoiseCauses) {
       const Eigen::Vector2d pixel_px = noise.Pixel(camera);
       const Eigen::Vector3d p_first = noise.Uniform(4, 9) * camera.Unproject(pixel_px.x(), pixel_px.y());
       matches.push_back(MatchOf(camera, p_first, noise.Normal2(1.5)));
-      matches.back().sigma_px = 1.5 / std::sqrt(2);  // the noise of one picture, shared by two
+      matches.back().sigma_px = 1.5 / std::sqrt(2);  // the noise of one image, distributed over two
     }
     const RefinedMotion refined = RefineMotion(camera, truth, matches);
     const double error_rad = Eigen::AngleAxisd(truth.rotation.transpose() * refined.motion.rotation).angle();
@@ -85,7 +85,7 @@ TEST(Epipolar, SigmasTellTheErrorsThatNoiseCauses) {
     claimed2 += refined.rotation_sigma_rad * refined.rotation_sigma_rad;
   }
   EXPECT_GT(rotation2, 0.4 * claimed2);
-  EXPECT_LT(rotation2, 4 * claimed2);  // three axes, and the outliers' share cut off
+  EXPECT_LT(rotation2, 4 * claimed2);  // the error has three axes, and outlier rejection removes the tail of the noise
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ struct Scene {
   std::vector<PoseObservation> observations;
 };
 
-// `wrong_share` of the observations lie anywhere in the picture. `flat`: all points on one plane.
+// `wrong_share`: share of the observations at random pixels. `flat`: all points are on one plane.
 Scene MakeScene(int count, double wrong_share, bool flat, uint64_t seed) {
   Scene scene;
   Noise noise(seed);

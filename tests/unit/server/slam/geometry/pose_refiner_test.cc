@@ -29,7 +29,7 @@ Scene MakeScene(int count, double noise_px, uint64_t seed) {
   return scene;
 }
 
-// A pose some way off the true one.
+// A pose near the true one.
 SE3<World, Camera> Disturbed(const Scene& scene) {
   return scene.T_world_camera * SE3<Camera, Camera>(Turn(2, -3, 2), {0.08, -0.05, 0.1});
 }
@@ -54,7 +54,7 @@ TEST(PoseRefiner, ReportsTheNoiseThatThePixelsHave) {
   const Scene scene = MakeScene(2000, 0.8, 2);
   const PoseEstimate estimate = RefinePose(scene.camera, Disturbed(scene), scene.observations);
   EXPECT_NEAR(estimate.inliers, 0.95 * 2000, 40);
-  // Cutting at 95 % takes the tail off: E[chi2 | chi2 < 5.991] = 1.685 for two degrees of freedom.
+  // The 95 % bound removes the tail: E[chi2 | chi2 < 5.991] = 1.685 for two degrees of freedom.
   EXPECT_NEAR(estimate.rms_px, 0.8 * std::sqrt(1.685), 0.03);
   EXPECT_LT(TurnError_deg(scene, estimate), 0.05);
 }
@@ -86,7 +86,7 @@ TEST(PoseRefiner, ACloseStartStandsAMajorityOfWrongMatches) {
 }
 
 TEST(PoseRefiner, DepthHoldsWhatPixelsLeaveOpen) {
-  // A small, distant patch: the pixels hardly tell the distance.
+  // A small, distant patch: the pixels hardly determine the distance.
   Scene scene = MakeScene(0, 1, 5);
   Noise noise(55);
   for (int i = 0; i < 40; ++i) {
@@ -121,7 +121,7 @@ TEST(PoseRefiner, AWrongDepthMakesAnOutlier) {
 
 TEST(PoseRefiner, TooFewUsableObservationsGiveNoInliers) {
   Scene scene = MakeScene(10, 0, 7);
-  for (int i = 0; i < 7; ++i) {  // all but three cannot be used, each for a reason of its own
+  for (int i = 0; i < 7; ++i) {  // only three are usable; the others are invalid for three different reasons
     PoseObservation& observation = scene.observations[i];
     if (i % 3 == 0) observation.sigma_px = 0;
     if (i % 3 == 1) observation.p_world.x() = std::numeric_limits<double>::quiet_NaN();

@@ -18,7 +18,8 @@ struct Scene {
   std::vector<SimilarityMatch> matches;
 };
 
-// Points that both cameras see, each where its own map has it: with noise of `depth_noise` of its distance.
+// Points that both cameras see, with a position in the map of each camera. `depth_noise`: standard deviation of a
+// position along its ray, as a share of the distance.
 Scene MakeScene(const Sim3<Camera, Camera>& S_first_second, int count, double depth_noise, double wrong_share,
                 uint64_t seed) {
   Scene scene;
@@ -147,7 +148,7 @@ TEST(Similarity, TheSameSeedGivesTheSameResult) {
 TEST(Similarity, GradientAgreesWithDifferencesOfTheCost) {
   const Similarity near_truth{1.05 * kTruth.scale(), (Turn(1, -1, 2) * kTruth.rotation()).toRotationMatrix(),
                               kTruth.translation() + Eigen::Vector3d(0.02, 0.01, -0.03)};
-  for (const double chi2_bound : {9.21, 1e6}) {  // beyond Huber's bound, within
+  for (const double chi2_bound : {9.21, 1e6}) {  // beyond Huber's bound, within it
     const Scene scene = MakeScene(kTruth, 5, 0.01, 0, 11);
     const SimilarityOptions options{.chi2_bound = chi2_bound};
     const auto linearize = [&](const Similarity& at) {

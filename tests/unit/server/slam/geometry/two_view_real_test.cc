@@ -1,4 +1,5 @@
-// Two views of a real hand-held camera: no made-up noise is as unkind as blur, rolling shutter and repeated texture.
+// Two views of a real hand-held camera: synthetic noise does not cover motion blur, rolling shutter and repeated
+// texture.
 
 #include <gtest/gtest.h>
 
@@ -95,7 +96,7 @@ TEST(TwoViewReal, NoWrongMotionBetweenHandHeldFrames) {
     const SE3<Camera, Camera> truth =
         trajectory[first].T_world_camera.Inverse() * trajectory[first + kGap].T_world_camera;
     EXPECT_LT(AngleBetween_deg(truth.rotation(), result.T_first_second.rotation()), 3) << "frame " << first;
-    // The two ground truths of this sequence differ from each other by up to 30 degrees over such short ways.
+    // The two ground truths of this sequence differ from each other by up to 30 degrees over such short baselines.
     EXPECT_LT(AngleBetween_deg(truth.translation(), result.T_first_second.translation()), 30) << "frame " << first;
   }
   ASSERT_GT(tried, 10);

@@ -11,14 +11,14 @@
 namespace romap::slam {
 namespace {
 
-// Where a ray (z = 1) of the first camera meets the scene: its z depth.
+// The z depth at which a ray (z = 1) of the first camera meets the scene.
 using Surface = std::function<double(const Eigen::Vector3d& ray, Noise& noise)>;
 
-// Boxes and walls: anything between 1 and 4 units away.
+// Boxes and walls at depths between 1 and 4 units.
 double Clutter(const Eigen::Vector3d&, Noise& noise) { return noise.Uniform(1, 4); }
-// A plane tilted by 35 degrees, 2 units away in the middle of the picture.
+// A plane tilted by 35 degrees, 2 units away in the middle of the image.
 double TiltedDesk(const Eigen::Vector3d& ray, Noise&) { return 2 / (1 + std::tan(35 * kDegree) * ray.y()); }
-// The same desk with things up to 0.3 units high on a third of it.
+// The same desk with objects up to 0.3 units high on a third of it.
 double LadenDesk(const Eigen::Vector3d& ray, Noise& noise) {
   const double desk = TiltedDesk(ray, noise);
   return noise.Uniform(0, 3) < 1 ? desk - noise.Uniform(0.05, 0.3) : desk;
@@ -162,7 +162,7 @@ TEST(TwoView, AFewNearPointsAreNotEnoughParallax) {
 }
 
 TEST(TwoView, APlaneWithTwoExplanationsIsAmbiguous) {
-  // Obliquely towards a tilted plane: the motion's twin also keeps all points before both cameras.
+  // The camera moves obliquely toward a tilted plane. The second solution also has all points in front of both cameras.
   const Scene scene = MakeScene(TiltedDesk, {Turn(0, 2, 0), {0.02, 0.15, 0.3}}, {.noise_px = 0.5});
   EXPECT_EQ(Solve(scene).outcome, TwoViewOutcome::kAmbiguous);
 }

@@ -15,7 +15,7 @@ namespace {
 
 BundleWorldOptions NoisyStart() {
   BundleWorldOptions options;
-  options.fixed_cameras = 4;  // a base long enough that scale is not the largest error
+  options.fixed_cameras = 4;  // a baseline long enough that scale is not the largest error
   options.pixel_noise_px = 0.5;
   options.pose_noise_rad = 0.005;
   options.pose_noise_mu = 0.02;
@@ -83,10 +83,10 @@ TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
   const double pose_before_mu = RmsPoseErrorMu(world);
   const BundleSummary summary = AdjustBundle(world.problem, {.dense = true});
   EXPECT_TRUE(summary.usable);
-  // Two residuals of 0.5 px per observation, less the share that the parameters take up.
+  // Two residuals of 0.5 px per observation, reduced by the degrees of freedom of the parameters.
   const double freedom = 1 - (6 * 6 + 200 * 3) / (2.0 * static_cast<double>(world.problem.observations.size()));
   EXPECT_NEAR(summary.final_rms_px, 0.5 * std::sqrt(2 * freedom), 0.05);
-  // The bound holds for 95 % of them.
+  // The bound accepts 95 % of the observations.
   EXPECT_LT(summary.outliers, 0.08 * static_cast<double>(world.problem.observations.size()));
   EXPECT_LT(RmsPoseErrorMu(world), 0.25 * pose_before_mu);
   EXPECT_LT(RmsPoseErrorMu(world), 0.008);
@@ -123,7 +123,7 @@ TEST(BundleAdjustment, ObservationsCalledOutliersAreLeftOutAndMayComeBack) {
   BundleObservation& right = world.problem.observations[20];
   right.outlier = true;
   BundleProblem without = world.problem;
-  without.observations[10].pixel_px.x() -= 299;  // as long as it is left out, its pixel is nothing to it
+  without.observations[10].pixel_px.x() -= 299;  // the pixel of an ignored observation has no effect
   ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
   ASSERT_TRUE(AdjustBundle(without, {.dense = true}).usable);
   EXPECT_TRUE(Same(world.problem, without));
@@ -215,7 +215,7 @@ TEST(BundleAdjustment, DepthFindsTheScaleThatImagesCannot) {
   options.fixed_cameras = 1;
   options.with_depth = true;
   BundleWorld world = MakeBundleWorld(options);
-  // All but the fixed camera and the depths is larger by a third.
+  // Everything except the fixed camera and the measured depths is scaled by 1.3.
   const Eigen::Vector3d anchor = world.true_poses[0].translation();
   for (BundleCamera& camera : world.problem.cameras) {
     const SE3<World, Camera>& T = camera.T_world_camera;
@@ -274,7 +274,7 @@ TEST(BundleAdjustment, AnAbortBeforeTheStartChangesNothing) {
   EXPECT_TRUE(Same(world.problem, before));
 }
 
-// Whenever the abort comes, what is there afterwards is whole and no worse than what was there before.
+// Whenever the abort arrives, the result is consistent and no worse than the start.
 TEST(BundleAdjustment, AnAbortKeepsWhatWasReached) {
   BundleWorldOptions options = NoisyStart();
   options.cameras = 30;
@@ -323,7 +323,7 @@ TEST(BundleAdjustment, BadNumbersAreLeftOut) {
   add([&](BundleObservation& observation) { observation.depth_mu = nan; });
   problem.points.push_back({Eigen::Vector3d(nan, 0, 0), false});
   add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
-  problem.points.push_back({Eigen::Vector3d(100, 0, 0), false});  // behind
+  problem.points.push_back({Eigen::Vector3d(100, 0, 0), false});  // behind the camera
   add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
   BundleCamera broken;
   broken.T_world_camera = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(nan, 0, 0)};

@@ -1,6 +1,7 @@
 #pragma once
 
-// Worlds with exact answers for bundle adjustment: cameras on an orbit around a ball of points, with dials for noise.
+// Synthetic worlds with known ground truth for bundle adjustment: cameras on an orbit around a ball of points, with
+// adjustable noise.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -14,7 +15,7 @@ namespace romap::slam {
 
 struct BundleWorldOptions {
   int cameras = 10;
-  int fixed_cameras = 2;  // the first ones; they start where they truly are
+  int fixed_cameras = 2;  // the first ones; they start at their true poses
   int points = 200;
   int observations_per_point = 6;  // by this many consecutive cameras
   double step_rad = 0.1;           // between neighbors on the orbit
@@ -23,7 +24,7 @@ struct BundleWorldOptions {
   double pose_noise_rad = 0;       // of the start, per axis
   double pose_noise_mu = 0;        // of the start, per axis, before `scale`
   double point_noise_mu = 0;       // of the start, per axis, before `scale`
-  double outlier_share = 0;        // share of the observations that are anywhere in the image
+  double outlier_share = 0;        // share of the observations that are at random pixels
   bool with_depth = false;         // observations carry depth
   double depth_noise_mu = 0.01;    // before `scale`
   unsigned seed = 1;

@@ -12,7 +12,7 @@
 namespace romap::slam {
 
 // Compares all Jacobians of `cost` at `parameters` with central differences, to 1e-6 of the largest entry of each.
-// `refresh` is called whenever the parameters have changed. They are restored.
+// Calls `refresh` whenever the parameters have changed. Restores the parameters.
 inline void ExpectJacobiansMatch(const ceres::CostFunction& cost, const std::vector<double*>& parameters,
                                  const std::function<void()>& refresh) {
   constexpr double kStep = 1e-6;
@@ -46,7 +46,7 @@ inline void ExpectJacobiansMatch(const ceres::CostFunction& cost, const std::vec
     EXPECT_LT((numeric - analytic[block]).cwiseAbs().maxCoeff(), 1e-6 * size) << "block " << block << "\nanalytic\n"
                                                                               << analytic[block] << "\nnumeric\n"
                                                                               << numeric;
-    // Ceres asks for the Jacobians of free blocks only.
+    // Ceres requests only the Jacobians of free blocks.
     std::vector<double*> only_this(sizes.size(), nullptr);
     RowMajor alone(residuals, sizes[block]);
     only_this[block] = alone.data();

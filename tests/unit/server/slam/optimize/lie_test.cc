@@ -25,7 +25,7 @@ std::vector<Sim3Vector> Samples() {
   return samples;
 }
 
-// The exponential by definition: of the 4x4 generator, by scaling and squaring of a long series.
+// The exponential of the 4x4 generator by definition: a long series with scaling and squaring.
 Eigen::Matrix4d ExpByDefinition(const Sim3Vector& v) {
   Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
   generator.topLeftCorner<3, 3>() = Hat(v.head<3>()) + v[6] * Eigen::Matrix3d::Identity();

@@ -14,14 +14,16 @@ namespace {
 
 using std::numbers::pi;
 
-// A walk once around a circle: the truth, what drifted odometry makes of it, its edges, and one that closes the loop.
+// A path once around a circle: the true poses, the poses of drifting odometry, its edges, and an edge that closes the
+// loop.
 struct Loop {
   std::vector<SE3<World, Camera>> truth;
   std::vector<PoseGraphNode> nodes;
   std::vector<PoseGraphEdge> edges;
 };
 
-// `drift` is what each step adds in error: a turn (rad), a shift (of a radius of 1), a factor of scale (logarithm).
+// `drift`: the error that each step adds: rotation (rad), translation (for a radius of 1), logarithm of the scale
+// factor.
 Loop MakeLoop(int count, const Sim3Vector& drift, double length_mu = 1) {
   Loop loop;
   for (int i = 0; i < count; ++i) {
@@ -81,7 +83,7 @@ TEST(PoseGraph, ALoopSpreadsDriftInPoseAndScale) {
 }
 
 TEST(PoseGraph, WithFixedScaleScalesStayAndPosesImprove) {
-  // Of what a rigid loop can tell: longer steps would only make a larger circle.
+  // Only errors that a rigid loop can reveal: longer steps would only make a larger circle.
   const Sim3Vector drift = (Sim3Vector() << 0, 0, 0.002, 0, 0, 0.001, 0).finished();
   Loop loop = MakeLoop(100, drift);
   const double before_mu = RmsErrorMu(loop);
@@ -119,7 +121,7 @@ TEST(PoseGraph, DoesNotDependOnTheUnitOfTheMap) {
 }
 
 TEST(PoseGraph, HeavyEdgesBendLess) {
-  // Two measurements of one step that disagree: the answer divides the difference by their weights.
+  // Two measurements of one step disagree: the result is their mean, weighted by the weights of the edges.
   std::vector<PoseGraphNode> nodes(2);
   nodes[0].fixed = true;
   const auto step = [](double x_mu) { return Sim3<Camera, Camera>(1, Eigen::Quaterniond::Identity(), {x_mu, 0, 0}); };
@@ -139,7 +141,7 @@ TEST(PoseGraph, FloatingPartsAreRefused) {
   };
   std::vector<PoseGraphEdge> cut;
   for (const PoseGraphEdge& edge : loop.edges) {
-    if (edge.a != 9 && edge.a != 15) cut.push_back(edge);  // nodes 10..15 hang on nothing
+    if (edge.a != 9 && edge.a != 15) cut.push_back(edge);  // nodes 10..15 are disconnected
   }
   EXPECT_FALSE(OptimizePoseGraph(loop.nodes, cut, {}).usable);
   EXPECT_TRUE(unchanged());

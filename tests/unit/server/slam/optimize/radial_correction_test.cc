@@ -51,7 +51,8 @@ TEST(RadialCorrection, BundleAdjustmentFindsTheLensOfThePictures) {
   }
 }
 
-// Noise says nothing of a lens: an error that were measured in the corrected image would make it shrink.
+// Noise contains no information about the lens. An error measured in the corrected image would cause that image to
+// shrink.
 TEST(RadialCorrection, BundleAdjustmentFindsNoLensWhereThereIsNone) {
   BundleWorld world = MakeBundleWorld(NoisyStart(1));
   world.problem.lens = BundleLens{};
@@ -59,7 +60,7 @@ TEST(RadialCorrection, BundleAdjustmentFindsNoLensWhereThereIsNone) {
   EXPECT_NEAR(world.problem.lens->correction.k1, 0, 0.015);
 }
 
-// What is believed before anything is seen holds where little is seen.
+// A prior with a small sigma keeps k1 near 0 although the observations are distorted.
 TEST(RadialCorrection, ThePriorHolds) {
   BundleWorld world = MakeBundleWorld(NoisyStart(1));
   for (BundleObservation& observation : world.problem.observations) {

@@ -63,7 +63,7 @@ TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbors) {
     found_in_one += OwnersIn(tree, seen_again, 1).contains(i);
     found_in_three += OwnersIn(tree, seen_again, 3).contains(i);
   }
-  EXPECT_GT(found_in_one, 200);  // a leaf at random would have 20
+  EXPECT_GT(found_in_one, 200);  // a random leaf would contain 20
   EXPECT_GT(found_in_three, found_in_one + 20);
 }
 

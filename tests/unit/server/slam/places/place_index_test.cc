@@ -13,7 +13,7 @@ using ::testing::Field;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Places are lists of random descriptors; a view of a place sees part of them, with bits flipped, and clutter.
+// Places are lists of random descriptors. A view of a place contains part of them, with flipped bits, and clutter.
 class PlaceIndexTest : public ::testing::Test {
  protected:
   std::vector<Feature> MakePlace(int features) {
@@ -102,12 +102,12 @@ TEST_F(PlaceIndexTest, ScoreOfTheSamePictureIsOneAndOfAStrangerAboutZero) {
 
 TEST_F(PlaceIndexTest, WhatIsEverywhereSaysLittle) {
   PlaceIndex index;
-  const auto everywhere = MakePlace(200);  // say, a logo in the picture
+  const auto everywhere = MakePlace(200);  // for example a logo in every image
   std::vector<std::vector<Feature>> places;
   for (uint64_t i = 1; i <= 30; ++i) {
     places.push_back(MakePlace(40));
     auto features = View(places.back(), 1, 0.05);
-    // The place asked for shows the logo least clearly: by the number of similar features it would be last.
+    // The queried place shows the logo least clearly. Ranked only by the number of similar features, it would be last.
     const auto logo = View(everywhere, i == 3 ? 0.5 : 1, 0.02);
     features.insert(features.end(), logo.begin(), logo.end());
     index.Add(KeyframeId{i}, features);
@@ -139,7 +139,7 @@ TEST_F(PlaceIndexTest, AKeyframeDoesNotWinByBeingFull) {
 TEST_F(PlaceIndexTest, ForgetsWhatIsRemoved) {
   PlaceIndex index;
   const auto places = AddPlaces(index, 30);
-  // More than are swept at once: some of these are swept out, some are only hidden.
+  // Enough to trigger a sweep: some of these are removed from the tree, others are only ignored.
   for (uint64_t id = 3; id <= 14; ++id) index.Remove(KeyframeId{id});
   EXPECT_EQ(index.size(), 18u);
   for (size_t place = 0; place < places.size(); ++place) {

@@ -58,7 +58,7 @@ TEST(FitPlane, RefusesALine) {
   EXPECT_FALSE(FitPlane(points, std::vector<double>(5, 1.0), kUp).has_value());
 }
 
-// The deviation must tell the true scatter of the normal, with weights that have nothing to do with accuracy too.
+// sigma_rad must match the true scatter of the normal, even with weights that are unrelated to accuracy.
 TEST(FitPlane, SigmaTellsTheScatterOfTheNormal) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;

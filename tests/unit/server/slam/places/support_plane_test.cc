@@ -77,7 +77,7 @@ TEST(SupportPlane, SigmaGrowsWithTheNoiseAndTellsTheError) {
   }
 }
 
-// What cannot hold the objects is no support, however many points it has.
+// A plane that cannot support the objects is rejected, regardless of the number of its points.
 TEST(SupportPlane, IsNeitherTheFloorFarBelowNorTheWallBehind) {
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);

@@ -10,21 +10,22 @@
 
 namespace romap::slam {
 
-// A sparse monocular map of boxes on a table, seen from above on part of a circle, with dials for what goes wrong.
-// Built with the table at z = 0 and meters, then turned, shifted and scaled at random, as a monocular map is.
+// A sparse monocular map of boxes on a table, seen from above on part of a circle, with adjustable disturbances. Built
+// in meters with the table at z = 0, then rotated, shifted and scaled at random, because the frame and scale of a
+// monocular map are arbitrary.
 class SupportWorld {
  public:
   struct Dials {
     int table_points = 200;
     double table_half_width = 0.6;
     int object_points = 120;
-    double object_bottom = 0;    // lowest part of the objects that has points, share of their height
+    double object_bottom = 0;    // lowest height of object points, as a share of the object's height
     int floor_points = 0;        // 0.75 below the table, seen past it
     int wall_points = 0;         // upright, behind the table
     int clutter_points = 0;      // on top of the table, unlabeled, up to 0.25 high
-    double stray_share = 0;      // of the table points: anywhere instead
+    double stray_share = 0;      // share of the table points at random heights
     double depth_noise = 0.005;  // relative, along the ray
-    double sigma_factor = 1;     // stated over true uncertainty
+    double sigma_factor = 1;     // ratio of the stated to the true uncertainty
     double elevation_rad = 35 * std::numbers::pi / 180;
     uint64_t seed = 1;
   };
@@ -51,7 +52,7 @@ class SupportWorld {
   double TiltError_rad(const SupportPlane& plane) const {
     return std::acos(std::clamp(plane.normal_world.dot(up()), -1.0, 1.0));
   }
-  // How far the plane found is from the table under the objects, meters.
+  // Distance of the plane found from the table under the objects, meters.
   double HeightError_m(const SupportPlane& plane) const {
     return std::abs(plane.normal_world.dot(ToMap({0, 0, 0})) - plane.offset_mu) / scale_;
   }
@@ -66,7 +67,7 @@ class SupportWorld {
   double Uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
   Eigen::Vector3d ToMap(const Eigen::Vector3d& p) const { return scale_ * (rotation_ * p) + shift_; }
 
-  // The point as triangulation finds it, in the map.
+  // The triangulated position of the point, in the map.
   Eigen::Vector3d Measured(const Eigen::Vector3d& p) {
     const Eigen::Vector3d center = centers_m_[random_() % centers_m_.size()];
     return ToMap(center + (1 + dials_.depth_noise * Normal()) * (p - center));
@@ -81,7 +82,7 @@ class SupportWorld {
       const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(back).normalized();
       centers_m_.push_back(1.2 * back);
       camera_centers.push_back(ToMap(centers_m_.back()));
-      // A hand does not hold the camera level.
+      // A hand-held camera is not level.
       camera_ups.push_back(rotation_ * (Eigen::AngleAxisd(0.1 * Normal(), back) * back.cross(right)));
     }
   }
