@@ -24,7 +24,7 @@ class FeatureGrid {
  private:
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<int> cell_begin_;  // indices into `members_`, one more than cells
+  std::vector<int> cell_begin_;  // first index into `members_` of each cell, and the end
   std::vector<int> members_;
 };
 

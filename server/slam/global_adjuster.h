@@ -7,8 +7,8 @@
 
 namespace romap::slam {
 
-// Global bundle adjustment: adjusts a copy of the whole map on a thread while the map keeps growing, and writes the
-// result back later. At most one run at a time. Not thread-safe.
+// Global bundle adjustment: adjusts a copy of the whole map on a background thread while the map keeps growing, and
+// writes the result back later. At most one run at a time. Not thread-safe.
 class GlobalAdjuster {
  public:
   // `run_inline`: Start() solves on the calling thread, so that the same frames give the same map.
@@ -17,7 +17,7 @@ class GlobalAdjuster {
 
   // Copies the map and starts to adjust it; cancels an earlier run. `find_lens`: see GlobalProblem.
   void Start(const SlamMap& map, bool find_lens);
-  // Discards the run, whether it is finished or not; the map stays as it is.
+  // Discards the run, finished or not. The map does not change.
   void Cancel();
   // Started, and neither applied nor canceled since.
   bool IsPending() const { return run_ != nullptr; }

@@ -18,13 +18,13 @@ struct TrackingQuality {
 };
 
 // Selects keyframes by camera poses: one is due when the camera has rotated or moved enough since the last one, or has
-// moved a little and much time has passed; a camera that does not move gets none. A due keyframe waits a few frames for
-// one that is sharp and, if only some frames have masks, has masks.
+// moved slightly and much time has passed. A static camera gets no further keyframes. A due keyframe waits a few frames
+// for a frame that is sharp and, if only some frames have masks, has masks.
 class KeyframeSelector {
  public:
   explicit KeyframeSelector(const SlamConfig& config) : config_(config) {}
 
-  // Whether this frame is a keyframe. Call once per frame, in order. The first frame always is one.
+  // Whether this frame is a keyframe. Call once per frame, in order. The first frame is always a keyframe.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera);
 
   // The same for a pose that was tracked from the image. A keyframe is also due when few points of the map are left in

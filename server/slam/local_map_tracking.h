@@ -18,7 +18,7 @@ struct PoseFromPoints {
 };
 
 // Estimates the pose of one frame from the points of a local map. All methods return nullopt if they match too few
-// points. Holds references: `map` and `frame` outlive it.
+// points. Holds references: `map` and `frame` must outlive it.
 class LocalMapTracking {
  public:
   LocalMapTracking(const LocalMap& map, const FrameFeatures& frame, const SlamConfig& config)
@@ -32,10 +32,10 @@ class LocalMapTracking {
   std::optional<PoseFromPoints> TrackByDescriptors(const std::vector<MapPointId>& ids) const;
   // Searches all points in a wide area around their projections at the pose of a recently relocalized frame.
   std::optional<PoseFromPoints> TrackNear(const SE3<World, Camera>& start) const;
-  // Refines `first` by all points of the local map, searched close to their projections.
+  // Refines `first` with all points of the local map, searched close to their projections.
   std::optional<PoseFromPoints> TrackAllPoints(const PoseFromPoints& first, int min_inliers) const;
 
-  // Median depth of the matched points [mu]; 0 without any.
+  // Median depth of the matched points [mu]; 0 if there are none.
   double MedianDepth_mu(const PoseFromPoints& pose) const;
 
  private:

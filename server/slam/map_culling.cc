@@ -6,12 +6,12 @@
 namespace romap::slam {
 namespace {
 
-// A new point must have this many observations when this many keyframes have followed it, or it is removed.
+// A new point is removed unless it has kTrialObservations observations after kTrialKeyframes further keyframes.
 constexpr uint64_t kTrialKeyframes = 3;
 constexpr int kTrialObservations = 3;
 constexpr double kRedundantShare = 0.97;
 constexpr int kOtherKeyframes = 3;
-constexpr size_t kMaxRemoved = 2;  // at once, so that bundle adjustment can compensate
+constexpr size_t kMaxRemoved = 2;  // per call, so that bundle adjustment can compensate
 
 bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
   int points = 0;
@@ -55,7 +55,7 @@ void CullPoints(const SlamConfig& config, SlamMap& map) {
 std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map) {
   std::vector<KeyframeId> removed;
   const auto may_remove = [&](const MapKeyframe& keyframe) {
-    // Tracking depends on the newest ones, and the first one defines the world.
+    // Tracking depends on the newest keyframes, and the first keyframe defines the world.
     return !keyframe.pose_given && keyframe.parent && keyframe.loops.empty() && keyframe.id.value + 5 < newest.id.value;
   };
   for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) {
@@ -67,7 +67,7 @@ std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyfram
     }
   }
   if (map.keyframes().size() > static_cast<size_t>(config.max_keyframes)) {
-    // The one closest to its parent adds the least information.
+    // The keyframe closest to its parent adds the least information.
     KeyframeId least;
     double highest = 0;
     for (const auto& [id, keyframe] : map.keyframes()) {

@@ -8,10 +8,10 @@
 
 namespace romap::slam {
 
-// Makes the first keyframes and points of an empty map. World: the first camera is at the origin; z points up according
-// to `frame`'s gravity if the views have depth; else z is opposite to the first camera's y axis. Without depth, the
-// median depth of the points in the first view becomes one map unit. Returns the newest keyframe; nullopt if bundle
-// adjustment leaves large errors or there are too few points; the map must then be discarded.
+// Creates the first keyframes and points of an empty map. World: the first camera is at the origin; z points up
+// according to `frame`'s gravity if the views have depth; else z is opposite to the first camera's y axis. Without
+// depth, the median depth of the points in the first view becomes one map unit. Returns the newest keyframe; nullopt if
+// bundle adjustment leaves large errors or there are too few points; the map must then be discarded.
 std::optional<KeyframeId> InitializeMap(const InitialViews& views, const Frame& frame, const SlamConfig& config,
                                         SlamMap& map);
 

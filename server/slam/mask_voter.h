@@ -19,7 +19,7 @@ class MaskVoter {
 
   // A frame that was tracked against the map and is not a keyframe. Call in the order of frames.
   void ObserveFrame(const TrackedFrame& tracked, SlamMap& map);
-  // Masks of an earlier frame that had none. Ignored if the frame is no longer stored.
+  // Masks that arrived after their frame. Ignored if the frame is no longer stored.
   void ObserveMasks(const FrameMasks& masks, SlamMap& map);
 
  private:

@@ -31,7 +31,7 @@ class MonocularInitializer {
  public:
   explicit MonocularInitializer(const SlamConfig& config) : config_(config) {}
 
-  // Processes the next frame. Without a result, `reason` is the reason in words for users.
+  // Processes the next frame. Without a result, `reason` explains the reason to users.
   std::optional<InitialViews> Offer(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
   void Reset() { followed_.clear(); }
 

@@ -158,7 +158,7 @@ std::optional<LoopMatch> PlaceRecognizer::MakeLoop(const MapKeyframe& keyframe, 
 
   loop.S_old_newest = Sim3<Camera, Camera>(T_old_world * located.T_world_camera);
   if (fix_scale || loop.drift_px < kNoDrift_px) return loop;
-  // Only points that both sides have determine the ratio of their scales.
+  // Only points that exist on both sides determine the ratio of their scales.
   const auto similarity = SolveSimilarity(keyframe.camera(), common,
                                           {.min_inliers = kMinCommonPoints, .seed = config_.Seed(keyframe.id.value)});
   spdlog::debug("slam: loop candidate {} to {}: drift {:.1f} px, {} of {} common points agree", keyframe.id.ToString(),

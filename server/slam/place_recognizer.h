@@ -13,7 +13,7 @@ namespace romap::slam {
 // A loop with less drift than this in the newest keyframe's image needs no correction.
 inline constexpr double kNoDrift_px = 4;
 
-// A keyframe that shows a place which an old keyframe shows too.
+// A keyframe and an old keyframe that show the same place.
 struct LoopMatch {
   KeyframeId newest;
   KeyframeId old;
@@ -22,7 +22,7 @@ struct LoopMatch {
   double drift_px = 0;  // median distance in the newest image between features and projections of the old points
 };
 
-// Place recognition: finds keyframes by their descriptors and verifies them by geometry.
+// Place recognition: finds keyframes by their descriptors and verifies them geometrically.
 class PlaceRecognizer {
  public:
   PlaceRecognizer(const SlamConfig& config, const SlamMap* map) : config_(config), map_(map), index_(1) {}
@@ -34,11 +34,11 @@ class PlaceRecognizer {
     SE3<World, Camera> T_world_camera;
     KeyframeId keyframe;  // shows the same place
   };
-  // The pose of a frame without any prior knowledge.
+  // Finds the pose of a frame without a prior.
   std::optional<Relocalized> Relocalize(const FrameFeatures& frame) const;
 
-  // An old keyframe that shows the same place but shares few or no points with this one. `fix_scale`: the map's scale
-  // does not drift.
+  // Finds an old keyframe that shows the same place but shares few or no points with this one. `fix_scale`: the map's
+  // scale does not drift.
   std::optional<LoopMatch> FindLoop(const MapKeyframe& keyframe, bool fix_scale) const;
 
  private:

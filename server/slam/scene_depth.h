@@ -18,10 +18,10 @@ struct DepthView {
 
 DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_camera);
 
-// Typical depth of the scene in map units, seen from `first`. A depth image gives it directly. Otherwise it is the
-// median over image blocks of a plane sweep (Collins 1996): `second` is warped to `first` for planes at several depths
-// and each block votes for the depth with the least difference. nullopt: the views are too close together or too
-// different, or have no texture.
+// Typical depth of the scene in map units, seen from `first`. If `first` has a depth image, the depth is taken from it.
+// Otherwise it is the median over image blocks of a plane sweep (Collins 1996): `second` is warped to `first` for
+// planes at several depths and each block votes for the depth with the least difference. nullopt: the views are too
+// close together or too different, or have no texture.
 std::optional<double> SceneDepth(const DepthView& first, const DepthView& second);
 
 }  // namespace romap::slam

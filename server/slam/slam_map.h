@@ -24,7 +24,7 @@ inline constexpr int kMinSharedPoints = 15;
 struct MapKeyframe {
   KeyframeId id;
   std::shared_ptr<const FrameFeatures> frame;
-  bool pose_given = false;              // by the client: it is never moved
+  bool pose_given = false;              // by the client; never moved
   std::optional<PosePrior> prior = {};  // the client's estimate of its pose
   size_t scene_features = 0;            // number of scene features, which come before additional object features
   std::vector<MapPointId> points = {};  // one per feature, 0 = none
@@ -82,7 +82,7 @@ class SlamMap {
   // Records that the feature observes the point. Returns false and changes nothing if the feature already observes a
   // point or the keyframe already observes this one.
   bool AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature);
-  // Also removes the point if neither two observations nor one with depth are left.
+  // Also removes the point unless at least two observations, or one with depth, are left.
   void RemoveObservation(MapPointId point, KeyframeId keyframe);
   void RemovePoint(MapPointId point);
   // Removes `from` and moves its observations to `into` where possible.
@@ -90,7 +90,7 @@ class SlamMap {
   // Its children get its parent, and its pose relative to the parent is kept (see KeyframePose).
   void RemoveKeyframe(KeyframeId keyframe);
 
-  // nullptr: unknown or removed. The id of a point that was merged finds the point it was merged into.
+  // nullptr: unknown or removed. For the id of a merged point, returns the point it was merged into.
   PointTrack* FindPoint(MapPointId point);
   const PointTrack* FindPoint(MapPointId point) const { return const_cast<SlamMap*>(this)->FindPoint(point); }
   MapKeyframe* FindKeyframe(KeyframeId keyframe);
@@ -101,7 +101,8 @@ class SlamMap {
   // The current pose of a keyframe. One that was removed moves with its parent.
   std::optional<ScaledPose> KeyframePose(KeyframeId keyframe) const;
 
-  // Keyframes that share at least `min_shared` points with this one, most first (then the newest).
+  // Keyframes that share at least `min_shared` points with this one, sorted by the number of shared points, then by
+  // age, the newest first.
   std::vector<std::pair<KeyframeId, int>> Covisible(const MapKeyframe& keyframe, int min_shared) const;
 
   ObservedRay RayOf(const MapKeyframe& keyframe, int feature) const;
@@ -115,7 +116,7 @@ class SlamMap {
   // Does not move points, because the adjustment that estimates the lens moves them.
   void CorrectLens(const RadialCorrection& lens);
 
-  // Applies a similarity to everything.
+  // Applies a similarity to all keyframes and points.
   void Transform(const Sim3<World, World>& S_new_old);
 
   std::map<KeyframeId, MapKeyframe>& keyframes() { return keyframes_; }

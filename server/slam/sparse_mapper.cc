@@ -68,7 +68,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   } else if (HasPose(image.tracked) && is_of_current_map) {
     MapTrackedFrame(image, mapped);
   } else if (HasPose(image.tracked)) {
-    // It was tracked against a map that has been reset since.
+    // The frame was tracked against a map that has since been reset.
     mapped.tracked.state = TrackingState::kLost;
     mapped.tracked.is_keyframe = false;
   } else if (image.tracked.state == TrackingState::kLost && is_of_current_map) {

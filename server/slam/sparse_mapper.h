@@ -37,7 +37,7 @@ struct MappedFrame {
 class SparseMapper {
  public:
   // `local_map` outlives the mapper. `inline_adjustment`: global bundle adjustment runs inside Process() instead of on
-  // a thread, so that the same frames give the same map.
+  // a background thread, so that the same frames give the same map.
   SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment = false);
 
   MappedFrame Process(const TrackedImage& image);

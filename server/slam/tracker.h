@@ -23,7 +23,7 @@ namespace romap::slam {
 // The result of tracking one frame, for the mapping thread.
 struct TrackedImage {
   TrackedFrame tracked;
-  std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is no keyframe
+  std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is not a keyframe
   std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
@@ -31,8 +31,8 @@ struct TrackedImage {
 };
 
 // Finds the camera pose of each frame: uses the given pose, or tracks the camera from the image against the local map.
-// Frames come in the order of their time stamps, from one thread, which never waits for mapping: it uses the newest
-// local map available.
+// Call Track() from one thread in the order of time stamps. It never waits for mapping, but uses the newest local map
+// available.
 //
 // Tracking from images: the motion of the last frames predicts the pose; the points of the last frame are searched
 // around their projections; if that fails, in a wider area and then by descriptors alone (P3P). Then all points of the
@@ -43,7 +43,7 @@ class Tracker {
   // `local_map` outlives the tracker.
   Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot* local_map);
 
-  // Never rejects a decoded frame. Without a pose, `tracked.reason` is the reason in words for users.
+  // Never rejects a decoded frame. Without a pose, `tracked.reason` explains the reason to users.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
 
  private:

@@ -13,7 +13,7 @@ class TrackingStatus {
   bool IsTracking() const { return state_ == TrackingState::kTracking; }
   // Lost, or relocalized so recently that the pose must still be confirmed by more points than usual.
   bool NeedsConfirmation() const { return IsLost() || frames_since_recovery_ < kConfirmationFrames; }
-  // Frames tracked since the map was initialized or the camera relocalized.
+  // Frames tracked since the map was initialized or the camera was relocalized.
   int frames_since_recovery() const { return frames_since_recovery_; }
   // The first frame of the current loss; valid only while lost.
   uint64_t lost_since_frame() const { return lost_since_frame_; }

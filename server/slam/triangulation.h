@@ -28,7 +28,7 @@ bool Agrees(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 double Parallax_rad(const ObservedRay& a, const ObservedRay& b, const Eigen::Vector3d& p_world);
 double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
-// The point closest to two rays (midpoint method). nullopt: parallel, or behind a camera.
+// The point closest to two rays (midpoint method). nullopt: the rays are parallel, or the point is behind a camera.
 std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b);
 
 // The point that fits all rays best: Gauss-Newton on the errors of bearings and ranges with Huber weights (at the

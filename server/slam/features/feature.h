@@ -40,7 +40,7 @@ inline constexpr double kMaxOctaveScale = 3.58;  // kOctaveFactor ^ (kOctaves - 
 
 // A corner of one frame.
 struct Feature {
-  Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, for every lens
+  Eigen::Vector2f pixel_px;  // in the pinhole image of Frame::camera, for all lens models
   int octave = 0;            // pyramid level it was found on, 0 = full size
   double octave_scale = 1;   // kOctaveFactor ^ octave
   float angle_rad = 0;       // of its patch, from the image's +x axis toward +y (clockwise), -pi..pi

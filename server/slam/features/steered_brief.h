@@ -32,8 +32,8 @@ struct BriefTest {
   int8_t second_y_px = 0;
 };
 
-// The 256 tests, learned to be discriminative and uncorrelated; bit i of the descriptor is bit i %
-// 64 of its word i / 64.
+// The 256 tests, learned to be discriminative and uncorrelated; bit i of the descriptor is bit (i % 64) of its word (i
+// / 64).
 const std::array<BriefTest, 256>& BriefTests();
 
 // Results of the tests with the pattern rotated to the direction of the patch (steered BRIEF, Rublee et al., ICCV

@@ -30,7 +30,7 @@ struct SupportPlaneQuery {
   uint64_t seed = 1;
 };
 
-// The plane that supports the objects; its normal is the up direction. nullopt: no plane can support them.
+// Finds the plane that supports the objects; its normal is the up direction. nullopt: no plane can support them.
 std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query);
 
 }  // namespace romap::slam

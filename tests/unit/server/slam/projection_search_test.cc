@@ -33,7 +33,7 @@ TEST(MatchDescriptors, FindsMutualBestMatchesWithinTheLimits) {
     EXPECT_EQ(match.distance,
               HammingDistance(first[static_cast<size_t>(match.first)], second[static_cast<size_t>(match.second)]));
   }
-  second.push_back(Flip(first[0], 11));  // a rival
+  second.push_back(Flip(first[0], 11));  // a second candidate for first[0]
   EXPECT_EQ(MatchDescriptors(first, second, 50, 0.8).size(), 19U);
   EXPECT_TRUE(MatchDescriptors({}, second, 50, 0.8).empty());
   EXPECT_TRUE(MatchDescriptors(first, {}, 50, 0.8).empty());

@@ -90,7 +90,7 @@ TEST_F(SlamMapTest, MergedPointsAreFoundByBothIds) {
   map_.MergePoints(from, into);
   ASSERT_NE(map_.FindPoint(from), nullptr);
   EXPECT_EQ(map_.FindPoint(from)->point.id, into);
-  EXPECT_EQ(map_.FindPoint(into)->observations.size(), 3U);  // b observed both; one observation stays
+  EXPECT_EQ(map_.FindPoint(into)->observations.size(), 3U);  // b observed both points; one of its observations remains
   ExpectConsistent();
 }
 
@@ -113,7 +113,7 @@ TEST_F(SlamMapTest, ARemovedKeyframeMovesWithItsParent) {
   const KeyframeId removed = b.id;
   map_.RemoveKeyframe(removed);
   EXPECT_EQ(map_.FindKeyframe(removed), nullptr);
-  // The map grows to twice its size and turns by a quarter around z.
+  // Scale the map by two and rotate it by 90 degrees around z.
   map_.Transform({2, Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(0, 0, 1)});
   const auto pose = map_.KeyframePose(removed);

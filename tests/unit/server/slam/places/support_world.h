@@ -20,7 +20,7 @@ class SupportWorld {
     double table_half_width = 0.6;
     int object_points = 120;
     double object_bottom = 0;    // lowest height of object points, as a share of the object's height
-    int floor_points = 0;        // 0.75 below the table, seen past it
+    int floor_points = 0;        // 0.75 m below the table, visible beside it
     int wall_points = 0;         // upright, behind the table
     int clutter_points = 0;      // on top of the table, unlabeled, up to 0.25 high
     double stray_share = 0;      // share of the table points at random heights
