@@ -15,8 +15,8 @@ struct ScaledPose {
   SE3<World, Camera> T_world_camera;
   double scale = 1;  // product of all scale corrections, > 0
 
-  // The pose of a frame that is anchored to this keyframe. The translation of `T_this_frame` is in map units of the time
-  // when the keyframe was made, as in TrackedFrame::T_reference_camera.
+  // The pose of a frame that is anchored to this keyframe. The translation of `T_this_frame` is in map units of the
+  // time when the keyframe was made, as in TrackedFrame::T_reference_camera.
   SE3<World, Camera> Compose(const SE3<Camera, Camera>& T_this_frame) const {
     return T_world_camera * ScaleTranslation(T_this_frame, scale);
   }

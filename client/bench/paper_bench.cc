@@ -95,7 +95,7 @@ class PaperBench {
     fs::remove_all(options_.out_dir + "/scratch", error);
     if (!status.ok() && !absl::IsCancelled(status)) return status;
     if (!status.ok()) {
-      results_.notes.push_back("Interrupted: some rows lack runs.");
+      results_.notes.push_back("Interrupted: some rows are incomplete.");
       ROMAP_RETURN_IF_ERROR(WriteReport());
     }
     return std::move(results_);

@@ -8,8 +8,8 @@ namespace romap::bench {
 
 // The clock of the benchmark.
 enum class BenchClock {
-  kCpu,  // CPU time of this process divided by the number of threads: the time on an idle machine if threads never
-         // waited for each other
+  kCpu,   // CPU time of this process divided by the number of threads: the time on an idle machine if threads never
+          // waited for each other
   kWall,  // wall time
 };
 

@@ -124,7 +124,7 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
       ->capture_default_str();
   command
       ->add_option("--mask-delay", options->stream.mask_delay_s,
-                   "Send the masks this long after their frame [s of frame timestamps], simulating a detector delay; "
+                   "Delay of the masks relative to their frame [s of frame timestamps], simulating a detector delay; "
                    "the server accepts masks up to objects.max_mask_delay_s late")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

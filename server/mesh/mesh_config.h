@@ -50,7 +50,7 @@ struct MeshConfig {
 
   void SurfaceFields(ConfigFields& fields) {
     fields.Add("fill_unseen", &fill_unseen,
-               {.help = "Make empty space solid if no training view can see it (undersides, insides)"});
+               {.help = "Make empty space solid if it is invisible in all training views (undersides, insides)"});
     fields.Add("cut_below_support", &cut_below_support,
                {.help = "End the object at the lowest height where a training view sees its surface"});
     fields.Add("min_component_share", &min_component_share,
@@ -58,7 +58,7 @@ struct MeshConfig {
                 .max = 1,
                 .help = "Minimum size of a separate piece, as a share of the largest one; smaller ones are removed"});
     fields.Add("trim_unseen", &trim_unseen,
-               {.help = "Remove surface that no training view sees; the mesh is then open"});
+               {.help = "Remove surface that is invisible in all training views; the mesh is then open"});
     fields.Add("trim_confidence", &trim_confidence,
                {.min = 0, .max = 1, .help = "Minimum confidence of a vertex that trim_unseen keeps"});
   }

@@ -320,7 +320,7 @@ std::vector<Match> MatchGlobally(const Scene& scene) {
     match.landmark = static_cast<int>(l);
     match.agreement = Agreement(scene, d, l);
     if (CoversAnother(scene, d, l, matched)) {
-      match.doubt = "covers another object too";
+      match.doubt = "mask covers a second object";
     } else if (IsAmbiguous(scene, scores, static_cast<Eigen::Index>(l), detection_of[l])) {
       match.doubt = "another match scores nearly as well";
     }

@@ -74,7 +74,7 @@ Decision DecideMergeWithPoints(const Landmark& with_cuboid, const Landmark& with
 Decision DecideConfirmation(const LandmarkEvidence& evidence, const LandmarkGeometry& geometry,
                             const ObjectsConfig& config) {
   if (!geometry.cuboid) return {false, "no cuboid yet"};
-  if (!HasPlausibleProportions(*geometry.cuboid)) return {false, "cuboid of implausible proportions"};
+  if (!HasPlausibleProportions(*geometry.cuboid)) return {false, "implausible cuboid proportions"};
   if (DetectedTooRarely(evidence, config)) return {false, "detected in too few of the frames that should show it"};
   if (MasksDisagree(evidence)) return {false, "masks disagree with its shape"};
   // A part of a larger object is covered by that object's mask in most frames.
@@ -178,7 +178,7 @@ Decision DecideMerge(const Landmark& a, const Landmark& b, const PointRegistry& 
   if (overlap > kProbableOverlap) return {true, "same class and most of the volume"};
   // Cuboids of one object from two distant view directions may disagree on its far side.
   if (!(overlap > kPossibleOverlap)) return {false, "too little overlap"};
-  if (!PointsAgree(a, b, points).value_or(true)) return {false, "the map points lie apart"};
+  if (!PointsAgree(a, b, points).value_or(true)) return {false, "map points are too far apart"};
   return {true, "same class, part of the volume, and map points that agree"};
 }
 

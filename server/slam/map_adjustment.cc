@@ -9,7 +9,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr size_t kMaxHoldingKeyframes = 20;
+constexpr size_t kMaxAnchorKeyframes = 20;
 
 class ProblemBuilder {
  public:
@@ -90,7 +90,7 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
   std::vector<std::pair<int, KeyframeId>> holding;
   for (const auto& [id, count] : around) holding.emplace_back(count, id);
   std::sort(holding.rbegin(), holding.rend());
-  if (holding.size() > kMaxHoldingKeyframes) holding.resize(kMaxHoldingKeyframes);
+  if (holding.size() > kMaxAnchorKeyframes) holding.resize(kMaxAnchorKeyframes);
 
   // A small map has no keyframes outside the window: its oldest one is fixed. The observations do not determine the
   // scale; damping keeps it.

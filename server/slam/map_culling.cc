@@ -37,7 +37,7 @@ void CullPoints(const SlamConfig& config, SlamMap& map) {
   std::vector<MapPointId> removed;
   std::vector<std::pair<uint64_t, MapPointId>> by_age;
   for (const auto& [id, track] : map.points()) {
-    const bool trial_is_over = map.keyframe_count() - track.born_keyframe >= kTrialKeyframes;
+    const bool trial_is_over = map.keyframe_count() - track.created_keyframe >= kTrialKeyframes;
     if (trial_is_over && track.point.observations < kTrialObservations) {
       removed.push_back(id);
     } else {

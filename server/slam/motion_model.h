@@ -14,7 +14,7 @@ class MotionModel {
   // Forgets the last pose and the motion.
   void Reset();
   // The last pose remains known, but the motion becomes unknown.
-  void ForgetMotion() { motion_.reset(); }
+  void ResetMotion() { motion_.reset(); }
   void RestartAt(const SE3<World, Camera>& T_world_camera);
   // Records a tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame
   // is usable; false after a loss of tracking.

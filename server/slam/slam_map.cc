@@ -34,7 +34,7 @@ PointTrack& SlamMap::AddPoint(const Eigen::Vector3d& position_world) {
   PointTrack& track = points_[id];
   track.point.id = id;
   track.point.position_world = position_world;
-  track.born_keyframe = keyframe_count_;
+  track.created_keyframe = keyframe_count_;
   return track;
 }
 

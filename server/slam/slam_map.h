@@ -62,10 +62,10 @@ struct PointTrack {
   std::vector<FeatureRef> observations = {};                   // by keyframe
   Descriptor descriptor{};                                     // of the observation that differs least from all others
   Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
-  double size_mu = 0;            // width of one pixel of the feature's octave at the point; similar in all keyframes
-  uint64_t born_keyframe = 0;    // number of the keyframe that created it
-  uint64_t latest_keyframe = 0;  // number of the newest keyframe that observes it
-  MaskVotes votes = {};          // from frames with masks that are not keyframes
+  double size_mu = 0;             // width of one pixel of the feature's octave at the point; similar in all keyframes
+  uint64_t created_keyframe = 0;  // number of the keyframe that created it
+  uint64_t latest_keyframe = 0;   // number of the newest keyframe that observes it
+  MaskVotes votes = {};           // from frames with masks that are not keyframes
 };
 
 // The keyframes and points of one session. Not thread-safe. Ids are never reused.

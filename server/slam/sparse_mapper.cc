@@ -222,11 +222,11 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
 
 // ------------------------------------------------------------------------------------------------ the whole map
 
-void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current_->map, MayFindLens()); }
+void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current_->map, CanEstimateLens()); }
 
 // From few views, lens distortion cannot be separated from the shape of the scene. The client computed its poses with
 // its own calibration.
-bool SparseMapper::MayFindLens() const {
+bool SparseMapper::CanEstimateLens() const {
   return config_.refine_lens && !current_->world_is_given &&
          current_->map.keyframes().size() >= kMinKeyframesToFindLens;
 }

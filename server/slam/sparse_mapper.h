@@ -88,7 +88,7 @@ class SparseMapper {
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
-  bool MayFindLens() const;
+  bool CanEstimateLens() const;
   void AlignWithUp(bool is_last = false);
   void UpdatePose(TrackedFrame& tracked) const;
   void PublishLocalMap(KeyframeId reference, std::optional<LocalMap::Relocalization> relocalized = {});

@@ -67,7 +67,7 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
       motion_.RestartAt(newest.keyframes.find(newest.reference)->second.T_world_camera);
       status_.OnMapInitialized();
     } else {
-      motion_.ForgetMotion();
+      motion_.ResetMotion();
       status_.OnMapReset();
     }
   } else if (newest.points.empty() && !world_is_given_) {
@@ -117,7 +117,7 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   image.tracked.state = TrackingState::kInitializing;
   image.features = features;
   if (waiting_since_generation_) {
-    image.tracked.reason = "initial map is being built";
+    image.tracked.reason = "map initialization in progress";
     return image;
   }
   const auto with_depth =
@@ -216,7 +216,7 @@ void Tracker::Lose(const std::string& why, TrackedImage& image) {
   status_.OnLost(image.tracked.frame->frame_id);
   image.tracked.state = TrackingState::kLost;
   image.tracked.reason = why;
-  motion_.ForgetMotion();
+  motion_.ResetMotion();
 }
 
 bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image) {

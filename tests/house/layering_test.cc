@@ -87,7 +87,7 @@ const std::vector<std::string>& Allowed(const std::string& path) {
   return best == nullptr ? kNothing : *best;
 }
 
-TEST(HouseTest, FoldersIncludeOnlyWhatTheyMay) {
+TEST(HouseTest, FoldersIncludeOnlyAllowedFolders) {
   const std::regex include(R"(^\s*#include\s+"([^"]+)\")");
   for (const SourceFile& file : SourceFiles()) {
     const std::vector<std::string>& allowed = Allowed(file.path);

@@ -248,7 +248,7 @@ inline void Composite(const Ray* rays, const RaySpan* spans, int ray_count, cons
     const bool has_partner = partner != r && partner >= 0 && partner < ray_count && spans[partner].count > 0;
     float partner_error[3] = {};
     if (has_partner) ColorError(results[partner], rays[partner].target, weights, partner_error);
-    const RayLoss loss = LossOfRay(results[r], target, weights, has_partner ? partner_error : nullptr);
+    const RayLoss loss = LossOfRay(results[r], target, weights, has_partner, partner_error);
     results[r].loss = loss.value;
     results[r].color_loss = loss.color;
     const int at = spans[r].first;

@@ -21,7 +21,7 @@ void Composite(std::span<const Ray> rays, std::span<const RaySpan> spans, Sample
                              c.density.data() + at, {c.red.data() + at, c.green.data() + at, c.blue.data() + at}};
     const RayTarget& target = rays[r].target;
     RayResult result = plain::CompositeForward(samples, target.depth, c.weight.data() + at, c.behind.data() + at);
-    result.color_loss = plain::LossOfRay(result, target, LossWeights{}, nullptr).color;
+    result.color_loss = plain::LossOfRay(result, target, LossWeights{}, /*has_partner=*/false, nullptr).color;
     results.push_back(result);
   }
 }

@@ -138,7 +138,7 @@ __device__ void RenderRay(const StepParams& p, const TileRays& in, Tile<T>& tile
   for (int c = 0; c < 3; ++c) partner_error[c] = __shfl_xor_sync(kWholeWarp, error[c], 1);
   if (count == 0) return;
   const bool has_partner = target.partner != 0 && partner_has_samples;
-  const RayLoss loss = plain::LossOfRay(result, target, p.loss_weights, has_partner ? partner_error : nullptr);
+  const RayLoss loss = plain::LossOfRay(result, target, p.loss_weights, has_partner, partner_error);
   if (target.is_object) in.color_loss[r] = loss.color;
   plain::CompositeBackward(ray, target.depth, loss, tile.weight + at, tile.behind + at, tile.raw + kOutputs * at);
   atomicAdd(&p.counters->rays, 1ull);

@@ -38,7 +38,7 @@ ROMAP_HD void ColorError(const RayResult& ray, const RayTarget& target, const Lo
 }
 
 // `partner_error` [3]: see LossOfRay. Half of the contrast belongs to this ray, the other half to its partner.
-ROMAP_HD void AddColorLoss(const RayResult& ray, const RayTarget& target, const LossWeights& weights,
+ROMAP_HD void AddColorLoss(const RayResult& ray, const RayTarget& target, const LossWeights& weights, bool has_partner,
                            const float* partner_error, RayLoss& loss) {
   if (!HasTargetColor(target, weights)) return;
   float error[3];
@@ -48,7 +48,7 @@ ROMAP_HD void AddColorLoss(const RayResult& ray, const RayTarget& target, const 
   for (int c = 0; c < 3; ++c) {
     const float back = BackgroundColor(target, weights, c);
     float wanted = target.is_object ? target.rgb[c] : back;
-    if (partner_error != nullptr) {
+    if (has_partner) {
       // Moving the target color makes the derivative of the square that of both terms.
       const float difference = error[c] - partner_error[c];
       wanted -= weights.contrast * difference;

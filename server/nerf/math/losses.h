@@ -31,13 +31,14 @@
 
 ROMAP_MATH_BEGIN
 
-// All terms of a ray. `partner_error` [3]: the color error (ColorError) of its partner, null without a partner. Terms
-// are summed in a fixed order, because the order changes the last bits.
-ROMAP_HD RayLoss LossOfRay(const RayResult& ray, const RayTarget& target, const LossWeights& weights,
+// All terms of a ray; `partner_error` [3] is the color error (ColorError) of its partner, ignored without a partner. It
+// is not a pointer that may be null, because nvcc would then keep it on the stack. Terms are summed in a fixed order,
+// because the order changes the last bits.
+ROMAP_HD RayLoss LossOfRay(const RayResult& ray, const RayTarget& target, const LossWeights& weights, bool has_partner,
                            const float* partner_error) {
   RayLoss loss{};
   AddOpacityLoss(ray, target, weights, loss);
-  AddColorLoss(ray, target, weights, partner_error, loss);
+  AddColorLoss(ray, target, weights, has_partner, partner_error, loss);
   AddDepthLoss(ray, target, weights, loss);
   AddDensityLoss(ray, target, weights, loss);
   return loss;

@@ -94,7 +94,7 @@ double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, 
   return lines.algebraic * lines.algebraic / (lines.slope2 * match.sigma_px * match.sigma_px);
 }
 
-RayMatch NearestObedient(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
+RayMatch ClosestEpipolarMatch(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
   const EpipolarLines lines = LinesOf(camera, essential, match);
   if (!(lines.slope2 > 0)) return match;
   const double shift = lines.algebraic / lines.slope2;

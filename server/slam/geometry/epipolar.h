@@ -35,7 +35,7 @@ inline constexpr double kEpipolarChi2Bound = 3.841;
 double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match);
 
 // The nearest match that satisfies the epipolar constraint to first order, so that its rays intersect.
-RayMatch NearestObedient(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match);
+RayMatch ClosestEpipolarMatch(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match);
 
 // Intersection of the two rays of a match for a given motion.
 struct RayMeeting {

@@ -12,7 +12,7 @@ namespace romap::slam {
 namespace {
 
 constexpr int kPolishRounds = 5;
-constexpr int kTurnRounds = 5;
+constexpr int kRotationRounds = 5;
 // Translations below this share of the distance to the plane are rounding errors.
 constexpr double kNoTranslation = 1e-9;
 
@@ -80,7 +80,7 @@ double TransferSupport(const CameraModel& camera, const Eigen::Matrix3d& homogra
   return support;
 }
 
-Eigen::Matrix3d PolishHomography(const CameraModel& camera, const Eigen::Matrix3d& start,
+Eigen::Matrix3d RefineHomography(const CameraModel& camera, const Eigen::Matrix3d& start,
                                  std::span<const RayMatch> matches) {
   Eigen::Matrix3d best = start;
   double best_support = TransferSupport(camera, best, matches);
@@ -118,11 +118,11 @@ std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography) {
   return motions;
 }
 
-Eigen::Matrix3d FitTurn(const CameraModel& camera, const Eigen::Matrix3d& homography,
-                        std::span<const RayMatch> matches) {
+Eigen::Matrix3d FitRotation(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                            std::span<const RayMatch> matches) {
   Eigen::Matrix3d turn = NearestRotation(homography);
   double support = TransferSupport(camera, turn, matches);
-  for (int round = 0; round < kTurnRounds; ++round) {
+  for (int round = 0; round < kRotationRounds; ++round) {
     // Kabsch 1976 on unit rays.
     Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
     for (const RayMatch& match : ExplainedBy(camera, turn, matches)) {

@@ -26,7 +26,7 @@ double TransferChi2(const CameraModel& camera, const Eigen::Matrix3d& homography
 double TransferSupport(const CameraModel& camera, const Eigen::Matrix3d& homography, std::span<const RayMatch> matches);
 
 // Refits the homography to the matches that agree with it, as long as its support increases.
-Eigen::Matrix3d PolishHomography(const CameraModel& camera, const Eigen::Matrix3d& start,
+Eigen::Matrix3d RefineHomography(const CameraModel& camera, const Eigen::Matrix3d& start,
                                  std::span<const RayMatch> matches);
 
 // Decomposes a homography into the camera motions in front of a plane that produce it (Malis and Vargas 2007), at most
@@ -35,7 +35,7 @@ std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography);
 
 // Fits a rotation to the matches that agree with it, starting from the rotation closest to `homography`: the motion if
 // the camera only rotated.
-Eigen::Matrix3d FitTurn(const CameraModel& camera, const Eigen::Matrix3d& homography,
-                        std::span<const RayMatch> matches);
+Eigen::Matrix3d FitRotation(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                            std::span<const RayMatch> matches);
 
 }  // namespace romap::slam

@@ -46,8 +46,8 @@ NormalEquations<N> Minimize(int max_iterations, const Linearize& linearize, cons
     typename NormalEquations<N>::Matrix damped = here.hessian;
     damped.diagonal() *= 1 + damping;
     const typename NormalEquations<N>::Vector step = -damped.ldlt().solve(here.gradient);
-    const double promised_gain = -step.dot(here.gradient);
-    if (!step.allFinite() || !(promised_gain > kNegligibleGain * here.cost + kNegligibleAbsoluteGain)) break;
+    const double expected_gain = -step.dot(here.gradient);
+    if (!step.allFinite() || !(expected_gain > kNegligibleGain * here.cost + kNegligibleAbsoluteGain)) break;
     const State candidate = move(state, step);
     const NormalEquations<N> there = linearize(candidate);
     if (there.cost < here.cost) {

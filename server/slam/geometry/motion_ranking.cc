@@ -17,8 +17,8 @@ constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
 // Minima closer to each other than this are not rivals.
 constexpr double kNearRotation_rad = 1 * kDegree_rad;
 constexpr double kNearDirection_rad = 10 * kDegree_rad;
-constexpr double kMedianChi2 = 0.4549;  // of chi-square with one degree of freedom
-constexpr double kLeastNoise = 0.25;    // lower limit, as a share of the given noise
+constexpr double kMedianChi2 = 0.4549;   // of chi-square with one degree of freedom
+constexpr double kMinNoiseRatio = 0.25;  // lower limit, as a share of the given noise
 
 std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const Motion> starts,
                                      std::span<const RayMatch> matches) {
@@ -26,7 +26,7 @@ std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const 
   for (const Motion& start : starts) {
     const RefinedMotion candidate = RefineMotion(camera, start, matches);
     const bool is_known = std::any_of(refined.begin(), refined.end(), [&](const RefinedMotion& other) {
-      return AreAlike(other.motion, candidate.motion, kSameRotation_rad, kSameDirection_rad);
+      return AreSimilar(other.motion, candidate.motion, kSameRotation_rad, kSameDirection_rad);
     });
     if (!is_known) refined.push_back(candidate);
   }
@@ -38,7 +38,7 @@ std::vector<RefinedMotion> RefineAll(const CameraModel& camera, std::span<const 
 // Ratio of the actual noise of the agreeing matches (from their median error) to their sigma_px. A sigma_px that is too
 // large hides how much better one motion is than another. The ratio is at most 1, because matches with a larger scatter
 // may be wrong.
-double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
+double NoiseRatio(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
   const Eigen::Matrix3d essential = motion.Essential();
   std::vector<double> chi2s;
   for (const RayMatch& match : matches) {
@@ -46,7 +46,7 @@ double NoiseOverClaim(const CameraModel& camera, const Motion& motion, std::span
     if (chi2 < kEpipolarChi2Bound) chi2s.push_back(chi2);
   }
   if (chi2s.empty()) return 1;
-  return std::clamp(std::sqrt(Median(std::move(chi2s)) / kMedianChi2), kLeastNoise, 1.0);
+  return std::clamp(std::sqrt(Median(std::move(chi2s)) / kMedianChi2), kMinNoiseRatio, 1.0);
 }
 
 // Adds starts along the axes and halfway between them. RefineMotion also tries the opposite directions.
@@ -58,9 +58,9 @@ void AddAllDirections(const Eigen::Matrix3d& rotation, std::vector<Motion>& star
 
 }  // namespace
 
-double MotionRanking::RivalSupport() const {
+double MotionRanking::SecondBestSupport() const {
   for (const RefinedMotion& rival : motions) {
-    if (!AreAlike(motions.front().motion, rival.motion, kNearRotation_rad, kNearDirection_rad)) return rival.support;
+    if (!AreSimilar(motions.front().motion, rival.motion, kNearRotation_rad, kNearDirection_rad)) return rival.support;
   }
   return 0;
 }
@@ -76,7 +76,7 @@ MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search,
   ranking.motions = RefineAll(camera, starts, ranking.matches);
   if (ranking.motions.empty()) return ranking;
 
-  const double noise = NoiseOverClaim(camera, ranking.motions.front().motion, matches);
+  const double noise = NoiseRatio(camera, ranking.motions.front().motion, matches);
   for (RayMatch& match : ranking.matches) match.sigma_px *= noise;
   starts.clear();
   for (const RefinedMotion& refined : ranking.motions) starts.push_back(refined.motion);

@@ -14,7 +14,7 @@ struct MotionRanking {
   std::vector<RayMatch> matches;  // with sigma_px reduced if they scatter less than given
 
   // Support of the best motion that clearly differs from the first one; 0 if there is none.
-  double RivalSupport() const;
+  double SecondBestSupport() const;
 };
 
 // Refines the motions found by RANSAC, the motions of its homography, and motions in all directions with the best

@@ -96,10 +96,10 @@ class Shortlist {
 
   void Offer(const Motion& motion, double support) {
     for (const Entry& entry : entries_) {
-      if (entry.support >= support && AreAlike(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad)) return;
+      if (entry.support >= support && AreSimilar(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad)) return;
     }
     std::erase_if(entries_, [&](const Entry& entry) {
-      return AreAlike(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad);
+      return AreSimilar(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad);
     });
     const auto position =
         std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.support < support; });
@@ -125,7 +125,7 @@ class Shortlist {
 
 }  // namespace
 
-bool AreAlike(const Motion& a, const Motion& b, double rotation_rad, double direction_rad) {
+bool AreSimilar(const Motion& a, const Motion& b, double rotation_rad, double direction_rad) {
   const double turn_rad = Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle();
   return turn_rad < rotation_rad && a.direction.dot(b.direction) > std::cos(direction_rad);
 }
@@ -161,7 +161,7 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
   }
   search.motions = shortlist.Motions();
   if (search.homography) {
-    search.homography = PolishHomography(camera, *search.homography, matches);
+    search.homography = RefineHomography(camera, *search.homography, matches);
     search.homography_support = TransferSupport(camera, *search.homography, matches);
   }
   return search;

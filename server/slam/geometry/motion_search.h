@@ -24,6 +24,6 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
                            uint64_t seed);
 
 // Whether two motions differ by less than these angles.
-bool AreAlike(const Motion& a, const Motion& b, double rotation_rad, double direction_rad);
+bool AreSimilar(const Motion& a, const Motion& b, double rotation_rad, double direction_rad);
 
 }  // namespace romap::slam

@@ -55,9 +55,9 @@ struct Score {
 Score ScoreOf(const CameraModel& camera, const CameraFromWorld& pose, std::span<const PoseObservation> observations) {
   Score score;
   for (const PoseObservation& observation : observations) {
-    const double badness = ErrorOf(camera, pose, observation).chi2 / Chi2Bound(observation);
-    if (!(badness <= 1)) continue;
-    score.support += 1 - badness;
+    const double normalized_chi2 = ErrorOf(camera, pose, observation).chi2 / Chi2Bound(observation);
+    if (!(normalized_chi2 <= 1)) continue;
+    score.support += 1 - normalized_chi2;
     ++score.inliers;
   }
   return score;

@@ -10,7 +10,7 @@ namespace {
 // Cost of a match that a step moves behind a camera; see reprojection.cc.
 constexpr double kCostBehindCamera = 1e4;
 // Keeps the normal equations nonsingular if the scale is fixed.
-constexpr double kIdleInformation = 1;
+constexpr double kFixedScaleInformation = 1;
 
 using PointDerivative = Eigen::Matrix<double, 3, 7>;
 
@@ -63,7 +63,7 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
   if (options.fix_scale) {
     moved_first.col(6).setZero();
     moved_second.col(6).setZero();
-    equations.hessian(6, 6) += kIdleInformation;
+    equations.hessian(6, 6) += kFixedScaleInformation;
   }
   AddPixel(ProjectionDerivative(camera, errors.second_in_first, match.first_sigma_px) * moved_first, errors.first,
            options.chi2_bound, equations);

@@ -24,7 +24,7 @@ int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const
   std::vector<double> parallaxes_rad;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (!(SampsonChi2(camera, essential, matches[i]) < kEpipolarChi2Bound)) continue;
-    const RayMatch obedient = NearestObedient(camera, essential, matches[i]);
+    const RayMatch obedient = ClosestEpipolarMatch(camera, essential, matches[i]);
     const RayMeeting meeting = MeetingOf(camera, motion, obedient);
     if (meeting.is_significant && !meeting.IsBeforeBoth()) continue;
     parallaxes_rad.push_back(meeting.parallax_rad);
@@ -38,8 +38,8 @@ int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const
 }
 
 // Support of a pure rotation.
-double TurnSupport(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches) {
-  return search.homography ? TransferSupport(camera, FitTurn(camera, *search.homography, matches), matches) : 0;
+double RotationSupport(const CameraModel& camera, const MotionSearch& search, std::span<const RayMatch> matches) {
+  return search.homography ? TransferSupport(camera, FitRotation(camera, *search.homography, matches), matches) : 0;
 }
 
 }  // namespace
@@ -61,12 +61,12 @@ TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMat
   const int agreeing = Triangulate(camera, best.motion, ranking.matches, result);
   if (agreeing < options.min_points) return result;
 
-  if (TurnSupport(camera, search, ranking.matches) > options.max_turn_share * best.support ||
+  if (RotationSupport(camera, search, ranking.matches) > options.max_rotation_support_ratio * best.support ||
       result.points < options.min_points || result.parallax_rad < options.min_parallax_deg * kDegree_rad ||
       best.rotation_sigma_rad > options.max_rotation_sigma_deg * kDegree_rad ||
       best.direction_sigma_rad > options.max_direction_sigma_deg * kDegree_rad) {
     result.outcome = TwoViewOutcome::kTooLittleParallax;
-  } else if (ranking.RivalSupport() > options.max_rival_share * best.support) {
+  } else if (ranking.SecondBestSupport() > options.max_second_best_ratio * best.support) {
     result.outcome = TwoViewOutcome::kAmbiguous;
   } else {
     result.outcome = TwoViewOutcome::kOk;
@@ -79,9 +79,9 @@ const char* Describe(TwoViewOutcome outcome) {
     case TwoViewOutcome::kOk:
       return "found";
     case TwoViewOutcome::kTooFewMatches:
-      return "too few matches agree on one motion";
+      return "too few matches agree with one camera motion";
     case TwoViewOutcome::kTooLittleParallax:
-      return "too little parallax: the camera stood still or only turned";
+      return "too little parallax: the camera did not move or only rotated";
     case TwoViewOutcome::kAmbiguous:
       return "two motions explain the matches about equally well";
   }

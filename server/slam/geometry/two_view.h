@@ -31,9 +31,9 @@ struct TwoViewOptions {
   int min_points = 50;            // triangulated, in front of both cameras, with small reprojection errors
   double min_parallax_deg = 1.5;  // median over all agreeing matches, including those of distant points
   // A pure rotation is assumed if its support exceeds this share of the best motion's support.
-  double max_turn_share = 0.6;
+  double max_rotation_support_ratio = 0.6;
   // The result is ambiguous if the support of another motion exceeds this share of the best motion's support.
-  double max_rival_share = 0.88;
+  double max_second_best_ratio = 0.88;
   // Standard deviations from the covariance of the refined motion, along its least certain axis.
   double max_rotation_sigma_deg = 0.8;
   double max_direction_sigma_deg = 3;
@@ -59,7 +59,7 @@ struct TwoViewResult {
 TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMatch> matches,
                            const TwoViewOptions& options);
 
-// Short text for users, for example "too little parallax: the camera stood still or only turned".
+// Short text for users, for example "too little parallax: the camera did not move or only rotated".
 const char* Describe(TwoViewOutcome outcome);
 
 }  // namespace romap::slam

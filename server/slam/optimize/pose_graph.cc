@@ -30,7 +30,7 @@ std::vector<PoseGraphEdge> SoundEdges(const std::vector<PoseGraphNode>& nodes,
 }
 
 // Whether every node is fixed or connected to a fixed one; otherwise part of the graph is undetermined.
-bool HangsTogether(const std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges) {
+bool IsConnectedToFixed(const std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges) {
   std::vector<int> parent(nodes.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](int node) {
@@ -57,7 +57,7 @@ double TypicalLengthMu(const std::vector<PoseGraphEdge>& edges) {
 }
 
 template <class To, class From>
-Sim3<To, From> WithLengthsTimes(double factor, const Sim3<To, From>& S) {
+Sim3<To, From> ScaleLengths(double factor, const Sim3<To, From>& S) {
   return {S.scale(), S.rotation(), factor * S.translation()};
 }
 
@@ -76,7 +76,7 @@ class PoseGraphSolver {
   double unit_mu_;
   std::vector<NodeState> states_;
   RefreshNodes refresh_{&states_};
-  ceres::SubsetManifold scale_held_{7, {kScaleComponent}};
+  ceres::SubsetManifold fixed_scale_{7, {kScaleComponent}};
   std::deque<RelativePoseCost> costs_;  // costs cannot be moved, hence no vector
   ceres::Problem ceres_;                // last, because it refers to the other members
 };
@@ -93,18 +93,18 @@ PoseGraphSolver::PoseGraphSolver(const std::vector<PoseGraphNode>& nodes, const 
                                  bool fix_scale)
     : unit_mu_(TypicalLengthMu(edges)), ceres_(ProblemOptions(&refresh_)) {
   states_.reserve(nodes.size());
-  for (const PoseGraphNode& node : nodes) states_.emplace_back(WithLengthsTimes(1 / unit_mu_, node.S_world_camera));
+  for (const PoseGraphNode& node : nodes) states_.emplace_back(ScaleLengths(1 / unit_mu_, node.S_world_camera));
   for (const PoseGraphEdge& edge : edges) {
     NodeState& a = states_[edge.a];
     NodeState& b = states_[edge.b];
-    costs_.emplace_back(&a, &b, WithLengthsTimes(1 / unit_mu_, edge.S_a_b), edge.weight);
+    costs_.emplace_back(&a, &b, ScaleLengths(1 / unit_mu_, edge.S_a_b), edge.weight);
     ceres_.AddResidualBlock(&costs_.back(), nullptr, a.increment.data(), b.increment.data());
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
     double* increment = states_[i].increment.data();
     if (!ceres_.HasParameterBlock(increment)) continue;
     if (nodes[i].fixed) ceres_.SetParameterBlockConstant(increment);
-    if (fix_scale) ceres_.SetManifold(increment, &scale_held_);
+    if (fix_scale) ceres_.SetManifold(increment, &fixed_scale_);
   }
 }
 
@@ -128,7 +128,7 @@ bool PoseGraphSolver::WriteBack(std::vector<PoseGraphNode>& nodes) const {
   std::vector<Sim3<World, Camera>> optimized;
   for (const NodeState& state : states_) {
     const Eigen::Map<const Sim3Vector> increment(state.increment.data());
-    optimized.push_back(WithLengthsTimes(unit_mu_, state.start * ExpSim3<Camera>(increment)));
+    optimized.push_back(ScaleLengths(unit_mu_, state.start * ExpSim3<Camera>(increment)));
     if (!optimized.back().IsFinite()) return false;
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
@@ -143,7 +143,8 @@ PoseGraphSummary OptimizePoseGraph(std::vector<PoseGraphNode>& nodes, const std:
                                    const PoseGraphOptions& options) {
   const auto is_finite = [](const PoseGraphNode& node) { return node.S_world_camera.IsFinite(); };
   const std::vector<PoseGraphEdge> sound = SoundEdges(nodes, edges);
-  if (sound.empty() || !std::all_of(nodes.begin(), nodes.end(), is_finite) || !HangsTogether(nodes, sound)) return {};
+  if (sound.empty() || !std::all_of(nodes.begin(), nodes.end(), is_finite) || !IsConnectedToFixed(nodes, sound))
+    return {};
   PoseGraphSolver solver(nodes, sound, options.fix_scale);
   PoseGraphSummary summary = solver.Run(options.max_iterations);
   summary.usable = summary.usable && solver.WriteBack(nodes);

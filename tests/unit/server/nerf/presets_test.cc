@@ -55,7 +55,7 @@ TEST(PresetsTest, PaperIsThePapersConfiguration) {
   EXPECT_EQ(c.max_extra_steps, 0);
 }
 
-TEST(PresetsTest, ExplicitKeysOverrideWhereverThePresetStands) {
+TEST(PresetsTest, ExplicitKeysOverrideThePresetInAnyOrder) {
   for (const char* yaml :
        {"nerf:\n  preset: paper\n  hidden_width: 48\n", "nerf:\n  hidden_width: 48\n  preset: paper\n"}) {
     NerfConfig config;

@@ -102,7 +102,7 @@ TEST_F(AssociationTest, ClassDecidesBetweenEqualGeometry) {
   EXPECT_EQ(Run().matches[0].landmark, 1);
 }
 
-TEST_F(AssociationTest, AMaskOverTwoNeighborsGetsADoubt) {
+TEST_F(AssociationTest, AMaskOverTwoNeighborsIsMarkedAsDoubtful) {
   AddCube(-0.13, "cup");
   AddCube(0.13, "cup");
   AddMask(1, BoxOf(*landmarks_[0]) | BoxOf(*landmarks_[1]), "cup");

@@ -37,9 +37,9 @@ TEST(DecideConfirmation, AcceptsEnoughConsistentObservations) { EXPECT_EQ(Reason
 TEST(DecideConfirmation, NeedsAPlausibleCuboid) {
   Landmark landmark = GoodLandmark(1);
   landmark.geometry.cuboid->half_extents = {1, 1, 0.01};
-  EXPECT_EQ(ReasonNotToConfirm(landmark), "cuboid of implausible proportions");
+  EXPECT_EQ(ReasonNotToConfirm(landmark), "implausible cuboid proportions");
   landmark.geometry.cuboid->half_extents.z() = 0;
-  EXPECT_EQ(ReasonNotToConfirm(landmark), "cuboid of implausible proportions");
+  EXPECT_EQ(ReasonNotToConfirm(landmark), "implausible cuboid proportions");
   landmark.geometry.cuboid.reset();
   EXPECT_EQ(ReasonNotToConfirm(landmark), "no cuboid yet");
 }
@@ -143,7 +143,7 @@ TEST(DecidePruning, RemovesPartsOfOtherObjects) {
   EXPECT_EQ(ReasonToPrune(ObjectState::kProvisional, evidence, true, 0), "part of another object");
 }
 
-TEST(DecidePruning, RemovesWhatIsMissedAndWhatIsNotObservedAgain) {
+TEST(DecidePruning, RemovesMissedAndUnobservedLandmarks) {
   LandmarkEvidence evidence;
   evidence.last_frame = 100;
   evidence.missed_in_view = 39;
@@ -155,7 +155,7 @@ TEST(DecidePruning, RemovesWhatIsMissedAndWhatIsNotObservedAgain) {
   EXPECT_EQ(ReasonToPrune(ObjectState::kProvisional, evidence, true, 101), "no longer detected where it was observed");
 }
 
-TEST(DecidePruningAtFinish, RemovesWhatIsProvisional) {
+TEST(DecidePruningAtFinish, RemovesProvisionalLandmarks) {
   EXPECT_TRUE(DecidePruningAtFinish(ObjectState::kProvisional).yes);
   EXPECT_FALSE(DecidePruningAtFinish(ObjectState::kConfirmed).yes);
   EXPECT_FALSE(DecidePruningAtFinish(ObjectState::kLost).yes);

@@ -37,7 +37,7 @@ std::vector<uint64_t> Keyframes(const std::vector<std::shared_ptr<Frame>>& frame
   return keyframes;
 }
 
-TEST(GivenPoseTracker, HandsOnThePoseAndTheFrame) {
+TEST(GivenPoseTracker, ForwardsPoseAndFrame) {
   GivenPoseTracker tracker{SlamConfig{}};
   const auto frame = BlackFrame(5, TexturedWorld::OrbitPose(30));
   const auto tracked = tracker.Take(frame);
@@ -48,7 +48,7 @@ TEST(GivenPoseTracker, HandsOnThePoseAndTheFrame) {
   EXPECT_TRUE(tracked.is_keyframe);
 }
 
-TEST(GivenPoseTracker, TakesUpFromGravity) {
+TEST(GivenPoseTracker, SetsUpFromGravity) {
   GivenPoseTracker tracker{SlamConfig{}};
   const auto frame = BlackFrame(1, TexturedWorld::OrbitPose(0));
   const Eigen::Vector3d up_world = Eigen::Vector3d::UnitY();

@@ -19,7 +19,7 @@ TEST(MaskZones, WithoutMasksNothingIsKnown) {
   EXPECT_EQ(MaskZones(cv::Mat(480, 640, CV_16UC1, cv::Scalar(0))).At({10, 10}, 1, 0), MaskZone::kFar);
 }
 
-TEST(MaskZones, TellsInsideBorderNearAndFar) {
+TEST(MaskZones, DistinguishesInsideBorderNearAndFar) {
   const MaskZones zones(Labels());
   EXPECT_EQ(zones.At({250, 200}, 1, kLabel), MaskZone::kInside);
   EXPECT_EQ(zones.At({299, 200}, 1, 0), MaskZone::kBorder);  // inside, but too close to the border to have a label
@@ -34,7 +34,7 @@ TEST(MaskZones, CoarseFeaturesHaveAWideBorder) {
   EXPECT_EQ(zones.At({306, 200}, 3.5, 0), MaskZone::kBorder);
 }
 
-TEST(MaskZones, PlacesAtAndBeyondTheImagesEdgeAreAnswered) {
+TEST(MaskZones, HandlesPixelsOutsideTheImage) {
   cv::Mat labels(9, 11, CV_16UC1, cv::Scalar(kLabel));
   const MaskZones zones(labels);
   EXPECT_EQ(zones.At({0, 0}, 3.5, 0), MaskZone::kBorder);
@@ -42,7 +42,7 @@ TEST(MaskZones, PlacesAtAndBeyondTheImagesEdgeAreAnswered) {
   EXPECT_EQ(zones.At({-100, 1000}, 1, 0), MaskZone::kNear);
 }
 
-TEST(MaskVotes, CountsPlacesThatAreKnown) {
+TEST(MaskVotes, IgnoresUnknownZones) {
   MaskVotes votes;
   for (const MaskZone place : {MaskZone::kUnknown, MaskZone::kInside, MaskZone::kInside, MaskZone::kNear}) {
     votes.Add(place);

@@ -21,7 +21,7 @@ TEST(SceneDepth, MeasuresTheDistanceOfAPlane) {
   }
 }
 
-TEST(SceneDepth, HasNoAnswerWithoutBaselineOrTexture) {
+TEST(SceneDepth, ReturnsNothingWithoutBaselineOrTexture) {
   const TexturedWorld world;
   const DepthView first = MakeDepthView(*world.Render(1, PoseAbove(0)), PoseAbove(0));
   EXPECT_FALSE(SceneDepth(first, first));
@@ -33,7 +33,7 @@ TEST(SceneDepth, HasNoAnswerWithoutBaselineOrTexture) {
   EXPECT_FALSE(SceneDepth(MakeDepthView(*black, PoseAbove(0)), second));
 }
 
-TEST(SceneDepth, ADepthImageGivesItAtOnce) {
+TEST(SceneDepth, ADepthImageDeterminesItImmediately) {
   const TexturedWorld world;
   auto frame = world.Render(1, PoseAbove(0));
   frame->depth_mu = world.RenderDepth(*frame);

@@ -22,7 +22,7 @@ TEST(IntersectRays, MeetsInThePoint) {
   EXPECT_LT((*found - p_world).norm(), 1e-9);
 }
 
-TEST(IntersectRays, HasNoAnswerForParallelOrDivergingRays) {
+TEST(IntersectRays, ReturnsNothingForParallelOrDivergingRays) {
   const ObservedRay a{.center_world = {0, 0, 0}, .bearing_world = Eigen::Vector3d::UnitZ()};
   const ObservedRay parallel{.center_world = {1, 0, 0}, .bearing_world = Eigen::Vector3d::UnitZ()};
   const ObservedRay diverging{.center_world = {1, 0, 0}, .bearing_world = Eigen::Vector3d(0.2, 0, 1).normalized()};
@@ -37,7 +37,7 @@ TEST(BearingChi2, IsOneAtOneSigmaAndInfiniteBehind) {
   EXPECT_TRUE(std::isinf(BearingChi2(ray, {0, 0, -2})));
 }
 
-TEST(Agrees, AsksTheRangeTooWhereThereIsOne) {
+TEST(Agrees, ChecksTheRangeIfKnown) {
   ObservedRay ray{.center_world = {0, 0, 0}, .bearing_world = Eigen::Vector3d::UnitZ(), .bearing_sigma_rad = 0.01};
   EXPECT_TRUE(Agrees(ray, {0, 0, 5}));
   EXPECT_FALSE(Agrees(ray, {1, 0, 5}));
@@ -56,7 +56,7 @@ TEST(Parallax, IsTheAngleBetweenTheRays) {
   EXPECT_NEAR(MaxParallax_rad({a, c, b}, p_world), std::atan(1.0), 1e-12);
 }
 
-TEST(RefinePoint, ManyNoisySightsPlaceThePointBetterThanTwo) {
+TEST(RefinePoint, ManyNoisyRaysAreMoreAccurateThanTwo) {
   const Eigen::Vector3d p_world(0.1, 0.2, 3);
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 1e-3);
@@ -79,7 +79,7 @@ TEST(RefinePoint, ManyNoisySightsPlaceThePointBetterThanTwo) {
   EXPECT_LT(error_of_all / 50, 0.01);
 }
 
-TEST(RefinePoint, OneWildSightHardlyMovesIt) {
+TEST(RefinePoint, IsRobustToOneOutlier) {
   const Eigen::Vector3d p_world(0, 0, 2);
   std::vector<ObservedRay> rays;
   for (int i = 0; i < 6; ++i) rays.push_back(RayFrom({0.2 * i, 0, 0}, p_world));
@@ -87,7 +87,7 @@ TEST(RefinePoint, OneWildSightHardlyMovesIt) {
   EXPECT_LT((RefinePoint(rays, p_world) - p_world).norm(), 0.01);
 }
 
-TEST(RefinePoint, ARangeFixesWhatASingleRayLeavesOpen) {
+TEST(RefinePoint, RangeDeterminesDepthOfASingleRay) {
   ObservedRay ray{.center_world = {0, 0, 0}, .bearing_world = Eigen::Vector3d::UnitZ(), .bearing_sigma_rad = 1e-3};
   ray.range_mu = 2;
   ray.range_sigma_mu = 0.02;

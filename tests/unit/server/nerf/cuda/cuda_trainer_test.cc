@@ -139,7 +139,7 @@ TEST_F(CudaTrainerTest, EqualStepsGiveEqualSumsOverBlocks) {
   EXPECT_EQ(results[1], results[3]);
 }
 
-TEST_F(CudaTrainerTest, UsesWhatTheHostChanged) {
+TEST_F(CudaTrainerTest, UsesStateChangedOnTheHost) {
   const NerfConfig config = SmallConfig();
   const StepSource source = BallSource(config);
   CpuTrainer cpu(config, 3, PlainKernels());

@@ -62,7 +62,7 @@ struct TestRay {
 };
 
 RayLoss LossOf(const RayResult& result, const LossCase& c) {
-  return plain::LossOfRay(result, TargetOf(c), c.weights, c.has_partner ? kPartnerError : nullptr);
+  return plain::LossOfRay(result, TargetOf(c), c.weights, c.has_partner, kPartnerError);
 }
 
 class LossGradientTest : public ::testing::TestWithParam<LossCase> {};
@@ -119,13 +119,13 @@ TEST(LossOfRayTest, IsTheSumOfItsTerms) {
   target.depth = 1;
   const float partner_error[3] = {0.05f, 0, 0};
   const float color = 0.25f * 0.25f, contrast = 3 * 0.2f * 0.2f;
-  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, nullptr).color, color);
-  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, nullptr).value, color + 2 * 0.25f + 4 * 0.1f);
-  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, partner_error).value,
+  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, false, nullptr).color, color);
+  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, false, nullptr).value, color + 2 * 0.25f + 4 * 0.1f);
+  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, true, partner_error).value,
                   color + 2 * 0.25f + 4 * 0.1f + 0.5f * contrast)
       << "half of the contrast belongs to the partner";
   target.is_object = false;
-  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, nullptr).value, 3 * 0.75f + 0.5f * 6)
+  EXPECT_FLOAT_EQ(plain::LossOfRay(ray, target, weights, false, nullptr).value, 3 * 0.75f + 0.5f * 6)
       << "background rays have no color without a random background";
 }
 
@@ -135,9 +135,9 @@ TEST(LossOfRayTest, OutlierDepthsHaveAConstantLoss) {
   target.depth = 1;
   RayResult ray{};
   ray.depth_error = 0.1f;
-  EXPECT_EQ(plain::LossOfRay(ray, target, weights, nullptr).d_depth_error, 1);
+  EXPECT_EQ(plain::LossOfRay(ray, target, weights, false, nullptr).d_depth_error, 1);
   ray.depth_error = 0.9f;
-  const RayLoss outlier = plain::LossOfRay(ray, target, weights, nullptr);
+  const RayLoss outlier = plain::LossOfRay(ray, target, weights, false, nullptr);
   EXPECT_EQ(outlier.d_depth_error, 0);
   EXPECT_FLOAT_EQ(outlier.value, 0.2f);
 }

@@ -62,7 +62,7 @@ TEST(FeatureExtractor, AFeatureOnTheMasksBorderHasNoLabel) {
   }
 }
 
-TEST(FeatureExtractor, GivesAsManyAsAskedForWhereThereAreEnough) {
+TEST(FeatureExtractor, ReturnsTheRequestedNumber) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
   SlamConfig config;

@@ -20,7 +20,7 @@ RayMatch MatchOf(const CameraModel& camera, const Eigen::Vector3d& p_first, cons
   return {camera.Unproject(first_px.x(), first_px.y()), camera.Unproject(second_px.x(), second_px.y()), 1.5};
 }
 
-TEST(Epipolar, ExactMatchesObeyAndMeetWhereTheyAre) {
+TEST(Epipolar, ExactMatchesSatisfyTheConstraintAndIntersectAtThePoint) {
   const CameraModel camera = TestCamera();
   const Eigen::Vector3d p_first(0.4, -0.3, 5);
   const RayMatch match = MatchOf(camera, p_first, {0, 0});
@@ -36,7 +36,7 @@ TEST(Epipolar, TheSampsonErrorIsTheDistanceToTheNearestObedientMatch) {
   const CameraModel camera = TestCamera();
   const Eigen::Matrix3d essential = TestMotion().Essential();
   const RayMatch match = MatchOf(camera, {0.4, -0.3, 5}, {2, -3});
-  const RayMatch obedient = NearestObedient(camera, essential, match);
+  const RayMatch obedient = ClosestEpipolarMatch(camera, essential, match);
   const double moved2_px2 = (camera.Project(obedient.first) - camera.Project(match.first)).squaredNorm() +
                             (camera.Project(obedient.second) - camera.Project(match.second)).squaredNorm();
   const double chi2 = SampsonChi2(camera, essential, match);
@@ -65,7 +65,7 @@ TEST(Epipolar, GradientAgreesWithDifferencesOfTheCost) {
   }
 }
 
-TEST(Epipolar, SigmasTellTheErrorsThatNoiseCauses) {
+TEST(Epipolar, SigmasMatchTheActualErrors) {
   const CameraModel camera = TestCamera();
   const Motion truth = TestMotion();
   double rotation2 = 0;

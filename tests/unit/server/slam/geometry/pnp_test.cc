@@ -56,7 +56,7 @@ TEST(Pnp, StandsSeventyPercentWrongMatches) {
   }
 }
 
-TEST(Pnp, FindsNothingInChaos) {
+TEST(Pnp, FindsNothingInRandomMatches) {
   const Scene scene = MakeScene(200, 1, false, 2);
   EXPECT_FALSE(SolvePnp(scene.camera, scene.observations, {}).has_value());
 }
@@ -79,7 +79,7 @@ TEST(Pnp, ObservationsThatCannotBeUsedAreLeftOut) {
   EXPECT_FALSE(estimate->inlier[1]);
 }
 
-TEST(Pnp, PointsOnALineDoNoHarm) {
+TEST(Pnp, AcceptsCollinearPoints) {
   Scene scene = MakeScene(30, 0, false, 5);
   for (int i = 0; i < 30; ++i) {
     const Eigen::Vector3d p_camera(0.05 * i - 0.7, 0, 3);

@@ -59,7 +59,7 @@ TEST(PoseRefiner, ReportsTheNoiseThatThePixelsHave) {
   EXPECT_LT(TurnError_deg(scene, estimate), 0.05);
 }
 
-TEST(PoseRefiner, WrongMatchesAreNamedAndDoNotPull) {
+TEST(PoseRefiner, WrongMatchesAreOutliersAndDoNotBiasThePose) {
   Scene scene = MakeScene(400, 1, 3);
   Noise noise(33);
   for (int i = 0; i < 400; i += 3) scene.observations[i].pixel_px = noise.Pixel(scene.camera);
@@ -85,7 +85,7 @@ TEST(PoseRefiner, ACloseStartStandsAMajorityOfWrongMatches) {
   EXPECT_GE(estimate.inliers, 105);
 }
 
-TEST(PoseRefiner, DepthHoldsWhatPixelsLeaveOpen) {
+TEST(PoseRefiner, DepthDeterminesWhatPixelsDoNot) {
   // A small, distant patch: the pixels hardly determine the distance.
   Scene scene = MakeScene(0, 1, 5);
   Noise noise(55);

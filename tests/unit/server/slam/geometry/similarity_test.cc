@@ -85,7 +85,7 @@ TEST(AlignPoints, AMirrorImageDoesNotBecomeAReflection) {
   }
 }
 
-TEST(AlignPoints, WhatDoesNotDetermineARotationIsRefused) {
+TEST(AlignPoints, RejectsPointsThatDoNotDetermineARotation) {
   const std::vector<Eigen::Vector3d> two{{0, 0, 1}, {1, 0, 1}};
   const std::vector<Eigen::Vector3d> line{{0, 0, 1}, {1, 0, 1}, {2, 0, 1}, {3, 0, 1}};
   const std::vector<Eigen::Vector3d> same(5, Eigen::Vector3d(1, 2, 3));
@@ -119,7 +119,7 @@ TEST(Similarity, AFixedScaleStaysOne) {
   EXPECT_LT(AngleBetween_deg(estimate->S_first_second.rotation(), kTruth.rotation()), 0.5);
 }
 
-TEST(Similarity, FindsNothingInChaos) {
+TEST(Similarity, FindsNothingInRandomMatches) {
   const Scene scene = MakeScene(kTruth, 150, 0.02, 1, 8);
   EXPECT_FALSE(SolveSimilarity(scene.camera, scene.matches, {}).has_value());
   EXPECT_FALSE(SolveSimilarity(scene.camera, {}, {}).has_value());

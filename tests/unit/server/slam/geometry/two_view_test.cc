@@ -101,7 +101,7 @@ TEST(TwoView, FindsTheMotionAboveADesk) {
   EXPECT_TRUE(result.from_homography);
 }
 
-TEST(TwoView, FindsTheMotionBeforeALadenDesk) {
+TEST(TwoView, FindsTheMotionInFrontOfADeskWithObjects) {
   const Scene scene = MakeScene(LadenDesk, kSideways, {.noise_px = 0.5});
   ExpectRight(scene, Solve(scene));
 }
@@ -137,7 +137,7 @@ TEST(TwoView, PointsAreWhereTheyShouldBe) {
   EXPECT_LT(NearestQuantile(errors, 0.9), 0.1);
 }
 
-TEST(TwoView, RefusesAMereTurn) {
+TEST(TwoView, RejectsPureRotation) {
   for (const Surface& surface : {Surface(Clutter), Surface(DeskFromStraightAbove)}) {
     for (uint64_t seed = 1; seed <= 5; ++seed) {
       const Scene scene = MakeScene(surface, {Turn(3, -8, 4), {0, 0, 0}}, {.outlier_share = 0.2, .seed = seed});
@@ -146,7 +146,7 @@ TEST(TwoView, RefusesAMereTurn) {
   }
 }
 
-TEST(TwoView, RefusesToStartFromStandingStill) {
+TEST(TwoView, RejectsAStationaryCamera) {
   const Scene still = MakeScene(Clutter, {}, {.seed = 3});
   EXPECT_EQ(Solve(still).outcome, TwoViewOutcome::kTooLittleParallax);
   const Scene exactly_still = MakeScene(Clutter, {}, {.noise_px = 0});

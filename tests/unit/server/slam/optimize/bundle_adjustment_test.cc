@@ -94,7 +94,7 @@ TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
   EXPECT_LT(RmsPointErrorMu(world), 0.02);
 }
 
-TEST(BundleAdjustment, TenPercentOutliersHardlyMatter) {
+TEST(BundleAdjustment, ToleratesTenPercentOutliers) {
   BundleWorldOptions options = NoisyStart();
   options.observations_per_point = 8;
   BundleWorld clean = MakeBundleWorld(options);
@@ -115,7 +115,7 @@ TEST(BundleAdjustment, TenPercentOutliersHardlyMatter) {
   EXPECT_LT(summary.final_rms_px, 0.8);
 }
 
-TEST(BundleAdjustment, ObservationsCalledOutliersAreLeftOutAndMayComeBack) {
+TEST(BundleAdjustment, MarkedOutliersAreIgnoredAndReclassified) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   BundleObservation& wrong = world.problem.observations[10];
   wrong.pixel_px.x() += 300;
@@ -131,7 +131,7 @@ TEST(BundleAdjustment, ObservationsCalledOutliersAreLeftOutAndMayComeBack) {
   EXPECT_FALSE(right.outlier);
 }
 
-TEST(BundleAdjustment, WhatIsFixedDoesNotMoveAtAll) {
+TEST(BundleAdjustment, FixedParametersDoNotChange) {
   BundleWorldOptions options = NoisyStart();
   BundleWorld world = MakeBundleWorld(options);
   for (size_t i = 0; i < 50; ++i) {
@@ -240,7 +240,7 @@ TEST(BundleAdjustment, AWrongDepthIsAnOutlier) {
   EXPECT_LT(RmsPoseErrorMu(world), 0.005);
 }
 
-TEST(BundleAdjustment, PriorsHoldTheGauge) {
+TEST(BundleAdjustment, PriorsFixTheGauge) {
   BundleWorldOptions options = NoisyStart();
   options.fixed_cameras = 0;
   BundleWorld world = MakeBundleWorld(options);
@@ -252,7 +252,7 @@ TEST(BundleAdjustment, PriorsHoldTheGauge) {
   EXPECT_LT(RmsTurnRad(world), 0.002);
 }
 
-TEST(BundleAdjustment, ACameraWithAPriorAloneGoesThere) {
+TEST(BundleAdjustment, ACameraWithOnlyAPriorMovesToThePrior) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   BundleCamera lonely;
   lonely.T_world_camera = OrbitPose(2.0, 1);
@@ -275,7 +275,7 @@ TEST(BundleAdjustment, AnAbortBeforeTheStartChangesNothing) {
 }
 
 // Whenever the abort arrives, the result is consistent and no worse than the start.
-TEST(BundleAdjustment, AnAbortKeepsWhatWasReached) {
+TEST(BundleAdjustment, AnAbortKeepsTheBestResult) {
   BundleWorldOptions options = NoisyStart();
   options.cameras = 30;
   options.points = 1000;
@@ -303,7 +303,7 @@ TEST(BundleAdjustment, FewIterationsKeepTheBestSoFar) {
   EXPECT_LT(summary.final_rms_px, 0.5 * summary.initial_rms_px);
 }
 
-TEST(BundleAdjustment, BadNumbersAreLeftOut) {
+TEST(BundleAdjustment, NonFiniteInputIsIgnored) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   BundleWorld world = MakeBundleWorld(NoisyStart());
   BundleProblem clean = world.problem;
@@ -361,7 +361,7 @@ TEST(BundleAdjustment, NothingToDoIsNotUsable) {
   EXPECT_FALSE(AdjustBundle(idle.problem, {.max_iterations = 0}).usable);
 }
 
-TEST(BundleAdjustment, PointsThatStartBehindTheCameraSpoilNothing) {
+TEST(BundleAdjustment, IgnoresPointsBehindTheCamera) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   for (size_t i = 0; i < 10; ++i) world.problem.points[i].position_world = Eigen::Vector3d(30, 5, 0);
   ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);

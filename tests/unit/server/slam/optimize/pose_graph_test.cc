@@ -120,7 +120,7 @@ TEST(PoseGraph, DoesNotDependOnTheUnitOfTheMap) {
   }
 }
 
-TEST(PoseGraph, HeavyEdgesBendLess) {
+TEST(PoseGraph, EdgesWithLargeWeightChangeLess) {
   // Two measurements of one step disagree: the result is their mean, weighted by the weights of the edges.
   std::vector<PoseGraphNode> nodes(2);
   nodes[0].fixed = true;
@@ -130,7 +130,7 @@ TEST(PoseGraph, HeavyEdgesBendLess) {
   EXPECT_NEAR(nodes[1].S_world_camera.translation().x(), 1.25, 1e-6);
 }
 
-TEST(PoseGraph, FloatingPartsAreRefused) {
+TEST(PoseGraph, RejectsDisconnectedGraphs) {
   Loop loop = MakeLoop(20, kDrift);
   const std::vector<PoseGraphNode> before = loop.nodes;
   const auto unchanged = [&] {
@@ -154,7 +154,7 @@ TEST(PoseGraph, FloatingPartsAreRefused) {
   EXPECT_FALSE(OptimizePoseGraph(none, {}, {}).usable);
 }
 
-TEST(PoseGraph, BadNumbersAreLeftOutOrRefused) {
+TEST(PoseGraph, InvalidInputIsIgnoredOrRejected) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Loop clean = MakeLoop(30, kDrift);
   Loop loop = clean;

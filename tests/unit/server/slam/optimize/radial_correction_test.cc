@@ -21,7 +21,7 @@ BundleWorldOptions NoisyStart(double pixel_noise_px) {
   return options;
 }
 
-TEST(RadialCorrection, TheTwoWaysAreInverse) {
+TEST(RadialCorrection, DistortAndUndistortAreInverse) {
   const CameraModel model = BundleWorldCamera();
   for (const double k1 : {-0.1, 0.0, 0.05}) {
     const RadialCorrection lens{k1};
@@ -61,7 +61,7 @@ TEST(RadialCorrection, BundleAdjustmentFindsNoLensWhereThereIsNone) {
 }
 
 // A prior with a small sigma keeps k1 near 0 although the observations are distorted.
-TEST(RadialCorrection, ThePriorHolds) {
+TEST(RadialCorrection, ATightPriorDominates) {
   BundleWorld world = MakeBundleWorld(NoisyStart(1));
   for (BundleObservation& observation : world.problem.observations) {
     observation.pixel_px = RadialCorrection{-0.1}.Distort(world.problem.camera, observation.pixel_px);

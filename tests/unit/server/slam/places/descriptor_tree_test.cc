@@ -67,7 +67,7 @@ TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbors) {
   EXPECT_GT(found_in_three, found_in_one + 20);
 }
 
-TEST_F(DescriptorTreeTest, BearsDescriptorsThatCannotBeToldApart) {
+TEST_F(DescriptorTreeTest, HandlesEqualDescriptors) {
   DescriptorTree tree(1);
   const Descriptor same = Draw();
   for (uint32_t i = 0; i < 3000; ++i) tree.Insert({same, i});

@@ -50,7 +50,7 @@ class PlaceIndexTest : public ::testing::Test {
   std::mt19937_64 random_{11};
 };
 
-TEST_F(PlaceIndexTest, AnswersNothingWhenThereIsNothing) {
+TEST_F(PlaceIndexTest, AnEmptyIndexReturnsNothing) {
   PlaceIndex index;
   EXPECT_THAT(index.Query(MakePlace(100), 3), IsEmpty());
   index.Remove(KeyframeId{7});
@@ -100,7 +100,7 @@ TEST_F(PlaceIndexTest, ScoreOfTheSamePictureIsOneAndOfAStrangerAboutZero) {
   for (const PlaceMatch& stranger : index.Query(MakePlace(300), 3)) EXPECT_LT(stranger.score, 0.01);
 }
 
-TEST_F(PlaceIndexTest, WhatIsEverywhereSaysLittle) {
+TEST_F(PlaceIndexTest, CommonFeaturesHaveLowWeight) {
   PlaceIndex index;
   const auto everywhere = MakePlace(200);  // for example a logo in every image
   std::vector<std::vector<Feature>> places;
@@ -121,7 +121,7 @@ TEST_F(PlaceIndexTest, WhatIsEverywhereSaysLittle) {
   EXPECT_GT(matches[0].score, 3 * matches[1].score);
 }
 
-TEST_F(PlaceIndexTest, AKeyframeDoesNotWinByBeingFull) {
+TEST_F(PlaceIndexTest, ManyFeaturesDoNotIncreaseTheScore) {
   PlaceIndex index;
   AddPlaces(index, 20);
   const auto place = MakePlace(200);
@@ -136,7 +136,7 @@ TEST_F(PlaceIndexTest, AKeyframeDoesNotWinByBeingFull) {
   EXPECT_EQ(matches[0].keyframe, KeyframeId{101});
 }
 
-TEST_F(PlaceIndexTest, ForgetsWhatIsRemoved) {
+TEST_F(PlaceIndexTest, RemovedKeyframesAreNotReturned) {
   PlaceIndex index;
   const auto places = AddPlaces(index, 30);
   // Enough to trigger a sweep: some of these are removed from the tree, others are only ignored.
@@ -177,7 +177,7 @@ TEST_F(PlaceIndexTest, MemoryFollowsTheKeyframesThatAreThere) {
   EXPECT_LT(index.bytes(), 3 * full_bytes);
 }
 
-TEST_F(PlaceIndexTest, TheSameSeedAnswersTheSame) {
+TEST_F(PlaceIndexTest, IsDeterministicForASeed) {
   PlaceIndex first(5);
   PlaceIndex second(5);
   std::vector<std::vector<Feature>> places;

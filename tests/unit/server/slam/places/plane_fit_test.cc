@@ -11,7 +11,7 @@ namespace {
 
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
-TEST(PlaneThrough, HoldsItsThreePoints) {
+TEST(PlaneThrough, ContainsItsThreePoints) {
   const Eigen::Vector3d a(1, 2, 3), b(2, 2, 4), c(0, 5, 1);
   const auto plane = PlaneThrough(a, b, c);
   ASSERT_TRUE(plane.has_value());
@@ -19,7 +19,7 @@ TEST(PlaneThrough, HoldsItsThreePoints) {
   for (const Eigen::Vector3d& p : {a, b, c}) EXPECT_NEAR(plane->Height(p), 0, 1e-12);
 }
 
-TEST(PlaneThrough, RefusesALine) {
+TEST(PlaneThrough, RejectsCollinearPoints) {
   EXPECT_FALSE(PlaneThrough({0, 0, 0}, {1, 1, 1}, {2, 2, 2}).has_value());
   EXPECT_FALSE(PlaneThrough({0, 0, 0}, {0, 0, 0}, {2, 2, 2}).has_value());
   EXPECT_FALSE(PlaneThrough({0, 0, 0}, {1, 0.01, 0}, {2, 0, 0}).has_value());
@@ -44,7 +44,7 @@ TEST(FitPlane, FindsATiltedPlaneWithItsNormalUp) {
   EXPECT_LT((from_below->plane.normal + fit->plane.normal).norm(), 1e-12);
 }
 
-TEST(FitPlane, PassesOverPointsWithoutWeight) {
+TEST(FitPlane, IgnoresPointsWithoutWeight) {
   const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0.5, 0.5, 9}};
   const std::vector<double> weights = {1, 1, 1, 1, 0};
   const auto fit = FitPlane(points, weights, kUp);
@@ -53,7 +53,7 @@ TEST(FitPlane, PassesOverPointsWithoutWeight) {
   EXPECT_FALSE(FitPlane(points, std::vector<double>{1, 1, 1, 0, 0}, kUp).has_value());
 }
 
-TEST(FitPlane, RefusesALine) {
+TEST(FitPlane, RejectsCollinearPoints) {
   const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 1, 0}, {2, 2, 0}, {3, 3, 0}, {4, 4, 0}};
   EXPECT_FALSE(FitPlane(points, std::vector<double>(5, 1.0), kUp).has_value());
 }

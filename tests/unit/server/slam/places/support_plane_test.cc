@@ -121,7 +121,7 @@ TEST(SupportPlane, NeedsPointsObjectsAndCameras) {
   EXPECT_FALSE(FindSupportPlane(query).has_value());
 }
 
-TEST(SupportPlane, PassesOverPointsThatAreNotNumbers) {
+TEST(SupportPlane, IgnoresPointsThatAreNotFinite) {
   SupportWorld world({});
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (size_t i = 0; i < world.points.size(); i += 5) {
