@@ -55,7 +55,7 @@ void AddPaperPart(CLI::App& app, Command* chosen) {
   command->add_option("--times", bench.times_s, "Training times at which the quality is measured [s]")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--cap", bench.cap_s, "Maximal training time per object [s]; longer training plans are shortened")
+  command->add_option("--cap", bench.cap_s, "Maximum training time per object [s]; longer training plans are shortened")
       ->capture_default_str();
   command->add_option("--threads", bench.threads, "Number of threads that train one object")->capture_default_str();
   const std::map<std::string, bench::BenchClock> clocks = {{"cpu", bench::BenchClock::kCpu},

@@ -119,7 +119,7 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
       ->capture_default_str();
   command
       ->add_option("--mask-rate", options->stream.mask_rate_hz,
-                   "Maximal rate of frames with masks [Hz], simulating a slow detector; 0 = unlimited")
+                   "Maximum rate of frames with masks [Hz], simulating a slow detector; 0 = unlimited")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
@@ -148,11 +148,11 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_flag("--realtime", options->stream.realtime,
                     "Send frames at the recorded rate; the server drops frames when overloaded");
   command->add_option("--first", options->stream.first_frame, "Index of the first frame to send");
-  command->add_option("--frames", options->stream.frame_count, "Maximal number of frames to send")
+  command->add_option("--frames", options->stream.frame_count, "Maximum number of frames to send")
       ->check(CLI::PositiveNumber);
   command
       ->add_option("--max-training", options->stream.max_training_s,
-                   "Maximal wait for training after the last frame [s]")
+                   "Maximum wait for training after the last frame [s]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--name", options->stream.session_name, "Display name of the session");

@@ -37,7 +37,8 @@ const char* FindDoubt(const ViewCandidate& candidate, const ViewContext& context
     inside += label == candidate.label ? 1 : 0;
     outside += label == 0 ? 1 : 0;
   }
-  if (in_image < kMinInImage * static_cast<double>(context.body_world.size())) return "most of the object is outside the image";
+  if (in_image < kMinInImage * static_cast<double>(context.body_world.size()))
+    return "most of the object is outside the image";
   if (inside < kMinInsidePerOutside * outside) return "mask covers too little of the object";
   if (inside < kMinVisible * in_image) return "mostly occluded";
   const cv::Rect expected = ProjectCuboid(context.cuboid, kCuboidEnlargement, camera, candidate.T_world_camera);

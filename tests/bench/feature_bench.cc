@@ -175,8 +175,7 @@ struct Cost {
   }
 };
 
-void RunPairs(const char* name, const files::Sequence& sequence, size_t every, const slam::SlamConfig& config,
-              const Extract& extract) {
+void RunPairs(const char* name, const files::Sequence& sequence, size_t every, const Extract& extract) {
   std::map<size_t, Score> scores;
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {
@@ -231,8 +230,8 @@ int Main(int argc, char** argv) {
   }
   cv::setNumThreads(1);
   slam::FeatureExtractor extractor(config);
-  RunPairs("OpenCV", *sequence, every, config, [&](const Frame& frame) { return OpenCvOrb(frame, config); });
-  RunPairs("romap", *sequence, every, config, [&](const Frame& frame) { return extractor.ExtractScene(frame); });
+  RunPairs("OpenCV", *sequence, every, [&](const Frame& frame) { return OpenCvOrb(frame, config); });
+  RunPairs("romap", *sequence, every, [&](const Frame& frame) { return extractor.ExtractScene(frame); });
   RunObjects(*sequence, every, extractor);
   return 0;
 }

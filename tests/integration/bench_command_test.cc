@@ -83,7 +83,7 @@ TEST(BenchCommandTest, InterruptWritesAPartialReport) {
   const testing_support::ProcessResult end = bench.Wait();
   EXPECT_EQ(end.exit_code, 130) << end.err;
   EXPECT_THAT(end.err, HasSubstr("of 1500 runs"));
-  EXPECT_THAT(end.out, HasSubstr("Interrupted: some rows lack runs"));
+  EXPECT_THAT(end.out, HasSubstr("Interrupted: some rows are incomplete"));
   const nlohmann::json runs = ReadJson(folder / "out/paper.json")["runs"];
   EXPECT_GE(runs["done"], 1);
   EXPECT_LT(runs["done"], 1500);

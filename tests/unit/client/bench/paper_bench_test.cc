@@ -123,7 +123,7 @@ TEST(PaperBenchTest, InterruptKeepsPartialResults) {
   const nlohmann::json json = ReadJson(options.out_dir + "/paper.json");
   EXPECT_EQ(json["runs"]["done"], 1);
   EXPECT_EQ(json["runs"]["planned"], 3);
-  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("Interrupted: some rows lack runs"));
+  EXPECT_THAT(*files::ReadFile(options.out_dir + "/paper.md"), HasSubstr("Interrupted: some rows are incomplete"));
   EXPECT_FALSE(fs::exists(options.out_dir + "/scratch"));
 }
 
