@@ -1,5 +1,6 @@
 // romap-server: serves the mapping service of this process over gRPC until SIGINT or SIGTERM.
-// Exit status: 0 after SIGINT or SIGTERM, 1 server could not start, 2 invalid flags or configuration.
+// Exit status: 0 after SIGINT or SIGTERM, 1 server could not start, 2 invalid flags or configuration,
+// 3 configuration file cannot be read.
 
 #include <fmt/format.h>
 #include <pthread.h>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "common/config.h"
+#include "common/exit_code.h"
 #include "common/status.h"
 #include "common/version.h"
 #include "server/session/local_mapping_service.h"
@@ -24,9 +26,6 @@
 
 namespace romap {
 namespace {
-
-constexpr int kExitFailure = 1;
-constexpr int kExitUsage = 2;
 
 struct Flags {
   std::string config_file;
@@ -80,7 +79,7 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
     PrintError(fmt::format("{} (see romap-server --help)", e.what()));
-    return kExitUsage;
+    return kUsageError;
   }
   if (listen_address) flags.assignments.push_back("transport.listen_address=" + *listen_address);
   if (log_level) flags.assignments.push_back("log.level=" + *log_level);
@@ -122,7 +121,7 @@ int Main(int argc, char** argv) {
   ConfigFields fields = config.Fields();
   if (const absl::Status status = fields.Load(flags.config_file, flags.assignments); !status.ok()) {
     PrintError(Message(status));
-    return kExitUsage;
+    return ToExitCode(status);
   }
   if (flags.dump_config) {
     fmt::print("{}", fields.DumpYaml(flags.expert ? Audience::kExpert : Audience::kOperator));
@@ -135,7 +134,7 @@ int Main(int argc, char** argv) {
   auto server = transport::GrpcServer::Start(&service, config.transport);
   if (!server.ok()) {
     PrintError(Message(server.status()));
-    return absl::IsInvalidArgument(server.status()) ? kExitUsage : kExitFailure;
+    return absl::IsInvalidArgument(server.status()) ? kUsageError : kFailure;
   }
   fmt::print("romap-server listening on {}\n", (*server)->address());
   std::fflush(stdout);

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "client/cli/command.h"
-#include "client/cli/exit_code.h"
 #include "client/cli/interrupt.h"
+#include "common/exit_code.h"
 #include "common/status.h"
 #include "common/version.h"
 

@@ -228,7 +228,7 @@ TEST(InvalidInputTest, UnknownFlagCommandAndConfigKey) {
 
 TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
   const testing_support::TemporaryFolder folder;
-  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "missing.yaml"}), 2,
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "missing.yaml"}), 3,
                 "missing.yaml: cannot read: No such file or directory");
   std::ofstream(folder / "conflict.yaml") << "nerf:\n  backend: cuda\n  field: sdf\n";
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "conflict.yaml"}), 2,

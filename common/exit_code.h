@@ -2,9 +2,9 @@
 
 #include <absl/status/status.h>
 
-namespace romap::cli {
+namespace romap {
 
-// The exit status of `romap`. 130 is the shell's convention for SIGINT.
+// The exit status of `romap` and `romap-server`. 130 is the shell's convention for SIGINT.
 enum ExitCode : int {
   kSuccess = 0,
   kFailure = 1,
@@ -26,4 +26,4 @@ inline constexpr const char* kExitCodeHelp =
 
 ExitCode ToExitCode(const absl::Status& status);
 
-}  // namespace romap::cli
+}  // namespace romap

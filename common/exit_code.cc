@@ -1,6 +1,6 @@
-#include "client/cli/exit_code.h"
+#include "common/exit_code.h"
 
-namespace romap::cli {
+namespace romap {
 
 ExitCode ToExitCode(const absl::Status& status) {
   switch (status.code()) {
@@ -23,4 +23,4 @@ ExitCode ToExitCode(const absl::Status& status) {
   }
 }
 
-}  // namespace romap::cli
+}  // namespace romap

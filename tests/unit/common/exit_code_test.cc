@@ -1,8 +1,8 @@
-#include "client/cli/exit_code.h"
+#include "common/exit_code.h"
 
 #include <gtest/gtest.h>
 
-namespace romap::cli {
+namespace romap {
 namespace {
 
 TEST(ExitCodeTest, FollowsTheDocumentedTable) {
@@ -19,4 +19,4 @@ TEST(ExitCodeTest, FollowsTheDocumentedTable) {
 }
 
 }  // namespace
-}  // namespace romap::cli
+}  // namespace romap
