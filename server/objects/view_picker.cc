@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "common/image_sharpness.h"
 #include "common/map_motion.h"
 #include "common/statistics.h"
 #include "server/objects/angles.h"
@@ -139,19 +140,10 @@ ObjectView MakeView(const ViewCandidate& candidate, const ViewContext& context) 
   return view;
 }
 
-// Variance of the Laplacian of the gray image inside `box_px`: small for blurred images. Source: J. L. Pech-Pacheco et
-// al., "Diatom autofocusing in brightfield microscopy", ICPR 2000.
-double MeasureSharpness(const cv::Mat& image_bgr, const cv::Rect& box_px) {
+// 0 if the box is outside the image.
+double SharpnessInBox(const cv::Mat& image_bgr, const cv::Rect& box_px) {
   const cv::Rect box = box_px & cv::Rect({}, image_bgr.size());
-  if (box.empty()) return 0;
-  cv::Mat gray;
-  cv::cvtColor(image_bgr(box), gray, cv::COLOR_BGR2GRAY);
-  cv::Mat laplacian;
-  cv::Laplacian(gray, laplacian, CV_16S);
-  cv::Scalar mean;
-  cv::Scalar deviation;
-  cv::meanStdDev(laplacian, mean, deviation);
-  return deviation[0] * deviation[0];
+  return box.empty() ? 0 : ImageSharpness(image_bgr(box));
 }
 
 }  // namespace
@@ -180,7 +172,7 @@ bool ViewPicker::IsNewDirection(const Eigen::Vector3d& camera_center, const Eige
 
 bool ViewPicker::IsSharp(const ViewCandidate& candidate) {
   constexpr size_t kHistory = 30;  // candidates
-  const double sharpness = MeasureSharpness(candidate.frame->image_bgr, candidate.box_px);
+  const double sharpness = SharpnessInBox(candidate.frame->image_bgr, candidate.box_px);
   sharpness_history_.push_back(sharpness);
   if (sharpness_history_.size() > kHistory) sharpness_history_.erase(sharpness_history_.begin());
   return sharpness >= kMinSharpnessShare * Median(sharpness_history_);

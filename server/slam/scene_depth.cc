@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "common/image_sharpness.h"
 #include "common/statistics.h"
 
 namespace romap::slam {
@@ -71,14 +72,10 @@ std::optional<double> MedianDepth(const cv::Mat& depth_mu) {
 }
 
 // Measured at half the image's size, which preserves strong motion blur but averages out noise.
-double Sharpness(const cv::Mat& image_bgr) {
-  cv::Mat half, gray, laplacian;
+double HalfSizeSharpness(const cv::Mat& image_bgr) {
+  cv::Mat half;
   cv::resize(image_bgr, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  cv::cvtColor(half, gray, cv::COLOR_BGR2GRAY);
-  cv::Laplacian(gray, laplacian, CV_16S);
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(laplacian, mean, deviation);
-  return deviation[0] * deviation[0];
+  return ImageSharpness(half);
 }
 
 }  // namespace
@@ -97,7 +94,7 @@ DepthView MakeDepthView(const Frame& frame, const SE3<World, Camera>& T_world_ca
   view.camera.fy_px *= scale_y;
   view.camera.cx_px = (view.camera.cx_px + 0.5) * scale_x - 0.5;  // pixel centers are at integer coordinates
   view.camera.cy_px = (view.camera.cy_px + 0.5) * scale_y - 0.5;
-  view.sharpness = Sharpness(frame.image_bgr);
+  view.sharpness = HalfSizeSharpness(frame.image_bgr);
   if (!frame.depth_mu.empty()) view.sensor_depth_mu = MedianDepth(frame.depth_mu);
   return view;
 }

@@ -11,8 +11,8 @@ namespace romap::slam {
 struct DepthView {
   CameraModel camera;  // of `gray`
   SE3<World, Camera> T_world_camera;
-  cv::Mat gray = {};     // CV_8UC1, about 160 px wide
-  double sharpness = 0;  // variance of the Laplacian, gray levels squared; compares frames of one scene
+  cv::Mat gray = {};                           // CV_8UC1, about 160 px wide
+  double sharpness = 0;                        // ImageSharpness at half the frame's size
   std::optional<double> sensor_depth_mu = {};  // median of the frame's depth image
 };
 
