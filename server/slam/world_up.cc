@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "server/slam/places/support_plane.h"
+#include "server/slam/geometry/support_plane.h"
 
 namespace romap::slam {
 namespace {
@@ -34,7 +34,7 @@ bool IsBackground(const MaskVotes& votes) {
   return votes.inside <= kMaxInsideShare * votes.total() && votes.border <= kMaxBorderShare * votes.total();
 }
 
-Evidence Gather(const SlamMap& map) {
+Evidence GatherEvidence(const SlamMap& map) {
   Evidence evidence;
   for (const auto& [id, track] : map.points()) {
     MaskVotes votes = track.votes;
@@ -78,7 +78,7 @@ std::optional<Eigen::Quaterniond> WorldUp::ProposeRotation(const SlamMap& map, b
   } else {
     if (!is_last && map.keyframe_count() < next_fit_) return std::nullopt;
     next_fit_ = map.keyframe_count() + (confidence_ >= kHighConfidence ? kLongPeriod_keyframes : kPeriod_keyframes);
-    const Evidence evidence = Gather(map);
+    const Evidence evidence = GatherEvidence(map);
     const auto plane = FindSupportPlane({.points = evidence.points,
                                          .object_points_world = evidence.object_points,
                                          .camera_centers_world = evidence.centers,

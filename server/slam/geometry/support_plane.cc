@@ -1,4 +1,4 @@
-#include "server/slam/places/support_plane.h"
+#include "server/slam/geometry/support_plane.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/statistics.h"
-#include "server/slam/places/plane_fit.h"
+#include "server/slam/geometry/plane_fit.h"
 
 namespace romap::slam {
 namespace {
@@ -24,9 +24,9 @@ constexpr double kPromisingShare = 0.7;  // of the best score so far
 constexpr size_t kMaxCandidates = 30;
 constexpr double kSame_rad = 0.5 * kDegree;
 constexpr int kRefinements = 10;
-// Lengths without a unit are shares of the typical distance from a camera to the objects.
-constexpr double kLeastSigma = 0.002;  // points of a real surface scatter at least this much
-constexpr double kMostSigma = 0.03;    // less accurate points are ignored
+// Lengths without a unit suffix are relative to the typical distance from a camera to the objects.
+constexpr double kMinSigma = 0.002;  // minimum scatter of points on a real surface
+constexpr double kMaxSigma = 0.03;   // less accurate points are ignored
 constexpr double kInlierSigmas = 2.5;
 // Weight of a point far from the objects' masks, relative to one near them.
 constexpr double kFarWeight = 0.3;
@@ -96,24 +96,24 @@ double DistanceToObjects(const Scene& scene, const Eigen::Vector3d& p) {
   return std::sqrt(nearest_squared);
 }
 
-void WeighPoints(const SupportPlaneQuery& query, Scene& scene) {
-  const double least_sigma_mu = kLeastSigma * scene.distance_mu;
+void WeightPoints(const SupportPlaneQuery& query, Scene& scene) {
+  const double min_sigma_mu = kMinSigma * scene.distance_mu;
   // Points near a mask in the image may be far away in space, such as the floor behind the table.
   const double reach_mu = std::max(2 * scene.object_spread_mu, kReach * scene.distance_mu);
   for (const SupportPoint& point : query.points) {
-    if (!point.position_world.allFinite() || !(point.sigma_mu <= kMostSigma * scene.distance_mu)) continue;
-    const double sigma_mu = std::hypot(point.sigma_mu, least_sigma_mu);
+    if (!point.position_world.allFinite() || !(point.sigma_mu <= kMaxSigma * scene.distance_mu)) continue;
+    const double sigma_mu = std::hypot(point.sigma_mu, min_sigma_mu);
     const double distance = DistanceToObjects(scene, point.position_world) / reach_mu;
     const double closeness = (point.near_object ? 1 : kFarWeight) / std::pow(1 + distance * distance, 2);
     scene.points.push_back(point.position_world);
     scene.sigmas_mu.push_back(sigma_mu);
     scene.closeness.push_back(closeness);
-    scene.weights.push_back(closeness * std::pow(least_sigma_mu / sigma_mu, 2));
+    scene.weights.push_back(closeness * std::pow(min_sigma_mu / sigma_mu, 2));
   }
 }
 
-// Plausibility, 0..1, that the objects stand on this plane, regardless of the points on it.
-double ObjectsStandOn(const Scene& scene, const Plane& plane) {
+// Plausibility, 0..1, that this plane supports the objects, regardless of the points on it.
+double SupportPlausibility(const Scene& scene, const Plane& plane) {
   const auto above = [&](const Eigen::Vector3d& p) { return plane.Height(p) > 0; };
   const auto cameras_above = static_cast<double>(std::ranges::count_if(scene.cameras, above));
   if (cameras_above < kMinCamerasAbove * static_cast<double>(scene.cameras.size())) return 0;
@@ -123,12 +123,12 @@ double ObjectsStandOn(const Scene& scene, const Plane& plane) {
   const double low = LowerQuantile(heights, 0.1);
   const double extent = LowerQuantile(heights, 0.9) - low;
   // Masks are inexact and include some points behind and below the object.
-  const double tolerance = 0.1 * extent + 3 * kLeastSigma * scene.distance_mu;
+  const double tolerance = 0.1 * extent + 3 * kMinSigma * scene.distance_mu;
   const auto below = static_cast<double>(std::ranges::count_if(heights, [&](double h) { return h < -tolerance; }));
-  const double rest_above = 1 - Ramp(below / static_cast<double>(heights.size()), 0.1, 0.3);
+  const double share_score = 1 - Ramp(below / static_cast<double>(heights.size()), 0.1, 0.3);
   // The lowest observed points of an object may be above its bottom, but not by several object heights.
   const double gap = std::max(0.0, low) / (extent + 0.02 * scene.distance_mu);
-  return rest_above / (1 + std::pow(gap, 4));
+  return share_score / (1 + std::pow(gap, 4));
 }
 
 // Score of one point for the plane: its weight when on the plane, 0 when off it.
@@ -178,7 +178,7 @@ struct Candidate {
 };
 
 double Score(const Scene& scene, const Plane& plane) {
-  return IsLevel(scene, plane) ? Support(scene, plane) * ObjectsStandOn(scene, plane) : 0;
+  return IsLevel(scene, plane) ? Support(scene, plane) * SupportPlausibility(scene, plane) : 0;
 }
 
 // Promising planes through three points drawn in proportion to their weights, best first (RANSAC with the score of
@@ -207,17 +207,19 @@ struct FoundPlane {
 };
 
 // Likelihood that `other` would score as high as `best` with another sample of points from the same surfaces: 1 if the
-// scores are equal, and smaller the more points contradict `other`. Points that agree with both do not count.
-double ChanceOfOther(const Scene& scene, const FoundPlane& best, const FoundPlane& other) {
-  const double best_stands = ObjectsStandOn(scene, best.fit.plane);
-  const double other_stands = ObjectsStandOn(scene, other.fit.plane);
+// scores are equal; decreases with the number of points that contradict `other`. Points that agree with both planes do
+// not count.
+double RelativeLikelihood(const Scene& scene, const FoundPlane& best, const FoundPlane& other) {
+  const double best_plausibility = SupportPlausibility(scene, best.fit.plane);
+  const double other_plausibility = SupportPlausibility(scene, other.fit.plane);
   double variance = 0;
   for (size_t i = 0; i < scene.points.size(); ++i) {
-    variance += std::pow(
-        best_stands * SupportOf(scene, best.fit.plane, i) - other_stands * SupportOf(scene, other.fit.plane, i), 2);
+    variance += std::pow(best_plausibility * SupportOf(scene, best.fit.plane, i) -
+                             other_plausibility * SupportOf(scene, other.fit.plane, i),
+                         2);
   }
-  const double worse_by = best.score - other.score;
-  return worse_by > 0 ? std::exp(-worse_by * worse_by / (2 * variance)) : 1;
+  const double deficit = best.score - other.score;
+  return deficit > 0 ? std::exp(-deficit * deficit / (2 * variance)) : 1;
 }
 
 // The best of the candidates after refinement. With few points or clutter next to the support, other planes may explain
@@ -242,7 +244,7 @@ std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidat
     };
     if (std::ranges::any_of(normals, is_same)) continue;
     normals.push_back(other.fit.plane.normal);
-    const double likelihood = ChanceOfOther(scene, best, other);
+    const double likelihood = RelativeLikelihood(scene, best, other);
     likelihoods += likelihood;
     variance += likelihood * std::pow(Angle_rad(best.fit.plane.normal, other.fit.plane.normal), 2);
   }
@@ -255,8 +257,8 @@ std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidat
 double SupportedShare(const Scene& scene, const Plane& plane, std::span<const size_t> inliers) {
   const double reach_mu = kReach * scene.distance_mu;
   const auto is_supported = [&](const Eigen::Vector3d& p) {
-    const Eigen::Vector3d foot = p - plane.Height(p) * plane.normal;
-    return std::ranges::any_of(inliers, [&](size_t i) { return (scene.points[i] - foot).norm() < reach_mu; });
+    const Eigen::Vector3d projection = p - plane.Height(p) * plane.normal;
+    return std::ranges::any_of(inliers, [&](size_t i) { return (scene.points[i] - projection).norm() < reach_mu; });
   };
   return static_cast<double>(std::ranges::count_if(scene.object_points, is_supported)) /
          static_cast<double>(scene.object_points.size());
@@ -273,7 +275,7 @@ double Confidence(const Scene& scene, const PlaneFit& fit, std::span<const size_
   const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kDegree), 2));
   // Few inliers near the objects and many far away indicate another surface.
   return Ramp(inlier_weight / all_weight, 0.1, 0.4) * Ramp(close_inliers, 3, 15) * sharpness *
-         SupportedShare(scene, fit.plane, inliers) * ObjectsStandOn(scene, fit.plane);
+         SupportedShare(scene, fit.plane, inliers) * SupportPlausibility(scene, fit.plane);
 }
 
 }  // namespace
@@ -281,7 +283,7 @@ double Confidence(const Scene& scene, const PlaneFit& fit, std::span<const size_
 std::optional<SupportPlane> FindSupportPlane(const SupportPlaneQuery& query) {
   Scene scene;
   if (!MeasureScene(query, scene)) return std::nullopt;
-  WeighPoints(query, scene);
+  WeightPoints(query, scene);
   if (std::ssize(scene.points) < kMinInliers) return std::nullopt;
   const auto fit = ChoosePlane(scene, SearchPlanes(scene, query.seed));
   if (!fit) return std::nullopt;

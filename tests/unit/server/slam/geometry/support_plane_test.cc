@@ -1,4 +1,4 @@
-#include "server/slam/places/support_plane.h"
+#include "server/slam/geometry/support_plane.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <ostream>
 #include <string>
 
-#include "tests/unit/server/slam/places/support_world.h"
+#include "tests/unit/server/slam/geometry/support_world.h"
 
 namespace romap::slam {
 namespace {
@@ -16,18 +16,18 @@ constexpr double kDegree = std::numbers::pi / 180;
 
 struct WorldCase {
   std::string name;
-  SupportWorld::Dials dials;
+  SupportWorld::Options options;
   friend void PrintTo(const WorldCase& world_case, std::ostream* os) { *os << world_case.name; }
 };
 
 class SupportPlaneInWorlds : public ::testing::TestWithParam<WorldCase> {};
 
-TEST_P(SupportPlaneInWorlds, IsTheTable) {
+TEST_P(SupportPlaneInWorlds, FindsTheTable) {
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
-    SupportWorld::Dials dials = GetParam().dials;
-    dials.seed = seed;
-    const SupportWorld world(dials);
+    SupportWorld::Options options = GetParam().options;
+    options.seed = seed;
+    const SupportWorld world(options);
     const auto plane = FindSupportPlane(world.Query());
     ASSERT_TRUE(plane.has_value());
     EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kDegree);
@@ -37,28 +37,31 @@ TEST_P(SupportPlaneInWorlds, IsTheTable) {
     EXPECT_GT(plane->confidence, 0.5);
     EXPECT_LE(plane->confidence, 1);
     EXPECT_NEAR(plane->normal_world.norm(), 1, 1e-9);
-    EXPECT_GE(plane->inliers, dials.table_points / 4);
+    EXPECT_GE(plane->inliers, options.table_points / 4);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Worlds, SupportPlaneInWorlds,
-    ::testing::Values(
-        WorldCase{"Plain", {}}, WorldCase{"FewPoints", {.table_points = 150}},
-        WorldCase{"StatedTooCertain", {.sigma_factor = 0}}, WorldCase{"StatedTooUncertain", {.sigma_factor = 4}},
-        WorldCase{"FloorSeenPastTheTable", {.table_points = 60, .floor_points = 1000}},
-        WorldCase{"FloorAndNoFeetSeen", {.object_bottom = 0.4, .floor_points = 500}},
-        WorldCase{"WallBehind", {.wall_points = 1000}},
-        WorldCase{"WallBehindSteepView", {.wall_points = 500, .elevation_rad = 60 * kDegree}},
-        WorldCase{"ClutterOnTheTable", {.clutter_points = 200}},
-        WorldCase{"HalfOfThePointsStray", {.stray_share = 0.5}},
-        WorldCase{"GrazingView", {.elevation_rad = 12 * kDegree}},
-        WorldCase{
-            "Everything",
-            {.table_points = 250, .floor_points = 500, .wall_points = 500, .clutter_points = 100, .stray_share = 0.2}}),
+    ::testing::Values(WorldCase{"Plain", {}}, WorldCase{"FewPoints", {.table_points = 150}},
+                      WorldCase{"SigmasTooSmall", {.sigma_factor = 0}},
+                      WorldCase{"SigmasTooLarge", {.sigma_factor = 4}},
+                      WorldCase{"FloorVisibleBesideTheTable", {.table_points = 60, .floor_points = 1000}},
+                      WorldCase{"FloorVisibleAndObjectBottomsHidden", {.object_bottom = 0.4, .floor_points = 500}},
+                      WorldCase{"WallBehind", {.wall_points = 1000}},
+                      WorldCase{"WallBehindSteepView", {.wall_points = 500, .elevation_rad = 60 * kDegree}},
+                      WorldCase{"ClutterOnTheTable", {.clutter_points = 200}},
+                      WorldCase{"HalfOfTheTablePointsAreOutliers", {.outlier_share = 0.5}},
+                      WorldCase{"GrazingView", {.elevation_rad = 12 * kDegree}},
+                      WorldCase{"Everything",
+                                {.table_points = 250,
+                                 .floor_points = 500,
+                                 .wall_points = 500,
+                                 .clutter_points = 100,
+                                 .outlier_share = 0.2}}),
     [](const auto& info) { return info.param.name; });
 
-TEST(SupportPlane, SigmaGrowsWithTheNoiseAndTellsTheError) {
+TEST(SupportPlane, SigmaGrowsWithTheNoiseAndBoundsTheError) {
   double sigma_before_rad = 0;
   for (const double noise : {0.002, 0.01, 0.02}) {
     SCOPED_TRACE(noise);
@@ -78,7 +81,7 @@ TEST(SupportPlane, SigmaGrowsWithTheNoiseAndTellsTheError) {
 }
 
 // A plane that cannot support the objects is rejected, regardless of the number of its points.
-TEST(SupportPlane, IsNeitherTheFloorFarBelowNorTheWallBehind) {
+TEST(SupportPlane, RejectsADistantFloorAndAWall) {
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     const SupportWorld floor({.table_points = 0, .floor_points = 800, .seed = seed});
@@ -88,15 +91,15 @@ TEST(SupportPlane, IsNeitherTheFloorFarBelowNorTheWallBehind) {
   }
 }
 
-TEST(SupportPlane, HasLittleConfidenceInPointsWithoutAPlane) {
+TEST(SupportPlane, HasLowConfidenceWithoutAPlane) {
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
-    const auto plane = FindSupportPlane(SupportWorld({.stray_share = 1, .seed = seed}).Query());
+    const auto plane = FindSupportPlane(SupportWorld({.outlier_share = 1, .seed = seed}).Query());
     EXPECT_LT(plane ? plane->confidence : 0, 0.2);
   }
 }
 
-TEST(SupportPlane, IsNotMadeOfPointsOnALine) {
+TEST(SupportPlane, RejectsCollinearPoints) {
   SupportWorld world({});
   const Eigen::Vector3d start = world.points[0].position_world;
   const Eigen::Vector3d along = world.points[1].position_world - start;
@@ -104,7 +107,7 @@ TEST(SupportPlane, IsNotMadeOfPointsOnALine) {
   EXPECT_FALSE(FindSupportPlane(world.Query()).has_value());
 }
 
-TEST(SupportPlane, NeedsPointsObjectsAndCameras) {
+TEST(SupportPlane, RequiresPointsObjectsAndCameras) {
   const SupportWorld world({});
   EXPECT_FALSE(FindSupportPlane({}).has_value());
   SupportPlaneQuery query = world.Query();
@@ -136,8 +139,8 @@ TEST(SupportPlane, IgnoresPointsThatAreNotFinite) {
   EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kDegree);
 }
 
-TEST(SupportPlane, IsTheSameForTheSameSeedAndAboutTheSameForAnother) {
-  const SupportWorld world({.clutter_points = 100, .stray_share = 0.3});
+TEST(SupportPlane, IsDeterministicForASeedAndSimilarForAnother) {
+  const SupportWorld world({.clutter_points = 100, .outlier_share = 0.3});
   const auto first = FindSupportPlane(world.Query(5));
   const auto again = FindSupportPlane(world.Query(5));
   const auto other = FindSupportPlane(world.Query(6));

@@ -1,4 +1,4 @@
-#include "server/slam/places/plane_fit.h"
+#include "server/slam/geometry/plane_fit.h"
 
 #include <gtest/gtest.h>
 
@@ -58,8 +58,8 @@ TEST(FitPlane, RejectsCollinearPoints) {
   EXPECT_FALSE(FitPlane(points, std::vector<double>(5, 1.0), kUp).has_value());
 }
 
-// sigma_rad must match the true scatter of the normal, even with weights that are unrelated to accuracy.
-TEST(FitPlane, SigmaTellsTheScatterOfTheNormal) {
+// sigma_rad must match the actual scatter of the normal, even if the weights are unrelated to accuracy.
+TEST(FitPlane, SigmaMatchesTheScatterOfTheNormal) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0, 1);

@@ -1,4 +1,4 @@
-#include "server/slam/places/plane_fit.h"
+#include "server/slam/geometry/plane_fit.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
