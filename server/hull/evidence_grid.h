@@ -25,8 +25,8 @@ enum class CellEvidence : uint8_t {
 // - It is empty: at least max(min_background, background_share * n) views show background, where n is the number of
 //   views whose crop contains the cell.
 // - It is unconfirmed: fewer than max(min_object, object_share * n) views show the object, where n is the number of
-//   views whose image contains the cell. A view that shows another object is no evidence that the cell is empty;
-//   without this case, space behind other objects in nearly all views would be kept.
+//   views whose image contains the cell. Views in which something hides the cell are no evidence that it is empty;
+//   without this rule, space that other objects hide in nearly all views would be kept.
 struct CarvingRule {
   int min_background = 1;
   double background_share = 0;

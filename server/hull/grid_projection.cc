@@ -18,10 +18,10 @@ RowProjector::RowProjector(const GridProjection& projection, const VoxelGrid& gr
       x_(Eigen::ArrayXf::LinSpaced(grid.cells, 0, static_cast<float>(grid.cells - 1))) {}
 
 bool RowProjector::Project(int y, int z) {
-  constexpr double kLeastDepth = 1e-9;
+  constexpr double kMinDepth = 1e-9;
   first_ = projection_ * grid_.CellCenter(0, y, z);
   const double last_z = first_.z() + static_cast<double>(grid_.cells - 1) * step_.z();
-  if (!(std::min(first_.z(), last_z) > kLeastDepth)) return false;
+  if (!(std::min(first_.z(), last_z) > kMinDepth)) return false;
   const Eigen::Vector3f q = first_.cast<float>();
   const Eigen::Vector3f step = step_.cast<float>();
   inverse_z_ = (q.z() + x_ * step.z()).inverse();

@@ -21,8 +21,8 @@ struct GridProjection {
 };
 
 // The pixels under the centers of one row of cells (along x). Projecting every cell of a grid into every view dominates
-// the cost of carving, so the arithmetic is in single precision and vectorized over the row. A center that projects to
-// within rounding of a pixel border may be assigned to either pixel, but always to the same one.
+// the cost of carving, so the arithmetic is in single precision and vectorized over the row. Rounding may move a
+// center near a pixel border to the neighboring pixel, but the result is deterministic.
 class RowProjector {
  public:
   RowProjector(const GridProjection& projection, const VoxelGrid& grid);

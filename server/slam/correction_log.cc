@@ -39,15 +39,15 @@ MapCorrection CorrectionLog::TakeCorrection(const SlamMap& map) {
     if (!now) continue;
     const SE3<World, Camera>& before = recorded.pose.T_world_camera;
     const SE3<World, Camera>& after = now->T_world_camera;
-    const double turn_rad = after.rotation().angularDistance(before.rotation());
+    const double rotation_rad = after.rotation().angularDistance(before.rotation());
     const double distance_mu = (after.translation() - before.translation()).norm();
     const double scale = now->scale / recorded.pose.scale;
-    const bool is_too_small = turn_rad < kNoticeable_rad && distance_mu < kNoticeable_rad * recorded.depth_mu &&
-                              std::abs(scale - 1) < kNoticeableScale;
-    if (is_too_small) continue;
-    const Eigen::Quaterniond turn = after.rotation() * before.rotation().conjugate();
-    const Eigen::Vector3d shift = after.translation() - scale * (turn * before.translation());
-    correction.keyframes.push_back({.id = id, .T_world_camera = after, .S_new_old = {scale, turn, shift}});
+    const bool is_negligible = rotation_rad < kNoticeable_rad && distance_mu < kNoticeable_rad * recorded.depth_mu &&
+                               std::abs(scale - 1) < kNoticeableScale;
+    if (is_negligible) continue;
+    const Eigen::Quaterniond rotation = after.rotation() * before.rotation().conjugate();
+    const Eigen::Vector3d shift = after.translation() - scale * (rotation * before.translation());
+    correction.keyframes.push_back({.id = id, .T_world_camera = after, .S_new_old = {scale, rotation, shift}});
     recorded = {*now, scale * recorded.depth_mu};
   }
   for (auto it = points_.begin(); it != points_.end();) {

@@ -10,7 +10,7 @@
 namespace romap::slam {
 
 // Records which keyframe poses and point positions later stages have, and reports which of them have changed
-// noticeably. Motions too small to report accumulate until they are noticeable.
+// noticeably. Changes too small to report accumulate until they are noticeable.
 class CorrectionLog {
  public:
   // Records a keyframe that is passed to later stages. `scale`: see ScaledPose.

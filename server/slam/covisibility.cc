@@ -9,20 +9,21 @@ constexpr size_t kMaxPoints = 8000;
 
 }  // namespace
 
-std::vector<KeyframeId> Neighborhood(const SlamMap& map, const MapKeyframe& keyframe, size_t first, size_t second) {
+std::vector<KeyframeId> Neighborhood(const SlamMap& map, const MapKeyframe& keyframe, size_t max_neighbors,
+                                     size_t max_second_neighbors) {
   std::vector<KeyframeId> ids;
   std::set<KeyframeId> known = {keyframe.id};
-  auto around = map.Covisible(keyframe, kMinSharedPoints);
-  if (around.empty() && keyframe.parent) around.emplace_back(keyframe.parent, 0);
-  if (around.size() > first) around.resize(first);
-  for (const auto& [id, shared] : around) {
+  auto neighbors = map.Covisible(keyframe, kMinSharedPoints);
+  if (neighbors.empty() && keyframe.parent) neighbors.emplace_back(keyframe.parent, 0);
+  if (neighbors.size() > max_neighbors) neighbors.resize(max_neighbors);
+  for (const auto& [id, shared] : neighbors) {
     if (known.insert(id).second) ids.push_back(id);
   }
-  if (second == 0) return ids;
-  for (const auto& [id, shared] : around) {
+  if (max_second_neighbors == 0) return ids;
+  for (const auto& [id, shared] : neighbors) {
     size_t taken = 0;
     for (const auto& [next, count] : map.Covisible(*map.FindKeyframe(id), kMinSharedPoints)) {
-      if (taken++ == second) break;
+      if (taken++ == max_second_neighbors) break;
       if (known.insert(next).second) ids.push_back(next);
     }
   }

@@ -12,19 +12,19 @@ struct Best {
   int second_distance = std::numeric_limits<int>::max();
 };
 
-[[gnu::always_inline]] inline int CountDifferent(const Descriptor& a, const Descriptor& b) {
+[[gnu::always_inline]] inline int CountDifferingBits(const Descriptor& a, const Descriptor& b) {
   return __builtin_popcountll(a[0] ^ b[0]) + __builtin_popcountll(a[1] ^ b[1]) + __builtin_popcountll(a[2] ^ b[2]) +
          __builtin_popcountll(a[3] ^ b[3]);
 }
 
 // Inlined into both of its callers, so that it is compiled with and without the popcnt instruction.
-[[gnu::always_inline]] inline void FindBestIn(std::span<const Descriptor> first, std::span<const Descriptor> second,
-                                              std::vector<Best>& of_first, std::vector<Best>& of_second) {
+[[gnu::always_inline]] inline void FindBestImpl(std::span<const Descriptor> first, std::span<const Descriptor> second,
+                                                std::vector<Best>& best_of_first, std::vector<Best>& best_of_second) {
   for (size_t i = 0; i < first.size(); ++i) {
     const Descriptor a = first[i];
     Best best;
     for (size_t k = 0; k < second.size(); ++k) {
-      const int distance = CountDifferent(a, second[k]);
+      const int distance = CountDifferingBits(a, second[k]);
       if (distance < best.distance) {
         best.second_distance = best.distance;
         best.distance = distance;
@@ -32,43 +32,43 @@ struct Best {
       } else if (distance < best.second_distance) {
         best.second_distance = distance;
       }
-      if (distance < of_second[k].distance) {
-        of_second[k].distance = distance;
-        of_second[k].index = static_cast<int>(i);
+      if (distance < best_of_second[k].distance) {
+        best_of_second[k].distance = distance;
+        best_of_second[k].index = static_cast<int>(i);
       }
     }
-    of_first[i] = best;
+    best_of_first[i] = best;
   }
 }
 
 #if defined(__x86_64__)
-[[gnu::target("popcnt")]] void FindBestFast(std::span<const Descriptor> first, std::span<const Descriptor> second,
-                                            std::vector<Best>& of_first, std::vector<Best>& of_second) {
-  FindBestIn(first, second, of_first, of_second);
+[[gnu::target("popcnt")]] void FindBestWithPopcnt(std::span<const Descriptor> first, std::span<const Descriptor> second,
+                                                  std::vector<Best>& best_of_first, std::vector<Best>& best_of_second) {
+  FindBestImpl(first, second, best_of_first, best_of_second);
 }
 #endif
 
-void FindBest(std::span<const Descriptor> first, std::span<const Descriptor> second, std::vector<Best>& of_first,
-              std::vector<Best>& of_second) {
+void FindBest(std::span<const Descriptor> first, std::span<const Descriptor> second, std::vector<Best>& best_of_first,
+              std::vector<Best>& best_of_second) {
 #if defined(__x86_64__)
-  static const bool has_bit_count = __builtin_cpu_supports("popcnt") != 0;
-  if (has_bit_count) return FindBestFast(first, second, of_first, of_second);
+  static const bool has_popcnt = __builtin_cpu_supports("popcnt") != 0;
+  if (has_popcnt) return FindBestWithPopcnt(first, second, best_of_first, best_of_second);
 #endif
-  FindBestIn(first, second, of_first, of_second);
+  FindBestImpl(first, second, best_of_first, best_of_second);
 }
 
 }  // namespace
 
 std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               int max_distance, double ratio) {
-  std::vector<Best> of_first(first.size());
-  std::vector<Best> of_second(second.size());
-  FindBest(first, second, of_first, of_second);
+  std::vector<Best> best_of_first(first.size());
+  std::vector<Best> best_of_second(second.size());
+  FindBest(first, second, best_of_first, best_of_second);
   std::vector<DescriptorMatch> matches;
   for (size_t i = 0; i < first.size(); ++i) {
-    const Best& best = of_first[i];
+    const Best& best = best_of_first[i];
     if (best.index < 0 || best.distance > max_distance) continue;
-    if (of_second[static_cast<size_t>(best.index)].index != static_cast<int>(i)) continue;
+    if (best_of_second[static_cast<size_t>(best.index)].index != static_cast<int>(i)) continue;
     if (best.second_distance != std::numeric_limits<int>::max() && best.distance >= ratio * best.second_distance) {
       continue;
     }

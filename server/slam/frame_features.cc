@@ -12,7 +12,7 @@ namespace {
 constexpr int kCell_px = 16;
 constexpr float kMaxDepthJump = 0.02F;  // relative to the depth, in a 3x3 neighborhood
 
-// z depth at a feature; 0 where the depth image has none or is discontinuous.
+// z depth at a feature; 0 if the depth there is unknown or discontinuous.
 double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
   const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
   const int v = static_cast<int>(std::lround(feature.pixel_px.y()));
@@ -67,25 +67,25 @@ bool FrameFeatures::HasDepth() const {
 
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
                                                        const RadialCorrection& lens) {
-  auto made = std::make_shared<FrameFeatures>();
-  made->frame_id = frame.frame_id;
-  made->timestamp_ns = frame.timestamp_ns;
-  made->camera = frame.camera;
-  made->features = std::move(features);
-  const size_t count = made->features.size();
-  made->ranges_mu.assign(count, 0);
-  made->has_masks = frame.has_masks;
+  auto result = std::make_shared<FrameFeatures>();
+  result->frame_id = frame.frame_id;
+  result->timestamp_ns = frame.timestamp_ns;
+  result->camera = frame.camera;
+  result->features = std::move(features);
+  const size_t count = result->features.size();
+  result->ranges_mu.assign(count, 0);
+  result->has_masks = frame.has_masks;
   const MaskZones zones(frame.labels);
   for (size_t i = 0; i < count; ++i) {
-    const Feature& feature = made->features[i];
-    made->image_px.push_back(feature.pixel_px);
+    const Feature& feature = result->features[i];
+    result->image_px.push_back(feature.pixel_px);
     const Eigen::Vector3d ray = frame.camera.Unproject(feature.pixel_px.x(), feature.pixel_px.y());
-    made->bearings_camera.push_back(ray.normalized());
-    if (!frame.depth_mu.empty()) made->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
-    made->mask_zones.push_back(zones.At(feature.pixel_px, feature.octave_scale, feature.label));
+    result->bearings_camera.push_back(ray.normalized());
+    if (!frame.depth_mu.empty()) result->ranges_mu[i] = DepthAt(frame.depth_mu, feature) * ray.norm();
+    result->mask_zones.push_back(zones.At(feature.pixel_px, feature.octave_scale, feature.label));
   }
-  made->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, made->features);
-  return WithLens(std::move(made), lens);
+  result->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, result->features);
+  return WithLens(std::move(result), lens);
 }
 
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame,

@@ -28,7 +28,7 @@ class FeatureGrid {
   std::vector<int> members_;
 };
 
-// The features of one frame, which slam keeps instead of the image. Immutable, so that threads can share it.
+// The features of one frame. Keyframes store them instead of the image. Immutable, so that threads can share it.
 struct FrameFeatures {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
@@ -51,7 +51,7 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
                                                        const RadialCorrection& lens = {});
 // The same frame with its features corrected by another lens. Returns `frame` itself if it has this lens.
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame, const RadialCorrection& lens);
-// The same frame with its features labeled by masks that arrived after it, in the same way as FeatureExtractor does.
+// The same frame with its features labeled by masks that arrived after it, as FeatureExtractor does.
 // `labels`: CV_16UC1 of the frame's size.
 std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& frame, const cv::Mat& labels, int mask_erosion_px);
 // The features with their pixels in the image, before the lens correction.

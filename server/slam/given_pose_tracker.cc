@@ -4,7 +4,7 @@
 
 namespace romap::slam {
 
-TrackedFrame GivenPoseTracker::Take(std::shared_ptr<const Frame> frame) {
+TrackedFrame GivenPoseTracker::Track(std::shared_ptr<const Frame> frame) {
   TrackedFrame tracked;
   tracked.T_world_camera = *frame->T_world_camera;
   up_.Add(*frame, tracked.T_world_camera);

@@ -15,7 +15,7 @@ class GivenPoseTracker {
   explicit GivenPoseTracker(const SlamConfig& config) : selector_(config) {}
 
   // `frame` must have a pose.
-  TrackedFrame Take(std::shared_ptr<const Frame> frame);
+  TrackedFrame Track(std::shared_ptr<const Frame> frame);
 
  private:
   KeyframeSelector selector_;

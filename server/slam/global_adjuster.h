@@ -19,7 +19,7 @@ class GlobalAdjuster {
   void Start(const SlamMap& map, bool find_lens);
   // Discards the run, finished or not. The map does not change.
   void Cancel();
-  // Started, and neither applied nor canceled since.
+  // True after Start() until the run is applied or canceled.
   bool IsPending() const { return run_ != nullptr; }
   // Writes the result of the pending run to the map it was started with. `wait`: blocks until the run is finished.
   // Returns whether the map changed: false without a pending or finished run, or if the solver failed.

@@ -11,7 +11,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kFewPoints = 100;  // known points of a keyframe below which tracking may fail soon
+constexpr int kFewPoints = 100;  // with fewer known points in a keyframe, tracking may fail soon
 
 }  // namespace
 
@@ -33,11 +33,11 @@ MapKeyframe& KeyframeBuilder::Insert(const TrackedImage& image, const SE3<World,
   std::shared_ptr<const FrameFeatures> features = image.features;
   const Frame& frame = *image.tracked.frame;
   if (!image.pose_given) {
-    // Objects are small: in keyframes they get additional features.
-    const std::vector<Feature> more = extractor_.ExtractObjects(frame, UncorrectedFeatures(*features));
-    if (!more.empty()) {
+    // Objects are small, so keyframes get additional features on them.
+    const std::vector<Feature> object_features = extractor_.ExtractObjects(frame, UncorrectedFeatures(*features));
+    if (!object_features.empty()) {
       std::vector<Feature> all = UncorrectedFeatures(*features);
-      all.insert(all.end(), more.begin(), more.end());
+      all.insert(all.end(), object_features.begin(), object_features.end());
       features = MakeFrameFeatures(frame, std::move(all));
     }
   }
@@ -70,14 +70,14 @@ void KeyframeBuilder::MakePoints(MapKeyframe& keyframe, SlamMap& map) const {
   const auto known =
       std::count_if(keyframe.points.begin(), keyframe.points.end(), [](MapPointId id) { return bool(id); });
   const bool has_few = !keyframe.pose_given && known < kFewPoints;
-  PointMaker by_parallax(has_few ? PointMaker::Generous(config_) : config_, &map);
+  PointMaker by_parallax(has_few ? PointMaker::RelaxedConfig(config_) : config_, &map);
   by_parallax.MakePointsByParallax(keyframe, by_parallax.KeyframesToMatch(keyframe));
   PointMaker maker(config_, &map);
   maker.MakePointsByDepth(keyframe);
   if (keyframe.pose_given) return;
-  std::vector<MapKeyframe*> around;
-  for (const KeyframeId id : Neighborhood(map, keyframe, 8, 0)) around.push_back(map.FindKeyframe(id));
-  maker.FuseDuplicates(keyframe, around);
+  std::vector<MapKeyframe*> neighbors;
+  for (const KeyframeId id : Neighborhood(map, keyframe, 8, 0)) neighbors.push_back(map.FindKeyframe(id));
+  maker.FuseDuplicates(keyframe, neighbors);
 }
 
 }  // namespace romap::slam

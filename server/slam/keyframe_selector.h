@@ -11,15 +11,15 @@ namespace romap::slam {
 
 // How well a frame was tracked from its image.
 struct TrackingQuality {
-  double scene_depth_mu = 0;      // median over its matched points
-  double tracked_share = 1;       // matched points over the points of the newest keyframe
-  int keyframes_waiting = 0;      // selected, but not yet in the map
-  bool has_unseen_depth = false;  // its depth image would add many points
+  double scene_depth_mu = 0;   // median over its matched points
+  double tracked_share = 1;    // matched points over the points of the newest keyframe
+  int keyframes_waiting = 0;   // selected, but not yet in the map
+  bool has_new_depth = false;  // its depth image would add many points
 };
 
 // Selects keyframes by camera poses: one is due when the camera has rotated or moved enough since the last one, or has
-// moved slightly and much time has passed. A static camera gets no further keyframes. A due keyframe waits a few frames
-// for a frame that is sharp and, if only some frames have masks, has masks.
+// moved slightly and the last keyframe is many frames old. A static camera gets no further keyframes. A due keyframe
+// waits a few frames for a frame that is sharp and, if only some frames have masks, has masks.
 class KeyframeSelector {
  public:
   explicit KeyframeSelector(const SlamConfig& config) : config_(config) {}
@@ -27,16 +27,16 @@ class KeyframeSelector {
   // Whether this frame is a keyframe. Call once per frame, in order. The first frame is always a keyframe.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera);
 
-  // The same for a pose that was tracked from the image. A keyframe is also due when few points of the map are left in
-  // view. While earlier keyframes wait for mapping, only those that tracking needs are selected.
+  // The same for a pose that was tracked from the image. A keyframe is also due when few map points are still
+  // in view. While earlier keyframes wait for mapping, only those that tracking needs are selected.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera, const TrackingQuality& quality);
 
  private:
-  // Motion since the last keyframe relative to the motion that makes the next one due; 1 = due.
+  // Motion since the last keyframe, divided by the motion that makes the next one due.
   double Progress(const SE3<World, Camera>& T_world_camera) const;
   bool IsDue(const DepthView& view);
-  bool IsGood(const Frame& frame, double sharpness);
-  void Take(DepthView view);
+  bool IsSharpWithMasks(const Frame& frame, double sharpness);
+  void SetLastKeyframe(DepthView view);
 
   const SlamConfig config_;
   std::optional<DepthView> last_keyframe_;

@@ -84,8 +84,7 @@ bool CorrectDrift(const LoopMatch& loop, bool fix_scale, const std::vector<MapKe
   const PoseGraphSummary summary = OptimizePoseGraph(nodes, edges, {.fix_scale = fix_scale});
   spdlog::info(
       "slam: loop from {} to {}: drift {:.0f} px, scale {:.3f}; pose graph of {} keyframes and {} edges, cost {:.3g} "
-      "-> "
-      "{:.3g}",
+      "-> {:.3g}",
       loop.newest.ToString(), loop.old.ToString(), loop.drift_px, S_new_old.scale(), nodes.size(), edges.size(),
       summary.initial_cost, summary.final_cost);
   if (!summary.usable) return false;
@@ -96,7 +95,7 @@ bool CorrectDrift(const LoopMatch& loop, bool fix_scale, const std::vector<MapKe
 }
 
 // The keyframe and its neighbors.
-std::vector<MapKeyframe*> SideOf(MapKeyframe& keyframe, SlamMap& map) {
+std::vector<MapKeyframe*> WithNeighbors(MapKeyframe& keyframe, SlamMap& map) {
   std::vector<MapKeyframe*> side = {&keyframe};
   for (const auto& [id, shared] : map.Covisible(keyframe, kMinSharedPoints)) side.push_back(map.FindKeyframe(id));
   return side;
@@ -107,8 +106,8 @@ std::vector<MapKeyframe*> SideOf(MapKeyframe& keyframe, SlamMap& map) {
 bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, SlamMap& map) {
   MapKeyframe& newest = *map.FindKeyframe(loop.newest);
   MapKeyframe& old = *map.FindKeyframe(loop.old);
-  std::vector<MapKeyframe*> new_side = SideOf(newest, map);
-  std::vector<MapKeyframe*> old_side = SideOf(old, map);
+  std::vector<MapKeyframe*> new_side = WithNeighbors(newest, map);
+  std::vector<MapKeyframe*> old_side = WithNeighbors(old, map);
   const bool drifted = loop.drift_px > kNoDrift_px;
   if (drifted) {
     if (!CorrectDrift(loop, fix_scale, new_side, map)) return false;

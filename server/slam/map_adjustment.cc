@@ -31,32 +31,31 @@ class ProblemBuilder {
   // Adds the point with its observations from keyframes that were added.
   void AddPoint(const PointTrack& track) {
     const auto point = static_cast<int>(problem_.points.size());
-    bool seen = false;
+    bool is_observed = false;
     for (const FeatureRef& observation : track.observations) {
       const auto camera = camera_of_.find(observation.keyframe);
       if (camera == camera_of_.end()) continue;
-      problem_.bundle.observations.push_back(Observe(camera->second, point, observation));
-      seen = true;
+      problem_.bundle.observations.push_back(MakeObservation(camera->second, point, observation));
+      is_observed = true;
     }
-    if (!seen) return;
+    if (!is_observed) return;
     problem_.points.push_back(track.point.id);
     problem_.bundle.points.push_back({.position_world = track.point.position_world});
   }
 
-  bool Has(KeyframeId keyframe) const { return camera_of_.contains(keyframe); }
   MapProblem Take() { return std::move(problem_); }
 
  private:
-  BundleObservation Observe(int camera, int point, const FeatureRef& ref) const {
-    const FrameFeatures& seen = *map_.FindKeyframe(ref.keyframe)->frame;
+  BundleObservation MakeObservation(int camera, int point, const FeatureRef& ref) const {
+    const FrameFeatures& frame = *map_.FindKeyframe(ref.keyframe)->frame;
     const auto i = static_cast<size_t>(ref.feature);
-    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? seen.image_px[i] : seen.features[i].pixel_px;
+    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? frame.image_px[i] : frame.features[i].pixel_px;
     BundleObservation observation{.camera = camera,
                                   .point = point,
                                   .pixel_px = pixel_px.cast<double>(),
-                                  .sigma_px = config_.pixel_sigma_px * seen.features[i].octave_scale};
-    if (seen.ranges_mu[i] > 0) {
-      observation.depth_mu = seen.ranges_mu[i] * seen.bearings_camera[i].z();
+                                  .sigma_px = config_.pixel_sigma_px * frame.features[i].octave_scale};
+    if (frame.ranges_mu[i] > 0) {
+      observation.depth_mu = frame.ranges_mu[i] * frame.bearings_camera[i].z();
       observation.depth_sigma_mu = config_.depth_sigma_ratio * observation.depth_mu;
     }
     return observation;
@@ -87,23 +86,23 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
     for (const FeatureRef& observation : map.FindPoint(point)->observations) ++around[observation.keyframe];
   }
   for (const MapKeyframe* keyframe : window) around.erase(keyframe->id);
-  std::vector<std::pair<int, KeyframeId>> holding;
-  for (const auto& [id, count] : around) holding.emplace_back(count, id);
-  std::sort(holding.rbegin(), holding.rend());
-  if (holding.size() > kMaxAnchorKeyframes) holding.resize(kMaxAnchorKeyframes);
+  std::vector<std::pair<int, KeyframeId>> anchors;
+  for (const auto& [id, count] : around) anchors.emplace_back(count, id);
+  std::sort(anchors.rbegin(), anchors.rend());
+  if (anchors.size() > kMaxAnchorKeyframes) anchors.resize(kMaxAnchorKeyframes);
 
-  // A small map has no keyframes outside the window: its oldest one is fixed. The observations do not determine the
-  // scale; damping keeps it.
-  KeyframeId held;
-  if (holding.empty()) {
-    held = (*std::min_element(window.begin(), window.end(), [](auto* a, auto* b) { return a->id < b->id; }))->id;
+  // A small map has no keyframes outside the window: its oldest keyframe is fixed. The observations do not determine
+  // the scale; the damping of the solver keeps it.
+  KeyframeId anchored;
+  if (anchors.empty()) {
+    anchored = (*std::min_element(window.begin(), window.end(), [](auto* a, auto* b) { return a->id < b->id; }))->id;
   }
 
   ProblemBuilder builder(map, config, newest.camera());
   for (const MapKeyframe* keyframe : window) {
-    builder.AddKeyframe(*keyframe, keyframe->id == held && !keyframe->prior);
+    builder.AddKeyframe(*keyframe, keyframe->id == anchored && !keyframe->prior);
   }
-  for (const auto& [count, id] : holding) builder.AddKeyframe(*map.FindKeyframe(id), true);
+  for (const auto& [count, id] : anchors) builder.AddKeyframe(*map.FindKeyframe(id), true);
   for (const MapPointId point : points) builder.AddPoint(*map.FindPoint(point));
   return builder.Take();
 }

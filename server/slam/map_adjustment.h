@@ -23,7 +23,7 @@ struct MapProblem {
 MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const SlamConfig& config);
 
 // All keyframes and points. The first keyframe is fixed unless it has a prior. Without depth, the observations do not
-// determine the scale; damping keeps it. `find_lens`: the lens correction is estimated too.
+// determine the scale; the damping of the solver keeps it. `find_lens`: the lens correction is estimated too.
 MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
 
 // Writes the solution of a window back and removes the outlier observations.

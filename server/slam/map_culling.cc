@@ -10,7 +10,7 @@ namespace {
 constexpr uint64_t kTrialKeyframes = 3;
 constexpr int kTrialObservations = 3;
 constexpr double kRedundantShare = 0.97;
-constexpr int kOtherKeyframes = 3;
+constexpr int kMinOtherKeyframes = 3;
 constexpr size_t kMaxRemoved = 2;  // per call, so that bundle adjustment can compensate
 
 bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
@@ -24,9 +24,9 @@ bool IsRedundant(const MapKeyframe& keyframe, const SlamMap& map) {
       if (observation.keyframe == keyframe.id) continue;
       const auto& features = map.FindKeyframe(observation.keyframe)->features();
       as_good += features[static_cast<size_t>(observation.feature)].octave <= keyframe.features()[i].octave + 1 ? 1 : 0;
-      if (as_good == kOtherKeyframes) break;
+      if (as_good == kMinOtherKeyframes) break;
     }
-    redundant += as_good == kOtherKeyframes ? 1 : 0;
+    redundant += as_good == kMinOtherKeyframes ? 1 : 0;
   }
   return points > 0 && redundant > kRedundantShare * points;
 }
@@ -68,20 +68,20 @@ std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyfram
   }
   if (map.keyframes().size() > static_cast<size_t>(config.max_keyframes)) {
     // The keyframe closest to its parent adds the least information.
-    KeyframeId least;
-    double highest = 0;
+    KeyframeId closest;
+    double max_closeness = 0;
     for (const auto& [id, keyframe] : map.keyframes()) {
       if (!may_remove(keyframe)) continue;
       const double distance_mu = (keyframe.center_world() - map.FindKeyframe(keyframe.parent)->center_world()).norm();
       const double closeness = 1 / (1e-9 + distance_mu);
-      if (closeness > highest) {
-        highest = closeness;
-        least = id;
+      if (closeness > max_closeness) {
+        max_closeness = closeness;
+        closest = id;
       }
     }
-    if (least) {
-      map.RemoveKeyframe(least);
-      removed.push_back(least);
+    if (closest) {
+      map.RemoveKeyframe(closest);
+      removed.push_back(closest);
     }
   }
   return removed;

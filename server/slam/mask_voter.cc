@@ -12,12 +12,12 @@ namespace {
 // 17 s at 30 frames/s, longer than any detector takes.
 constexpr size_t kMaxWaitingFrames = 512;
 
-MapKeyframe* KeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
-  // Late masks belong to recent keyframes, and keyframes are in the order of their frames.
+MapKeyframe* FindKeyframeOfFrame(uint64_t frame_id, SlamMap& map) {
+  // Late masks belong to recent keyframes, so the search starts with the newest. Keyframes are in frame order.
   for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend(); ++it) {
-    const uint64_t of_keyframe = it->second.frame->frame_id;
-    if (of_keyframe == frame_id) return &it->second;
-    if (of_keyframe < frame_id) break;
+    const uint64_t keyframe_frame_id = it->second.frame->frame_id;
+    if (keyframe_frame_id == frame_id) return &it->second;
+    if (keyframe_frame_id < frame_id) break;
   }
   return nullptr;
 }
@@ -37,7 +37,7 @@ void MaskVoter::ObserveFrame(const TrackedFrame& tracked, SlamMap& map) {
 }
 
 void MaskVoter::ObserveMasks(const FrameMasks& masks, SlamMap& map) {
-  if (MapKeyframe* keyframe = KeyframeOfFrame(masks.frame_id, map)) {
+  if (MapKeyframe* keyframe = FindKeyframeOfFrame(masks.frame_id, map)) {
     if (!keyframe->frame->has_masks) {
       keyframe->frame = WithMasks(*keyframe->frame, masks.labels, config_.mask_erosion_px);
     }

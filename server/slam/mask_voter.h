@@ -11,8 +11,8 @@ namespace romap::slam {
 
 // Assigns masks to map points if the masks arrive after their frame or belong to a frame that is not a keyframe. Both
 // are common with slow detectors. Masks of a keyframe label its features. Masks of another frame count as votes
-// (PointTrack::votes) for the points of its reference keyframe, unless that keyframe has masks, because the votes would
-// repeat them.
+// (PointTrack::votes) for the points of its reference keyframe, unless that keyframe has masks, because then the votes
+// add no information.
 class MaskVoter {
  public:
   explicit MaskVoter(const SlamConfig& config) : config_(config) {}

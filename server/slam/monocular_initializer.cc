@@ -19,10 +19,10 @@ constexpr int kMaxDistance = 60;       // Hamming, bits
 constexpr double kRatio = 0.85;
 // Minimum median motion of the features for SolveTwoView, as a share of the image's width.
 constexpr double kMinMotionShare = 0.012;
-constexpr int kMaxWait_frames = 90;       // a view is dropped after this
+constexpr int kMaxWait_frames = 90;       // for a second view; then the view is dropped
 constexpr double kMinParallax_deg = 1.5;  // median over the points of the two first views
-constexpr double kMinKeptShare = 0.15;    // of the first view's features must still be followed
-constexpr double kSpacingShare = 0.03;    // of the image's width: motion after which another view is followed
+constexpr double kMinKeptShare = 0.15;    // minimum share of the view's features that are still matched
+constexpr double kSpacingShare = 0.03;    // of the image's width: median motion after which the next view is added
 constexpr size_t kMaxFollowed = 4;
 
 }  // namespace
@@ -76,8 +76,8 @@ void MonocularInitializer::Follow(const FrameFeatures& frame, FollowedView& view
   ++view.frames;
 }
 
-std::optional<InitialViews> MonocularInitializer::Offer(std::shared_ptr<const FrameFeatures> frame,
-                                                        std::string* reason) {
+std::optional<InitialViews> MonocularInitializer::AddFrame(std::shared_ptr<const FrameFeatures> frame,
+                                                           std::string* reason) {
   if (frame->size() < kMinFeatures) {
     *reason = fmt::format("too little texture: {} features, {} needed", frame->size(), kMinFeatures);
     followed_.clear();
@@ -93,46 +93,49 @@ std::optional<InitialViews> MonocularInitializer::Offer(std::shared_ptr<const Fr
   });
   if (dropped > 0) *reason = "too few features of the first view are still visible";
   for (auto view = followed_.rbegin(); view != followed_.rend(); ++view) {
-    if (auto views = Try(*view, frame, reason)) {
+    if (auto views = TryToInitialize(*view, frame, reason)) {
       followed_.clear();
       return views;
     }
   }
-  const bool has_moved_on = followed_.empty() || followed_.back().motion_px > kSpacingShare * frame->camera.width_px;
-  if (has_moved_on && followed_.size() < kMaxFollowed) AddView(std::move(frame));
+  const bool is_far_from_newest_view =
+      followed_.empty() || followed_.back().motion_px > kSpacingShare * frame->camera.width_px;
+  if (is_far_from_newest_view && followed_.size() < kMaxFollowed) AddView(std::move(frame));
   return std::nullopt;
 }
 
-std::optional<InitialViews> MonocularInitializer::Try(const FollowedView& view,
-                                                      const std::shared_ptr<const FrameFeatures>& frame,
-                                                      std::string* reason) const {
-  if (view.motion_px < kMinMotionShare * frame->camera.width_px) {
-    *reason = fmt::format("too little parallax: the image moved by {:.1f} px", view.motion_px);
+std::optional<InitialViews> MonocularInitializer::TryToInitialize(const FollowedView& view,
+                                                                  const std::shared_ptr<const FrameFeatures>& frame,
+                                                                  std::string* reason) const {
+  const double min_motion_px = kMinMotionShare * frame->camera.width_px;
+  if (view.motion_px < min_motion_px) {
+    *reason = fmt::format("too little parallax: median feature motion {:.1f} px, {:.1f} px needed", view.motion_px,
+                          min_motion_px);
     return std::nullopt;
   }
-  std::vector<TwoViewMatch> pairs;
+  std::vector<TwoViewMatch> two_view_matches;
   for (const Match& match : view.matches) {
     const Feature& a = view.frame->features[static_cast<size_t>(match.first)];
     const Feature& b = frame->features[static_cast<size_t>(match.second)];
-    pairs.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
-                     config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
+    two_view_matches.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
+                                config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
   }
   TwoViewOptions options;
   options.min_parallax_deg = kMinParallax_deg;
   options.seed = config_.Seed(frame->frame_id);
-  const TwoViewResult result = SolveTwoView(frame->camera, pairs, options);
+  const TwoViewResult result = SolveTwoView(frame->camera, two_view_matches, options);
   if (result.outcome != TwoViewOutcome::kOk) {
-    *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome), pairs.size(),
-                          result.points, result.parallax_rad * 180 / std::numbers::pi);
+    *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome),
+                          two_view_matches.size(), result.points, result.parallax_rad * 180 / std::numbers::pi);
     return std::nullopt;
   }
-  InitialViews start{.first = view.frame, .second = frame, .T_first_second = result.T_first_second};
+  InitialViews initial_views{.first = view.frame, .second = frame, .T_first_second = result.T_first_second};
   for (size_t i = 0; i < view.matches.size(); ++i) {
     if (!result.points_first[i]) continue;
-    start.points.push_back({view.matches[i].first, view.matches[i].second, *result.points_first[i]});
+    initial_views.points.push_back({view.matches[i].first, view.matches[i].second, *result.points_first[i]});
   }
   *reason = "two views found; initializing the map";
-  return start;
+  return initial_views;
 }
 
 }  // namespace romap::slam

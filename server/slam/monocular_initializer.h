@@ -31,8 +31,8 @@ class MonocularInitializer {
  public:
   explicit MonocularInitializer(const SlamConfig& config) : config_(config) {}
 
-  // Processes the next frame. Without a result, `reason` explains the reason to users.
-  std::optional<InitialViews> Offer(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
+  // Processes the next frame. Without a result, `reason` is a text for users that explains why.
+  std::optional<InitialViews> AddFrame(std::shared_ptr<const FrameFeatures> frame, std::string* reason);
   void Reset() { followed_.clear(); }
 
  private:
@@ -50,8 +50,9 @@ class MonocularInitializer {
 
   void AddView(std::shared_ptr<const FrameFeatures> frame);
   void Follow(const FrameFeatures& frame, FollowedView& view) const;
-  std::optional<InitialViews> Try(const FollowedView& view, const std::shared_ptr<const FrameFeatures>& frame,
-                                  std::string* reason) const;
+  std::optional<InitialViews> TryToInitialize(const FollowedView& view,
+                                              const std::shared_ptr<const FrameFeatures>& frame,
+                                              std::string* reason) const;
 
   const SlamConfig config_;
   std::vector<FollowedView> followed_;  // oldest first

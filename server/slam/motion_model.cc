@@ -5,7 +5,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kLongestPrediction_s = 0.25;
+constexpr double kMaxPrediction_s = 0.25;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ void MotionModel::Update(const SE3<World, Camera>& T_world_camera, const std::op
   motion_.reset();
   if (last_pose_ && is_continuous) {
     motion_ = last_pose_->Inverse() * T_world_camera;
-    motion_s_ = 1e-9 * static_cast<double>(timestamp_ns - last_timestamp_ns_);
+    motion_duration_s_ = 1e-9 * static_cast<double>(timestamp_ns - last_timestamp_ns_);
   }
   last_pose_ = T_world_camera;
   last_prior_ = prior;
@@ -43,10 +43,10 @@ SE3<World, Camera> MotionModel::Predict(const Frame& frame, bool use_prior) cons
   if (use_prior && frame.T_world_camera && last_prior_) {
     return *last_pose_ * (last_prior_->Inverse() * *frame.T_world_camera);
   }
-  if (!motion_ || motion_s_ <= 0) return *last_pose_;
+  if (!motion_ || motion_duration_s_ <= 0) return *last_pose_;
   const double gap_s = 1e-9 * static_cast<double>(frame.timestamp_ns - last_timestamp_ns_);
-  if (gap_s > kLongestPrediction_s) return *last_pose_;
-  const double share = gap_s / motion_s_;
+  if (gap_s > kMaxPrediction_s) return *last_pose_;
+  const double share = gap_s / motion_duration_s_;
   const Eigen::AngleAxisd turn(motion_->rotation());
   const Eigen::Quaterniond rotation(Eigen::AngleAxisd(share * turn.angle(), turn.axis()));
   return *last_pose_ * SE3<Camera, Camera>(rotation, share * motion_->translation());

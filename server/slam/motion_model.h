@@ -11,13 +11,14 @@ namespace romap::slam {
 // The pose of the last tracked frame and the motion that led to it; predicts the pose of the next frame.
 class MotionModel {
  public:
-  // Forgets the last pose and the motion.
+  // Discards the last pose and the motion.
   void Reset();
-  // The last pose remains known, but the motion becomes unknown.
+  // Discards the motion, but keeps the last pose.
   void ResetMotion() { motion_.reset(); }
+  // Sets the last pose and discards the motion.
   void RestartAt(const SE3<World, Camera>& T_world_camera);
   // Records a tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame
-  // is usable; false after a loss of tracking.
+  // is usable; false if tracking was lost in between.
   void Update(const SE3<World, Camera>& T_world_camera, const std::optional<SE3<World, Camera>>& prior,
               int64_t timestamp_ns, bool is_continuous);
   // The map around a keyframe was corrected: the last pose and the motion move with it.
@@ -33,7 +34,7 @@ class MotionModel {
   std::optional<SE3<World, Camera>> last_prior_;  // the client's pose of the last tracked frame
   int64_t last_timestamp_ns_ = 0;
   std::optional<SE3<Camera, Camera>> motion_;  // T_previous_last
-  double motion_s_ = 0;                        // its duration
+  double motion_duration_s_ = 0;               // duration of `motion_`
 };
 
 }  // namespace romap::slam

@@ -35,8 +35,8 @@ std::vector<LocalPoint> MakeLocalPoints(const SlamMap& map, const std::vector<Ma
   return points;
 }
 
-PoseObservation Observe(const FrameFeatures& frame, int feature, const Eigen::Vector3d& p_world,
-                        const SlamConfig& config) {
+PoseObservation MakeObservation(const FrameFeatures& frame, int feature, const Eigen::Vector3d& p_world,
+                                const SlamConfig& config) {
   const Feature& f = frame.features[static_cast<size_t>(feature)];
   return {
       .p_world = p_world, .pixel_px = f.pixel_px.cast<double>(), .sigma_px = config.pixel_sigma_px * f.octave_scale};
@@ -66,7 +66,7 @@ std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatu
   std::vector<PoseObservation> observations;
   for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxDistance, kRatio)) {
     observations.push_back(
-        Observe(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
+        MakeObservation(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
   }
   const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinFirstInliers, .seed = config_.Seed(call)});
   if (!pose) return std::nullopt;
@@ -81,7 +81,7 @@ std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatu
     observations.clear();
     for (const PointMatch& match : matches) {
       observations.push_back(
-          Observe(frame, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
+          MakeObservation(frame, match.feature, around[static_cast<size_t>(match.point)].position_world, config_));
     }
     refined = RefinePose(frame.camera, located.T_world_camera, observations);
     located.T_world_camera = refined.T_world_camera;
@@ -91,7 +91,7 @@ std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatu
       located.points.emplace_back(around[static_cast<size_t>(matches[i].point)].id, matches[i].feature);
     }
   }
-  spdlog::debug("slam: frame {} matches {}: {} of {} points agree", frame.frame_id, around_keyframe.id.ToString(),
+  spdlog::debug("slam: frame {} compared with {}: {} of {} points agree", frame.frame_id, around_keyframe.id.ToString(),
                 refined.inliers, observations.size());
   if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
     return std::nullopt;

@@ -22,11 +22,11 @@ constexpr double kSearchRadius_px = 4;       // around the projection of a known
 constexpr double kFuseRadius_px = 2.5;
 constexpr int kFuseDistance = 50;  // Hamming, bits
 
-std::vector<uint8_t> TiedFeatures(const MapKeyframe& keyframe) {
-  std::vector<uint8_t> tied(keyframe.points.size());
-  std::transform(keyframe.points.begin(), keyframe.points.end(), tied.begin(),
+std::vector<uint8_t> ObservedFeatures(const MapKeyframe& keyframe) {
+  std::vector<uint8_t> observed(keyframe.points.size());
+  std::transform(keyframe.points.begin(), keyframe.points.end(), observed.begin(),
                  [](MapPointId point) { return static_cast<uint8_t>(point ? 1 : 0); });
-  return tied;
+  return observed;
 }
 
 }  // namespace
@@ -39,13 +39,13 @@ LocalPoint MakeLocalPoint(const PointTrack& track) {
           .descriptor = track.descriptor};
 }
 
-SlamConfig PointMaker::Generous(SlamConfig config) {
+SlamConfig PointMaker::RelaxedConfig(SlamConfig config) {
   config.matched_keyframes *= 2;
   config.min_parallax_deg *= 0.6;
   return config;
 }
 
-bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
+bool PointMaker::Associate(MapKeyframe& keyframe, int feature, PointTrack& track) {
   if (keyframe.points[static_cast<size_t>(feature)]) return false;
   const ObservedRay ray = map_->RayOf(keyframe, feature);
   if (!keyframe.pose_given) {
@@ -55,27 +55,27 @@ bool PointMaker::Tie(MapKeyframe& keyframe, int feature, PointTrack& track) {
   std::vector<ObservedRay> rays = map_->RaysOf(track);
   rays.push_back(ray);
   const Eigen::Vector3d p_world = RefinePoint(rays, track.point.position_world);
-  if (!std::all_of(rays.begin(), rays.end(), [&](const ObservedRay& s) { return Agrees(s, p_world); })) return false;
+  if (!std::all_of(rays.begin(), rays.end(), [&](const ObservedRay& r) { return Agrees(r, p_world); })) return false;
   if (!map_->AddObservation(track, keyframe, feature)) return false;
   track.point.position_world = p_world;
   return true;
 }
 
 void PointMaker::FindKnownPoints(MapKeyframe& keyframe, const std::vector<MapPointId>& candidates) {
-  using Claim = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
-  std::vector<Claim> claims;
+  using Candidate = std::tuple<int, MapPointId, int>;  // distance, point, feature: the best come first
+  std::vector<Candidate> found_features;
   ProjectionMatcher matcher(*keyframe.frame, keyframe.T_world_camera());
   const ProjectionSearch search{.radius_px = kSearchRadius_px, .max_distance = kMaxMatchDistance_bits};
-  const std::vector<uint8_t> tied = TiedFeatures(keyframe);
+  const std::vector<uint8_t> observed = ObservedFeatures(keyframe);
   for (const MapPointId id : candidates) {
     const PointTrack* track = map_->FindPoint(id);
     if (track == nullptr) continue;
-    if (const auto found = matcher.Find(MakeLocalPoint(*track), search, tied)) {
-      claims.emplace_back(found->distance, track->point.id, found->feature);
+    if (const auto found = matcher.Find(MakeLocalPoint(*track), search, observed)) {
+      found_features.emplace_back(found->distance, track->point.id, found->feature);
     }
   }
-  std::sort(claims.begin(), claims.end());
-  for (const auto& [distance, id, feature] : claims) Tie(keyframe, feature, *map_->FindPoint(id));
+  std::sort(found_features.begin(), found_features.end());
+  for (const auto& [distance, id, feature] : found_features) Associate(keyframe, feature, *map_->FindPoint(id));
 }
 
 std::optional<int> PointMaker::FindFreeFeature(const PointTrack& track, const MapKeyframe& keyframe) const {
@@ -90,14 +90,14 @@ void PointMaker::MakePointsByParallax(MapKeyframe& keyframe, const std::vector<M
   for (MapKeyframe* other : others) {
     for (const FeatureMatch& match : MatchAlongEpipolarPlanes(keyframe, *other, config_)) {
       if (const MapPointId known = other->points[static_cast<size_t>(match.second)]) {
-        Tie(keyframe, match.first, *map_->FindPoint(known));
+        Associate(keyframe, match.first, *map_->FindPoint(known));
         continue;
       }
       PointTrack* track = MakePoint(keyframe, match.first, *other, match.second);
       if (track == nullptr) continue;
       for (MapKeyframe* third : others) {
         if (third == other) continue;
-        if (const auto feature = FindFreeFeature(*track, *third)) Tie(*third, *feature, *track);
+        if (const auto feature = FindFreeFeature(*track, *third)) Associate(*third, *feature, *track);
       }
     }
   }
@@ -164,31 +164,28 @@ std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyfra
   return others;
 }
 
-int PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& points) {
+void PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& points) {
   ProjectionMatcher matcher(*keyframe.frame, keyframe.T_world_camera());
   const ProjectionSearch search{.radius_px = kFuseRadius_px, .max_distance = kFuseDistance};
-  int fused = 0;
   for (const MapPointId id : points) {
     PointTrack* track = map_->FindPoint(id);
     if (track == nullptr) continue;
-    const bool seen_here =
+    const bool is_observed_here =
         std::any_of(track->observations.begin(), track->observations.end(),
                     [&](const FeatureRef& observation) { return observation.keyframe == keyframe.id; });
-    if (seen_here) continue;
+    if (is_observed_here) continue;
     const auto found = matcher.Find(MakeLocalPoint(*track), search, {});
     if (!found) continue;
     const MapPointId there = keyframe.points[static_cast<size_t>(found->feature)];
     if (!there) {
-      fused += Tie(keyframe, found->feature, *track) ? 1 : 0;
+      Associate(keyframe, found->feature, *track);
       continue;
     }
     // Keep the point with more observations.
     const PointTrack* other = map_->FindPoint(there);
     const bool keep_other = other->observations.size() >= track->observations.size();
     map_->MergePoints(keep_other ? track->point.id : there, keep_other ? there : track->point.id);
-    ++fused;
   }
-  return fused;
 }
 
 void PointMaker::FuseDuplicates(MapKeyframe& keyframe, const std::vector<MapKeyframe*>& neighbors) {

@@ -13,7 +13,7 @@ namespace romap::slam {
 
 // Parameters of the search for known points around their projections.
 struct ProjectionSearch {
-  double radius_px = 4;   // multiplied by the expected octave scale, clamped to 1..3
+  double radius_px = 4;   // multiplied by the predicted octave scale, clamped to 1..3
   int max_distance = 60;  // Hamming, bits
   double ratio = 0.9;     // best over second best distance; candidates at the same spot do not count
   // Between the ray and the mean ray of the point. ORB descriptors differ too much at larger angles.
@@ -37,13 +37,13 @@ class ProjectionMatcher {
  public:
   ProjectionMatcher(const FrameFeatures& frame, const SE3<World, Camera>& T_world_camera);
 
-  // Pixel and expected octave scale of a point; nullopt: behind the camera, outside the image, or viewed
-  // from too different a direction.
-  struct Expected {
+  // Predicted pixel and octave scale of a point; nullopt: behind the camera, outside the image, or viewed from a
+  // direction that differs too much from LocalPoint::direction_world.
+  struct Prediction {
     Eigen::Vector2d pixel_px;
     double octave_scale = 1;
   };
-  std::optional<Expected> Expect(const LocalPoint& point, double min_view_cosine) const;
+  std::optional<Prediction> Predict(const LocalPoint& point, double min_view_cosine) const;
 
   // The feature that matches the point. Features with a non-zero entry in `taken` (empty: none) are ignored.
   std::optional<FoundFeature> Find(const LocalPoint& point, const ProjectionSearch& search,

@@ -109,8 +109,7 @@ struct SlamConfig {
     fields.Add("close_loops", &close_loops,
                {.audience = Audience::kOperator, .help = "Correct the map when the camera returns to a known place"});
     fields.Add("refine_lens", &refine_lens,
-               {.help = "Estimate the residual lens distortion, if the camera is tracked "
-                        "from images"});
+               {.help = "Estimate the residual lens distortion, if the camera is tracked from images"});
     fields.Add("max_points", &max_points,
                {.unit = "points",
                 .min = 100,

@@ -9,7 +9,7 @@
 namespace romap::slam {
 namespace {
 
-size_t FeatureOf(const PointTrack& track, KeyframeId keyframe) {
+size_t ObservationIndex(const PointTrack& track, KeyframeId keyframe) {
   const auto it = std::find_if(track.observations.begin(), track.observations.end(),
                                [&](const FeatureRef& observation) { return observation.keyframe == keyframe; });
   return static_cast<size_t>(it - track.observations.begin());
@@ -39,9 +39,9 @@ PointTrack& SlamMap::AddPoint(const Eigen::Vector3d& position_world) {
 }
 
 bool SlamMap::AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature) {
-  MapPointId& tied = keyframe.points[static_cast<size_t>(feature)];
-  if (tied || FeatureOf(track, keyframe.id) < track.observations.size()) return false;
-  tied = track.point.id;
+  MapPointId& observed = keyframe.points[static_cast<size_t>(feature)];
+  if (observed || ObservationIndex(track, keyframe.id) < track.observations.size()) return false;
+  observed = track.point.id;
   const auto after = std::find_if(track.observations.begin(), track.observations.end(),
                                   [&](const FeatureRef& observation) { return observation.keyframe > keyframe.id; });
   track.observations.insert(after, {keyframe.id, feature});
@@ -53,7 +53,7 @@ bool SlamMap::AddObservation(PointTrack& track, MapKeyframe& keyframe, int featu
 void SlamMap::RemoveObservation(MapPointId point, KeyframeId keyframe_id) {
   PointTrack* track = FindPoint(point);
   if (track == nullptr) return;
-  const size_t index = FeatureOf(*track, keyframe_id);
+  const size_t index = ObservationIndex(*track, keyframe_id);
   if (index == track->observations.size()) return;
   MapKeyframe& keyframe = keyframes_.at(keyframe_id);
   const auto feature = static_cast<size_t>(track->observations[index].feature);
@@ -63,9 +63,9 @@ void SlamMap::RemoveObservation(MapPointId point, KeyframeId keyframe_id) {
   const auto has_depth = [&](const FeatureRef& observation) {
     return keyframes_.at(observation.keyframe).frame->ranges_mu[static_cast<size_t>(observation.feature)] > 0;
   };
-  const bool placed =
+  const bool is_determined =
       track->observations.size() >= 2 || (track->observations.size() == 1 && has_depth(track->observations[0]));
-  if (!placed) RemovePoint(track->point.id);
+  if (!is_determined) RemovePoint(track->point.id);
 }
 
 void SlamMap::RemovePoint(MapPointId point) {
@@ -183,11 +183,11 @@ void SlamMap::Refresh(PointTrack& track) const {
     directions += rays.back();
   }
   track.direction_world = directions.normalized();
-  double least_cosine = 1;
+  double min_cosine = 1;
   for (size_t i = 0; i < rays.size(); ++i) {
-    for (size_t k = 0; k < i; ++k) least_cosine = std::min(least_cosine, rays[i].dot(rays[k]));
+    for (size_t k = 0; k < i; ++k) min_cosine = std::min(min_cosine, rays[i].dot(rays[k]));
   }
-  track.point.max_parallax_rad = std::acos(std::clamp(least_cosine, -1.0, 1.0));
+  track.point.max_parallax_rad = std::acos(std::clamp(min_cosine, -1.0, 1.0));
 
   const FeatureRef& newest = track.observations.back();
   const MapKeyframe& keyframe = keyframes_.at(newest.keyframe);
@@ -195,12 +195,12 @@ void SlamMap::Refresh(PointTrack& track) const {
   track.size_mu =
       feature.octave_scale * (track.point.position_world - keyframe.center_world()).norm() / keyframe.camera().fx_px;
 
-  int least_sum = std::numeric_limits<int>::max();
+  int min_sum = std::numeric_limits<int>::max();
   for (size_t i = 0; i < samples; ++i) {
     int sum = 0;
     for (const Descriptor& other : descriptors) sum += HammingDistance(descriptors[i], other);
-    if (sum >= least_sum) continue;
-    least_sum = sum;
+    if (sum >= min_sum) continue;
+    min_sum = sum;
     track.descriptor = descriptors[i];
   }
 }

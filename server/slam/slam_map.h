@@ -87,7 +87,7 @@ class SlamMap {
   void RemovePoint(MapPointId point);
   // Removes `from` and moves its observations to `into` where possible.
   void MergePoints(MapPointId from, MapPointId into);
-  // Its children get its parent, and its pose relative to the parent is kept (see KeyframePose).
+  // Its children become children of its parent. Its pose relative to the parent is kept (see KeyframePose).
   void RemoveKeyframe(KeyframeId keyframe);
 
   // nullptr: unknown or removed. For the id of a merged point, returns the point it was merged into.
@@ -98,7 +98,7 @@ class SlamMap {
     return const_cast<SlamMap*>(this)->FindKeyframe(keyframe);
   }
 
-  // The current pose of a keyframe. One that was removed moves with its parent.
+  // The current pose of a keyframe. A removed keyframe moves with its parent. nullopt if unknown.
   std::optional<ScaledPose> KeyframePose(KeyframeId keyframe) const;
 
   // Keyframes that share at least `min_shared` points with this one, sorted by the number of shared points, then by

@@ -15,7 +15,7 @@ constexpr double kFollowRadius_px = 12;
 constexpr double kWideRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
 constexpr int kMinDepthsToInitialize = 150;
-constexpr int kFewInliers = 100;  // below which the depth image would add many points
+constexpr int kFewInliers = 100;  // with fewer, the depth image would add many points
 // A map that is initialized with priors inherits their errors. Priors are used as poses until the map has enough points
 // and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
@@ -34,7 +34,7 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
-  if (UsesGivenPose(*frame)) return TakeGivenPose(std::move(frame));
+  if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame));
   auto features = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
   if (!HasMap() || waiting_since_generation_) return Initialize(std::move(frame), std::move(features));
   return TrackByImage(std::move(frame), std::move(features));
@@ -80,7 +80,7 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
 
 // ------------------------------------------------------------------------------------------------ given poses
 
-bool Tracker::UsesGivenPose(const Frame& frame) const {
+bool Tracker::ShouldUseGivenPose(const Frame& frame) const {
   if (!frame.T_world_camera || pose_use_ == PoseUse::kIgnore || waiting_since_generation_) return false;
   // A map that was initialized from images has a different world frame than the client.
   if (HasMap() && !world_is_given_) return false;
@@ -90,9 +90,9 @@ bool Tracker::UsesGivenPose(const Frame& frame) const {
   return !map_suffices;
 }
 
-TrackedImage Tracker::TakeGivenPose(std::shared_ptr<const Frame> frame) {
+TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   TrackedImage image;
-  image.tracked = given_.Take(frame);
+  image.tracked = given_.Track(frame);
   image.pose_given = pose_use_ == PoseUse::kGiven;
   image.generation = map_ ? map_->generation : 0;
   world_is_given_ = true;
@@ -127,7 +127,7 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
     image.tracked.reason = "view with depth found; initializing the map";
     monocular_initializer_.Reset();
   } else {
-    image.initial_views = monocular_initializer_.Offer(features, &image.tracked.reason);
+    image.initial_views = monocular_initializer_.AddFrame(features, &image.tracked.reason);
   }
   if (!image.initial_views) return image;
   waiting_since_generation_ = image.generation;
@@ -146,14 +146,14 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   image.features = features;
   image.generation = map_->generation;
   if (features->size() < static_cast<size_t>(kMinFeatures)) {
-    Lose(fmt::format("too little texture: {} features, {} needed", features->size(), kMinFeatures), image);
+    MarkLost(fmt::format("too little texture: {} features, {} needed", features->size(), kMinFeatures), image);
     return image;
   }
   const LocalMapTracking tracking(*map_, *features, config_);
   if (const std::optional<PoseFromPoints> pose = FindPose(*frame, tracking)) {
     Accept(*pose, tracking, image);
   } else {
-    Lose("too few map points matched", image);
+    MarkLost("too few map points matched", image);
   }
   return image;
 }
@@ -212,7 +212,7 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& trackin
   }
 }
 
-void Tracker::Lose(const std::string& why, TrackedImage& image) {
+void Tracker::MarkLost(const std::string& why, TrackedImage& image) {
   status_.OnLost(image.tracked.frame->frame_id);
   image.tracked.state = TrackingState::kLost;
   image.tracked.reason = why;
@@ -227,7 +227,7 @@ bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking&
   quality.scene_depth_mu = tracking.MedianDepth_mu(pose);
   quality.tracked_share = pose.inliers / std::max(1.0, static_cast<double>(map_->reference_points));
   quality.keyframes_waiting = static_cast<int>(waiting);
-  quality.has_unseen_depth = image.features->HasDepth() && pose.inliers < kFewInliers;
+  quality.has_new_depth = image.features->HasDepth() && pose.inliers < kFewInliers;
   return selector_.IsKeyframe(*image.tracked.frame, pose.T_world_camera, quality);
 }
 

@@ -43,16 +43,16 @@ class Tracker {
   // `local_map` outlives the tracker.
   Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot* local_map);
 
-  // Never rejects a decoded frame. Without a pose, `tracked.reason` explains the reason to users.
+  // If no pose is found, `tracked.reason` is a text for users that explains why.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
 
  private:
   void TakeNewestMap();
   void AdoptNewMap(const LocalMap& newest);
   bool HasMap() const { return map_ && !map_->points.empty(); }
-  bool UsesGivenPose(const Frame& frame) const;
+  bool ShouldUseGivenPose(const Frame& frame) const;
 
-  TrackedImage TakeGivenPose(std::shared_ptr<const Frame> frame);
+  TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
@@ -60,7 +60,7 @@ class Tracker {
   std::optional<PoseFromPoints> FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> ConfirmByAllPoints(const PoseFromPoints& first, const LocalMapTracking& tracking) const;
   void Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image);
-  void Lose(const std::string& why, TrackedImage& image);
+  void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image);
   void AnchorToReference(TrackedFrame& tracked) const;
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "server/slam/geometry/levenberg_marquardt.h"
+
 namespace romap::slam {
 namespace {
 
@@ -19,11 +21,8 @@ struct Normals {
   double cost = 0;
 };
 
-double HuberWeight(double chi2, double bound) { return chi2 <= bound ? 1.0 : std::sqrt(bound / chi2); }
-double HuberCost(double chi2, double bound) { return chi2 <= bound ? chi2 : 2 * std::sqrt(bound * chi2) - bound; }
-
 // With offset d = p - c and bearing b, the error across the ray is e = (I - b b^T) d / (b^T d), in radians for small
-// angles; its derivative is taken with the distance b^T d held fixed.
+// angles; its derivative is taken at constant distance b^T d.
 void Accumulate(const ObservedRay& ray, const Eigen::Vector3d& p_world, Normals& normals) {
   const Eigen::Vector3d offset = p_world - ray.center_world;
   const double along = ray.bearing_world.dot(offset);
@@ -73,14 +72,6 @@ double Parallax_rad(const ObservedRay& a, const ObservedRay& b, const Eigen::Vec
   const Eigen::Vector3d ray_a = p_world - a.center_world;
   const Eigen::Vector3d ray_b = p_world - b.center_world;
   return std::atan2(ray_a.cross(ray_b).norm(), ray_a.dot(ray_b));
-}
-
-double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world) {
-  double largest_rad = 0;
-  for (size_t i = 0; i < rays.size(); ++i) {
-    for (size_t j = 0; j < i; ++j) largest_rad = std::max(largest_rad, Parallax_rad(rays[i], rays[j], p_world));
-  }
-  return largest_rad;
 }
 
 std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b) {

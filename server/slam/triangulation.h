@@ -26,13 +26,12 @@ bool Agrees(const ObservedRay& ray, const Eigen::Vector3d& p_world);
 
 // Angle between the rays from two camera centers to a point.
 double Parallax_rad(const ObservedRay& a, const ObservedRay& b, const Eigen::Vector3d& p_world);
-double MaxParallax_rad(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
 // The point closest to two rays (midpoint method). nullopt: the rays are parallel, or the point is behind a camera.
 std::optional<Eigen::Vector3d> IntersectRays(const ObservedRay& a, const ObservedRay& b);
 
 // The point that fits all rays best: Gauss-Newton on the errors of bearings and ranges with Huber weights (at the
-// bounds above), poses held fixed. Starts at and falls back to `p_world` if a step does not reduce the cost.
+// bounds above), with constant poses. Starts at `p_world` and returns it if no step reduces the cost.
 Eigen::Vector3d RefinePoint(const std::vector<ObservedRay>& rays, const Eigen::Vector3d& p_world);
 
 }  // namespace romap::slam

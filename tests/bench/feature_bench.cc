@@ -96,8 +96,8 @@ Nearest FindNearest(const slam::Feature& feature, const std::vector<slam::Featur
   return nearest;
 }
 
-// The true pixel of a feature of `from` in `to`; nullopt if its depth is unknown, or if it is outside the image or
-// hidden.
+// The true pixel in `to` of a feature of `from`; nullopt if its depth is unknown, or if it is occluded or outside the
+// image.
 std::optional<Eigen::Vector2d> TruePixel(const slam::Feature& feature, const Frame& from, const Frame& to) {
   const cv::Rect image(0, 0, from.depth_mu.cols, from.depth_mu.rows);
   const auto depth_at = [&](const Frame& frame, double u, double v) -> double {
@@ -110,8 +110,8 @@ std::optional<Eigen::Vector2d> TruePixel(const slam::Feature& feature, const Fra
   const Eigen::Vector3d p_to = (to.T_world_camera->Inverse() * *from.T_world_camera) * p_from;
   if (p_to.z() <= 0) return std::nullopt;
   const Eigen::Vector2d pixel_px = to.camera.Project(p_to);
-  const double seen_mu = depth_at(to, pixel_px.x(), pixel_px.y());
-  if (!(seen_mu > 0) || std::abs(seen_mu / p_to.z() - 1) > 0.05) return std::nullopt;
+  const double measured_mu = depth_at(to, pixel_px.x(), pixel_px.y());
+  if (!(measured_mu > 0) || std::abs(measured_mu / p_to.z() - 1) > 0.05) return std::nullopt;
   return pixel_px;
 }
 
@@ -120,7 +120,7 @@ double Ratio(double part, double whole) { return whole > 0 ? part / whole : 0; }
 struct Score {
   double pairs = 0;
   double matches = 0;
-  double judged = 0;  // matches with a true pixel
+  double with_truth = 0;  // matches with a true pixel
   double correct = 0;
   double visible = 0;  // features with a true pixel
   double repeated = 0;
@@ -128,22 +128,23 @@ struct Score {
   double error_px = 0;
 };
 
-void Judge(const std::vector<slam::Feature>& first, const Frame& first_frame, const std::vector<slam::Feature>& second,
-           const Frame& second_frame, Score& score) {
+// Adds the matches of one pair of frames to the score.
+void AddPair(const std::vector<slam::Feature>& first, const Frame& first_frame,
+             const std::vector<slam::Feature>& second, const Frame& second_frame, Score& score) {
   std::set<std::pair<int, int>> cells;
   for (size_t i = 0; i < first.size(); ++i) {
     const std::optional<Eigen::Vector2d> true_px = TruePixel(first[i], first_frame, second_frame);
     score.visible += true_px ? 1 : 0;
-    const Nearest there = FindNearest(first[i], second);
-    if (there.index < 0 || there.distance > slam::kMaxMatchDistance_bits ||
-        there.distance >= slam::kMaxMatchRatio * there.second_distance) {
+    const Nearest match = FindNearest(first[i], second);
+    if (match.index < 0 || match.distance > slam::kMaxMatchDistance_bits ||
+        match.distance >= slam::kMaxMatchRatio * match.second_distance) {
       continue;
     }
-    const slam::Feature& other = second[static_cast<size_t>(there.index)];
+    const slam::Feature& other = second[static_cast<size_t>(match.index)];
     if (FindNearest(other, first).index != static_cast<int>(i)) continue;
     score.matches += 1;
     if (!true_px) continue;
-    score.judged += 1;
+    score.with_truth += 1;
     const double error_px = (other.pixel_px.cast<double>() - *true_px).norm();
     if (error_px > kCorrect_px) continue;
     score.error_px += error_px;
@@ -162,7 +163,7 @@ struct Cost {
   double features = 0;
   double user_s = 0;
 
-  std::vector<slam::Feature> Of(const Extract& extract, const Frame& frame) {
+  std::vector<slam::Feature> Measure(const Extract& extract, const Frame& frame) {
     const double start_s = UserSeconds();
     std::vector<slam::Feature> result = extract(frame);
     user_s += UserSeconds() - start_s;
@@ -175,34 +176,35 @@ struct Cost {
   }
 };
 
-void RunPairs(const char* name, const files::Sequence& sequence, size_t every, const Extract& extract) {
+void MeasurePairs(const char* name, const files::Sequence& sequence, size_t every, const Extract& extract) {
   std::map<size_t, Score> scores;
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {
     const std::optional<Frame> first = LoadFrame(sequence, i);
     if (!first) continue;
-    const std::vector<slam::Feature> features = cost.Of(extract, *first);
+    const std::vector<slam::Feature> features = cost.Measure(extract, *first);
     for (const size_t gap : kGaps) {
       const std::optional<Frame> second = i + gap < sequence.size() ? LoadFrame(sequence, i + gap) : std::nullopt;
-      if (second) Judge(features, *first, cost.Of(extract, *second), *second, scores[gap]);
+      if (second) AddPair(features, *first, cost.Measure(extract, *second), *second, scores[gap]);
     }
   }
   cost.Print(name);
   for (const auto& [gap, score] : scores) {
-    std::printf("  %2zu apart: %6.1f matches, %6.1f correct, precision %.3f, recall %.3f, %5.1f cells, error %.2f px\n",
-                gap, score.matches / score.pairs, score.correct / score.pairs, Ratio(score.correct, score.judged),
-                Ratio(score.correct, score.visible), score.cells / score.pairs, Ratio(score.error_px, score.correct));
+    std::printf(
+        "  %2zu frames apart: %6.1f matches, %6.1f correct, precision %.3f, recall %.3f, %5.1f cells, error %.2f px\n",
+        gap, score.matches / score.pairs, score.correct / score.pairs, Ratio(score.correct, score.with_truth),
+        Ratio(score.correct, score.visible), score.cells / score.pairs, Ratio(score.error_px, score.correct));
   }
 }
 
 // Measures the cost of the additional object features of a keyframe.
-void RunObjects(const files::Sequence& sequence, size_t every, slam::FeatureExtractor& extractor) {
+void MeasureObjectFeatures(const files::Sequence& sequence, size_t every, slam::FeatureExtractor& extractor) {
   Cost cost;
   for (size_t i = 0; i < sequence.size(); i += every) {
     const std::optional<Frame> frame = LoadFrame(sequence, i);
     if (!frame || !frame->has_masks) continue;
     const std::vector<slam::Feature> scene = extractor.ExtractScene(*frame);
-    cost.Of([&](const Frame& f) { return extractor.ExtractObjects(f, scene); }, *frame);
+    cost.Measure([&](const Frame& f) { return extractor.ExtractObjects(f, scene); }, *frame);
   }
   if (cost.images > 0) cost.Print("romap objects");
 }
@@ -230,9 +232,9 @@ int Main(int argc, char** argv) {
   }
   cv::setNumThreads(1);
   slam::FeatureExtractor extractor(config);
-  RunPairs("OpenCV", *sequence, every, [&](const Frame& frame) { return OpenCvOrb(frame, config); });
-  RunPairs("romap", *sequence, every, [&](const Frame& frame) { return extractor.ExtractScene(frame); });
-  RunObjects(*sequence, every, extractor);
+  MeasurePairs("OpenCV", *sequence, every, [&](const Frame& frame) { return OpenCvOrb(frame, config); });
+  MeasurePairs("romap", *sequence, every, [&](const Frame& frame) { return extractor.ExtractScene(frame); });
+  MeasureObjectFeatures(*sequence, every, extractor);
   return 0;
 }
 

@@ -6,7 +6,7 @@
 // Evaluates random tests on corners of generated images (dead leaves: Lee, Mumford and Huang, IJCV 2001). Each corner
 // has two views; the second has different noise and a small random warp. Ranks first the tests whose results differ
 // often between corners and rarely between the two views of a corner. Then takes tests from the top of the list that
-// are not correlated with a test already taken (the greedy search of Rublee et al., ICCV 2011).
+// are not correlated with a test already selected (the greedy search of Rublee et al., ICCV 2011).
 
 #include <algorithm>
 #include <array>
@@ -27,7 +27,7 @@
 namespace romap::measure {
 namespace {
 
-constexpr int kPictures = 60;
+constexpr int kImages = 60;
 constexpr int kLeaves = 700;
 constexpr int kCornersPerOctave = 60;
 constexpr size_t kCandidates = 20000;
@@ -48,7 +48,7 @@ double Normal(std::mt19937& random) {
 
 // Random ellipses and rectangles that occlude each other, many small and few large, each with one gray level.
 cv::Mat DeadLeaves(std::mt19937& random) {
-  cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
+  cv::Mat image(480, 640, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < kLeaves; ++i) {
     const double size_px = 6 / std::sqrt(1 - Uniform(random) * (1 - std::pow(6.0 / 200, 2)));
     const cv::RotatedRect leaf(
@@ -57,23 +57,23 @@ cv::Mat DeadLeaves(std::mt19937& random) {
         static_cast<float>(360 * Uniform(random)));
     const cv::Scalar gray(255 * Uniform(random));
     if (Uniform(random) < 0.4) {
-      cv::ellipse(picture, leaf, gray, cv::FILLED, cv::LINE_AA);
+      cv::ellipse(image, leaf, gray, cv::FILLED, cv::LINE_AA);
     } else {
       std::array<cv::Point2f, 4> corners;
       leaf.points(corners.data());
       std::array<cv::Point, 4> pixels;
       std::copy(corners.begin(), corners.end(), pixels.begin());
-      cv::fillConvexPoly(picture, pixels, gray, cv::LINE_AA);
+      cv::fillConvexPoly(image, pixels, gray, cv::LINE_AA);
     }
   }
-  cv::GaussianBlur(picture, picture, {0, 0}, 0.8);
-  return picture;
+  cv::GaussianBlur(image, image, {0, 0}, 0.8);
+  return image;
 }
 
-cv::Mat WithNoise(const cv::Mat& picture, uint64_t seed) {
-  cv::Mat grain(picture.size(), CV_16SC1), noisy;
+cv::Mat WithNoise(const cv::Mat& image, uint64_t seed) {
+  cv::Mat grain(image.size(), CV_16SC1), noisy;
   cv::RNG(seed).fill(grain, cv::RNG::NORMAL, 0, kNoise);
-  cv::add(picture, grain, noisy, cv::noArray(), CV_8U);
+  cv::add(image, grain, noisy, cv::noArray(), CV_8U);
   return noisy;
 }
 
@@ -103,10 +103,10 @@ struct Views {
   std::vector<Patch> second;
 };
 
-void AddViews(const cv::Mat& picture, uint64_t seed, std::mt19937& random, Views& views) {
+void AddViews(const cv::Mat& image, uint64_t seed, std::mt19937& random, Views& views) {
   constexpr int kMargin_px = slam::kPatchBorder_px + 4;  // for the second view's shift
   slam::ImagePyramid one, other;
-  const cv::Mat one_gray = WithNoise(picture, 2 * seed), other_gray = WithNoise(picture, 2 * seed + 1);
+  const cv::Mat one_gray = WithNoise(image, 2 * seed), other_gray = WithNoise(image, 2 * seed + 1);
   one.Build(one_gray, 64);
   other.Build(other_gray, 64);
   for (int octave = 0; octave < one.octaves(); ++octave) {
@@ -167,7 +167,7 @@ double ShareDiffering(const Bits& a, const Bits& b, size_t count) {
 struct Candidate {
   slam::BriefTest test;
   Bits bits;
-  double merit = 0;
+  double separation = 0;
 };
 
 // Sorted by how well the test alone distinguishes different corners from views of the same corner: distance of the
@@ -183,29 +183,29 @@ std::vector<Candidate> RankCandidates(const Views& views, std::mt19937& random) 
     if (std::abs(ones - 0.5) > kMaxImbalance) continue;
     const double flips = ShareDiffering(candidate.bits, Outcomes(candidate.test, views.second), count);
     const double differs = 2 * ones * (1 - ones);
-    candidate.merit = (differs - flips) / std::sqrt(differs * (1 - differs) + flips * (1 - flips));
+    candidate.separation = (differs - flips) / std::sqrt(differs * (1 - differs) + flips * (1 - flips));
     candidates.push_back(std::move(candidate));
   }
   std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+                   [](const Candidate& a, const Candidate& b) { return a.separation > b.separation; });
   return candidates;
 }
 
-std::vector<slam::BriefTest> TakeUncorrelated(const std::vector<Candidate>& candidates, size_t corners) {
-  std::vector<const Candidate*> taken;
-  for (double limit = kFirstCorrelation; taken.size() < slam::BriefTests().size(); limit += kCorrelationStep) {
-    taken.clear();
+std::vector<slam::BriefTest> SelectUncorrelated(const std::vector<Candidate>& candidates, size_t corners) {
+  std::vector<const Candidate*> selected;
+  for (double limit = kFirstCorrelation; selected.size() < slam::BriefTests().size(); limit += kCorrelationStep) {
+    selected.clear();
     for (const Candidate& candidate : candidates) {
-      const bool is_new = std::none_of(taken.begin(), taken.end(), [&](const Candidate* other) {
+      const bool is_new = std::none_of(selected.begin(), selected.end(), [&](const Candidate* other) {
         return std::abs(1 - 2 * ShareDiffering(candidate.bits, other->bits, corners)) > limit;
       });
-      if (is_new) taken.push_back(&candidate);
-      if (taken.size() == slam::BriefTests().size()) break;
+      if (is_new) selected.push_back(&candidate);
+      if (selected.size() == slam::BriefTests().size()) break;
     }
-    std::fprintf(stderr, "correlation up to %.2f: %zu tests\n", limit, taken.size());
+    std::fprintf(stderr, "correlation up to %.2f: %zu tests\n", limit, selected.size());
   }
   std::vector<slam::BriefTest> tests;
-  for (const Candidate* candidate : taken) tests.push_back(candidate->test);
+  for (const Candidate* candidate : selected) tests.push_back(candidate->test);
   return tests;
 }
 
@@ -220,9 +220,9 @@ void PrintTable(const std::vector<slam::BriefTest>& tests) {
 int Main() {
   std::mt19937 random(1);
   Views views;
-  for (uint64_t i = 0; i < kPictures; ++i) AddViews(DeadLeaves(random), i, random, views);
+  for (uint64_t i = 0; i < kImages; ++i) AddViews(DeadLeaves(random), i, random, views);
   std::fprintf(stderr, "%zu corners\n", views.first.size());
-  PrintTable(TakeUncorrelated(RankCandidates(views, random), views.first.size()));
+  PrintTable(SelectUncorrelated(RankCandidates(views, random), views.first.size()));
   return 0;
 }
 

@@ -40,7 +40,7 @@ class Runner {
         sparse_mapper_(options.slam, &local_map_, /*inline_adjustment=*/true),
         object_mapper_(options.objects) {}
 
-  absl::Status Take(const FrameInput& input) {
+  absl::Status Process(const FrameInput& input) {
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest_.Accept(input));
     const slam::MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
     if (mapped.was_reset) {
@@ -53,7 +53,7 @@ class Runner {
     run_.frames_s += UserSeconds() - frame_start_s;
     if (mapped.view) Observe(*mapped.view);
     TakeLateMasks(input.timestamp_ns);
-    Remember(mapped.tracked);
+    RecordPose(mapped.tracked);
     ++run_.frames;
     return absl::OkStatus();
   }
@@ -62,7 +62,7 @@ class Runner {
     TakeLateMasks(std::numeric_limits<int64_t>::max());
     Record(object_mapper_.Correct(sparse_mapper_.Finish()));
     Record(object_mapper_.Finish());
-    for (const Tracked& tracked : tracked_) run_.trajectory.push_back({tracked.timestamp_ns, PoseNow(tracked)});
+    for (const Tracked& tracked : tracked_) run_.trajectory.push_back({tracked.timestamp_ns, CurrentPose(tracked)});
     return std::move(run_);
   }
 
@@ -93,13 +93,13 @@ class Runner {
     }
   }
 
-  void Remember(const TrackedFrame& tracked) {
+  void RecordPose(const TrackedFrame& tracked) {
     if (tracked.state != TrackingState::kTracking && tracked.state != TrackingState::kRelocalized) return;
     tracked_.push_back(
         {tracked.frame->timestamp_ns, tracked.T_world_camera, tracked.reference, tracked.T_reference_camera});
   }
 
-  SE3<World, Camera> PoseNow(const Tracked& tracked) const {
+  SE3<World, Camera> CurrentPose(const Tracked& tracked) const {
     if (!tracked.reference) return tracked.T_world_camera;
     const auto reference = slam::SparseMapperInspector(sparse_mapper_).map().KeyframePose(tracked.reference);
     return reference ? reference->Compose(tracked.T_reference_camera) : tracked.T_world_camera;
@@ -155,7 +155,7 @@ absl::StatusOr<ObjectRun> RunObjects(const files::Sequence& sequence, const Obje
   Runner runner(sequence, options);
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(const FrameInput input, sequence.Load(i));
-    ROMAP_RETURN_IF_ERROR(runner.Take(input));
+    ROMAP_RETURN_IF_ERROR(runner.Process(input));
   }
   return runner.Finish();
 }

@@ -2,7 +2,7 @@
 //
 //   slam_bench DIR [--set slam.FIELD=VALUE]... [--sensor-depth]
 //
-// Prints keyframes, points, points by the label that most of their observations carry, user time per stage, and, where
+// Prints keyframes, points, points by the most frequent label of their observations, user time per stage, and, where
 // the sequence has depth, the relative depth error of every observation of a point by its final position.
 
 #include <algorithm>
@@ -45,8 +45,8 @@ std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraMo
   return frame;
 }
 
-// What one keyframe saw, with the true depth at each pixel (0 = unknown).
-struct SeenPoint {
+// An observation of a point in a keyframe, with the true depth at its pixel (0 = unknown).
+struct ObservedPoint {
   MapPointId point;
   uint16_t label = 0;
   SE3<Camera, World> T_camera_world;
@@ -63,7 +63,7 @@ struct Run {
   double track_s = 0;
   double map_s = 0;
   double slowest_s = 0;
-  std::vector<SeenPoint> seen;
+  std::vector<ObservedPoint> observations;
   std::map<MapPointId, PointRecord> points;
 };
 
@@ -73,12 +73,12 @@ void Record(const KeyframeView& view, const cv::Mat& true_depth_mu, Run& run) {
     PointRecord& record = run.points[observation.point];
     record.point = view.points[i];
     ++record.labels[observation.label];
-    SeenPoint seen{observation.point, observation.label, view.T_world_camera.Inverse()};
+    ObservedPoint observed{observation.point, observation.label, view.T_world_camera.Inverse()};
     if (!true_depth_mu.empty()) {
-      seen.true_depth_mu = true_depth_mu.at<float>(static_cast<int>(std::lround(observation.pixel_px.y())),
-                                                   static_cast<int>(std::lround(observation.pixel_px.x())));
+      observed.true_depth_mu = true_depth_mu.at<float>(static_cast<int>(std::lround(observation.pixel_px.y())),
+                                                       static_cast<int>(std::lround(observation.pixel_px.x())));
     }
-    run.seen.push_back(seen);
+    run.observations.push_back(observed);
   }
   for (const MapPointId id : view.removed_points) run.points.erase(id);
 }
@@ -88,7 +88,7 @@ double QuantileOrNan(const std::vector<double>& values, double share) {
   return values.empty() ? std::nan("") : LowerQuantile(values, share);
 }
 
-uint16_t MostSeenLabel(const PointRecord& record) {
+uint16_t MostFrequentLabel(const PointRecord& record) {
   return std::max_element(record.labels.begin(), record.labels.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; })
       ->first;
@@ -102,15 +102,15 @@ void Report(const Run& run, const slam::SparseMapper& mapper) {
   std::printf("tracker %.2f ms/frame, mapper %.2f ms/keyframe (slowest %.1f), user time\n",
               1e3 * run.track_s / static_cast<double>(run.frames), 1e3 * run.map_s / keyframes, 1e3 * run.slowest_s);
   std::map<uint16_t, size_t> points_of_label;
-  for (const auto& [id, record] : run.points) ++points_of_label[MostSeenLabel(record)];
+  for (const auto& [id, record] : run.points) ++points_of_label[MostFrequentLabel(record)];
   std::map<uint16_t, std::vector<double>> errors_of_label;
   std::vector<double> all_errors;
-  for (const SeenPoint& seen : run.seen) {
-    const auto it = run.points.find(seen.point);
-    if (it == run.points.end() || seen.true_depth_mu <= 0) continue;
-    const double depth_mu = (seen.T_camera_world * it->second.point.position_world).z();
-    const double error = std::abs(depth_mu / seen.true_depth_mu - 1);
-    errors_of_label[seen.label].push_back(error);
+  for (const ObservedPoint& observed : run.observations) {
+    const auto it = run.points.find(observed.point);
+    if (it == run.points.end() || observed.true_depth_mu <= 0) continue;
+    const double depth_mu = (observed.T_camera_world * it->second.point.position_world).z();
+    const double error = std::abs(depth_mu / observed.true_depth_mu - 1);
+    errors_of_label[observed.label].push_back(error);
     all_errors.push_back(error);
   }
   std::printf("relative depth error of observations: median %.4f, 90 %% %.4f (%zu)\n", QuantileOrNan(all_errors, 0.5),

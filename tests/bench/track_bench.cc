@@ -1,5 +1,5 @@
-// Tracks the camera through a recorded sequence from its images, with tracking and mapping as a server runs them but
-// without objects, and writes the trajectories.
+// Tracks the camera through a recorded sequence from its images, with the tracking and mapping of a server but without
+// objects, and writes the trajectories.
 //
 //   track_bench DIR --out FOLDER [--set slam.FIELD=VALUE]... [--depth] [--poses given|prior|ignore] [--cut A:B]
 //               [--until N] [--one-thread] [--fps RATE] [--verbose]
@@ -7,8 +7,7 @@
 // Writes FOLDER/trajectory.txt with the final pose of every frame and FOLDER/live.txt with the poses as tracking first
 // estimated them (TUM format). Prints the numbers of tracked and lost frames, the times per frame and per bundle
 // adjustment, and the time of cv::ORB::detectAndCompute with the same number of features. --cut skips the frames
-// A..B-1.
-// --one-thread maps between the frames instead of on a thread, so that the same input gives the same result.
+// A..B-1. --one-thread maps between the frames instead of on a thread, so that the same input gives the same result.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -296,7 +295,7 @@ class Run {
       }
     }
     if (up_sum.isZero()) return;
-    fmt::print("up is off by {:.2f} deg\n",
+    fmt::print("up direction error {:.2f} deg\n",
                std::acos(std::clamp(up_sum.normalized().z(), -1.0, 1.0)) * 180 / std::numbers::pi);
   }
 

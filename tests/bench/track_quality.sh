@@ -13,7 +13,7 @@ while [ $# -gt 0 ] && [ "$1" != -- ]; do sequences+=("$1"); shift; done
 mkdir -p "$out"
 middle() { sort -n | awk '{ v[NR] = $1 } END { print v[int((NR + 1) / 2)] }'; }
 
-echo '| sequence | first tracked frame | tracked after | ATE rmse: median, worst [cm] | of the path | up off by | time per frame: median, p99 [ms] | over cv::ORB | local adjustment: mean [ms] |'
+echo '| sequence | first tracked frame | tracked after | ATE rmse: median, worst [cm] | of the path | up direction error | time per frame: median, p99 [ms] | over cv::ORB | local adjustment: mean [ms] |'
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- |'
 for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
@@ -25,7 +25,7 @@ for sequence in "${sequences[@]}"; do
        "| $(all | sed -n 's/.* after (\([0-9.]*\) %.*/\1/p' | middle) %" \
        "| $(all | sed -n 's/^ATE rmse \([0-9.]*\) cm.*/\1/p' | middle), $(all | sed -n 's/^ATE rmse \([0-9.]*\) cm.*/\1/p' | sort -n | tail -1)" \
        "| $(all | sed -n 's/^ATE rmse .* cm, \([0-9.]*\) %.*/\1/p' | middle) %" \
-       "| $(all | sed -n 's/^up is off by \([0-9.]*\) deg/\1/p' | middle) deg" \
+       "| $(all | sed -n 's/^up direction error \([0-9.]*\) deg/\1/p' | middle) deg" \
        "| $(all | sed -n 's/^tracking: median \([0-9.]*\) ms.*/\1/p' | middle), $(all | sed -n 's/^tracking: .*p99 \([0-9.]*\) ms.*/\1/p' | middle)" \
        "| $(all | sed -n 's/^tracking: .* ms, \([0-9.]*\) times.*/\1/p' | middle)" \
        "| $(all | sed -n 's/.*local adjustment: mean \([0-9]*\) ms.*/\1/p' | middle) |"

@@ -60,10 +60,10 @@ void ObserveKeyframe(const KeyframeView& view, const objects::ObjectsConfig& con
       return objects::AngleBetween(other, direction) < config.silhouette_angle_deg * objects::kRadPerDeg;
     });
     if (redundant || observed.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
-    const double start = UserSeconds();
+    const double start_s = UserSeconds();
     observed.segments.push_back(
         objects::FindLineSegments(frame.image_bgr, frame.labels, detection.label, detection.box_px));
-    run.find_s += UserSeconds() - start;
+    run.find_s += UserSeconds() - start_s;
     observed.directions.push_back(direction);
     observed.R_world_camera.push_back(view.T_world_camera.RotationMatrix());
     run.crop_area_px2 += detection.box_px.area();
@@ -89,15 +89,15 @@ absl::StatusOr<Run> ObserveSequence(const files::Sequence& sequence) {
 }
 
 void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
-  const double start = UserSeconds();
+  const double start_s = UserSeconds();
   const auto yaw = objects::YawFromLines(R_world_reference, views);
-  const double spent_ms = 1e3 * (UserSeconds() - start);
+  const double time_ms = 1e3 * (UserSeconds() - start_s);
   if (!yaw) {
     std::printf(" %s none", name);
     return;
   }
   std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence,
-              yaw->edges, spent_ms);
+              yaw->edges, time_ms);
 }
 
 void PrintGroups(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {

@@ -7,16 +7,15 @@
 namespace romap::slam {
 namespace {
 
-// Each image cell of kCell_px keeps at least kMinInCell corners, because in scenes with little structure the camera
+// Each image cell of kCell_px keeps at least kMinPerCell corners, because in scenes with little structure the camera
 // pose depends on corners in all parts of the image.
 constexpr int kCell_px = 80;
-constexpr int kMinInCell = 8;
-// Number of candidates per requested corner. More candidates spread the corners better, but weak corners are matched
-// less often.
-constexpr double kChoice = 3;
+constexpr int kMinPerCell = 8;
+// More candidates allow a more even distribution, but they include weaker corners, which are matched less often.
+constexpr double kCandidatesPerCorner = 3;
 constexpr int kCircleRadius_px = 3;  // of FAST's test
 
-bool Stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; }
+bool IsStronger(const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; }
 
 // Divides a rectangle evenly into cells of about kCell_px.
 class CellGrid {
@@ -46,52 +45,53 @@ class CellGrid {
   int rows_;
 };
 
-// Keeps the `count` strongest corners of the image and the kMinInCell strongest corners of each cell.
-void KeepChoice(Corners& corners, const cv::Size& image_size, size_t count) {
-  std::stable_sort(corners.begin(), corners.end(), Stronger);
+// Keeps the `count` strongest corners of the image and the kMinPerCell strongest corners of each cell.
+void KeepCandidates(Corners& corners, const cv::Size& image_size, size_t count) {
+  std::stable_sort(corners.begin(), corners.end(), IsStronger);
   const CellGrid grid(cv::Rect(cv::Point(), image_size));
   std::vector<int> in_cell(grid.size(), 0);
   size_t kept = 0;
   for (size_t i = 0; i < corners.size(); ++i) {
     const size_t cell = grid.IndexOf(corners[i].pt);
-    if (i < count || in_cell[cell] < kMinInCell) corners[kept++] = corners[i];
+    if (i < count || in_cell[cell] < kMinPerCell) corners[kept++] = corners[i];
     ++in_cell[cell];
   }
   corners.resize(kept);
 }
 
-// Takes corners in order and skips those within about `distance_px` of a taken corner: each taken corner covers a
-// square of that half side around it, in cells of half that size. Stops when more than `limit` are taken. Returns
-// indices.
-std::vector<size_t> TakeApart(const Corners& corners, const cv::Size& image_size, float distance_px, size_t limit) {
-  constexpr int kReach_cells = 2;
-  const float cell_px = distance_px / kReach_cells;
+// Selects corners in order and skips those closer than about `spacing_px` to a selected one: each selected corner
+// covers a square of half side `spacing_px`, on a grid of cells of half that size. Stops after `limit` + 1 corners.
+// Returns their indices.
+std::vector<size_t> SelectWithSpacing(const Corners& corners, const cv::Size& image_size, float spacing_px,
+                                      size_t limit) {
+  constexpr int kHalfSide_cells = 2;
+  const float cell_px = spacing_px / kHalfSide_cells;
   const int columns = static_cast<int>(static_cast<float>(image_size.width) / cell_px) + 1;
   const int rows = static_cast<int>(static_cast<float>(image_size.height) / cell_px) + 1;
-  cv::Mat covered(rows + 2 * kReach_cells, columns + 2 * kReach_cells, CV_8UC1, cv::Scalar(0));
-  std::vector<size_t> taken;
-  for (size_t i = 0; i < corners.size() && taken.size() <= limit; ++i) {
+  cv::Mat covered(rows + 2 * kHalfSide_cells, columns + 2 * kHalfSide_cells, CV_8UC1, cv::Scalar(0));
+  std::vector<size_t> selected;
+  for (size_t i = 0; i < corners.size() && selected.size() <= limit; ++i) {
     const int column = static_cast<int>(corners[i].pt.x / cell_px);
     const int row = static_cast<int>(corners[i].pt.y / cell_px);
-    if (covered.at<uint8_t>(row + kReach_cells, column + kReach_cells) != 0) continue;
-    taken.push_back(i);
-    for (int y = row; y <= row + 2 * kReach_cells; ++y) {
-      std::fill_n(covered.ptr<uint8_t>(y) + column, 2 * kReach_cells + 1, uint8_t{1});
+    if (covered.at<uint8_t>(row + kHalfSide_cells, column + kHalfSide_cells) != 0) continue;
+    selected.push_back(i);
+    for (int y = row; y <= row + 2 * kHalfSide_cells; ++y) {
+      std::fill_n(covered.ptr<uint8_t>(y) + column, 2 * kHalfSide_cells + 1, uint8_t{1});
     }
   }
-  return taken;
+  return selected;
 }
 
 }  // namespace
 
 Corners DetectCorners(const cv::Mat& image, const cv::Rect& part, int threshold) {
-  const cv::Rect reach = cv::Rect(part.x - kCircleRadius_px, part.y - kCircleRadius_px,
-                                  part.width + 2 * kCircleRadius_px, part.height + 2 * kCircleRadius_px) &
-                         cv::Rect(cv::Point(), image.size());
+  const cv::Rect searched = cv::Rect(part.x - kCircleRadius_px, part.y - kCircleRadius_px,
+                                     part.width + 2 * kCircleRadius_px, part.height + 2 * kCircleRadius_px) &
+                            cv::Rect(cv::Point(), image.size());
   Corners corners;
-  if (std::min(reach.width, reach.height) <= 2 * kCircleRadius_px) return corners;
-  cv::FAST(image(reach), corners, threshold, /*nonmaxSuppression=*/true, cv::FastFeatureDetector::TYPE_9_16);
-  for (cv::KeyPoint& corner : corners) corner.pt += cv::Point2f(reach.tl());
+  if (std::min(searched.width, searched.height) <= 2 * kCircleRadius_px) return corners;
+  cv::FAST(image(searched), corners, threshold, /*nonmaxSuppression=*/true, cv::FastFeatureDetector::TYPE_9_16);
+  for (cv::KeyPoint& corner : corners) corner.pt += cv::Point2f(searched.tl());
   return corners;
 }
 
@@ -102,7 +102,7 @@ Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int 
   std::vector<int> in_cell(grid.size(), 0);
   for (const cv::KeyPoint& corner : corners) ++in_cell[grid.IndexOf(corner.pt)];
   for (size_t cell = 0; cell < grid.size(); ++cell) {
-    if (in_cell[cell] >= kMinInCell) continue;
+    if (in_cell[cell] >= kMinPerCell) continue;
     const Corners weak = DetectCorners(image, grid.Cell(cell), min_threshold);
     corners.insert(corners.end(), weak.begin(), weak.end());
   }
@@ -112,23 +112,23 @@ Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int 
 Corners SpreadEvenly(Corners corners, const cv::Size& image_size, size_t count) {
   if (corners.size() <= count) return corners;
   if (count == 0) return {};
-  KeepChoice(corners, image_size, static_cast<size_t>(kChoice * static_cast<double>(count)));
+  KeepCandidates(corners, image_size, static_cast<size_t>(kCandidatesPerCorner * static_cast<double>(count)));
   // Bisection: fewer than `count` corners fit at twice the spacing of a square lattice of `count` corners; all fit at
   // one pixel.
-  float near_px = 1;
-  float far_px = 2 * std::sqrt(static_cast<float>(image_size.area()) / static_cast<float>(count));
-  std::vector<size_t> taken = TakeApart(corners, image_size, near_px, count);
-  while (far_px - near_px > 0.25F) {
-    const float distance_px = 0.5F * (near_px + far_px);
-    std::vector<size_t> fewer = TakeApart(corners, image_size, distance_px, count);
+  float min_spacing_px = 1;
+  float max_spacing_px = 2 * std::sqrt(static_cast<float>(image_size.area()) / static_cast<float>(count));
+  std::vector<size_t> selected = SelectWithSpacing(corners, image_size, min_spacing_px, count);
+  while (max_spacing_px - min_spacing_px > 0.25F) {
+    const float spacing_px = 0.5F * (min_spacing_px + max_spacing_px);
+    std::vector<size_t> fewer = SelectWithSpacing(corners, image_size, spacing_px, count);
     const bool enough = fewer.size() >= count;
-    (enough ? near_px : far_px) = distance_px;
-    if (enough) taken = std::move(fewer);
+    (enough ? min_spacing_px : max_spacing_px) = spacing_px;
+    if (enough) selected = std::move(fewer);
   }
-  taken.resize(std::min(taken.size(), count));
+  selected.resize(std::min(selected.size(), count));
   Corners spread;
-  spread.reserve(taken.size());
-  for (const size_t i : taken) spread.push_back(corners[i]);
+  spread.reserve(selected.size());
+  for (const size_t i : selected) spread.push_back(corners[i]);
   return spread;
 }
 

@@ -12,8 +12,8 @@ using Corners = std::vector<cv::KeyPoint>;  // pt: whole pixels; response: FAST 
 // whole image; the order is row by row. Only the strongest of adjacent corners is kept.
 Corners DetectCorners(const cv::Mat& image, const cv::Rect& part, int threshold);
 
-// The same, but cells with few corners at `threshold` are searched again at `min_threshold`, because in a dim or
-// blurred part of the image weak corners are better than none.
+// The same, but also searches cells with few corners at `min_threshold`, because weak corners are better than none in a
+// dim or blurred part of the image.
 Corners DetectCornersEverywhere(const cv::Mat& image, const cv::Rect& part, int threshold, int min_threshold);
 
 // Selects at most `count` corners, spread evenly over the image: takes strong corners first and keeps a minimum

@@ -23,7 +23,7 @@ const std::array<double, kOctaves> kOctaveScales = [] {
   return scales;
 }();
 
-cv::Rect Describable(const cv::Mat& image) {
+cv::Rect DescribableArea(const cv::Mat& image) {
   return {kPatchBorder_px, kPatchBorder_px, image.cols - 2 * kPatchBorder_px, image.rows - 2 * kPatchBorder_px};
 }
 
@@ -39,7 +39,7 @@ bool IsSet(const cv::Mat& mask, const Eigen::Vector2f& pixel_px) {
 }
 
 // Marks the pixels around a feature as not free.
-void Occupy(cv::Mat& free, const Feature& feature) {
+void MarkOccupied(cv::Mat& free, const Feature& feature) {
   const auto radius_px = static_cast<float>(kSameCorner_px * feature.octave_scale);
   const Eigen::Vector2f begin_px = feature.pixel_px.array() - radius_px;
   const int side_px = static_cast<int>(std::ceil(2 * radius_px));
@@ -48,13 +48,13 @@ void Occupy(cv::Mat& free, const Feature& feature) {
   free(around & cv::Rect(cv::Point(), free.size())).setTo(0);
 }
 
-// Number of features of `octave` if `left` features are distributed over it and all finer octaves, in proportion to the
-// side lengths of their images. Coarse corners are fewer, but visible from farther away.
-size_t Share(size_t left, int octave) {
+// Number of features of `octave` if `remaining` features are distributed over it and all finer octaves, in proportion
+// to the side lengths of their images. Coarse corners are fewer, but visible from farther away.
+size_t OctaveShare(size_t remaining, int octave) {
   double sum = 0;
   for (int i = 0; i <= octave; ++i) sum += 1 / kOctaveScales[static_cast<size_t>(i)];
   return static_cast<size_t>(
-      std::lround(static_cast<double>(left) / (kOctaveScales[static_cast<size_t>(octave)] * sum)));
+      std::lround(static_cast<double>(remaining) / (kOctaveScales[static_cast<size_t>(octave)] * sum)));
 }
 
 }  // namespace
@@ -79,19 +79,20 @@ std::vector<Eigen::Vector2f> FeatureExtractor::PinholePixels(const Frame& frame,
 Corners FeatureExtractor::KeepVisible(const Frame& frame, int octave, const Corners& corners,
                                       const cv::Mat& free) const {
   const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
-  Corners seen;
+  Corners visible;
   for (size_t i = 0; i < corners.size(); ++i) {
-    if (IsInside(frame.camera, pixels_px[i]) && (free.empty() || IsSet(free, pixels_px[i]))) seen.push_back(corners[i]);
+    if (IsInside(frame.camera, pixels_px[i]) && (free.empty() || IsSet(free, pixels_px[i])))
+      visible.push_back(corners[i]);
   }
-  return seen;
+  return visible;
 }
 
-// Starts with the coarsest octave, so that the finer ones, which have more corners, make up for missing features.
+// Starts with the coarsest octave, so that the finer ones, which have more corners, compensate for missing features.
 std::vector<FeatureExtractor::Candidate> FeatureExtractor::FindInOctaves(const Frame& frame, int count,
                                                                          const FindCorners& find) const {
   std::vector<Candidate> candidates;
   for (int octave = pyramid_.octaves() - 1; octave >= 0; --octave) {
-    const Corners corners = find(octave, Share(static_cast<size_t>(count) - candidates.size(), octave));
+    const Corners corners = find(octave, OctaveShare(static_cast<size_t>(count) - candidates.size(), octave));
     const std::vector<Eigen::Vector2f> pixels_px = PinholePixels(frame, octave, corners);
     for (size_t i = 0; i < corners.size(); ++i) candidates.push_back({corners[i].pt, octave, pixels_px[i]});
   }
@@ -102,7 +103,7 @@ std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
   Prepare(frame);
   const auto find = [&](int octave, size_t count) {
     const cv::Mat& image = pyramid_.sharp(octave);
-    Corners corners = DetectCornersEverywhere(image, Describable(image), config_.scene_fast_threshold,
+    Corners corners = DetectCornersEverywhere(image, DescribableArea(image), config_.scene_fast_threshold,
                                               config_.scene_fast_min_threshold);
     if (!frame.source_gray.empty()) corners = KeepVisible(frame, octave, corners, {});
     return SpreadEvenly(std::move(corners), image.size(), count);
@@ -110,7 +111,7 @@ std::vector<Feature> FeatureExtractor::ExtractScene(const Frame& frame) {
   return Describe(frame, FindInOctaves(frame, config_.scene_features, find));
 }
 
-std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const std::vector<Feature>& have) {
+std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const std::vector<Feature>& existing) {
   if (frame.labels.empty() || config_.object_features == 0) return {};
   const cv::Mat inside = frame.labels > 0;
   cv::Rect box_px = cv::boundingRect(inside);
@@ -121,11 +122,11 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
   cv::Mat free;
   const auto find = [&](int octave, size_t count) {
     inside.copyTo(free);
-    for (const Feature& feature : have) {
-      if (feature.octave == octave) Occupy(free, feature);
+    for (const Feature& feature : existing) {
+      if (feature.octave == octave) MarkOccupied(free, feature);
     }
     const cv::Mat& image = pyramid_.sharp(octave);
-    const cv::Rect part = Describable(image) & pyramid_.Part(octave, box_px);
+    const cv::Rect part = DescribableArea(image) & pyramid_.Part(octave, box_px);
     const Corners corners = DetectCorners(image, part, config_.object_fast_threshold);
     return SpreadEvenly(KeepVisible(frame, octave, corners, free), image.size(), count);
   };
@@ -134,8 +135,8 @@ std::vector<Feature> FeatureExtractor::ExtractObjects(const Frame& frame, const 
 
 std::vector<Feature> FeatureExtractor::Extract(const Frame& frame) {
   std::vector<Feature> features = ExtractScene(frame);
-  const std::vector<Feature> more = ExtractObjects(frame, features);
-  features.insert(features.end(), more.begin(), more.end());
+  const std::vector<Feature> object_features = ExtractObjects(frame, features);
+  features.insert(features.end(), object_features.begin(), object_features.end());
   return features;
 }
 

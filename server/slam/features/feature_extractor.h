@@ -30,8 +30,9 @@ class FeatureExtractor {
   std::vector<Feature> ExtractScene(const Frame& frame);
 
   // At most SlamConfig::object_features additional features inside the instance masks. Accepts weaker corners, because
-  // objects are small and have little texture. `have`: the scene features of the same frame, which are not repeated.
-  std::vector<Feature> ExtractObjects(const Frame& frame, const std::vector<Feature>& have);
+  // objects are small and have little texture. `existing`: the scene features of the same frame, which are not
+  // repeated.
+  std::vector<Feature> ExtractObjects(const Frame& frame, const std::vector<Feature>& existing);
 
   // Both, scene features first.
   std::vector<Feature> Extract(const Frame& frame);

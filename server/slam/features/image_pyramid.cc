@@ -7,7 +7,7 @@
 namespace romap::slam {
 namespace {
 
-// Corresponds to the ORB paper, whose tests compare patches of 5 x 5 pixels.
+// About the smoothing of the ORB paper, whose tests compare the means of patches of 5 x 5 pixels.
 constexpr int kSmoothingSide_px = 7;
 constexpr double kSmoothingSigma_px = 2;
 

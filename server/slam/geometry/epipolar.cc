@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kRefineRounds = 4;
 constexpr int kIterationsPerRound = 6;
-// Factor on the distance bound in the first round, because the start was computed from only five noisy matches.
-constexpr double kFirstRoundReach = 4;
+// The first round accepts larger errors by this factor, because the start was computed from only five noisy matches.
+constexpr double kFirstRoundBoundFactor = 4;
 // Minimum ratio of the parallax to the angular pixel noise. At this ratio, the depth is accurate to about a third.
 constexpr double kSignificantParallax = 4;
 
@@ -27,7 +27,7 @@ struct EpipolarLines {
   double slope2 = 0;             // squared norm of the derivative with respect to all four pixel coordinates
 };
 
-EpipolarLines LinesOf(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
+EpipolarLines ComputeLines(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
   EpipolarLines lines;
   const Eigen::Vector3d second_line = essential * match.first;
   const Eigen::Vector3d first_line = essential.transpose() * match.second;
@@ -40,20 +40,20 @@ EpipolarLines LinesOf(const CameraModel& camera, const Eigen::Matrix3d& essentia
 }
 
 // Two unit vectors that are perpendicular to `direction` and to each other.
-Eigen::Matrix<double, 3, 2> AxesAcross(const Eigen::Vector3d& direction) {
+Eigen::Matrix<double, 3, 2> PerpendicularAxes(const Eigen::Vector3d& direction) {
   Eigen::Matrix<double, 3, 2> axes;
   axes.col(0) = direction.unitOrthogonal();
   axes.col(1) = direction.cross(axes.col(0));
   return axes;
 }
 
-// Derivatives of the essential matrix with respect to the parameters of Moved.
+// Derivatives of the essential matrix with respect to the parameters of ApplyStep.
 std::array<Eigen::Matrix3d, 5> EssentialDerivatives(const Motion& motion) {
   std::array<Eigen::Matrix3d, 5> derivatives;
   for (int k = 0; k < 3; ++k) {
     derivatives[k] = Skew(motion.direction) * Skew(Eigen::Vector3d::Unit(k)) * motion.rotation;
   }
-  const Eigen::Matrix<double, 3, 2> axes = AxesAcross(motion.direction);
+  const Eigen::Matrix<double, 3, 2> axes = PerpendicularAxes(motion.direction);
   for (int k = 0; k < 2; ++k) derivatives[3 + k] = Skew(axes.col(k)) * motion.rotation;
   return derivatives;
 }
@@ -77,7 +77,7 @@ void SetSigmas(const MotionEquations& equations, int inliers, RefinedMotion& ref
 
 }  // namespace
 
-std::vector<RayMatch> RaysOf(const CameraModel& camera, std::span<const TwoViewMatch> matches) {
+std::vector<RayMatch> ToRays(const CameraModel& camera, std::span<const TwoViewMatch> matches) {
   std::vector<RayMatch> rays;
   rays.reserve(matches.size());
   for (const TwoViewMatch& match : matches) {
@@ -90,31 +90,31 @@ std::vector<RayMatch> RaysOf(const CameraModel& camera, std::span<const TwoViewM
 Eigen::Matrix3d Motion::Essential() const { return Skew(direction) * rotation; }
 
 double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
-  const EpipolarLines lines = LinesOf(camera, essential, match);
+  const EpipolarLines lines = ComputeLines(camera, essential, match);
   return lines.algebraic * lines.algebraic / (lines.slope2 * match.sigma_px * match.sigma_px);
 }
 
 RayMatch ClosestEpipolarMatch(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
-  const EpipolarLines lines = LinesOf(camera, essential, match);
+  const EpipolarLines lines = ComputeLines(camera, essential, match);
   if (!(lines.slope2 > 0)) return match;
   const double shift = lines.algebraic / lines.slope2;
-  RayMatch obedient = match;
-  obedient.first -= shift * lines.first_slope;
-  obedient.second -= shift * lines.second_slope;
-  return obedient;
+  RayMatch corrected = match;
+  corrected.first -= shift * lines.first_slope;
+  corrected.second -= shift * lines.second_slope;
+  return corrected;
 }
 
-RayMeeting MeetingOf(const CameraModel& camera, const Motion& motion, const RayMatch& match) {
-  const Eigen::Vector3d first_turned = motion.rotation * match.first;
-  const Eigen::Vector3d normal = first_turned.cross(match.second);
+RayIntersection Intersect(const CameraModel& camera, const Motion& motion, const RayMatch& match) {
+  const Eigen::Vector3d first_rotated = motion.rotation * match.first;
+  const Eigen::Vector3d normal = first_rotated.cross(match.second);
   const double normal2 = normal.squaredNorm();
-  RayMeeting meeting;
-  meeting.parallax_rad = std::atan2(std::sqrt(normal2), first_turned.dot(match.second));
-  meeting.is_significant = meeting.parallax_rad > kSignificantParallax * match.sigma_px / camera.fx_px;
-  if (normal2 == 0) return meeting;
-  meeting.first_depth = -motion.direction.cross(match.second).dot(normal) / normal2;
-  meeting.second_depth = -motion.direction.cross(first_turned).dot(normal) / normal2;
-  return meeting;
+  RayIntersection intersection;
+  intersection.parallax_rad = std::atan2(std::sqrt(normal2), first_rotated.dot(match.second));
+  intersection.is_significant = intersection.parallax_rad > kSignificantParallax * match.sigma_px / camera.fx_px;
+  if (normal2 == 0) return intersection;
+  intersection.first_depth = -motion.direction.cross(match.second).dot(normal) / normal2;
+  intersection.second_depth = -motion.direction.cross(first_rotated).dot(normal) / normal2;
+  return intersection;
 }
 
 double Support(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
@@ -123,8 +123,8 @@ double Support(const CameraModel& camera, const Motion& motion, std::span<const 
   for (const RayMatch& match : matches) {
     const double chi2 = SampsonChi2(camera, essential, match);
     if (!(chi2 < kEpipolarChi2Bound)) continue;
-    const RayMeeting meeting = MeetingOf(camera, motion, match);
-    if (!meeting.is_significant || meeting.IsBeforeBoth()) support += 1 - chi2 / kEpipolarChi2Bound;
+    const RayIntersection intersection = Intersect(camera, motion, match);
+    if (!intersection.is_significant || intersection.IsInFrontOfBoth()) support += 1 - chi2 / kEpipolarChi2Bound;
   }
   return support;
 }
@@ -134,7 +134,7 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
   const std::array<Eigen::Matrix3d, 5> derivatives = EssentialDerivatives(motion);
   MotionEquations equations;
   for (const RayMatch& match : matches) {
-    const EpipolarLines lines = LinesOf(camera, essential, match);
+    const EpipolarLines lines = ComputeLines(camera, essential, match);
     if (!(lines.slope2 > 0)) continue;  // both points are at the epipoles and give no constraint
     const double scale = 1 / (std::sqrt(lines.slope2) * match.sigma_px);
     const double error = lines.algebraic * scale;
@@ -151,9 +151,9 @@ MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motio
   return equations;
 }
 
-Motion Moved(const Motion& motion, const MotionEquations::Vector& step) {
+Motion ApplyStep(const Motion& motion, const MotionEquations::Vector& step) {
   return {ExpRotationMatrix(step.head<3>()) * motion.rotation,
-          (motion.direction + AxesAcross(motion.direction) * step.tail<2>()).normalized()};
+          (motion.direction + PerpendicularAxes(motion.direction) * step.tail<2>()).normalized()};
 }
 
 RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::span<const RayMatch> matches) {
@@ -162,14 +162,14 @@ RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::
   inliers.reserve(matches.size());
   MotionEquations equations;
   for (int round = 0; round < kRefineRounds; ++round) {
-    const double reach = round == 0 ? kFirstRoundReach * kFirstRoundReach : 1.0;
+    const double bound_factor2 = round == 0 ? kFirstRoundBoundFactor * kFirstRoundBoundFactor : 1.0;
     const Eigen::Matrix3d essential = refined.motion.Essential();
     inliers.clear();
     for (const RayMatch& match : matches) {
-      if (SampsonChi2(camera, essential, match) < reach * kEpipolarChi2Bound) inliers.push_back(match);
+      if (SampsonChi2(camera, essential, match) < bound_factor2 * kEpipolarChi2Bound) inliers.push_back(match);
     }
     const auto linearize = [&](const Motion& at) { return EpipolarEquations(camera, at, inliers); };
-    const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return Moved(at, step); };
+    const auto move = [](const Motion& at, const MotionEquations::Vector& step) { return ApplyStep(at, step); };
     equations = Minimize<5>(kIterationsPerRound, linearize, move, refined.motion);
   }
   // A direction and its opposite have the same Sampson errors. Choose the one with more points in front of both

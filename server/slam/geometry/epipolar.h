@@ -17,7 +17,7 @@ struct RayMatch {
   double sigma_px = 1;
 };
 
-std::vector<RayMatch> RaysOf(const CameraModel& camera, std::span<const TwoViewMatch> matches);
+std::vector<RayMatch> ToRays(const CameraModel& camera, std::span<const TwoViewMatch> matches);
 
 // Relative motion of the camera, up to scale: p_second = rotation * p_first + direction * (unknown length > 0).
 struct Motion {
@@ -38,29 +38,29 @@ double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, 
 RayMatch ClosestEpipolarMatch(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match);
 
 // Intersection of the two rays of a match for a given motion.
-struct RayMeeting {
+struct RayIntersection {
   double first_depth = 0;   // z in the first camera, in units of the distance between the cameras
   double second_depth = 0;  // z in the second camera
   double parallax_rad = 0;  // angle between the rays
   // True if the angle clearly exceeds the pixel noise, so that the depths and their signs are reliable.
   bool is_significant = false;
 
-  bool IsBeforeBoth() const { return first_depth > 0 && second_depth > 0; }
+  bool IsInFrontOfBoth() const { return first_depth > 0 && second_depth > 0; }
 };
 
-RayMeeting MeetingOf(const CameraModel& camera, const Motion& motion, const RayMatch& match);
+RayIntersection Intersect(const CameraModel& camera, const Motion& motion, const RayMatch& match);
 
 // Number of matches that agree with a motion, each weighted from 1 (exact) to 0 (at the bound), as in MSAC (Torr and
-// Zisserman 2000). Matches behind a camera do not count.
+// Zisserman 2000). Points behind a camera do not count.
 double Support(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches);
 
 using MotionEquations = NormalEquations<5>;
 
-// Normal equations of the Sampson errors of the matches, with Huber weights. For the parameters, see Moved.
+// Normal equations of the Sampson errors of the matches, with Huber weights. For the parameters, see ApplyStep.
 MotionEquations EpipolarEquations(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches);
 
 // step = (rotation of the second camera's frame [rad], shift of the direction along two axes perpendicular to it).
-Motion Moved(const Motion& motion, const MotionEquations::Vector& step);
+Motion ApplyStep(const Motion& motion, const MotionEquations::Vector& step);
 
 // A motion that was fitted to its inliers, with its uncertainty.
 struct RefinedMotion {
@@ -71,7 +71,7 @@ struct RefinedMotion {
 };
 
 // Two-view bundle adjustment without explicit points: minimizes the Sampson errors of the matches within the bound over
-// the five parameters of the motion. Selects these matches again in each of a few rounds.
+// the five parameters of the motion. Repeats the selection of these matches in a few rounds.
 RefinedMotion RefineMotion(const CameraModel& camera, const Motion& start, std::span<const RayMatch> matches);
 
 }  // namespace romap::slam

@@ -11,7 +11,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kPolishRounds = 5;
+constexpr int kRefineRounds = 5;
 constexpr int kRotationRounds = 5;
 // Translations below this share of the distance to the plane are rounding errors.
 constexpr double kNoTranslation = 1e-9;
@@ -23,20 +23,20 @@ Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
   return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
-std::vector<RayMatch> ExplainedBy(const CameraModel& camera, const Eigen::Matrix3d& homography,
-                                  std::span<const RayMatch> matches) {
+std::vector<RayMatch> InliersOf(const CameraModel& camera, const Eigen::Matrix3d& homography,
+                                std::span<const RayMatch> matches) {
   const Eigen::Matrix3d inverse = homography.inverse();
-  std::vector<RayMatch> explained;
+  std::vector<RayMatch> inliers;
   for (const RayMatch& match : matches) {
-    if (TransferChi2(camera, homography, inverse, match) < kTransferChi2Bound) explained.push_back(match);
+    if (TransferChi2(camera, homography, inverse, match) < kTransferChi2Bound) inliers.push_back(match);
   }
-  return explained;
+  return inliers;
 }
 
 // Squared pixel distance between the projections of two rays; infinite if `mapped` points backward.
-double Distance2_px(const CameraModel& camera, const Eigen::Vector3d& mapped, const Eigen::Vector3d& seen) {
+double Distance2_px(const CameraModel& camera, const Eigen::Vector3d& mapped, const Eigen::Vector3d& observed) {
   if (!(mapped.z() > 0)) return std::numeric_limits<double>::infinity();
-  return (camera.Project(mapped) - camera.Project(seen)).squaredNorm();
+  return (camera.Project(mapped) - camera.Project(observed)).squaredNorm();
 }
 
 }  // namespace
@@ -65,9 +65,9 @@ std::optional<Eigen::Matrix3d> FitHomography(std::span<const RayMatch> matches) 
 
 double TransferChi2(const CameraModel& camera, const Eigen::Matrix3d& homography, const Eigen::Matrix3d& inverse,
                     const RayMatch& match) {
-  const double forth = Distance2_px(camera, homography * match.first, match.second);
-  const double back = Distance2_px(camera, inverse * match.second, match.first);
-  return std::max(forth, back) / (match.sigma_px * match.sigma_px);
+  const double forward_px2 = Distance2_px(camera, homography * match.first, match.second);
+  const double backward_px2 = Distance2_px(camera, inverse * match.second, match.first);
+  return std::max(forward_px2, backward_px2) / (match.sigma_px * match.sigma_px);
 }
 
 double TransferSupport(const CameraModel& camera, const Eigen::Matrix3d& homography,
@@ -84,18 +84,18 @@ Eigen::Matrix3d RefineHomography(const CameraModel& camera, const Eigen::Matrix3
                                  std::span<const RayMatch> matches) {
   Eigen::Matrix3d best = start;
   double best_support = TransferSupport(camera, best, matches);
-  for (int round = 0; round < kPolishRounds; ++round) {
-    const std::optional<Eigen::Matrix3d> polished = FitHomography(ExplainedBy(camera, best, matches));
-    if (!polished) break;
-    const double support = TransferSupport(camera, *polished, matches);
+  for (int round = 0; round < kRefineRounds; ++round) {
+    const std::optional<Eigen::Matrix3d> refitted = FitHomography(InliersOf(camera, best, matches));
+    if (!refitted) break;
+    const double support = TransferSupport(camera, *refitted, matches);
     if (!(support > best_support)) break;
-    best = *polished;
+    best = *refitted;
     best_support = support;
   }
   return best;
 }
 
-std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography) {
+std::vector<Motion> MotionsFromHomography(const Eigen::Matrix3d& homography) {
   cv::Matx33d matrix;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) matrix(row, column) = homography(row, column);
@@ -120,21 +120,21 @@ std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography) {
 
 Eigen::Matrix3d FitRotation(const CameraModel& camera, const Eigen::Matrix3d& homography,
                             std::span<const RayMatch> matches) {
-  Eigen::Matrix3d turn = NearestRotation(homography);
-  double support = TransferSupport(camera, turn, matches);
+  Eigen::Matrix3d rotation = NearestRotation(homography);
+  double support = TransferSupport(camera, rotation, matches);
   for (int round = 0; round < kRotationRounds; ++round) {
     // Kabsch 1976 on unit rays.
     Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
-    for (const RayMatch& match : ExplainedBy(camera, turn, matches)) {
+    for (const RayMatch& match : InliersOf(camera, rotation, matches)) {
       correlation += match.second.normalized() * match.first.normalized().transpose();
     }
     const Eigen::Matrix3d candidate = NearestRotation(correlation);
     const double candidate_support = TransferSupport(camera, candidate, matches);
     if (!(candidate_support > support)) break;
-    turn = candidate;
+    rotation = candidate;
     support = candidate_support;
   }
-  return turn;
+  return rotation;
 }
 
 }  // namespace romap::slam

@@ -31,7 +31,7 @@ Eigen::Matrix3d RefineHomography(const CameraModel& camera, const Eigen::Matrix3
 
 // Decomposes a homography into the camera motions in front of a plane that produce it (Malis and Vargas 2007), at most
 // four. Does not check that the points are in front of the cameras. Empty for a pure rotation.
-std::vector<Motion> MotionsOf(const Eigen::Matrix3d& homography);
+std::vector<Motion> MotionsFromHomography(const Eigen::Matrix3d& homography);
 
 // Fits a rotation to the matches that agree with it, starting from the rotation closest to `homography`: the motion if
 // the camera only rotated.

@@ -41,24 +41,24 @@ NormalEquations<N> Minimize(int max_iterations, const Linearize& linearize, cons
   constexpr double kNegligibleGain = 1e-6;          // of the cost
   constexpr double kNegligibleAbsoluteGain = 1e-9;  // in units of chi2, for data without noise
   double damping = 1e-4;
-  NormalEquations<N> here = linearize(state);
+  NormalEquations<N> current = linearize(state);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    typename NormalEquations<N>::Matrix damped = here.hessian;
+    typename NormalEquations<N>::Matrix damped = current.hessian;
     damped.diagonal() *= 1 + damping;
-    const typename NormalEquations<N>::Vector step = -damped.ldlt().solve(here.gradient);
-    const double expected_gain = -step.dot(here.gradient);
-    if (!step.allFinite() || !(expected_gain > kNegligibleGain * here.cost + kNegligibleAbsoluteGain)) break;
+    const typename NormalEquations<N>::Vector step = -damped.ldlt().solve(current.gradient);
+    const double expected_gain = -step.dot(current.gradient);
+    if (!step.allFinite() || !(expected_gain > kNegligibleGain * current.cost + kNegligibleAbsoluteGain)) break;
     const State candidate = move(state, step);
-    const NormalEquations<N> there = linearize(candidate);
-    if (there.cost < here.cost) {
+    const NormalEquations<N> next = linearize(candidate);
+    if (next.cost < current.cost) {
       state = candidate;
-      here = there;
+      current = next;
       damping = std::max(damping * 0.1, 1e-9);
     } else {
       damping *= 10;
     }
   }
-  return here;
+  return current;
 }
 
 }  // namespace romap::slam

@@ -14,7 +14,7 @@ constexpr double kDegree_rad = std::numbers::pi / 180;
 // Refined motions closer to each other than this are the same minimum.
 constexpr double kSameRotation_rad = 0.02 * kDegree_rad;
 constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
-// Minima closer to each other than this are not rivals.
+// Motions closer to each other than this are the same solution.
 constexpr double kNearRotation_rad = 1 * kDegree_rad;
 constexpr double kNearDirection_rad = 10 * kDegree_rad;
 constexpr double kMedianChi2 = 0.4549;   // of chi-square with one degree of freedom
@@ -59,8 +59,8 @@ void AddAllDirections(const Eigen::Matrix3d& rotation, std::vector<Motion>& star
 }  // namespace
 
 double MotionRanking::SecondBestSupport() const {
-  for (const RefinedMotion& rival : motions) {
-    if (!AreSimilar(motions.front().motion, rival.motion, kNearRotation_rad, kNearDirection_rad)) return rival.support;
+  for (const RefinedMotion& other : motions) {
+    if (!AreSimilar(motions.front().motion, other.motion, kNearRotation_rad, kNearDirection_rad)) return other.support;
   }
   return 0;
 }
@@ -70,8 +70,8 @@ MotionRanking RankMotions(const CameraModel& camera, const MotionSearch& search,
   ranking.matches.assign(matches.begin(), matches.end());
   std::vector<Motion> starts = search.motions;
   if (search.homography) {
-    const std::vector<Motion> of_plane = MotionsOf(*search.homography);
-    starts.insert(starts.end(), of_plane.begin(), of_plane.end());
+    const std::vector<Motion> plane_motions = MotionsFromHomography(*search.homography);
+    starts.insert(starts.end(), plane_motions.begin(), plane_motions.end());
   }
   ranking.motions = RefineAll(camera, starts, ranking.matches);
   if (ranking.motions.empty()) return ranking;

@@ -17,15 +17,15 @@ namespace {
 constexpr int kSampleSize = 5;
 constexpr size_t kMaxMotions = 6;
 // Models with at least this share of the best model's support are kept.
-constexpr double kRivalShare = 0.6;
+constexpr double kMinSupportShare = 0.6;
 // Motions from five noisy matches that are closer to each other than this converge to the same motion.
-constexpr double kAlikeRotation_rad = 0.03;
-constexpr double kAlikeDirection_rad = 0.25;
+constexpr double kDuplicateRotation_rad = 0.03;
+constexpr double kDuplicateDirection_rad = 0.25;
 
 using Sample = std::array<RayMatch, kSampleSize>;
 
-// The up to ten essential matrices of five matches.
-std::vector<Eigen::Matrix3d> EssentialsOf(const Sample& sample) {
+// The essential matrices, at most ten, that agree with five matches.
+std::vector<Eigen::Matrix3d> SolveFivePoint(const Sample& sample) {
   std::array<cv::Point2d, kSampleSize> first;
   std::array<cv::Point2d, kSampleSize> second;
   for (int i = 0; i < kSampleSize; ++i) {
@@ -52,7 +52,7 @@ struct Score {
   int inliers = 0;
 };
 
-Score ScoreOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
+Score ComputeScore(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
   Score score;
   for (const RayMatch& match : matches) {
     const double chi2 = SampsonChi2(camera, essential, match);
@@ -65,7 +65,8 @@ Score ScoreOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::
 
 // Returns the one of the four motions of an essential matrix (Hartley and Zisserman, result 9.19) with the most matches
 // in front of both cameras.
-Motion MotionOf(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
+Motion MotionFromEssential(const CameraModel& camera, const Eigen::Matrix3d& essential,
+                           std::span<const RayMatch> matches) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d quarter_turn;
   quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
@@ -90,16 +91,17 @@ class Shortlist {
  public:
   // Minimum support of a motion to be added.
   double Threshold() const {
-    const double share = entries_.empty() ? 0.0 : kRivalShare * entries_.front().support;
+    const double share = entries_.empty() ? 0.0 : kMinSupportShare * entries_.front().support;
     return entries_.size() < kMaxMotions ? share : std::max(share, entries_.back().support);
   }
 
-  void Offer(const Motion& motion, double support) {
+  void Add(const Motion& motion, double support) {
     for (const Entry& entry : entries_) {
-      if (entry.support >= support && AreSimilar(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad)) return;
+      if (entry.support >= support && AreSimilar(entry.motion, motion, kDuplicateRotation_rad, kDuplicateDirection_rad))
+        return;
     }
     std::erase_if(entries_, [&](const Entry& entry) {
-      return AreSimilar(entry.motion, motion, kAlikeRotation_rad, kAlikeDirection_rad);
+      return AreSimilar(entry.motion, motion, kDuplicateRotation_rad, kDuplicateDirection_rad);
     });
     const auto position =
         std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.support < support; });
@@ -110,7 +112,7 @@ class Shortlist {
   std::vector<Motion> Motions() const {
     std::vector<Motion> motions;
     for (const Entry& entry : entries_) {
-      if (entry.support >= kRivalShare * entries_.front().support) motions.push_back(entry.motion);
+      if (entry.support >= kMinSupportShare * entries_.front().support) motions.push_back(entry.motion);
     }
     return motions;
   }
@@ -143,10 +145,10 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
     const std::array<int, kSampleSize> indices = SampleDistinct<kSampleSize>(count, random);
     std::transform(indices.begin(), indices.end(), sample.begin(), [&](int index) { return matches[index]; });
 
-    for (const Eigen::Matrix3d& essential : EssentialsOf(sample)) {
-      const Score score = ScoreOf(camera, essential, matches);
+    for (const Eigen::Matrix3d& essential : SolveFivePoint(sample)) {
+      const Score score = ComputeScore(camera, essential, matches);
       if (score.support <= shortlist.Threshold()) continue;
-      shortlist.Offer(MotionOf(camera, essential, matches), score.support);
+      shortlist.Add(MotionFromEssential(camera, essential, matches), score.support);
       if (score.support <= search.essential_support) continue;
       search.essential_support = score.support;
       needed = SamplesNeeded(static_cast<double>(score.inliers) / count, kSampleSize, max_iterations);

@@ -17,9 +17,9 @@ constexpr int kSampleSize = 3;
 
 using Sample = std::array<PoseObservation, kSampleSize>;
 
-// The up to four poses that agree with three observations. OpenCV's solver gets rays here, hence the identity camera
-// matrix.
-std::vector<CameraFromWorld> PosesOf(const CameraModel& camera, const Sample& sample) {
+// The poses, at most four, that agree with three observations. The input of OpenCV's solver are rays, so the camera
+// matrix is the identity.
+std::vector<CameraFromWorld> SolveP3p(const CameraModel& camera, const Sample& sample) {
   std::array<cv::Point3d, kSampleSize> points;
   std::array<cv::Point2d, kSampleSize> rays;
   for (int i = 0; i < kSampleSize; ++i) {
@@ -52,7 +52,8 @@ struct Score {
   int inliers = 0;
 };
 
-Score ScoreOf(const CameraModel& camera, const CameraFromWorld& pose, std::span<const PoseObservation> observations) {
+Score ComputeScore(const CameraModel& camera, const CameraFromWorld& pose,
+                   std::span<const PoseObservation> observations) {
   Score score;
   for (const PoseObservation& observation : observations) {
     const double normalized_chi2 = ErrorOf(camera, pose, observation).chi2 / Chi2Bound(observation);
@@ -81,8 +82,8 @@ std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const 
     Sample sample;
     const std::array<int, kSampleSize> indices = SampleDistinct<kSampleSize>(count, random);
     for (int i = 0; i < kSampleSize; ++i) sample[i] = observations[indices[i]];
-    for (const CameraFromWorld& pose : PosesOf(camera, sample)) {
-      const Score score = ScoreOf(camera, pose, observations);
+    for (const CameraFromWorld& pose : SolveP3p(camera, sample)) {
+      const Score score = ComputeScore(camera, pose, observations);
       if (score.support <= best_support) continue;
       best_support = score.support;
       // A pose from three noisy points is inaccurate and misses inliers. Immediate refinement (Chum et al. 2003) gives

@@ -19,14 +19,14 @@ bool IsUsable(const PoseObservation& observation) {
 // number of marked observations.
 int MarkPlausible(const CameraModel& camera, const CameraFromWorld& pose, std::span<const PoseObservation> observations,
                   std::vector<uint8_t>& active) {
-  const double reach_px = camera.width_px + camera.height_px;
+  const double max_error_px = camera.width_px + camera.height_px;
   int count = 0;
   for (size_t i = 0; i < observations.size(); ++i) {
     active[i] = 0;
     if (!IsUsable(observations[i])) continue;
     const Eigen::Vector3d p_camera = pose.rotation * observations[i].p_world + pose.translation;
     if (!(p_camera.z() > 0)) continue;
-    active[i] = (camera.Project(p_camera) - observations[i].pixel_px).squaredNorm() < reach_px * reach_px;
+    active[i] = (camera.Project(p_camera) - observations[i].pixel_px).squaredNorm() < max_error_px * max_error_px;
     count += active[i];
   }
   return count;
@@ -62,7 +62,7 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
   const SE3<Camera, World> T_camera_world = start.Inverse();
   CameraFromWorld pose{T_camera_world.RotationMatrix(), T_camera_world.translation()};
   std::vector<uint8_t> active(observations.size());
-  std::vector<uint8_t> agreeing(observations.size());
+  std::vector<uint8_t> next_active(observations.size());
   int active_count = options.start_is_close ? MarkInliers(camera, pose, observations, active)
                                             : MarkPlausible(camera, pose, observations, active);
   const auto linearize = [&](const CameraFromWorld& at) {
@@ -73,10 +73,10 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
     return equations;
   };
   for (int round = 0; round < options.rounds && active_count >= kMinObservations; ++round) {
-    Minimize<6>(options.iterations_per_round, linearize, Moved, pose);
-    active_count = MarkInliers(camera, pose, observations, agreeing);
-    if (agreeing == active) break;
-    active.swap(agreeing);
+    Minimize<6>(options.iterations_per_round, linearize, ApplyStep, pose);
+    active_count = MarkInliers(camera, pose, observations, next_active);
+    if (next_active == active) break;
+    active.swap(next_active);
   }
 
   PoseEstimate estimate;

@@ -27,15 +27,15 @@ struct PoseEstimate {
 };
 
 struct PoseRefinerOptions {
-  int rounds = 3;                // outliers are selected again before every round except the first
+  int rounds = 3;                // outliers are reselected before every round except the first
   int iterations_per_round = 5;  // of Gauss-Newton (Levenberg-Marquardt)
   // Also selects outliers before the first round: for an accurate start pose and many wrong matches.
   bool start_is_close = false;
 };
 
 // Refines the camera pose by robust (Huber) Levenberg-Marquardt on the reprojection (and depth) errors of known points.
-// Six parameters; the chi-square bound rejects outliers (5.991 without depth, 7.815 with depth). This runs twice in
-// every frame, so no loop allocates and the normal equations are accumulated directly. With fewer than 4 usable
+// Six parameters; the chi-square bound rejects outliers (5.991 without depth, 7.815 with depth). It runs twice per
+// frame, so no loop allocates memory and the normal equations are accumulated directly. With fewer than 4 usable
 // observations the result has no inliers.
 PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& start,
                         std::span<const PoseObservation> observations, const PoseRefinerOptions& options = {});

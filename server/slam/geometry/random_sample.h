@@ -8,8 +8,8 @@
 
 namespace romap::slam {
 
-// Draws K different indices below `count` (count >= K). Plain modulo, because the standard distributions differ between
-// libraries and the same seed must give the same map everywhere.
+// Draws K different indices below `count` (count >= K). Uses modulo, because the standard distributions differ between
+// libraries and the same seed must give the same map on every platform.
 template <int K>
 std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
   std::array<int, K> sample;
@@ -25,11 +25,11 @@ std::array<int, K> SampleDistinct(int count, std::mt19937_64& random) {
 // Number of samples of `size` matches that RANSAC needs for a 99.9 % chance of one sample without outliers (Fischler
 // and Bolles 1981), at most `limit`.
 inline int SamplesNeeded(double inlier_share, int size, int limit) {
-  constexpr double kLogOfMissing = -6.907755;  // log(0.001)
-  const double clean = std::pow(inlier_share, size);
-  if (clean >= 1) return 1;
-  const double needed = std::ceil(kLogOfMissing / std::log1p(-clean));
-  return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also if clean is 0 and needed is infinite
+  constexpr double kLogFailureProbability = -6.907755;  // log(0.001)
+  const double probability = std::pow(inlier_share, size);
+  if (probability >= 1) return 1;
+  const double needed = std::ceil(kLogFailureProbability / std::log1p(-probability));
+  return needed < limit ? std::max(1, static_cast<int>(needed)) : limit;  // also if `needed` is infinite
 }
 
 }  // namespace romap::slam

@@ -40,9 +40,9 @@ void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, cons
   equations.cost += HuberCost(error.chi2, bound);
 }
 
-CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& step) {
-  const Eigen::Matrix3d turn = ExpRotationMatrix(step.tail<3>());
-  return {turn * pose.rotation, turn * pose.translation + step.head<3>()};
+CameraFromWorld ApplyStep(const CameraFromWorld& pose, const PoseEquations::Vector& step) {
+  const Eigen::Matrix3d rotation = ExpRotationMatrix(step.tail<3>());
+  return {rotation * pose.rotation, rotation * pose.translation + step.head<3>()};
 }
 
 }  // namespace romap::slam

@@ -47,11 +47,11 @@ inline ObservationError ErrorOf(const CameraModel& camera, const CameraFromWorld
 using PoseEquations = NormalEquations<6>;
 
 // Adds one observation to the normal equations of the pose, with the Huber weight for its Chi2Bound. Parameters:
-// translation, then rotation of the camera's frame (see Moved).
+// translation, then rotation of the camera's frame (see ApplyStep).
 void AddObservation(const CameraModel& camera, const CameraFromWorld& pose, const PoseObservation& observation,
                     PoseEquations& equations);
 
-// p_camera' = Exp(turn) * p_camera + shift, with step = (shift, turn).
-CameraFromWorld Moved(const CameraFromWorld& pose, const PoseEquations::Vector& step);
+// p_camera' = Exp(rotation) * p_camera + translation, with step = (translation, rotation).
+CameraFromWorld ApplyStep(const CameraFromWorld& pose, const PoseEquations::Vector& step);
 
 }  // namespace romap::slam

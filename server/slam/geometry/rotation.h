@@ -12,11 +12,11 @@ inline Eigen::Matrix3d Skew(const Eigen::Vector3d& a) {
   return skew;
 }
 
-// Rotation about the axis `turn_rad` by its length in radians (the exponential map of SO(3)).
-inline Eigen::Matrix3d ExpRotationMatrix(const Eigen::Vector3d& turn_rad) {
-  const double angle_rad = turn_rad.norm();
+// Rotation about the axis `rotation_rad` by its length in radians (the exponential map of SO(3)).
+inline Eigen::Matrix3d ExpRotationMatrix(const Eigen::Vector3d& rotation_rad) {
+  const double angle_rad = rotation_rad.norm();
   if (angle_rad == 0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad).toRotationMatrix();
+  return Eigen::AngleAxisd(angle_rad, rotation_rad / angle_rad).toRotationMatrix();
 }
 
 }  // namespace romap::slam

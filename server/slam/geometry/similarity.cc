@@ -17,7 +17,7 @@ constexpr int kRefineRounds = 5;
 constexpr int kIterationsPerRound = 8;
 // Minimum ratio of the second to the first singular value of the points' correlation. Below it, the points are
 // collinear (to a hundredth of their extent), and the rotation about the line is undetermined.
-constexpr double kLineShare = 1e-4;
+constexpr double kMinSingularValueRatio = 1e-4;
 
 Similarity FromSim3(const Sim3<Camera, Camera>& S) {
   return {S.scale(), S.rotation().toRotationMatrix(), S.translation()};
@@ -63,7 +63,7 @@ std::optional<PointAlignment> AlignPointSets(std::span<const Eigen::Vector3d> p_
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(correlation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d spreads = svd.singularValues();
-  if (!(spreads[1] > kLineShare * spreads[0])) return std::nullopt;
+  if (!(spreads[1] > kMinSingularValueRatio * spreads[0])) return std::nullopt;
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) signs.z() = -1;
 
@@ -112,7 +112,7 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
                                     std::span<const SimilarityMatch> matches, const SimilarityOptions& options) {
   Similarity similarity = FromSim3(start);
   std::vector<uint8_t> active(matches.size());
-  std::vector<uint8_t> agreeing(matches.size());
+  std::vector<uint8_t> next_active(matches.size());
   int inliers = MarkInliers(camera, similarity, matches, options, active);
   const auto linearize = [&](const Similarity& at) {
     SimilarityEquations equations;
@@ -122,10 +122,10 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
     return equations;
   };
   for (int round = 0; round < kRefineRounds && inliers >= kSampleSize; ++round) {
-    Minimize<7>(kIterationsPerRound, linearize, MovedSimilarity, similarity);
-    inliers = MarkInliers(camera, similarity, matches, options, agreeing);
-    const bool is_settled = agreeing == active;
-    active.swap(agreeing);
+    Minimize<7>(kIterationsPerRound, linearize, ApplySimilarityStep, similarity);
+    inliers = MarkInliers(camera, similarity, matches, options, next_active);
+    const bool is_settled = next_active == active;
+    active.swap(next_active);
     if (is_settled) break;
   }
   return {ToSim3(similarity), std::move(active), inliers};

@@ -71,11 +71,11 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
            options.chi2_bound, equations);
 }
 
-Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step) {
-  const double growth = std::exp(step[6]);
-  const Eigen::Matrix3d turn = ExpRotationMatrix(step.segment<3>(3));
-  return {growth * similarity.scale, turn * similarity.rotation,
-          growth * (turn * similarity.translation) + step.head<3>()};
+Similarity ApplySimilarityStep(const Similarity& similarity, const SimilarityEquations::Vector& step) {
+  const double scale = std::exp(step[6]);
+  const Eigen::Matrix3d rotation = ExpRotationMatrix(step.segment<3>(3));
+  return {scale * similarity.scale, rotation * similarity.rotation,
+          scale * (rotation * similarity.translation) + step.head<3>()};
 }
 
 }  // namespace romap::slam

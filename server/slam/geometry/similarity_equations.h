@@ -30,11 +30,11 @@ SimilarityErrors ErrorsOf(const CameraModel& camera, const Similarity& similarit
 using SimilarityEquations = NormalEquations<7>;
 
 // Adds both errors of a match, each with the Huber weight for options.chi2_bound. With a fixed scale, the seventh
-// parameter has no effect. For the parameters, see MovedSimilarity.
+// parameter has no effect. For the parameters, see ApplySimilarityStep.
 void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity, const SimilarityMatch& match,
                          const SimilarityOptions& options, SimilarityEquations& equations);
 
-// p_first' = exp(growth) * Exp(turn) * p_first + shift, with step = (shift, turn, growth).
-Similarity MovedSimilarity(const Similarity& similarity, const SimilarityEquations::Vector& step);
+// p_first' = exp(log_scale) * Exp(rotation) * p_first + translation, with step = (translation, rotation, log_scale).
+Similarity ApplySimilarityStep(const Similarity& similarity, const SimilarityEquations::Vector& step);
 
 }  // namespace romap::slam

@@ -24,12 +24,12 @@ int Triangulate(const CameraModel& camera, const Motion& motion, std::span<const
   std::vector<double> parallaxes_rad;
   for (size_t i = 0; i < matches.size(); ++i) {
     if (!(SampsonChi2(camera, essential, matches[i]) < kEpipolarChi2Bound)) continue;
-    const RayMatch obedient = ClosestEpipolarMatch(camera, essential, matches[i]);
-    const RayMeeting meeting = MeetingOf(camera, motion, obedient);
-    if (meeting.is_significant && !meeting.IsBeforeBoth()) continue;
-    parallaxes_rad.push_back(meeting.parallax_rad);
-    if (!meeting.is_significant) continue;
-    result.points_first[i] = meeting.first_depth * obedient.first;
+    const RayMatch corrected = ClosestEpipolarMatch(camera, essential, matches[i]);
+    const RayIntersection intersection = Intersect(camera, motion, corrected);
+    if (intersection.is_significant && !intersection.IsInFrontOfBoth()) continue;
+    parallaxes_rad.push_back(intersection.parallax_rad);
+    if (!intersection.is_significant) continue;
+    result.points_first[i] = intersection.first_depth * corrected.first;
     ++result.points;
   }
   if (parallaxes_rad.empty()) return 0;
@@ -49,7 +49,7 @@ TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMat
   TwoViewResult result;
   result.points_first.resize(matches.size());
   if (static_cast<int>(matches.size()) < options.min_matches) return result;
-  const std::vector<RayMatch> rays = RaysOf(camera, matches);
+  const std::vector<RayMatch> rays = ToRays(camera, matches);
   const MotionSearch search = SearchMotions(camera, rays, options.max_iterations, options.seed);
   const MotionRanking ranking = RankMotions(camera, search, rays);
   if (ranking.motions.empty()) return result;

@@ -59,7 +59,7 @@ struct TwoViewResult {
 TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMatch> matches,
                            const TwoViewOptions& options);
 
-// Short text for users, for example "too little parallax: the camera did not move or only rotated".
+// A short text for users, for example "too little parallax: the camera did not move or only rotated".
 const char* Describe(TwoViewOutcome outcome);
 
 }  // namespace romap::slam

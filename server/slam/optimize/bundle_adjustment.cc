@@ -8,7 +8,7 @@
 namespace romap::slam {
 namespace {
 
-bool IsSound(const BundleProblem& problem, const BundleObservation& observation) {
+bool IsValid(const BundleProblem& problem, const BundleObservation& observation) {
   const auto cameras = static_cast<int>(problem.cameras.size());
   const auto points = static_cast<int>(problem.points.size());
   if (observation.camera < 0 || observation.camera >= cameras) return false;
@@ -19,7 +19,7 @@ bool IsSound(const BundleProblem& problem, const BundleObservation& observation)
          problem.points[observation.point].position_world.allFinite();
 }
 
-bool IsSound(const CameraModel& camera) {
+bool IsValid(const CameraModel& camera) {
   return camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px) && std::isfinite(camera.fy_px) &&
          std::isfinite(camera.cx_px) && std::isfinite(camera.cy_px);
 }
@@ -33,7 +33,7 @@ struct ObservationError {
 // Returns the default values for invalid numbers and for points behind the camera.
 ObservationError Measure(const BundleProblem& problem, const BundleObservation& observation) {
   ObservationError error;
-  if (!IsSound(problem, observation)) return error;
+  if (!IsValid(problem, observation)) return error;
   const SE3<World, Camera>& T_world_camera = problem.cameras[observation.camera].T_world_camera;
   const Eigen::Vector3d p_camera = T_world_camera.rotation().conjugate() *
                                    (problem.points[observation.point].position_world - T_world_camera.translation());
@@ -91,7 +91,7 @@ void MarkOutliers(BundleProblem& problem, BundleSummary& summary) {
 
 BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options) {
   BundleSummary summary;
-  if (!IsSound(problem.camera)) return summary;
+  if (!IsValid(problem.camera)) return summary;
   std::vector<uint8_t> use = Select(problem, /*within_bound=*/false);
   summary.initial_rms_px = summary.final_rms_px = RmsPx(problem, use);
 

@@ -57,8 +57,8 @@ struct BundleProblem {
 
 struct BundleOptions {
   int max_iterations = 10;
-  // Stops when an iteration reduces the cost by less than this share. The default is sufficient for local changes. If
-  // the whole map bends, or with a lens, many small reductions add up, and a smaller value is needed.
+  // Stops when an iteration reduces the cost by less than this share. The default is sufficient for local changes.
+  // Correcting a bend of the whole map or estimating the lens takes many small steps and needs a smaller value.
   double function_tolerance = 1e-4;
   bool reject_outliers = true;  // those beyond the bound, after half of the iterations; all are reclassified at the end
   bool dense = false;           // few cameras: DENSE_SCHUR instead of SPARSE_SCHUR
@@ -68,8 +68,8 @@ struct BundleOptions {
 
 struct BundleSummary {
   int iterations = 0;
-  // Root mean square reprojection error, weighted by 1 / sigma^2, over the observations used (in the end only the
-  // inliers).
+  // Root mean square reprojection error, weighted by 1 / sigma^2, over the observations used (the
+  // inliers for final_rms_px).
   double initial_rms_px = 0;
   double final_rms_px = 0;
   int outliers = 0;

@@ -72,7 +72,7 @@ class BundleSolver {
   RefreshCameras refresh_{&cameras_};
   ceres::HuberLoss loss_{std::sqrt(kChi2Bound2)};
   ceres::HuberLoss depth_loss_{std::sqrt(kChi2Bound3)};
-  // Costs cannot be moved, hence no vectors.
+  // In deques, because costs cannot be moved.
   std::deque<ReprojectionCost> costs_;
   std::deque<ReprojectionDepthCost> depth_costs_;
   std::deque<LensedCost<ReprojectionCost>> lensed_costs_;
@@ -246,8 +246,8 @@ void BundleSolver::Run(const BundleOptions& options, int max_iterations, BundleR
   run.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
   run.converged = summary.termination_type == ceres::CONVERGENCE;
   if (!summary.iterations.empty()) run.trust_region_radius = summary.iterations.back().trust_region_radius;
-  const bool begun = run.iterations > 0 || !run.aborted;
-  run.usable = begun && summary.IsSolutionUsable() && WriteBack();
+  const bool has_started = run.iterations > 0 || !run.aborted;
+  run.usable = has_started && summary.IsSolutionUsable() && WriteBack();
 }
 
 // Returns false and writes nothing if a number is not finite.

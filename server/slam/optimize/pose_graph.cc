@@ -15,18 +15,18 @@ namespace {
 
 constexpr int kScaleComponent = 6;
 
-bool IsSound(const std::vector<PoseGraphNode>& nodes, const PoseGraphEdge& edge) {
+bool IsValid(const std::vector<PoseGraphNode>& nodes, const PoseGraphEdge& edge) {
   const auto count = static_cast<int>(nodes.size());
   return edge.a >= 0 && edge.a < count && edge.b >= 0 && edge.b < count && edge.a != edge.b && edge.S_a_b.IsFinite() &&
          edge.weight > 0 && std::isfinite(edge.weight);
 }
 
-std::vector<PoseGraphEdge> SoundEdges(const std::vector<PoseGraphNode>& nodes,
+std::vector<PoseGraphEdge> ValidEdges(const std::vector<PoseGraphNode>& nodes,
                                       const std::vector<PoseGraphEdge>& edges) {
-  std::vector<PoseGraphEdge> sound;
-  std::copy_if(edges.begin(), edges.end(), std::back_inserter(sound),
-               [&](const PoseGraphEdge& edge) { return IsSound(nodes, edge); });
-  return sound;
+  std::vector<PoseGraphEdge> valid;
+  std::copy_if(edges.begin(), edges.end(), std::back_inserter(valid),
+               [&](const PoseGraphEdge& edge) { return IsValid(nodes, edge); });
+  return valid;
 }
 
 // Whether every node is fixed or connected to a fixed one; otherwise part of the graph is undetermined.
@@ -38,12 +38,12 @@ bool IsConnectedToFixed(const std::vector<PoseGraphNode>& nodes, const std::vect
     return node;
   };
   for (const PoseGraphEdge& edge : edges) parent[root(edge.a)] = root(edge.b);
-  std::vector<uint8_t> held(nodes.size(), 0);
+  std::vector<uint8_t> anchored(nodes.size(), 0);
   for (size_t i = 0; i < nodes.size(); ++i) {
-    if (nodes[i].fixed) held[root(static_cast<int>(i))] = 1;
+    if (nodes[i].fixed) anchored[root(static_cast<int>(i))] = 1;
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
-    if (!held[root(static_cast<int>(i))]) return false;
+    if (!anchored[root(static_cast<int>(i))]) return false;
   }
   return true;
 }
@@ -77,7 +77,7 @@ class PoseGraphSolver {
   std::vector<NodeState> states_;
   RefreshNodes refresh_{&states_};
   ceres::SubsetManifold fixed_scale_{7, {kScaleComponent}};
-  std::deque<RelativePoseCost> costs_;  // costs cannot be moved, hence no vector
+  std::deque<RelativePoseCost> costs_;  // in a deque, because costs cannot be moved
   ceres::Problem ceres_;                // last, because it refers to the other members
 };
 
@@ -142,10 +142,10 @@ bool PoseGraphSolver::WriteBack(std::vector<PoseGraphNode>& nodes) const {
 PoseGraphSummary OptimizePoseGraph(std::vector<PoseGraphNode>& nodes, const std::vector<PoseGraphEdge>& edges,
                                    const PoseGraphOptions& options) {
   const auto is_finite = [](const PoseGraphNode& node) { return node.S_world_camera.IsFinite(); };
-  const std::vector<PoseGraphEdge> sound = SoundEdges(nodes, edges);
-  if (sound.empty() || !std::all_of(nodes.begin(), nodes.end(), is_finite) || !IsConnectedToFixed(nodes, sound))
+  const std::vector<PoseGraphEdge> valid = ValidEdges(nodes, edges);
+  if (valid.empty() || !std::all_of(nodes.begin(), nodes.end(), is_finite) || !IsConnectedToFixed(nodes, valid))
     return {};
-  PoseGraphSolver solver(nodes, sound, options.fix_scale);
+  PoseGraphSolver solver(nodes, valid, options.fix_scale);
   PoseGraphSummary summary = solver.Run(options.max_iterations);
   summary.usable = summary.usable && solver.WriteBack(nodes);
   return summary;

@@ -8,14 +8,14 @@ namespace romap::slam {
 namespace {
 
 // In units of sigma, per residual. Far beyond any bound, where the Huber loss is linear.
-constexpr double kResidualWithoutImage = 100;
+constexpr double kResidualBehindCamera = 100;
 
 Eigen::Vector3d PointInCamera(const CameraState& state, const double* p_world) {
   return state.R_camera_world * (Eigen::Map<const Eigen::Vector3d>(p_world) - state.t_world_camera);
 }
 
-void SetWithoutImage(int rows, double* residuals, double** jacobians) {
-  std::fill_n(residuals, rows, kResidualWithoutImage);
+void SetBehindCamera(int rows, double* residuals, double** jacobians) {
+  std::fill_n(residuals, rows, kResidualBehindCamera);
   if (jacobians == nullptr) return;
   if (jacobians[0] != nullptr) std::fill_n(jacobians[0], 6 * rows, 0.0);
   if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 3 * rows, 0.0);
@@ -49,7 +49,7 @@ ReprojectionCost::ReprojectionCost(const CameraModel& camera, const CameraState*
 bool ReprojectionCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
   const Eigen::Vector3d p_camera = PointInCamera(*state_, parameters[1]);
   if (p_camera.z() < kMinBundleDepth) {
-    SetWithoutImage(2, residuals, jacobians);
+    SetBehindCamera(2, residuals, jacobians);
     return true;
   }
   const double inverse_z = 1 / p_camera.z();
@@ -74,7 +74,7 @@ ReprojectionDepthCost::ReprojectionDepthCost(const CameraModel& camera, const Ca
 bool ReprojectionDepthCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
   const Eigen::Vector3d p_camera = PointInCamera(*state_, parameters[1]);
   if (p_camera.z() < kMinBundleDepth) {
-    SetWithoutImage(3, residuals, jacobians);
+    SetBehindCamera(3, residuals, jacobians);
     return true;
   }
   reprojection_.Evaluate(parameters, residuals, jacobians);  // the first two rows
@@ -90,17 +90,17 @@ PosePriorCost::PosePriorCost(const CameraState* state, const PosePrior& prior) :
 bool PosePriorCost::Evaluate(double const* const* /*parameters*/, double* residuals, double** jacobians) const {
   const CameraState& state = *state_;
   const Eigen::Matrix3d R_world_camera = state.R_camera_world.transpose();
-  const Eigen::Vector3d turn_rad =
+  const Eigen::Vector3d rotation_rad =
       LogRotation(Eigen::Quaterniond(prior_.T_world_camera.RotationMatrix().transpose() * R_world_camera));
   Eigen::Map<Eigen::Matrix<double, 6, 1>> residual(residuals);
-  residual.head<3>() = turn_rad / prior_.rotation_sigma_rad;
+  residual.head<3>() = rotation_rad / prior_.rotation_sigma_rad;
   residual.tail<3>() = (state.t_world_camera - prior_.T_world_camera.translation()) / prior_.translation_sigma_mu;
   if (jacobians == nullptr || jacobians[0] == nullptr) return true;
 
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> jacobian(jacobians[0]);
   jacobian.setZero();
   jacobian.topLeftCorner<3, 3>() =
-      RightJacobianOfRotation(turn_rad).inverse() * state.rotation_jacobian / prior_.rotation_sigma_rad;
+      RightJacobianOfRotation(rotation_rad).inverse() * state.rotation_jacobian / prior_.rotation_sigma_rad;
   jacobian.bottomRightCorner<3, 3>() = state.R_start / prior_.translation_sigma_mu;
   return true;
 }

@@ -58,29 +58,29 @@ class ReprojectionDepthCost final : public ceres::SizedCostFunction<3, 6, 3> {
 template <class Cost>
 class LensedCost final : public ceres::SizedCostFunction<Cost::kResiduals, 6, 3, 1> {
  public:
-  LensedCost(const CameraModel& camera, const Eigen::Vector2d& seen_px, double sigma_px, const Cost* cost)
+  LensedCost(const CameraModel& camera, const Eigen::Vector2d& observed_px, double sigma_px, const Cost* cost)
       : cost_(cost),
-        seen_((seen_px.x() - camera.cx_px) / camera.fx_px, (seen_px.y() - camera.cy_px) / camera.fy_px),
+        observed_((observed_px.x() - camera.cx_px) / camera.fx_px, (observed_px.y() - camera.cy_px) / camera.fy_px),
         weight_(camera.fx_px / sigma_px, camera.fy_px / sigma_px) {}
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     if (!cost_->Evaluate(parameters, residuals, jacobians)) return false;
     const double k1 = parameters[2][0];
-    const Eigen::Vector2d pinhole = seen_ + Eigen::Vector2d(residuals[0], residuals[1]).cwiseQuotient(weight_);
+    const Eigen::Vector2d pinhole = observed_ + Eigen::Vector2d(residuals[0], residuals[1]).cwiseQuotient(weight_);
     const double radius2 = pinhole.squaredNorm();
-    const Eigen::Vector2d bend = weight_.cwiseProduct(pinhole) * radius2;
-    residuals[0] += k1 * bend.x();
-    residuals[1] += k1 * bend.y();
+    const Eigen::Vector2d distortion = weight_.cwiseProduct(pinhole) * radius2;
+    residuals[0] += k1 * distortion.x();
+    residuals[1] += k1 * distortion.y();
     if (jacobians == nullptr) return true;
     const Eigen::Matrix2d by_pinhole =
         (1 + k1 * radius2) * Eigen::Matrix2d::Identity() + 2 * k1 * pinhole * pinhole.transpose();
     const Eigen::Matrix2d chain = weight_.asDiagonal() * by_pinhole * weight_.cwiseInverse().asDiagonal();
-    BendRows<6>(chain, jacobians[0]);
-    BendRows<3>(chain, jacobians[1]);
+    ApplyChainRule<6>(chain, jacobians[0]);
+    ApplyChainRule<3>(chain, jacobians[1]);
     if (jacobians[2] != nullptr) {
       std::fill_n(jacobians[2], Cost::kResiduals, 0.0);
-      jacobians[2][0] = bend.x();
-      jacobians[2][1] = bend.y();
+      jacobians[2][0] = distortion.x();
+      jacobians[2][1] = distortion.y();
     }
     return true;
   }
@@ -88,15 +88,15 @@ class LensedCost final : public ceres::SizedCostFunction<Cost::kResiduals, 6, 3,
  private:
   // The first two rows are those of the pixel.
   template <int kColumns>
-  static void BendRows(const Eigen::Matrix2d& chain, double* jacobian) {
+  static void ApplyChainRule(const Eigen::Matrix2d& chain, double* jacobian) {
     if (jacobian == nullptr) return;
     Eigen::Map<Eigen::Matrix<double, 2, kColumns, Eigen::RowMajor>> rows(jacobian);
     rows = (chain * rows).eval();
   }
 
   const Cost* cost_;
-  Eigen::Vector2d seen_;    // in focal lengths from the principal point
-  Eigen::Vector2d weight_;  // focal length / sigma
+  Eigen::Vector2d observed_;  // in focal lengths from the principal point
+  Eigen::Vector2d weight_;    // focal length / sigma
 };
 
 // Distance from a prior: rotation vector from the prior to the camera, then translation.

@@ -78,7 +78,7 @@ std::vector<Descriptor> DescriptorTree::PickCenters(std::span<const Entry> entri
 void DescriptorTree::Split(uint32_t leaf) {
   const std::vector<Descriptor> centers = PickCenters(nodes_[leaf].entries);
   if (centers.size() < 2) {
-    // All descriptors are equal. Try again only when there are many more.
+    // All descriptors are equal. Retry when there are twice as many.
     nodes_[leaf].split_at *= 2;
     return;
   }

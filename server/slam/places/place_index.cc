@@ -6,32 +6,32 @@
 namespace romap::slam {
 namespace {
 
-// ORB features of one corner differ in about 10-20 % of their 256 bits between views, those of different corners in
-// about half.
+// ORB descriptors of the same corner in two views differ in about 10 to 20 % of the 256 bits, those of different
+// corners in about half.
 constexpr int kMaxDistanceBits = 50;
 // Number of words searched per feature. With only one word, most neighbors across its border would be lost.
 constexpr int kLeavesPerFeature = 2;
 
-// The votes of one query.
+// Accumulates the votes of one query, feature by feature.
 class Votes {
  public:
   explicit Votes(size_t slots) : votes_(slots, 0.0), nearest_(slots, kNone) {}
 
   // Records a descriptor of `slot` that is similar to the current feature.
-  void See(uint32_t slot, int distance) {
-    if (nearest_[slot] == kNone) seen_.push_back(slot);
+  void AddSimilar(uint32_t slot, int distance) {
+    if (nearest_[slot] == kNone) similar_slots_.push_back(slot);
     nearest_[slot] = std::min(nearest_[slot], distance);
   }
 
-  // Turns the neighbors of the current feature into votes and starts the next feature. Returns the feature's weight.
-  double Count(double keyframes) {
-    const double weight = std::log((keyframes + 1) / (static_cast<double>(seen_.size()) + 0.5));
-    for (const uint32_t slot : seen_) {
+  // Adds the votes of the current feature and starts the next one. Returns the feature's weight.
+  double FinishFeature(double keyframes) {
+    const double weight = std::log((keyframes + 1) / (static_cast<double>(similar_slots_.size()) + 0.5));
+    for (const uint32_t slot : similar_slots_) {
       // True neighbors mostly have a smaller distance than wrong ones.
       votes_[slot] += weight * (1 - static_cast<double>(nearest_[slot]) / (kMaxDistanceBits + 1));
       nearest_[slot] = kNone;
     }
-    seen_.clear();
+    similar_slots_.clear();
     return weight;
   }
 
@@ -41,7 +41,7 @@ class Votes {
   static constexpr int kNone = 257;
   std::vector<double> votes_;
   std::vector<int> nearest_;  // of the current feature, by slot
-  std::vector<uint32_t> seen_;
+  std::vector<uint32_t> similar_slots_;
 };
 
 }  // namespace
@@ -93,10 +93,10 @@ std::vector<PlaceMatch> PlaceIndex::Query(std::span<const Feature> features, int
     for (const uint32_t leaf : search.leaves) {
       for (const DescriptorTree::Entry& entry : tree_.entries(leaf)) {
         const int distance = HammingDistance(entry.descriptor, feature.descriptor);
-        if (distance <= kMaxDistanceBits && slots_[entry.owner].keyframe) votes.See(entry.owner, distance);
+        if (distance <= kMaxDistanceBits && slots_[entry.owner].keyframe) votes.AddSimilar(entry.owner, distance);
       }
     }
-    total_weight += votes.Count(static_cast<double>(size()));
+    total_weight += votes.FinishFeature(static_cast<double>(size()));
   }
 
   std::vector<PlaceMatch> matches;

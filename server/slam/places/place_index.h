@@ -22,8 +22,8 @@ struct PlaceMatch {
 //
 // An inverted index whose words are the leaves of a tree that grows with the keyframes. A word stores whole
 // descriptors, so that a feature votes only for keyframes with a similar descriptor (Hamming embedding: Jegou et al.,
-// ECCV 2008), and votes less the more keyframes it is similar to (inverse document frequency: Sivic and Zisserman, ICCV
-// 2003). About 60 bytes per feature.
+// ECCV 2008), and its votes have less weight if it is similar to many keyframes (inverse document frequency: Sivic and
+// Zisserman, ICCV 2003). About 60 bytes per feature.
 class PlaceIndex {
  public:
   explicit PlaceIndex(uint64_t seed = 1);
@@ -51,8 +51,8 @@ class PlaceIndex {
   std::vector<Slot> slots_;
   std::vector<uint32_t> free_slots_;
   std::unordered_map<KeyframeId, uint32_t> slots_of_;
-  // Entries of removed keyframes stay in the tree and are ignored until there are many: one sweep is cheaper than many
-  // searches.
+  // Entries of removed keyframes stay in the tree and are ignored until there are many, because removing them visits
+  // the whole tree.
   std::vector<uint32_t> removed_slots_;
   size_t live_entries_ = 0;
   size_t removed_entries_ = 0;

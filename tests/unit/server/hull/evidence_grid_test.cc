@@ -15,7 +15,7 @@ EvidenceGrid WithFirstCell(int object, int background, int occluded) {
   return grid;
 }
 
-TEST(EvidenceGridTest, EnoughBackgroundRemovesACell) {
+TEST(EvidenceGridTest, RemovesCellsWithEnoughBackground) {
   const CarvingRule rule{.min_background = 2, .background_share = 0.25};
   EXPECT_TRUE(WithFirstCell(0, 1, 0).Keeps(0, rule));
   EXPECT_FALSE(WithFirstCell(0, 2, 0).Keeps(0, rule));
@@ -23,7 +23,7 @@ TEST(EvidenceGridTest, EnoughBackgroundRemovesACell) {
   EXPECT_FALSE(WithFirstCell(5, 4, 5).Keeps(0, rule));
 }
 
-TEST(EvidenceGridTest, TooFewViewsOfTheObjectRemoveACell) {
+TEST(EvidenceGridTest, RemovesCellsWithTooFewViewsOfTheObject) {
   const CarvingRule rule{.min_object = 2, .object_share = 0.5};
   EXPECT_FALSE(WithFirstCell(1, 0, 0).Keeps(0, rule));
   EXPECT_TRUE(WithFirstCell(2, 0, 2).Keeps(0, rule));
@@ -31,7 +31,7 @@ TEST(EvidenceGridTest, TooFewViewsOfTheObjectRemoveACell) {
   EXPECT_TRUE(WithFirstCell(0, 0, 3).Keeps(0, CarvingRule())) << "by default a cell needs no view of the object";
 }
 
-TEST(EvidenceGridTest, CropsThatDoNotContainACellOnlyCountAgainstTheObject) {
+TEST(EvidenceGridTest, CroppedViewsCountOnlyForTheObjectShare) {
   EvidenceGrid grid = WithFirstCell(1, 1, 0);
   for (int i = 0; i < 8; ++i) grid.Count(0, 1, CellEvidence::kCropped, 1);
   EXPECT_FALSE(grid.Keeps(0, {.min_background = 2, .object_share = 0.25})) << "1 of 10 images shows the object";
@@ -39,7 +39,7 @@ TEST(EvidenceGridTest, CropsThatDoNotContainACellOnlyCountAgainstTheObject) {
   EXPECT_FALSE(grid.Keeps(0, {.background_share = 0.5})) << "1 of 2 crops shows background";
 }
 
-TEST(EvidenceGridTest, CountsEachCellOfARow) {
+TEST(EvidenceGridTest, CountsEvidencePerCellOfARow) {
   EvidenceGrid grid = WithFirstCell(0, 0, 0);
   const std::vector<CellEvidence> row = {CellEvidence::kBackground, CellEvidence::kObject};
   grid.Count(2, row, 1);

@@ -15,7 +15,7 @@ GridProjection ProjectionAt(double distance) {
   return GridProjection::Of(kCamera, R, {0.05, -0.02, distance});
 }
 
-TEST(GridProjectionTest, EqualsTheCameraModel) {
+TEST(GridProjectionTest, AgreesWithTheCameraModel) {
   const Eigen::Matrix3d R = Eigen::AngleAxisd(-0.4, Eigen::Vector3d::UnitY()).toRotationMatrix();
   const Eigen::Vector3d t(0.1, 0.2, 2);
   const GridProjection projection = GridProjection::Of(kCamera, R, t);
@@ -25,7 +25,7 @@ TEST(GridProjectionTest, EqualsTheCameraModel) {
   EXPECT_TRUE((q / q.z()).head<2>().isApprox(kCamera.Project(R * p + t), 1e-12));
 }
 
-TEST(RowProjectorTest, EqualsTheProjectionOfEachCell) {
+TEST(RowProjectorTest, AgreesWithTheProjectionOfEachCell) {
   const GridProjection projection = ProjectionAt(1.5);
   RowProjector rows(projection, kGrid);
   for (int z = 0; z < kGrid.cells; z += 3) {
@@ -47,12 +47,12 @@ TEST(RowProjectorTest, RejectsRowsThatReachBehindTheCamera) {
   int rejected = 0;
   for (int z = 0; z < kGrid.cells; ++z) {
     for (int y = 0; y < kGrid.cells; ++y) {
-      double least_depth = 1;
+      double min_depth = 1;
       for (int x = 0; x < kGrid.cells; ++x) {
-        least_depth = std::min(least_depth, (projection * kGrid.CellCenter(x, y, z)).z());
+        min_depth = std::min(min_depth, (projection * kGrid.CellCenter(x, y, z)).z());
       }
-      EXPECT_EQ(rows.Project(y, z), least_depth > 1e-9) << "row " << y << " " << z;
-      rejected += least_depth > 1e-9 ? 0 : 1;
+      EXPECT_EQ(rows.Project(y, z), min_depth > 1e-9) << "row " << y << " " << z;
+      rejected += min_depth > 1e-9 ? 0 : 1;
     }
   }
   EXPECT_GT(rejected, 10);

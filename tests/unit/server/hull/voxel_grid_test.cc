@@ -7,7 +7,7 @@ namespace {
 
 const VoxelGrid kGrid{.half_extents = {1, 2, 3}, .cells = 4};
 
-TEST(VoxelGridTest, IndexRunsFastestAlongX) {
+TEST(VoxelGridTest, XIsTheFastestIndex) {
   EXPECT_EQ(kGrid.size(), 64u);
   EXPECT_EQ(kGrid.Index(0, 0, 0), 0u);
   EXPECT_EQ(kGrid.Index(1, 0, 0), 1u);
@@ -31,7 +31,7 @@ TEST(VoxelGridTest, CellAtInvertsCellCenter) {
   }
 }
 
-TEST(VoxelGridTest, PointsOutsideTheBoxAreInNoCell) {
+TEST(VoxelGridTest, CellAtReturnsNothingOutsideTheBox) {
   EXPECT_EQ(kGrid.CellAt({1.01, 0, 0}), std::nullopt);
   EXPECT_EQ(kGrid.CellAt({0, -2.01, 0}), std::nullopt);
   EXPECT_EQ(kGrid.CellAt({0, 0, std::nan("")}), std::nullopt);

@@ -63,7 +63,7 @@ TEST_F(EpipolarMatcherTest, MatchesEveryPoint) {
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
 
-TEST_F(EpipolarMatcherTest, WorksWhenTheCameraMovesForward) {
+TEST_F(EpipolarMatcherTest, MatchesPointsDuringForwardMotion) {
   const SE3<World, Camera> ahead(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.02, 0.01, 0.6));
   std::vector<Feature> features_ahead;
   SlamConfig config;
@@ -80,23 +80,23 @@ TEST_F(EpipolarMatcherTest, WorksWhenTheCameraMovesForward) {
 
 TEST_F(EpipolarMatcherTest, IgnoresEqualDescriptorsOffTheEpipolarPlane) {
   for (size_t i = 0; i < 200; ++i) {
-    Feature twin = second_[i];
-    twin.pixel_px.y() += 25;
-    second_.push_back(twin);
+    Feature duplicate = second_[i];
+    duplicate.pixel_px.y() += 25;
+    second_.push_back(duplicate);
   }
   const std::vector<FeatureMatch> matches = Match();
   EXPECT_GT(matches.size(), 195);
   for (const FeatureMatch& match : matches) EXPECT_EQ(match.first, match.second);
 }
 
-TEST_F(EpipolarMatcherTest, EqualDescriptorsInTheEpipolarPlaneAreAmbiguous) {
-  const Descriptor twin{1, 2, 3, 4};
-  Add({0, 0, 3}, twin);
-  second_.push_back(Project({0, 0, 2.5}, kSecond, twin));  // on the same ray of the first camera
+TEST_F(EpipolarMatcherTest, RejectsEqualDescriptorsInTheEpipolarPlane) {
+  const Descriptor duplicate{1, 2, 3, 4};
+  Add({0, 0, 3}, duplicate);
+  second_.push_back(Project({0, 0, 2.5}, kSecond, duplicate));  // on the same ray of the first camera
   EXPECT_EQ(Match().size(), 200);
 }
 
-TEST_F(EpipolarMatcherTest, FeaturesWithAPointAreNotMatchedAgain) {
+TEST_F(EpipolarMatcherTest, SkipsFeaturesThatHaveAPoint) {
   MapKeyframe first = MakeKeyframe(KeyframeId{2}, frame_, kFirst, first_);
   first.points[17] = MapPointId{5};
   const auto matches =
@@ -104,7 +104,7 @@ TEST_F(EpipolarMatcherTest, FeaturesWithAPointAreNotMatchedAgain) {
   EXPECT_EQ(matches.size(), first_.size() - 1);
 }
 
-TEST_F(EpipolarMatcherTest, WithoutBaselineThereAreNoMatches) {
+TEST_F(EpipolarMatcherTest, ReturnsNoMatchesWithoutBaseline) {
   const MapKeyframe keyframe = MakeKeyframe(KeyframeId{1}, frame_, kFirst, first_);
   EXPECT_TRUE(MatchAlongEpipolarPlanes(keyframe, keyframe, SlamConfig{}).empty());
 }

@@ -13,7 +13,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::Ge;
-using ::testing::HasSubstr;
 using ::testing::Le;
 
 std::shared_ptr<Frame> BlackFrame(uint64_t frame_id, const SE3<World, Camera>& T_world_camera) {
@@ -31,16 +30,16 @@ std::vector<uint64_t> Keyframes(const std::vector<std::shared_ptr<Frame>>& frame
   GivenPoseTracker tracker{SlamConfig{}};
   std::vector<uint64_t> keyframes;
   for (const auto& frame : frames) {
-    const auto tracked = tracker.Take(frame);
+    const auto tracked = tracker.Track(frame);
     if (tracked.is_keyframe) keyframes.push_back(frame->frame_id);
   }
   return keyframes;
 }
 
-TEST(GivenPoseTracker, ForwardsPoseAndFrame) {
+TEST(GivenPoseTracker, ReturnsTheGivenPoseAndTheFrame) {
   GivenPoseTracker tracker{SlamConfig{}};
   const auto frame = BlackFrame(5, TexturedWorld::OrbitPose(30));
-  const auto tracked = tracker.Take(frame);
+  const auto tracked = tracker.Track(frame);
   EXPECT_EQ(tracked.frame, frame);
   EXPECT_EQ(tracked.state, TrackingState::kTracking);
   EXPECT_EQ(tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
@@ -53,7 +52,7 @@ TEST(GivenPoseTracker, SetsUpFromGravity) {
   const auto frame = BlackFrame(1, TexturedWorld::OrbitPose(0));
   const Eigen::Vector3d up_world = Eigen::Vector3d::UnitY();
   frame->gravity_camera = -(frame->T_world_camera->rotation().conjugate() * up_world);
-  const auto tracked = tracker.Take(frame);
+  const auto tracked = tracker.Track(frame);
   EXPECT_LT((tracked.up_world - up_world).norm(), 1e-9);
 }
 
@@ -69,7 +68,7 @@ TEST(GivenPoseTracker, EveryFrameOfAFastOrbitIsAKeyframe) {
   EXPECT_EQ(Keyframes(frames).size(), 10);
 }
 
-TEST(GivenPoseTracker, AHandHeldCameraThatSlidesPastGetsOneEveryFewFrames) {
+TEST(GivenPoseTracker, TranslatingCameraGetsAKeyframeEveryFewFrames) {
   const TexturedWorld world;
   std::vector<std::shared_ptr<Frame>> frames;
   for (int i = 0; i < 60; ++i) {
@@ -79,27 +78,27 @@ TEST(GivenPoseTracker, AHandHeldCameraThatSlidesPastGetsOneEveryFewFrames) {
   EXPECT_THAT(Keyframes(frames).size(), AllOf(Ge(60 / 9), Le(60 / 4)));
 }
 
-TEST(GivenPoseTracker, AStandingCameraGetsOneKeyframe) {
+TEST(GivenPoseTracker, StaticCameraGetsOneKeyframe) {
   std::vector<std::shared_ptr<Frame>> frames;
   for (int i = 0; i < 100; ++i) frames.push_back(BlackFrame(i, TexturedWorld::OrbitPose(0.001 * (i % 3))));
   EXPECT_THAT(Keyframes(frames), ElementsAre(0));
 }
 
-TEST(GivenPoseTracker, ACameraThatCreepsGetsAKeyframeWhenTimePasses) {
+TEST(GivenPoseTracker, SlowCameraGetsAKeyframeAfterTheMaximumGap) {
   SlamConfig config;
   std::vector<std::shared_ptr<Frame>> frames;
   for (int i = 0; i < 100; ++i) frames.push_back(BlackFrame(i, TexturedWorld::OrbitPose(0.05 * i)));
   EXPECT_EQ(Keyframes(frames).size(), 1 + 99 / static_cast<size_t>(config.keyframe_max_gap_frames));
 }
 
-TEST(GivenPoseTracker, AnAbsurdJumpIsAccepted) {
+TEST(GivenPoseTracker, AcceptsImplausibleJumps) {
   const SE3<World, Camera> far_away(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1e7, -1e7, 1e7));
   EXPECT_THAT(Keyframes({BlackFrame(1, TexturedWorld::OrbitPose(0)), BlackFrame(2, far_away),
                          BlackFrame(3, TexturedWorld::OrbitPose(1))}),
               ElementsAre(1, 2, 3));
 }
 
-TEST(GivenPoseTracker, ADueKeyframeWaitsForASharpFrameButNotForEver) {
+TEST(GivenPoseTracker, DueKeyframeWaitsAFewFramesForASharpFrame) {
   const TexturedWorld world;
   std::vector<std::shared_ptr<Frame>> frames;  // stands still, then rotates by more than the threshold
   for (int i = 0; i < 16; ++i) {
@@ -111,7 +110,7 @@ TEST(GivenPoseTracker, ADueKeyframeWaitsForASharpFrameButNotForEver) {
   EXPECT_THAT(Keyframes(frames), ElementsAre(0, 12));
 }
 
-TEST(GivenPoseTracker, ADueKeyframeWaitsForMasksWhenOnlySomeFramesHaveThem) {
+TEST(GivenPoseTracker, DueKeyframeWaitsForMasksIfOnlySomeFramesHaveThem) {
   std::vector<std::shared_ptr<Frame>> frames;
   for (int i = 0; i < 30; ++i) {
     frames.push_back(BlackFrame(i, TexturedWorld::OrbitPose(1.6 * i)));

@@ -46,8 +46,8 @@ class MaskVoterTest : public ::testing::Test {
     return map_.AddKeyframe(MakeFrameFeatures(frame, features), {Eigen::Quaterniond::Identity(), {x_mu, 0, 0}}).id;
   }
 
-  // A frame anchored to the second keyframe and moved from there by x.
-  TrackedFrame PassingFrame(uint64_t frame_id, double x_mu, cv::Mat labels = {}) const {
+  // A frame whose reference is the second keyframe, displaced from it along x.
+  TrackedFrame FrameNearSecond(uint64_t frame_id, double x_mu, cv::Mat labels = {}) const {
     auto frame = std::make_shared<Frame>();
     frame->frame_id = frame_id;
     frame->camera = camera_;
@@ -91,7 +91,7 @@ TEST_F(MaskVoterTest, LateMasksLabelTheFeaturesOfAKeyframe) {
     EXPECT_EQ(after.features[i].label, inside ? kLabel : 0) << i;
     EXPECT_EQ(after.mask_zones[i] == MaskZone::kInside, inside) << i;
   }
-  // The features are replaced, not changed: other holders keep the old ones.
+  // The features are replaced, not modified, because other threads may still use the old ones.
   EXPECT_FALSE(before->has_masks);
   EXPECT_EQ(before->features[0].label, 0);
   EXPECT_FALSE(map_.FindKeyframe(second_)->frame->has_masks);
@@ -100,10 +100,10 @@ TEST_F(MaskVoterTest, LateMasksLabelTheFeaturesOfAKeyframe) {
   EXPECT_EQ(map_.FindKeyframe(first_)->features()[10].label, 0);
 }
 
-TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteAtItsProjections) {
-  // The camera stands 0.2 + 0.5 mu to the right of the first keyframe: all points move left by 0.7 / 5 * fx.
+TEST_F(MaskVoterTest, LateMasksOfOtherFramesCountAsVotes) {
+  // The camera is 0.2 + 0.5 mu to the right of the first keyframe: all points move left by 0.7 / 5 * fx.
   const double shift_px = 0.7 / kDepth_mu * camera_.fx_px;
-  voter_.ObserveFrame(PassingFrame(6, 0.5), map_);
+  voter_.ObserveFrame(FrameNearSecond(6, 0.5), map_);
   EXPECT_EQ(InsideVotes(), 0);
   voter_.ObserveMasks({.frame_id = 6, .labels = MaskUntil(130), .instances = {}}, map_);
   for (int i = 0; i < kPoints; ++i) {
@@ -121,21 +121,21 @@ TEST_F(MaskVoterTest, LateMasksOfAnotherFrameVoteAtItsProjections) {
   EXPECT_EQ(InsideVotes(), before) << "masks count once";
 }
 
-TEST_F(MaskVoterTest, FramesMoveWithTheMap) {
-  voter_.ObserveFrame(PassingFrame(6, 0.5), map_);
+TEST_F(MaskVoterTest, WaitingFramesMoveWithTheMap) {
+  voter_.ObserveFrame(FrameNearSecond(6, 0.5), map_);
   voter_.ObserveMasks({.frame_id = 6, .labels = MaskUntil(130), .instances = {}}, map_);
   const int before = InsideVotes();
-  voter_.ObserveFrame(PassingFrame(7, 0.5), map_);
+  voter_.ObserveFrame(FrameNearSecond(7, 0.5), map_);
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   map_.Transform({3.0, turn, {1, -2, 0.5}});
   voter_.ObserveMasks({.frame_id = 7, .labels = MaskUntil(130), .instances = {}}, map_);
   EXPECT_EQ(InsideVotes(), 2 * before);
 }
 
-TEST_F(MaskVoterTest, MasksAreInPixelsBeforeTheLensCorrection) {
+TEST_F(MaskVoterTest, ProjectsPointsWithLensDistortion) {
   map_.CorrectLens({-0.3});
   // The corrected features no longer match the points, so this tests the projection alone.
-  voter_.ObserveFrame(PassingFrame(6, -0.2, MaskUntil(60)), map_);
+  voter_.ObserveFrame(FrameNearSecond(6, -0.2, MaskUntil(60)), map_);
   const Eigen::Vector2d image_px = map_.lens().Distort(camera_, {40, 120});
   ASSERT_GT(image_px.x(), 45);
   const double last_inside_px = map_.lens().Distort(camera_, {20, 120}).x();
@@ -144,27 +144,27 @@ TEST_F(MaskVoterTest, MasksAreInPixelsBeforeTheLensCorrection) {
   EXPECT_EQ(VotesFor(3).inside, 0);  // pinhole pixel 80
 }
 
-TEST_F(MaskVoterTest, FramesDoNotVoteWhenTheirReferenceHasMasks) {
-  voter_.ObserveFrame(PassingFrame(6, 0, MaskUntil(200)), map_);
+TEST_F(MaskVoterTest, IgnoresFramesWhoseReferenceHasMasks) {
+  voter_.ObserveFrame(FrameNearSecond(6, 0, MaskUntil(200)), map_);
   const int before = InsideVotes();
   EXPECT_GT(before, 4);
   voter_.ObserveMasks({.frame_id = 5, .labels = MaskUntil(200), .instances = {}}, map_);
   ASSERT_TRUE(map_.FindKeyframe(second_)->frame->has_masks);
-  voter_.ObserveFrame(PassingFrame(7, 0, MaskUntil(200)), map_);
+  voter_.ObserveFrame(FrameNearSecond(7, 0, MaskUntil(200)), map_);
   EXPECT_EQ(InsideVotes(), before);
 }
 
-TEST_F(MaskVoterTest, MasksOfUnknownFramesAreIgnored) {
+TEST_F(MaskVoterTest, IgnoresMasksOfUnknownFrames) {
   voter_.ObserveMasks({.frame_id = 3, .labels = MaskUntil(320), .instances = {}}, map_);
   voter_.ObserveMasks({.frame_id = 99, .labels = MaskUntil(320), .instances = {}}, map_);
-  voter_.ObserveFrame(PassingFrame(6, 0), map_);
+  voter_.ObserveFrame(FrameNearSecond(6, 0), map_);
   voter_ = MaskVoter(SlamConfig{});
   voter_.ObserveMasks({.frame_id = 6, .labels = MaskUntil(320), .instances = {}}, map_);
   EXPECT_EQ(InsideVotes(), 0);
 }
 
 TEST_F(MaskVoterTest, MergedPointsKeepTheirVotes) {
-  voter_.ObserveFrame(PassingFrame(6, 0, MaskUntil(320)), map_);
+  voter_.ObserveFrame(FrameNearSecond(6, 0, MaskUntil(320)), map_);
   ASSERT_EQ(VotesFor(3).inside, 1);
   PointTrack& same = map_.AddPoint(PointAt(3));
   map_.MergePoints(points_[3], same.point.id);

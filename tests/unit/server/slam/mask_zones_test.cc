@@ -14,7 +14,7 @@ cv::Mat Labels() {
   return labels;
 }
 
-TEST(MaskZones, WithoutMasksNothingIsKnown) {
+TEST(MaskZones, ZonesAreUnknownWithoutMasks) {
   EXPECT_EQ(MaskZones({}).At({10, 10}, 1, 0), MaskZone::kUnknown);
   EXPECT_EQ(MaskZones(cv::Mat(480, 640, CV_16UC1, cv::Scalar(0))).At({10, 10}, 1, 0), MaskZone::kFar);
 }
@@ -44,8 +44,8 @@ TEST(MaskZones, HandlesPixelsOutsideTheImage) {
 
 TEST(MaskVotes, IgnoresUnknownZones) {
   MaskVotes votes;
-  for (const MaskZone place : {MaskZone::kUnknown, MaskZone::kInside, MaskZone::kInside, MaskZone::kNear}) {
-    votes.Add(place);
+  for (const MaskZone zone : {MaskZone::kUnknown, MaskZone::kInside, MaskZone::kInside, MaskZone::kNear}) {
+    votes.Add(zone);
   }
   MaskVotes more;
   more.Add(MaskZone::kBorder);

@@ -13,11 +13,11 @@ SE3<World, Camera> PoseAbove(double x_mu) { return TexturedWorld::LookAt({x_mu, 
 TEST(SceneDepth, MeasuresTheDistanceOfAPlane) {
   const TexturedWorld world;
   const DepthView first = MakeDepthView(*world.Render(1, PoseAbove(0)), PoseAbove(0));
-  for (const double way_mu : {0.1, 0.25}) {
-    const DepthView second = MakeDepthView(*world.Render(2, PoseAbove(way_mu)), PoseAbove(way_mu));
+  for (const double baseline_mu : {0.1, 0.25}) {
+    const DepthView second = MakeDepthView(*world.Render(2, PoseAbove(baseline_mu)), PoseAbove(baseline_mu));
     const auto depth_mu = SceneDepth(first, second);
-    ASSERT_TRUE(depth_mu) << way_mu;
-    EXPECT_NEAR(*depth_mu, 3, 0.5) << way_mu;
+    ASSERT_TRUE(depth_mu) << baseline_mu;
+    EXPECT_NEAR(*depth_mu, 3, 0.5) << baseline_mu;
   }
 }
 
@@ -33,7 +33,7 @@ TEST(SceneDepth, ReturnsNothingWithoutBaselineOrTexture) {
   EXPECT_FALSE(SceneDepth(MakeDepthView(*black, PoseAbove(0)), second));
 }
 
-TEST(SceneDepth, ADepthImageDeterminesItImmediately) {
+TEST(SceneDepth, UsesTheDepthImageIfThereIsOne) {
   const TexturedWorld world;
   auto frame = world.Render(1, PoseAbove(0));
   frame->depth_mu = world.RenderDepth(*frame);
@@ -42,7 +42,7 @@ TEST(SceneDepth, ADepthImageDeterminesItImmediately) {
   EXPECT_NEAR(*SceneDepth(view, view), 3, 0.01);
 }
 
-TEST(MakeDepthView, ABlurredFrameIsLessSharp) {
+TEST(MakeDepthView, BlurredFrameIsLessSharp) {
   const TexturedWorld world;
   auto frame = world.Render(1, PoseAbove(0));
   const double sharp = MakeDepthView(*frame, PoseAbove(0)).sharpness;

@@ -60,7 +60,7 @@ class SlamMapTest : public ::testing::Test {
   SlamMap map_{SlamConfig{}};
 };
 
-TEST_F(SlamMapTest, AFeatureObservesOnePointAndAKeyframeObservesAPointOnce) {
+TEST_F(SlamMapTest, RejectsASecondPointPerFeatureAndASecondFeaturePerPoint) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   PointTrack& first = AddPoint(3, {&a, &b});
@@ -70,7 +70,7 @@ TEST_F(SlamMapTest, AFeatureObservesOnePointAndAKeyframeObservesAPointOnce) {
   ExpectConsistent();
 }
 
-TEST_F(SlamMapTest, APointWithOneObservationLeftIsRemoved) {
+TEST_F(SlamMapTest, RemovesPointsWithOnlyOneObservationLeft) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   const MapPointId id = AddPoint(3, {&a, &b}).point.id;
@@ -106,7 +106,7 @@ TEST_F(SlamMapTest, CovisibilityCountsSharedPoints) {
   EXPECT_TRUE(map_.Covisible(b, 11).empty());
 }
 
-TEST_F(SlamMapTest, ARemovedKeyframeMovesWithItsParent) {
+TEST_F(SlamMapTest, RemovedKeyframeMovesWithItsParent) {
   MapKeyframe& a = AddKeyframe(0);
   MapKeyframe& b = AddKeyframe(1);
   b.parent = a.id;

@@ -127,7 +127,7 @@ TEST(SparseMapper, LabelsSeparateThePlateFromTheFloor) {
   EXPECT_LT(misplaced, 0.07 * plate_points);
 }
 
-TEST(SparseMapper, PointsGainObservationsAndAccuracy) {
+TEST(SparseMapper, MoreKeyframesGiveMoreObservationsAndAccuracy) {
   const TexturedWorld world;
   Mapper short_mapper;
   Mapper long_mapper;
@@ -215,7 +215,7 @@ TEST(SparseMapper, RespectsTheMaximumNumberOfPoints) {
   EXPECT_EQ(known.points.size(), mapper.points());
 }
 
-TEST(SparseMapper, AbsurdPoseDoesNotDamageTheMap) {
+TEST(SparseMapper, ImplausiblePoseDoesNotDamageTheMap) {
   const TexturedWorld world;
   Mapper mapper;
   MapOrbit(world, mapper, 4);

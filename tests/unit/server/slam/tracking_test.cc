@@ -1,4 +1,4 @@
-// Tracker and SparseMapper together, frame by frame on one thread, over a world with exact geometry.
+// Tracker and SparseMapper together, frame by frame on one thread, in a synthetic world.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ class TrackingTest : public ::testing::Test {
 
   std::shared_ptr<Frame> Render(int i) const { return world_.Render(static_cast<uint64_t>(i + 1), Pose(i)); }
 
-  TrackingState Feed(std::shared_ptr<Frame> frame) {
+  TrackingState ProcessFrame(std::shared_ptr<Frame> frame) {
     const TrackedImage image = tracker_->Track(frame);
     reason_ = image.tracked.reason;
     mapped_ = mapper_->Process(image);
@@ -55,12 +55,12 @@ class TrackingTest : public ::testing::Test {
     return state;
   }
 
-  // Feeds the frames 0..end-1 and returns the number of frames until initialization. Expects that tracking is not lost
-  // afterward.
-  int Follow(int end) {
+  // Processes the frames 0..end-1 and returns the number of frames until initialization. Expects that tracking is not
+  // lost afterward.
+  int ProcessFrames(int end) {
     int initializing = 0;
     for (int i = 0; i < end; ++i) {
-      const TrackingState state = Feed(Render(i));
+      const TrackingState state = ProcessFrame(Render(i));
       if (state == TrackingState::kInitializing && initializing == i) {
         ++initializing;
       } else {
@@ -135,49 +135,49 @@ class TrackingTest : public ::testing::Test {
 };
 
 TEST_F(TrackingTest, TracksFromImagesAlone) {
-  EXPECT_LT(Follow(90), 25);
+  EXPECT_LT(ProcessFrames(90), 25);
   const auto [worst, scale] = Error();
   EXPECT_LT(worst, 0.02);  // for a path of two units
   EXPECT_GT(map().keyframe_count(), 5U);
 }
 
-TEST_F(TrackingTest, StandingCameraWaitsAndReportsTheReason) {
+TEST_F(TrackingTest, StaticCameraReportsTooLittleParallax) {
   for (int i = 0; i < 8; ++i) {
     auto frame = Render(0);
     frame->frame_id = static_cast<uint64_t>(i + 1);
     frame->timestamp_ns = i * 33'000'000;
-    EXPECT_EQ(Feed(frame), TrackingState::kInitializing);
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kInitializing);
   }
   EXPECT_THAT(reason_, HasSubstr("too little parallax"));
   EXPECT_EQ(map().keyframe_count(), 0U);
 }
 
-TEST_F(TrackingTest, RotatingCameraWaitsAndReportsTheReason) {
+TEST_F(TrackingTest, RotatingCameraReportsTooLittleParallax) {
   for (int i = 0; i < 12; ++i) {
     const SE3<World, Camera> pose = TexturedWorld::LookAt({1.2, 0, 1.2}, {0.02 * i, 0.04 * i, 0});
-    EXPECT_EQ(Feed(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitializing) << i;
+    EXPECT_EQ(ProcessFrame(world_.Render(static_cast<uint64_t>(i + 1), pose)), TrackingState::kInitializing) << i;
   }
   EXPECT_THAT(reason_, HasSubstr("parallax"));
 }
 
-TEST_F(TrackingTest, RecoversFromACoveredLens) {
-  Follow(60);
+TEST_F(TrackingTest, RelocalizesAfterACoveredLens) {
+  ProcessFrames(60);
   const size_t keyframes = map().keyframe_count();
   for (int i = 60; i < 66; ++i) {
     auto frame = Render(i);
     frame->image_bgr.setTo(0);
-    EXPECT_EQ(Feed(frame), TrackingState::kLost);
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kLost);
     EXPECT_THAT(reason_, HasSubstr("texture"));
   }
   EXPECT_EQ(map().keyframe_count(), keyframes);
-  EXPECT_EQ(Feed(Render(66)), TrackingState::kRelocalized) << reason_;
-  EXPECT_EQ(Feed(Render(67)), TrackingState::kTracking) << reason_;
+  EXPECT_EQ(ProcessFrame(Render(66)), TrackingState::kRelocalized) << reason_;
+  EXPECT_EQ(ProcessFrame(Render(67)), TrackingState::kTracking) << reason_;
   EXPECT_EQ(resets_, 0);
   EXPECT_LT(Error().first, 0.02);
 }
 
 TEST_F(TrackingTest, RelocalizesAMovedCameraInTheSameMap) {
-  Follow(110);
+  ProcessFrames(110);
   // Unrelated images, then a much earlier pose, so that the last frames do not help.
   for (int i = 110; i < 113; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(i + 1), Pose(i));
@@ -185,12 +185,12 @@ TEST_F(TrackingTest, RelocalizesAMovedCameraInTheSameMap) {
     cv::RNG random(static_cast<uint64_t>(i));
     random.fill(noise, cv::RNG::UNIFORM, 0, 255);
     cv::GaussianBlur(noise, frame->image_bgr, {7, 7}, 0);
-    EXPECT_EQ(Feed(frame), TrackingState::kLost);
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kLost);
   }
   int relocalized_after = -1;
   for (int i = 0; i < 10 && relocalized_after < 0; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(120 + i), Pose(20 + i));
-    if (Feed(frame) == TrackingState::kRelocalized) relocalized_after = i;
+    if (ProcessFrame(frame) == TrackingState::kRelocalized) relocalized_after = i;
   }
   EXPECT_GE(relocalized_after, 0) << "not relocalized: " << reason_;
   EXPECT_LE(relocalized_after, 3);
@@ -199,16 +199,16 @@ TEST_F(TrackingTest, RelocalizesAMovedCameraInTheSameMap) {
 }
 
 TEST_F(TrackingTest, ResetsASmallMapAfterALongLoss) {
-  for (int i = 0; Feed(Render(i)) != TrackingState::kTracking; ++i) ASSERT_LT(i, 30) << reason_;
+  for (int i = 0; ProcessFrame(Render(i)) != TrackingState::kTracking; ++i) ASSERT_LT(i, 30) << reason_;
   for (int i = 0; i < 60; ++i) {
     auto frame = world_.Render(static_cast<uint64_t>(100 + i), Pose(0));
     frame->image_bgr.setTo(0);
-    Feed(frame);
+    ProcessFrame(frame);
   }
   EXPECT_EQ(resets_, 1);
   int tracked = 0;
   for (int i = 0; i < 40; ++i) {
-    tracked += Feed(world_.Render(static_cast<uint64_t>(200 + i), Pose(i))) == TrackingState::kTracking ? 1 : 0;
+    tracked += ProcessFrame(world_.Render(static_cast<uint64_t>(200 + i), Pose(i))) == TrackingState::kTracking ? 1 : 0;
   }
   EXPECT_GT(tracked, 15);
 }
@@ -217,7 +217,7 @@ TEST_F(TrackingTest, DepthGivesTheScaleFromTheFirstFrame) {
   for (int i = 0; i < 40; ++i) {
     auto frame = Render(i);
     frame->depth_mu = world_.RenderDepth(*frame);
-    const TrackingState state = Feed(frame);
+    const TrackingState state = ProcessFrame(frame);
     EXPECT_EQ(state, i == 0 ? TrackingState::kInitializing : TrackingState::kTracking) << i << ": " << reason_;
   }
   const auto [worst, scale] = Error();
@@ -230,7 +230,7 @@ TEST_F(TrackingTest, SameFramesGiveTheSamePoses) {
   for (int round = 0; round < 2; ++round) {
     Restart(PoseUse::kIgnore);
     frames_.clear();
-    for (int i = 0; i < 45; ++i) Feed(Render(i));
+    for (int i = 0; i < 45; ++i) ProcessFrame(Render(i));
     if (round == 0) {
       for (const TrackedPose& frame : frames_) first.push_back(frame.tracked.T_world_camera.Matrix());
     }
@@ -239,35 +239,35 @@ TEST_F(TrackingTest, SameFramesGiveTheSamePoses) {
   for (size_t i = 0; i < first.size(); ++i) EXPECT_EQ(first[i], frames_[i].tracked.T_world_camera.Matrix()) << i;
 }
 
-TEST_F(TrackingTest, GravityOfTheClientMakesZUp) {
+TEST_F(TrackingTest, ClientGravityAlignsZWithUp) {
   const Eigen::Vector3d down_world = -Eigen::Vector3d::UnitZ();
   for (int i = 0; i < 45; ++i) {
     auto frame = Render(i);
     frame->gravity_camera = frame->T_world_camera->rotation().conjugate() * down_world;
-    Feed(frame);
+    ProcessFrame(frame);
   }
   ASSERT_FALSE(frames_.empty());
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
 // The first camera looks down by 40 degrees and defines the map's up direction until objects show the support plane.
-TEST_F(TrackingTest, SupportPlaneMakesZUp) {
+TEST_F(TrackingTest, SupportPlaneAlignsZWithUp) {
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
     LabelTile(*frame);
-    Feed(frame);
+    ProcessFrame(frame);
   }
   mapper_->Finish();
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-TEST_F(TrackingTest, LateMasksMakeZUp) {
+TEST_F(TrackingTest, LateMasksAlignZWithUp) {
   std::deque<FrameMasks> late;
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
     LabelTile(*frame);
     late.push_back(TakeMasks(*frame));
-    Feed(frame);
+    ProcessFrame(frame);
     if (late.size() <= 15) continue;
     mapper_->ObserveMasks(late.front());
     late.pop_front();
@@ -278,13 +278,13 @@ TEST_F(TrackingTest, LateMasksMakeZUp) {
   EXPECT_LT(UpError_deg(), 0.5);
 }
 
-TEST_F(TrackingTest, MasksOfOtherFramesThanKeyframesMakeZUp) {
+TEST_F(TrackingTest, MasksOfNonKeyframesAlignZWithUp) {
   int keyframes_without = 0, others_with = 0;
   for (int i = 0; i < 60; ++i) {
     auto frame = Render(i);
     LabelTile(*frame);
     const FrameMasks masks = TakeMasks(*frame);
-    const TrackingState state = Feed(frame);
+    const TrackingState state = ProcessFrame(frame);
     if (state != TrackingState::kTracking || mapped_.view) {
       ++keyframes_without;
       continue;
@@ -302,7 +302,7 @@ TEST_F(TrackingTest, TracksFromImagesWhenGivenPosesStop) {
   Restart(PoseUse::kGiven);
   for (int i = 0; i < 40; ++i) {
     auto frame = Render(i);
-    EXPECT_EQ(Feed(frame), TrackingState::kTracking);
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
     EXPECT_EQ(mapped_.tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
   }
   for (int i = 40; i < 60; ++i) {
@@ -316,7 +316,7 @@ TEST_F(TrackingTest, TracksFromImagesWhenGivenPosesStop) {
     EXPECT_LT((mapped_.tracked.T_world_camera.translation() - truth.translation()).norm(), 0.02) << i;
   }
   auto frame = Render(60);
-  EXPECT_EQ(Feed(frame), TrackingState::kTracking);
+  EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
   EXPECT_EQ(mapped_.tracked.T_world_camera.Matrix(), frame->T_world_camera->Matrix());
 }
 
@@ -324,7 +324,7 @@ TEST_F(TrackingTest, ImagesCorrectPriors) {
   Restart(PoseUse::kPrior);
   std::mt19937_64 random(9);
   std::normal_distribution<double> noise(0, 0.01);
-  double of_priors = 0, of_tracking = 0;
+  double prior_error = 0, tracking_error = 0;
   for (int i = 0; i < 70; ++i) {
     auto frame = Render(i);
     const SE3<World, Camera> truth = *frame->T_world_camera;
@@ -334,10 +334,10 @@ TEST_F(TrackingTest, ImagesCorrectPriors) {
     mapped_ = mapper_->Process(image);
     EXPECT_EQ(image.tracked.state, TrackingState::kTracking) << i;
     if (i < 30) continue;
-    of_priors += off.norm();
-    of_tracking += (mapped_.tracked.T_world_camera.translation() - truth.translation()).norm();
+    prior_error += off.norm();
+    tracking_error += (mapped_.tracked.T_world_camera.translation() - truth.translation()).norm();
   }
-  EXPECT_LT(of_tracking, 0.7 * of_priors);
+  EXPECT_LT(tracking_error, 0.7 * prior_error);
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A thin book on a table, seen from all sides: few points of the table on one side of the book, many on the book's edge
-// on the other.
+// A thin book on a table, seen from all sides: few points of the table are on one side of the book, and many points
+// of the book's edge on the other.
 class WorldUpTest : public ::testing::Test {
  protected:
   static constexpr double kThickness_mu = 0.012;

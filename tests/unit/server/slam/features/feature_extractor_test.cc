@@ -15,7 +15,7 @@
 namespace romap::slam {
 namespace {
 
-size_t CountLabelled(const std::vector<Feature>& features) {
+size_t CountLabeled(const std::vector<Feature>& features) {
   return static_cast<size_t>(
       std::count_if(features.begin(), features.end(), [](const Feature& f) { return f.label != 0; }));
 }
@@ -31,31 +31,31 @@ TEST(FeatureExtractor, SpreadsFeaturesOverTheImage) {
   EXPECT_THAT(of_quarter, ::testing::Each(::testing::Gt(50)));
 }
 
-TEST(FeatureExtractor, AWeaklyTexturedObjectStillGetsFeatures) {
+TEST(FeatureExtractor, FindsFeaturesOnWeaklyTexturedObjects) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0), 0);
   cv::Mat faint;
   frame->image_bgr.convertTo(faint, -1, 0.12, 100);  // contrast below the scene's threshold
   faint.copyTo(frame->image_bgr, frame->labels > 0);
   SlamConfig config;
-  const size_t with_share = CountLabelled(FeatureExtractor(config).Extract(*frame));
+  const size_t with_object_features = CountLabeled(FeatureExtractor(config).Extract(*frame));
   config.object_features = 0;
-  const size_t without_share = CountLabelled(FeatureExtractor(config).Extract(*frame));
-  EXPECT_GT(with_share, 20);
-  EXPECT_GT(with_share, 3 * without_share);
+  const size_t without_object_features = CountLabeled(FeatureExtractor(config).Extract(*frame));
+  EXPECT_GT(with_object_features, 20);
+  EXPECT_GT(with_object_features, 3 * without_object_features);
 }
 
-TEST(FeatureExtractor, AFeatureOnTheMasksBorderHasNoLabel) {
+TEST(FeatureExtractor, FeaturesNearMaskBordersHaveNoLabel) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
   SlamConfig config;
   config.mask_erosion_px = 3;
   const std::vector<Feature> features = FeatureExtractor(config).Extract(*frame);
-  EXPECT_GT(CountLabelled(features), 20);
+  EXPECT_GT(CountLabeled(features), 20);
   for (const Feature& feature : features) {
-    const int reach = static_cast<int>(std::lround(3 * feature.octave_scale));
+    const int radius_px = static_cast<int>(std::lround(3 * feature.octave_scale));
     cv::Mat inner;
-    cv::erode(frame->labels, inner, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8UC1));
+    cv::erode(frame->labels, inner, cv::Mat::ones(2 * radius_px + 1, 2 * radius_px + 1, CV_8UC1));
     const int u = static_cast<int>(std::lround(feature.pixel_px.x()));
     const int v = static_cast<int>(std::lround(feature.pixel_px.y()));
     EXPECT_EQ(feature.label, inner.at<uint16_t>(v, u)) << u << " " << v;
@@ -74,7 +74,7 @@ TEST(FeatureExtractor, ReturnsTheRequestedNumber) {
   EXPECT_EQ(extractor.ExtractObjects(*frame, scene).size(), 3U);
 }
 
-TEST(FeatureExtractor, TheSameFrameGivesTheSameFeatures) {
+TEST(FeatureExtractor, IsDeterministic) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
   FeatureExtractor extractor{SlamConfig{}};
@@ -87,7 +87,7 @@ TEST(FeatureExtractor, TheSameFrameGivesTheSameFeatures) {
   }
 }
 
-TEST(FeatureExtractor, ABlackOrTinyImageHasNone) {
+TEST(FeatureExtractor, ReturnsNothingForBlackOrTinyImages) {
   const TexturedWorld world;
   auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
   frame->image_bgr.setTo(0);
@@ -95,12 +95,17 @@ TEST(FeatureExtractor, ABlackOrTinyImageHasNone) {
 
   const TexturedWorld tiny(16, 16);
   EXPECT_TRUE(FeatureExtractor(SlamConfig{}).Extract(*tiny.Render(1, TexturedWorld::OrbitPose(0))).empty());
-  const TexturedWorld small(48, 48);  // just large enough for the finest octave, too small for the coarse ones
-  FeatureExtractor(SlamConfig{}).Extract(*small.Render(1, TexturedWorld::OrbitPose(0)));
 }
 
-// The frame as a camera with this lens would have captured it.
-Frame SeenThrough(const CameraModel& source_camera, const Frame& pinhole) {
+TEST(FeatureExtractor, OmitsOctavesThatAreTooSmall) {
+  const TexturedWorld small(48, 48);  // large enough for the two finest octaves only
+  for (const Feature& feature : FeatureExtractor(SlamConfig{}).Extract(*small.Render(1, TexturedWorld::OrbitPose(0)))) {
+    EXPECT_LE(feature.octave, 1);
+  }
+}
+
+// The frame as captured by a camera with this lens.
+Frame CaptureThroughLens(const CameraModel& source_camera, const Frame& pinhole) {
   Frame frame = pinhole;
   frame.source_camera = source_camera;
   std::vector<Eigen::Vector2f> pixels_px;
@@ -127,26 +132,26 @@ Agreement Compare(const std::vector<Feature>& features, const std::vector<Featur
   Agreement agreement;
   for (const Feature& feature : features) {
     if (feature.octave > 1) continue;
-    const auto alike = std::min_element(others.begin(), others.end(), [&](const Feature& a, const Feature& b) {
+    const auto nearest = std::min_element(others.begin(), others.end(), [&](const Feature& a, const Feature& b) {
       return HammingDistance(a.descriptor, feature.descriptor) < HammingDistance(b.descriptor, feature.descriptor);
     });
-    if (alike == others.end() || HammingDistance(alike->descriptor, feature.descriptor) > 40) continue;
+    if (nearest == others.end() || HammingDistance(nearest->descriptor, feature.descriptor) > 40) continue;
     ++agreement.matches;
-    if ((alike->pixel_px - feature.pixel_px).norm() < feature.octave_scale) ++agreement.near;
+    if ((nearest->pixel_px - feature.pixel_px).norm() < feature.octave_scale) ++agreement.near;
   }
   return agreement;
 }
 
 class FeatureExtractorLens : public testing::TestWithParam<LensModel> {};
 
-TEST_P(FeatureExtractorLens, FeaturesAreWhereThePinholeCameraSeesThem) {
+TEST_P(FeatureExtractorLens, PositionsAgreeWithThePinholeImage) {
   const TexturedWorld world(640, 480);
   const auto pinhole = world.Render(1, TexturedWorld::OrbitPose(0), 0);
   CameraModel camera = world.camera();
   camera.lens = GetParam();
   camera.distortion = camera.lens == LensModel::kFisheye ? std::array<double, 5>{-0.02, 0.005, 0, 0, 0}
                                                          : std::array<double, 5>{-0.2, 0.04, 0.001, -0.001, 0};
-  const Frame distorted = SeenThrough(camera, *pinhole);
+  const Frame distorted = CaptureThroughLens(camera, *pinhole);
   FeatureExtractor extractor{SlamConfig{}};
   const std::vector<Feature> expected = extractor.ExtractScene(*pinhole);
   const std::vector<Feature> features = extractor.ExtractScene(distorted);
@@ -169,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(Lenses, FeatureExtractorLens,
                          testing::Values(LensModel::kRadialTangential, LensModel::kFisheye),
                          [](const auto& info) { return info.index == 0 ? "RadialTangential" : "Fisheye"; });
 
-TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
+TEST(FeatureExtractor, DropsFeaturesOutsideThePinholeImage) {
   const TexturedWorld world;
   Frame frame = *world.Render(1, TexturedWorld::OrbitPose(0));
   cv::cvtColor(frame.image_bgr, frame.source_gray, cv::COLOR_BGR2GRAY);
@@ -184,7 +189,7 @@ TEST(FeatureExtractor, WhatThePinholeImageDoesNotShowIsDropped) {
   }
 }
 
-TEST(FeatureExtractor, ObjectFeaturesRepeatNoSceneFeature) {
+TEST(FeatureExtractor, ObjectFeaturesDoNotRepeatSceneFeatures) {
   const TexturedWorld world;
   const auto frame = world.Render(1, TexturedWorld::OrbitPose(0));
   FeatureExtractor extractor{SlamConfig{}};
@@ -198,31 +203,31 @@ TEST(FeatureExtractor, ObjectFeaturesRepeatNoSceneFeature) {
   }
 }
 
-TEST(FeatureExtractor, TurnsItsAnglesAndPositionsWithTheImage) {
+TEST(FeatureExtractor, AnglesAndPositionsRotateWithTheImage) {
   const TexturedWorld world(400, 400);
   Frame frame = *world.Render(1, TexturedWorld::LookAt({0, 0, 2}, {0, 0, 0}), 0);
   FeatureExtractor extractor{SlamConfig{}};
   const std::vector<Feature> upright = extractor.ExtractScene(frame);
-  cv::Mat turned_bgr;
-  cv::rotate(frame.image_bgr, turned_bgr, cv::ROTATE_90_CLOCKWISE);
-  frame.image_bgr = turned_bgr;
-  std::vector<Feature> turned = extractor.ExtractScene(frame);
-  for (Feature& feature : turned) {
+  cv::Mat rotated_bgr;
+  cv::rotate(frame.image_bgr, rotated_bgr, cv::ROTATE_90_CLOCKWISE);
+  frame.image_bgr = rotated_bgr;
+  std::vector<Feature> rotated = extractor.ExtractScene(frame);
+  for (Feature& feature : rotated) {
     feature.pixel_px = {feature.pixel_px.y(), 399 - feature.pixel_px.x()};  // rotated back
   }
-  int same = 0, turned_along = 0, described_alike = 0;
+  int same = 0, rotated_equally = 0, similar_descriptors = 0;
   for (const Feature& feature : upright) {
-    for (const Feature& other : turned) {
+    for (const Feature& other : rotated) {
       if (other.octave != feature.octave || (other.pixel_px - feature.pixel_px).norm() > 0.5) continue;
       ++same;
-      const double turn_rad = std::remainder(other.angle_rad - feature.angle_rad, 2 * std::numbers::pi);
-      if (std::abs(turn_rad - std::numbers::pi / 2) < 0.1) ++turned_along;
-      if (HammingDistance(feature.descriptor, other.descriptor) < 30) ++described_alike;
+      const double rotation_rad = std::remainder(other.angle_rad - feature.angle_rad, 2 * std::numbers::pi);
+      if (std::abs(rotation_rad - std::numbers::pi / 2) < 0.1) ++rotated_equally;
+      if (HammingDistance(feature.descriptor, other.descriptor) < 30) ++similar_descriptors;
     }
   }
   EXPECT_GT(same, 300);
-  EXPECT_GT(turned_along, 0.95 * same);
-  EXPECT_GT(described_alike, 0.95 * same);
+  EXPECT_GT(rotated_equally, 0.95 * same);
+  EXPECT_GT(similar_descriptors, 0.95 * same);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace romap::slam {
 namespace {
 
-TEST(HammingDistance, CountsTheBitsThatDiffer) {
+TEST(HammingDistance, CountsDifferingBits) {
   std::mt19937_64 random(1);
   for (int round = 0; round < 200; ++round) {
     Descriptor a;
@@ -23,7 +23,7 @@ TEST(HammingDistance, CountsTheBitsThatDiffer) {
   }
 }
 
-TEST(HammingDistance, ReachesFromNothingToAllBits) {
+TEST(HammingDistance, IsZeroForEqualAnd256ForInvertedDescriptors) {
   const Descriptor zeros{};
   const Descriptor ones{~uint64_t{0}, ~uint64_t{0}, ~uint64_t{0}, ~uint64_t{0}};
   EXPECT_EQ(HammingDistance(zeros, zeros), 0);

@@ -23,15 +23,15 @@ cv::Mat SmoothNoise(uint64_t seed) {
   return image;
 }
 
-cv::Mat Turned(const cv::Mat& image, double angle_rad) {
-  cv::Mat turned;
+cv::Mat Rotate(const cv::Mat& image, double angle_rad) {
+  cv::Mat rotated;
   // OpenCV's angles are counterclockwise. Angles here are from x to y, which is clockwise.
-  const cv::Mat turn = cv::getRotationMatrix2D({kCenter_px, kCenter_px}, -angle_rad * 180 / std::numbers::pi, 1);
-  cv::warpAffine(image, turned, turn, image.size(), cv::INTER_CUBIC);
-  return turned;
+  const cv::Mat rotation = cv::getRotationMatrix2D({kCenter_px, kCenter_px}, -angle_rad * 180 / std::numbers::pi, 1);
+  cv::warpAffine(image, rotated, rotation, image.size(), cv::INTER_CUBIC);
+  return rotated;
 }
 
-TEST(BriefTests, AreDistinctAndWithinThePatchHoweverItIsTurned) {
+TEST(BriefTests, AreDistinctAndWithinThePatchAtAnyRotation) {
   std::set<std::tuple<int, int, int, int>> distinct;
   for (const BriefTest& test : BriefTests()) {
     EXPECT_LE(std::hypot(test.first_x_px, test.first_y_px), kPatchRadius_px);
@@ -58,13 +58,13 @@ TEST(IntensityCentroid, PointsToTheBrightSide) {
   }
 }
 
-TEST(IntensityCentroid, OfAnEvenPatchIsADirectionToo) {
+TEST(IntensityCentroid, UniformPatchHasTheDefaultDirection) {
   const PatchDirection direction = IntensityCentroid(cv::Mat(61, 61, CV_8UC1, cv::Scalar(90)), 30, 30);
   EXPECT_EQ(direction.cosine, 1);
   EXPECT_EQ(direction.sine, 0);
 }
 
-TEST(SteeredBrief, IsThePlainTestsForAnUprightPatch) {
+TEST(SteeredBrief, EqualsTheUnrotatedTestsForAnUprightPatch) {
   const cv::Mat image = SmoothNoise(1);
   const Descriptor descriptor = SteeredBrief(image, kCenter_px, kCenter_px, {1, 0});
   for (size_t i = 0; i < BriefTests().size(); ++i) {
@@ -75,18 +75,18 @@ TEST(SteeredBrief, IsThePlainTestsForAnUprightPatch) {
   }
 }
 
-TEST(SteeredBrief, HardlyChangesWhenTheImageTurnsAndMuchWhenItIsAnother) {
+TEST(SteeredBrief, IsInvariantToRotationAndDistinguishesImages) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const cv::Mat image = SmoothNoise(seed);
     const PatchDirection direction = IntensityCentroid(image, kCenter_px, kCenter_px);
     const Descriptor upright = SteeredBrief(image, kCenter_px, kCenter_px, direction);
     for (const double angle_rad : {0.3, 1.1, 2.5, -2.0}) {
-      const cv::Mat turned = Turned(image, angle_rad);
-      const PatchDirection turned_direction = IntensityCentroid(turned, kCenter_px, kCenter_px);
-      const double turn_rad =
-          std::atan2(turned_direction.sine, turned_direction.cosine) - std::atan2(direction.sine, direction.cosine);
-      EXPECT_NEAR(std::remainder(turn_rad - angle_rad, 2 * std::numbers::pi), 0, 0.1);
-      EXPECT_LT(HammingDistance(upright, SteeredBrief(turned, kCenter_px, kCenter_px, turned_direction)), 40);
+      const cv::Mat rotated = Rotate(image, angle_rad);
+      const PatchDirection rotated_direction = IntensityCentroid(rotated, kCenter_px, kCenter_px);
+      const double rotation_rad =
+          std::atan2(rotated_direction.sine, rotated_direction.cosine) - std::atan2(direction.sine, direction.cosine);
+      EXPECT_NEAR(std::remainder(rotation_rad - angle_rad, 2 * std::numbers::pi), 0, 0.1);
+      EXPECT_LT(HammingDistance(upright, SteeredBrief(rotated, kCenter_px, kCenter_px, rotated_direction)), 40);
     }
     const cv::Mat other = SmoothNoise(seed + 100);
     EXPECT_GT(HammingDistance(upright, SteeredBrief(other, kCenter_px, kCenter_px,

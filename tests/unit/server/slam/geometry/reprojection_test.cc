@@ -10,16 +10,16 @@ namespace {
 
 class ReprojectionGradient : public testing::TestWithParam<PoseObservation> {};
 
-TEST_P(ReprojectionGradient, AgreesWithDifferencesOfTheCost) {
+TEST_P(ReprojectionGradient, AgreesWithFiniteDifferences) {
   const CameraModel camera = TestCamera();
-  const CameraFromWorld pose{Turn(10, -20, 5).toRotationMatrix(), {0.1, -0.2, 0.4}};
+  const CameraFromWorld pose{RotationXyz(10, -20, 5).toRotationMatrix(), {0.1, -0.2, 0.4}};
   const auto linearize = [&](const CameraFromWorld& at) {
     PoseEquations equations;
     AddObservation(camera, at, GetParam(), equations);
     return equations;
   };
   ASSERT_GT(linearize(pose).cost, 0);
-  ExpectGradientOfCost<6>(linearize, Moved, pose);
+  ExpectGradientOfCost<6>(linearize, ApplyStep, pose);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -32,12 +32,12 @@ INSTANTIATE_TEST_SUITE_P(
         PoseObservation{
             .p_world = {-0.6, 0.5, 3.0}, .pixel_px = {80, 60}, .sigma_px = 2, .depth_mu = 2, .depth_sigma_mu = 0.1}));
 
-TEST(Reprojection, BehindTheCameraNothingAgrees) {
+TEST(Reprojection, PointBehindTheCameraHasInfiniteError) {
   const PoseObservation behind{.p_world = {0, 0, -1}, .pixel_px = {319.5, 239.5}};
   EXPECT_FALSE(std::isfinite(ErrorOf(TestCamera(), CameraFromWorld{}, behind).chi2));
 }
 
-TEST(Reprojection, ADepthWithoutDeviationIsNoDepth) {
+TEST(Reprojection, DepthRequiresAStandardDeviation) {
   EXPECT_FALSE(HasDepth({.depth_mu = 2, .depth_sigma_mu = 0}));
   EXPECT_FALSE(HasDepth({.depth_mu = 0, .depth_sigma_mu = 0.1}));
   EXPECT_TRUE(HasDepth({.depth_mu = 2, .depth_sigma_mu = 0.1}));

@@ -11,14 +11,14 @@
 namespace romap::slam {
 namespace {
 
-const Sim3<Camera, Camera> kTruth(1.6, Turn(12, -20, 5), {0.4, -0.1, 0.3});
+const Sim3<Camera, Camera> kTruth(1.6, RotationXyz(12, -20, 5), {0.4, -0.1, 0.3});
 
 struct Scene {
   CameraModel camera = TestCamera();
   std::vector<SimilarityMatch> matches;
 };
 
-// Points that both cameras see, with a position in the map of each camera. `depth_noise`: standard deviation of a
+// Points visible to both cameras, with a position in the map of each camera. `depth_noise`: standard deviation of a
 // position along its ray, as a share of the distance.
 Scene MakeScene(const Sim3<Camera, Camera>& S_first_second, int count, double depth_noise, double wrong_share,
                 uint64_t seed) {
@@ -28,7 +28,7 @@ Scene MakeScene(const Sim3<Camera, Camera>& S_first_second, int count, double de
     const Eigen::Vector2d second_px = noise.Pixel(scene.camera);
     const Eigen::Vector3d p_second = noise.Uniform(1, 4) * scene.camera.Unproject(second_px.x(), second_px.y());
     Eigen::Vector3d p_first = S_first_second * p_second;
-    if (!IsInPicture(scene.camera, p_first)) continue;
+    if (!IsInImage(scene.camera, p_first)) continue;
     Eigen::Vector2d first_px = scene.camera.Project(p_first);
     if (noise.Uniform(0, 1) < wrong_share) {
       first_px = noise.Pixel(scene.camera);
@@ -57,7 +57,7 @@ TEST(AlignPoints, FindsTheExactSimilarity) {
   EXPECT_LT((S->translation() - kTruth.translation()).norm(), 1e-9);
 }
 
-TEST(AlignPoints, AFixedScaleStaysOne) {
+TEST(AlignPoints, FixedScaleIsOne) {
   Noise noise(2);
   std::vector<Eigen::Vector3d> p_from;
   std::vector<Eigen::Vector3d> p_to;
@@ -71,7 +71,7 @@ TEST(AlignPoints, AFixedScaleStaysOne) {
   EXPECT_LT(AngleBetween_deg(S->rotation(), kTruth.rotation()), 1e-6);
 }
 
-TEST(AlignPoints, AMirrorImageDoesNotBecomeAReflection) {
+TEST(AlignPoints, MirroredPointsDoNotGiveAReflection) {
   Noise noise(3);
   std::vector<Eigen::Vector3d> p_from;
   std::vector<Eigen::Vector3d> p_to;
@@ -80,9 +80,8 @@ TEST(AlignPoints, AMirrorImageDoesNotBecomeAReflection) {
     p_to.push_back(p_from.back().cwiseProduct(Eigen::Vector3d(1, 1, -1)));
   }
   const auto alignment = AlignPointSets(p_from, p_to, false);
-  if (alignment) {
-    EXPECT_NEAR(alignment->rotation.determinant(), 1, 1e-9);
-  }
+  ASSERT_TRUE(alignment.has_value());
+  EXPECT_NEAR(alignment->rotation.determinant(), 1, 1e-9);
 }
 
 TEST(AlignPoints, RejectsPointsThatDoNotDetermineARotation) {
@@ -97,7 +96,7 @@ TEST(AlignPoints, RejectsPointsThatDoNotDetermineARotation) {
   EXPECT_TRUE((AlignPoints<Camera, Camera>(plane, plane, false)));
 }
 
-TEST(Similarity, StandsNoisyDepthsAndHalfWrongMatches) {
+TEST(Similarity, ToleratesNoisyDepthsAndHalfOutliers) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const Scene scene = MakeScene(kTruth, 150, 0.02, 0.5, seed);
     const auto estimate = SolveSimilarity(scene.camera, scene.matches, {});
@@ -110,7 +109,7 @@ TEST(Similarity, StandsNoisyDepthsAndHalfWrongMatches) {
   }
 }
 
-TEST(Similarity, AFixedScaleStaysOne) {
+TEST(Similarity, FixedScaleIsOne) {
   const Sim3<Camera, Camera> rigid(1, kTruth.rotation(), kTruth.translation());
   const Scene scene = MakeScene(rigid, 100, 0.01, 0.3, 7);
   const auto estimate = SolveSimilarity(scene.camera, scene.matches, {.fix_scale = true});
@@ -119,15 +118,15 @@ TEST(Similarity, AFixedScaleStaysOne) {
   EXPECT_LT(AngleBetween_deg(estimate->S_first_second.rotation(), kTruth.rotation()), 0.5);
 }
 
-TEST(Similarity, FindsNothingInRandomMatches) {
+TEST(Similarity, RejectsRandomMatches) {
   const Scene scene = MakeScene(kTruth, 150, 0.02, 1, 8);
   EXPECT_FALSE(SolveSimilarity(scene.camera, scene.matches, {}).has_value());
   EXPECT_FALSE(SolveSimilarity(scene.camera, {}, {}).has_value());
 }
 
-TEST(Similarity, RefinementComesBackFromAStartNearby) {
+TEST(Similarity, RefinementConvergesFromANearbyStart) {
   const Scene scene = MakeScene(kTruth, 200, 0, 0, 9);
-  const Sim3<Camera, Camera> start(1.005 * kTruth.scale(), Turn(0.2, 0, 0.1) * kTruth.rotation(),
+  const Sim3<Camera, Camera> start(1.005 * kTruth.scale(), RotationXyz(0.2, 0, 0.1) * kTruth.rotation(),
                                    kTruth.translation() + Eigen::Vector3d(0.005, 0, 0));
   const SimilarityEstimate estimate = RefineSimilarity(scene.camera, start, scene.matches, {});
   EXPECT_GT(estimate.inliers, 190);
@@ -136,7 +135,7 @@ TEST(Similarity, RefinementComesBackFromAStartNearby) {
   EXPECT_LT(AngleBetween_deg(estimate.S_first_second.rotation(), kTruth.rotation()), 0.1);
 }
 
-TEST(Similarity, TheSameSeedGivesTheSameResult) {
+TEST(Similarity, IsDeterministicForASeed) {
   const Scene scene = MakeScene(kTruth, 100, 0.02, 0.4, 10);
   const auto once = SolveSimilarity(scene.camera, scene.matches, {});
   const auto again = SolveSimilarity(scene.camera, scene.matches, {});
@@ -145,8 +144,8 @@ TEST(Similarity, TheSameSeedGivesTheSameResult) {
   EXPECT_EQ(once->inlier, again->inlier);
 }
 
-TEST(Similarity, GradientAgreesWithDifferencesOfTheCost) {
-  const Similarity near_truth{1.05 * kTruth.scale(), (Turn(1, -1, 2) * kTruth.rotation()).toRotationMatrix(),
+TEST(Similarity, GradientAgreesWithFiniteDifferences) {
+  const Similarity near_truth{1.05 * kTruth.scale(), (RotationXyz(1, -1, 2) * kTruth.rotation()).toRotationMatrix(),
                               kTruth.translation() + Eigen::Vector3d(0.02, 0.01, -0.03)};
   for (const double chi2_bound : {9.21, 1e6}) {  // beyond Huber's bound, within it
     const Scene scene = MakeScene(kTruth, 5, 0.01, 0, 11);
@@ -158,7 +157,7 @@ TEST(Similarity, GradientAgreesWithDifferencesOfTheCost) {
       }
       return equations;
     };
-    ExpectGradientOfCost<7>(linearize, MovedSimilarity, near_truth);
+    ExpectGradientOfCost<7>(linearize, ApplySimilarityStep, near_truth);
   }
 }
 

@@ -51,13 +51,14 @@ class Noise {
   std::mt19937_64 random_;
 };
 
-inline Eigen::Quaterniond Turn(double x_deg, double y_deg, double z_deg) {
+// Rotations about the x, y and z axes, multiplied in this order.
+inline Eigen::Quaterniond RotationXyz(double x_deg, double y_deg, double z_deg) {
   return Eigen::AngleAxisd(x_deg * kDegree, Eigen::Vector3d::UnitX()) *
          Eigen::AngleAxisd(y_deg * kDegree, Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(z_deg * kDegree, Eigen::Vector3d::UnitZ());
 }
 
-inline bool IsInPicture(const CameraModel& camera, const Eigen::Vector3d& p_camera) {
+inline bool IsInImage(const CameraModel& camera, const Eigen::Vector3d& p_camera) {
   if (p_camera.z() <= 0) return false;
   const Eigen::Vector2d pixel_px = camera.Project(p_camera);
   return pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() < camera.width_px && pixel_px.y() < camera.height_px;

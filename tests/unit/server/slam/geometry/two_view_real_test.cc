@@ -1,5 +1,5 @@
-// Two views of a real hand-held camera: synthetic noise does not cover motion blur, rolling shutter and repeated
-// texture.
+// Two views of a real hand-held camera, because synthetic noise does not include motion blur, rolling shutter and
+// repeated texture.
 
 #include <gtest/gtest.h>
 
@@ -76,7 +76,7 @@ std::vector<TwoViewMatch> Match(const View& first, const View& second) {
   return matches;
 }
 
-TEST(TwoViewReal, NoWrongMotionBetweenHandHeldFrames) {
+TEST(TwoViewReal, NeverReturnsAWrongMotionForHandHeldFrames) {
   const char* data_dir = std::getenv("ROMAP_DATA_DIR");
   if (data_dir == nullptr) GTEST_SKIP() << "ROMAP_DATA_DIR is not set";
   const std::filesystem::path sequence = std::filesystem::path(data_dir) / "redkitchen_600";

@@ -31,12 +31,12 @@ double RmsPoseErrorMu(const BundleWorld& world) {
   return std::sqrt(sum / static_cast<double>(world.true_poses.size()));
 }
 
-double RmsTurnRad(const BundleWorld& world) {
+double RmsRotationErrorRad(const BundleWorld& world) {
   double sum = 0;
   for (size_t i = 0; i < world.true_poses.size(); ++i) {
-    const double turn_rad =
+    const double error_rad =
         world.problem.cameras[i].T_world_camera.rotation().angularDistance(world.true_poses[i].rotation());
-    sum += turn_rad * turn_rad;
+    sum += error_rad * error_rad;
   }
   return std::sqrt(sum / static_cast<double>(world.true_poses.size()));
 }
@@ -62,7 +62,7 @@ bool Same(const BundleProblem& a, const BundleProblem& b) {
   return true;
 }
 
-TEST(BundleAdjustment, FindsTheExactWorldWithoutNoise) {
+TEST(BundleAdjustment, RecoversTheExactSceneWithoutNoise) {
   BundleWorldOptions options = NoisyStart();
   options.pixel_noise_px = 0;
   for (const bool dense : {false, true}) {
@@ -73,12 +73,12 @@ TEST(BundleAdjustment, FindsTheExactWorldWithoutNoise) {
     EXPECT_LT(summary.final_rms_px, 1e-3);
     EXPECT_EQ(summary.outliers, 0);
     EXPECT_LT(RmsPoseErrorMu(world), 1e-4);
-    EXPECT_LT(RmsTurnRad(world), 1e-4);
+    EXPECT_LT(RmsRotationErrorRad(world), 1e-4);
     EXPECT_LT(RmsPointErrorMu(world), 1e-4);
   }
 }
 
-TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
+TEST(BundleAdjustment, AccuracyMatchesTheNoise) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   const double pose_before_mu = RmsPoseErrorMu(world);
   const BundleSummary summary = AdjustBundle(world.problem, {.dense = true});
@@ -90,7 +90,7 @@ TEST(BundleAdjustment, ReachesTheAccuracyThatTheNoiseAllows) {
   EXPECT_LT(summary.outliers, 0.08 * static_cast<double>(world.problem.observations.size()));
   EXPECT_LT(RmsPoseErrorMu(world), 0.25 * pose_before_mu);
   EXPECT_LT(RmsPoseErrorMu(world), 0.008);
-  EXPECT_LT(RmsTurnRad(world), 0.003);
+  EXPECT_LT(RmsRotationErrorRad(world), 0.003);
   EXPECT_LT(RmsPointErrorMu(world), 0.02);
 }
 
@@ -151,7 +151,7 @@ TEST(BundleAdjustment, FixedParametersDoNotChange) {
   EXPECT_LT(RmsPoseErrorMu(world), 0.008);
 }
 
-TEST(BundleAdjustment, PointsThatOnlyFixedCamerasSeeStayAndAreJudged) {
+TEST(BundleAdjustment, PointsObservedOnlyByFixedCamerasStayAndAreClassified) {
   BundleWorldOptions options = NoisyStart();
   options.fixed_cameras = 6;
   BundleWorld world = MakeBundleWorld(options);
@@ -210,19 +210,19 @@ TEST(BundleAdjustment, IsDeterministic) {
   }
 }
 
-TEST(BundleAdjustment, DepthFindsTheScaleThatImagesCannot) {
+TEST(BundleAdjustment, DepthDeterminesTheScale) {
   BundleWorldOptions options = NoisyStart();
   options.fixed_cameras = 1;
   options.with_depth = true;
   BundleWorld world = MakeBundleWorld(options);
   // Everything except the fixed camera and the measured depths is scaled by 1.3.
-  const Eigen::Vector3d anchor = world.true_poses[0].translation();
+  const Eigen::Vector3d center_world = world.true_poses[0].translation();
   for (BundleCamera& camera : world.problem.cameras) {
     const SE3<World, Camera>& T = camera.T_world_camera;
-    camera.T_world_camera = {T.rotation(), anchor + 1.3 * (T.translation() - anchor)};
+    camera.T_world_camera = {T.rotation(), center_world + 1.3 * (T.translation() - center_world)};
   }
   for (BundlePoint& point : world.problem.points) {
-    point.position_world = anchor + 1.3 * (point.position_world - anchor);
+    point.position_world = center_world + 1.3 * (point.position_world - center_world);
   }
   const BundleSummary summary = AdjustBundle(world.problem, {.max_iterations = 30, .dense = true});
   EXPECT_TRUE(summary.usable);
@@ -230,7 +230,7 @@ TEST(BundleAdjustment, DepthFindsTheScaleThatImagesCannot) {
   EXPECT_LT(RmsPointErrorMu(world), 0.02);
 }
 
-TEST(BundleAdjustment, AWrongDepthIsAnOutlier) {
+TEST(BundleAdjustment, WrongDepthIsAnOutlier) {
   BundleWorldOptions options = NoisyStart();
   options.with_depth = true;
   BundleWorld world = MakeBundleWorld(options);
@@ -249,21 +249,21 @@ TEST(BundleAdjustment, PriorsFixTheGauge) {
   }
   ASSERT_TRUE(AdjustBundle(world.problem, {.dense = true}).usable);
   EXPECT_LT(RmsPoseErrorMu(world), 0.005);
-  EXPECT_LT(RmsTurnRad(world), 0.002);
+  EXPECT_LT(RmsRotationErrorRad(world), 0.002);
 }
 
-TEST(BundleAdjustment, ACameraWithOnlyAPriorMovesToThePrior) {
+TEST(BundleAdjustment, CameraWithOnlyAPriorMovesToThePrior) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
-  BundleCamera lonely;
-  lonely.T_world_camera = OrbitPose(2.0, 1);
-  lonely.prior = PosePrior{OrbitPose(2.1, 1), 0.01, 0.01};
-  world.problem.cameras.push_back(lonely);
+  BundleCamera unobserved;
+  unobserved.T_world_camera = OrbitPose(2.0, 1);
+  unobserved.prior = PosePrior{OrbitPose(2.1, 1), 0.01, 0.01};
+  world.problem.cameras.push_back(unobserved);
   ASSERT_TRUE(AdjustBundle(world.problem, {}).usable);
   const SE3<World, Camera>& reached = world.problem.cameras.back().T_world_camera;
   EXPECT_LT((reached.translation() - OrbitPose(2.1, 1).translation()).norm(), 1e-3);
 }
 
-TEST(BundleAdjustment, AnAbortBeforeTheStartChangesNothing) {
+TEST(BundleAdjustment, AbortBeforeTheStartChangesNothing) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   const BundleProblem before = world.problem;
   const std::atomic<bool> abort = true;
@@ -275,7 +275,7 @@ TEST(BundleAdjustment, AnAbortBeforeTheStartChangesNothing) {
 }
 
 // Whenever the abort arrives, the result is consistent and no worse than the start.
-TEST(BundleAdjustment, AnAbortKeepsTheBestResult) {
+TEST(BundleAdjustment, AbortKeepsTheBestResult) {
   BundleWorldOptions options = NoisyStart();
   options.cameras = 30;
   options.points = 1000;
@@ -303,7 +303,7 @@ TEST(BundleAdjustment, FewIterationsKeepTheBestSoFar) {
   EXPECT_LT(summary.final_rms_px, 0.5 * summary.initial_rms_px);
 }
 
-TEST(BundleAdjustment, NonFiniteInputIsIgnored) {
+TEST(BundleAdjustment, IgnoresInvalidInput) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   BundleWorld world = MakeBundleWorld(NoisyStart());
   BundleProblem clean = world.problem;
@@ -325,23 +325,24 @@ TEST(BundleAdjustment, NonFiniteInputIsIgnored) {
   add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
   problem.points.push_back({Eigen::Vector3d(100, 0, 0), false});  // behind the camera
   add([&](BundleObservation& observation) { observation.point = static_cast<int>(problem.points.size()) - 1; });
-  BundleCamera broken;
-  broken.T_world_camera = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(nan, 0, 0)};
-  broken.prior = PosePrior{};
-  problem.cameras.push_back(broken);
+  BundleCamera invalid_camera;
+  invalid_camera.T_world_camera = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(nan, 0, 0)};
+  invalid_camera.prior = PosePrior{};
+  problem.cameras.push_back(invalid_camera);
   add([&](BundleObservation& observation) { observation.camera = static_cast<int>(problem.cameras.size()) - 1; });
   problem.cameras[5].prior = PosePrior{problem.cameras[5].T_world_camera, 0, nan};
 
   ASSERT_TRUE(AdjustBundle(clean, {.dense = true}).usable);
-  const size_t sound = clean.observations.size();
+  const size_t valid_observations = clean.observations.size();
   ASSERT_TRUE(AdjustBundle(problem, {.dense = true}).usable);
   for (size_t i = 0; i < clean.cameras.size(); ++i) {
     EXPECT_EQ(problem.cameras[i].T_world_camera.translation(), clean.cameras[i].T_world_camera.translation()) << i;
   }
-  for (size_t i = sound; i < problem.observations.size(); ++i) EXPECT_TRUE(problem.observations[i].outlier) << i;
+  for (size_t i = valid_observations; i < problem.observations.size(); ++i)
+    EXPECT_TRUE(problem.observations[i].outlier) << i;
 }
 
-TEST(BundleAdjustment, NothingToDoIsNotUsable) {
+TEST(BundleAdjustment, IsNotUsableIfThereIsNothingToOptimize) {
   BundleProblem empty;
   EXPECT_FALSE(AdjustBundle(empty, {}).usable);
   empty.camera = BundleWorldCamera();
@@ -354,11 +355,11 @@ TEST(BundleAdjustment, NothingToDoIsNotUsable) {
   EXPECT_FALSE(AdjustBundle(all_fixed.problem, {}).usable);
   EXPECT_TRUE(Same(all_fixed.problem, before));
 
-  BundleWorld blind = MakeBundleWorld(NoisyStart());
-  blind.problem.camera.fx_px = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(AdjustBundle(blind.problem, {}).usable);
-  BundleWorld idle = MakeBundleWorld(NoisyStart());
-  EXPECT_FALSE(AdjustBundle(idle.problem, {.max_iterations = 0}).usable);
+  BundleWorld invalid_focal_length = MakeBundleWorld(NoisyStart());
+  invalid_focal_length.problem.camera.fx_px = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(AdjustBundle(invalid_focal_length.problem, {}).usable);
+  BundleWorld no_iterations = MakeBundleWorld(NoisyStart());
+  EXPECT_FALSE(AdjustBundle(no_iterations.problem, {.max_iterations = 0}).usable);
 }
 
 TEST(BundleAdjustment, IgnoresPointsBehindTheCamera) {

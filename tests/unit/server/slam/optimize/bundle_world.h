@@ -25,7 +25,7 @@ struct BundleWorldOptions {
   double pose_noise_mu = 0;        // of the start, per axis, before `scale`
   double point_noise_mu = 0;       // of the start, per axis, before `scale`
   double outlier_share = 0;        // share of the observations that are at random pixels
-  bool with_depth = false;         // observations carry depth
+  bool with_depth = false;         // observations include depth
   double depth_noise_mu = 0.01;    // before `scale`
   unsigned seed = 1;
 };
@@ -50,12 +50,12 @@ inline CameraModel BundleWorldCamera() {
 
 // At `angle_rad` on a circle of radius 3 in the xy plane, looking at its center.
 inline SE3<World, Camera> OrbitPose(double angle_rad, double scale) {
-  const Eigen::Vector3d outwards(std::cos(angle_rad), std::sin(angle_rad), 0);
+  const Eigen::Vector3d outward(std::cos(angle_rad), std::sin(angle_rad), 0);
   Eigen::Matrix3d R;
-  R.col(2) = -outwards;
+  R.col(2) = -outward;
   R.col(1) = -Eigen::Vector3d::UnitZ();
   R.col(0) = R.col(1).cross(R.col(2));
-  return {R, 3 * scale * outwards};
+  return {R, 3 * scale * outward};
 }
 
 class BundleWorldMaker {

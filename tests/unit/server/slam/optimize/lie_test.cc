@@ -45,7 +45,7 @@ Eigen::Matrix4d MatrixOf(const Sim3<Camera, Camera>& S) {
   return matrix;
 }
 
-TEST(Lie, ExponentialOfSimilaritiesIsThatOfTheirGenerator) {
+TEST(Lie, ExpSim3AgreesWithTheMatrixExponential) {
   for (const Sim3Vector& v : Samples()) {
     const Eigen::Matrix4d expected = ExpByDefinition(v);
     EXPECT_LT((MatrixOf(ExpSim3<Camera>(v)) - expected).cwiseAbs().maxCoeff(), 1e-11 * expected.cwiseAbs().maxCoeff())
@@ -53,7 +53,7 @@ TEST(Lie, ExponentialOfSimilaritiesIsThatOfTheirGenerator) {
   }
 }
 
-TEST(Lie, LogarithmUndoesTheExponential) {
+TEST(Lie, LogIsTheInverseOfExp) {
   for (const Sim3Vector& v : Samples()) {
     EXPECT_LT((LogSim3(ExpSim3<Camera>(v)) - v).norm(), 1e-11 * (1e-3 + v.norm())) << v.transpose();
     const Eigen::Vector3d w = v.head<3>();
@@ -61,12 +61,12 @@ TEST(Lie, LogarithmUndoesTheExponential) {
   }
 }
 
-TEST(Lie, LogarithmOfAHalfTurnIsOfLengthPi) {
+TEST(Lie, LogOfAHalfTurnHasLengthPi) {
   const Eigen::Quaterniond half_turn(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d(1, 2, -2) / 3));
   EXPECT_NEAR(LogRotation(half_turn).norm(), std::numbers::pi, 1e-12);
 }
 
-TEST(Lie, SmallIncrementsKeepTheirDigits) {
+TEST(Lie, SmallIncrementsKeepFullPrecision) {
   const Sim3Vector v = 1e-12 * (Sim3Vector() << 1, 2, 3, 4, 5, 6, 7).finished();
   const Sim3<Camera, Camera> S = ExpSim3<Camera>(v);
   EXPECT_LT((S.rotation().vec() - 0.5 * v.head<3>()).norm(), 1e-24);
@@ -95,7 +95,7 @@ TEST(Lie, RightJacobiansMatchFiniteDifferences) {
   }
 }
 
-TEST(Lie, AdjointMovesAnIncrementToTheOtherSide) {
+TEST(Lie, AdjointConvertsRightToLeftIncrements) {
   const Sim3Vector v = (Sim3Vector() << 0.1, 0.2, -0.3, 0.4, -0.5, 0.6, 0.2).finished();
   const Sim3<World, Camera> S(1.7, ExpRotation({0.3, 1.1, -0.8}), {2, -1, 3});
   const Eigen::Vector3d p_camera(0.3, -0.4, 2);

@@ -71,7 +71,7 @@ TEST(RelativePoseCost, JacobiansMatchFiniteDifferences) {
   }
 }
 
-TEST(PoseGraph, ALoopSpreadsDriftInPoseAndScale) {
+TEST(PoseGraph, LoopDistributesDriftOfPoseAndScale) {
   Loop loop = MakeLoop(100, kDrift);
   const double before_mu = RmsErrorMu(loop);
   ASSERT_GT(before_mu, 0.1);
@@ -82,7 +82,7 @@ TEST(PoseGraph, ALoopSpreadsDriftInPoseAndScale) {
   EXPECT_LT(RmsErrorMu(loop), 0.1 * before_mu) << before_mu;
 }
 
-TEST(PoseGraph, WithFixedScaleScalesStayAndPosesImprove) {
+TEST(PoseGraph, FixedScaleKeepsScalesAndImprovesPoses) {
   // Only errors that a rigid loop can reveal: longer steps would only make a larger circle.
   const Sim3Vector drift = (Sim3Vector() << 0, 0, 0.002, 0, 0, 0.001, 0).finished();
   Loop loop = MakeLoop(100, drift);
@@ -93,7 +93,7 @@ TEST(PoseGraph, WithFixedScaleScalesStayAndPosesImprove) {
   EXPECT_LT(RmsErrorMu(loop), 0.1 * before_mu) << before_mu;
 }
 
-TEST(PoseGraph, FixedNodesDoNotMoveAtAll) {
+TEST(PoseGraph, FixedNodesDoNotMove) {
   Loop loop = MakeLoop(50, kDrift);
   loop.nodes[20].fixed = true;
   const std::vector<PoseGraphNode> before = loop.nodes;

@@ -8,7 +8,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr BundleOptions kThorough{.max_iterations = 30, .function_tolerance = 1e-6};
+constexpr BundleOptions kManyIterations{.max_iterations = 30, .function_tolerance = 1e-6};
 
 BundleWorldOptions NoisyStart(double pixel_noise_px) {
   BundleWorldOptions options;
@@ -25,14 +25,14 @@ TEST(RadialCorrection, DistortAndUndistortAreInverse) {
   const CameraModel model = BundleWorldCamera();
   for (const double k1 : {-0.1, 0.0, 0.05}) {
     const RadialCorrection lens{k1};
-    for (const Eigen::Vector2d& seen_px :
+    for (const Eigen::Vector2d& observed_px :
          {Eigen::Vector2d(0, 0), Eigen::Vector2d(320, 240), Eigen::Vector2d(600, 90)}) {
-      EXPECT_LT((lens.Distort(model, lens.Undistort(model, seen_px)) - seen_px).norm(), 0.02) << k1;
+      EXPECT_LT((lens.Distort(model, lens.Undistort(model, observed_px)) - observed_px).norm(), 0.02) << k1;
     }
   }
 }
 
-TEST(RadialCorrection, BundleAdjustmentFindsTheLensOfThePictures) {
+TEST(RadialCorrection, BundleAdjustmentEstimatesTheDistortion) {
   for (const bool with_depth : {false, true}) {
     BundleWorldOptions options = NoisyStart(0.1);
     options.with_depth = with_depth;
@@ -41,10 +41,10 @@ TEST(RadialCorrection, BundleAdjustmentFindsTheLensOfThePictures) {
     for (BundleObservation& observation : world.problem.observations) {
       observation.pixel_px = lens.Distort(world.problem.camera, observation.pixel_px);
     }
-    BundleWorld blind = world;
-    const BundleSummary without = AdjustBundle(blind.problem, kThorough);
+    BundleWorld without_lens = world;
+    const BundleSummary without = AdjustBundle(without_lens.problem, kManyIterations);
     world.problem.lens = BundleLens{.sigma = 1};
-    const BundleSummary with = AdjustBundle(world.problem, kThorough);
+    const BundleSummary with = AdjustBundle(world.problem, kManyIterations);
     ASSERT_TRUE(with.usable);
     EXPECT_NEAR(world.problem.lens->correction.k1, -0.1, 0.02);
     EXPECT_LT(with.outliers, without.outliers);
@@ -53,21 +53,21 @@ TEST(RadialCorrection, BundleAdjustmentFindsTheLensOfThePictures) {
 
 // Noise contains no information about the lens. An error measured in the corrected image would cause that image to
 // shrink.
-TEST(RadialCorrection, BundleAdjustmentFindsNoLensWhereThereIsNone) {
+TEST(RadialCorrection, BundleAdjustmentEstimatesNoDistortionFromNoise) {
   BundleWorld world = MakeBundleWorld(NoisyStart(1));
   world.problem.lens = BundleLens{};
-  ASSERT_TRUE(AdjustBundle(world.problem, kThorough).usable);
+  ASSERT_TRUE(AdjustBundle(world.problem, kManyIterations).usable);
   EXPECT_NEAR(world.problem.lens->correction.k1, 0, 0.015);
 }
 
 // A prior with a small sigma keeps k1 near 0 although the observations are distorted.
-TEST(RadialCorrection, ATightPriorDominates) {
+TEST(RadialCorrection, TightPriorDominates) {
   BundleWorld world = MakeBundleWorld(NoisyStart(1));
   for (BundleObservation& observation : world.problem.observations) {
     observation.pixel_px = RadialCorrection{-0.1}.Distort(world.problem.camera, observation.pixel_px);
   }
   world.problem.lens = BundleLens{.sigma = 1e-4};
-  ASSERT_TRUE(AdjustBundle(world.problem, kThorough).usable);
+  ASSERT_TRUE(AdjustBundle(world.problem, kManyIterations).usable);
   EXPECT_NEAR(world.problem.lens->correction.k1, 0, 0.001);
 }
 

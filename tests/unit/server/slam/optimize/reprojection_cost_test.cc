@@ -13,9 +13,9 @@ namespace {
 
 // A camera away from its start, so that the Jacobians of the increment matter, and a point in its view.
 struct PointView {
-  explicit PointView(const Eigen::Vector3d& p_camera, double turn_rad = 0.7)
+  explicit PointView(const Eigen::Vector3d& p_camera, double rotation_rad = 0.7)
       : camera(SE3<World, Camera>(ExpRotation({0.4, -0.9, 1.3}), {0.5, -0.2, 0.8})) {
-    camera.increment = {turn_rad, -0.5 * turn_rad, 0.3 * turn_rad, 0.2, -0.1, 0.15};
+    camera.increment = {rotation_rad, -0.5 * rotation_rad, 0.3 * rotation_rad, 0.2, -0.1, 0.15};
     camera.Refresh();
     Eigen::Map<Eigen::Vector3d>(point.data()) = camera.Pose() * p_camera;
   }
@@ -36,14 +36,14 @@ TEST(ReprojectionCost, IsThePixelErrorInSigmas) {
 }
 
 TEST(ReprojectionCost, JacobiansMatchFiniteDifferences) {
-  for (const double turn_rad : {0.0, 1e-6, 0.02, 0.7, 2.0}) {
-    PointView view({0.3, -0.2, 1.5}, turn_rad);
+  for (const double rotation_rad : {0.0, 1e-6, 0.02, 0.7, 2.0}) {
+    PointView view({0.3, -0.2, 1.5}, rotation_rad);
     const ReprojectionCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1.7);
     ExpectJacobiansMatch(cost, view.Parameters(), [&] { view.camera.Refresh(); });
   }
 }
 
-TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
+TEST(ReprojectionCost, PointBehindTheCameraHasALargeConstantResidual) {
   PointView view({0.3, -0.2, -1.5});
   const ReprojectionCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1);
   Eigen::Vector2d residual;
@@ -56,12 +56,12 @@ TEST(ReprojectionCost, APointBehindTheCameraCostsButDoesNotFail) {
   EXPECT_TRUE(by_point.isZero());
 }
 
-TEST(LensedCost, IsTheErrorInThePictureThatTheLensGives) {
+TEST(LensedCost, IsTheErrorInTheDistortedImage) {
   PointView view({0.6, -0.4, 1.5});
   const CameraModel model = BundleWorldCamera();
   double k1 = -0.1;
-  const Eigen::Vector2d seen_px = RadialCorrection{k1}.Distort(model, model.Project({0.6, -0.4, 1.5}));
-  const Eigen::Vector2d pixel_px = seen_px + Eigen::Vector2d(3, -4);
+  const Eigen::Vector2d observed_px = RadialCorrection{k1}.Distort(model, model.Project({0.6, -0.4, 1.5}));
+  const Eigen::Vector2d pixel_px = observed_px + Eigen::Vector2d(3, -4);
   const ReprojectionCost inner(model, &view.camera, pixel_px, 2);
   const LensedCost<ReprojectionCost> cost(model, pixel_px, 2, &inner);
   std::vector<double*> parameters = view.Parameters();
@@ -97,14 +97,14 @@ TEST(ReprojectionDepthCost, AddsTheErrorOfInverseDepthInSigmas) {
 }
 
 TEST(ReprojectionDepthCost, JacobiansMatchFiniteDifferences) {
-  for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
-    PointView view({0.3, -0.2, 1.5}, turn_rad);
+  for (const double rotation_rad : {0.0, 0.02, 0.7, 2.0}) {
+    PointView view({0.3, -0.2, 1.5}, rotation_rad);
     const ReprojectionDepthCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1.7, 1.4, 0.001);
     ExpectJacobiansMatch(cost, view.Parameters(), [&] { view.camera.Refresh(); });
   }
 }
 
-TEST(ReprojectionDepthCost, APointBehindTheCameraCostsButDoesNotFail) {
+TEST(ReprojectionDepthCost, PointBehindTheCameraHasALargeConstantResidual) {
   PointView view({0.3, -0.2, -1.5});
   const ReprojectionDepthCost cost(BundleWorldCamera(), &view.camera, {400, 200}, 1, 1.4, 0.05);
   Eigen::Vector3d residual;
@@ -131,8 +131,8 @@ TEST(PosePriorCost, IsTheDistanceInSigmas) {
 }
 
 TEST(PosePriorCost, JacobianMatchesFiniteDifferences) {
-  for (const double turn_rad : {0.0, 0.02, 0.7, 2.0}) {
-    PointView view({0, 0, 1}, turn_rad);
+  for (const double rotation_rad : {0.0, 0.02, 0.7, 2.0}) {
+    PointView view({0, 0, 1}, rotation_rad);
     PosePrior prior;
     prior.T_world_camera = SE3<World, Camera>(ExpRotation({0.5, -0.8, 1.2}), {0.4, -0.1, 0.7});
     prior.rotation_sigma_rad = 0.03;
@@ -142,7 +142,7 @@ TEST(PosePriorCost, JacobianMatchesFiniteDifferences) {
   }
 }
 
-TEST(CameraState, PoseAgreesWithWhatTheCostsRead) {
+TEST(CameraState, PoseAgreesWithTheCachedMatrices) {
   const PointView view({0, 0, 1});
   const SE3<World, Camera> pose = view.camera.Pose();
   EXPECT_LT((pose.RotationMatrix().transpose() - view.camera.R_camera_world).norm(), 1e-12);

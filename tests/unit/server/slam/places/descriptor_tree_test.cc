@@ -33,7 +33,7 @@ class DescriptorTreeTest : public ::testing::Test {
   DescriptorTree::Search search_;
 };
 
-TEST_F(DescriptorTreeTest, KeepsEveryEntryAndFindsItInItsNearestLeaf) {
+TEST_F(DescriptorTreeTest, FindsEveryEntryInItsNearestLeaf) {
   DescriptorTree tree(1);
   std::vector<Descriptor> descriptors;
   for (uint32_t i = 0; i < 5000; ++i) {
@@ -45,7 +45,7 @@ TEST_F(DescriptorTreeTest, KeepsEveryEntryAndFindsItInItsNearestLeaf) {
   for (uint32_t i = 0; i < 5000; i += 97) EXPECT_TRUE(OwnersIn(tree, descriptors[i], 1).contains(i)) << i;
 }
 
-TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbors) {
+TEST_F(DescriptorTreeTest, SearchingMoreLeavesFindsMoreNeighbors) {
   DescriptorTree tree(1);
   std::vector<Descriptor> descriptors;
   for (uint32_t i = 0; i < 5000; ++i) {
@@ -56,12 +56,12 @@ TEST_F(DescriptorTreeTest, MoreLeavesFindMoreOfTheNeighbors) {
   int found_in_one = 0;
   int found_in_three = 0;
   for (uint32_t i = 0; i < 500; ++i) {
-    Descriptor seen_again = descriptors[i];
-    for (uint64_t& word : seen_again) {
+    Descriptor noisy = descriptors[i];
+    for (uint64_t& word : noisy) {
       for (int bit = 0; bit < 64; ++bit) word ^= uint64_t{flipped(random_)} << bit;
     }
-    found_in_one += OwnersIn(tree, seen_again, 1).contains(i);
-    found_in_three += OwnersIn(tree, seen_again, 3).contains(i);
+    found_in_one += OwnersIn(tree, noisy, 1).contains(i);
+    found_in_three += OwnersIn(tree, noisy, 3).contains(i);
   }
   EXPECT_GT(found_in_one, 200);  // a random leaf would contain 20
   EXPECT_GT(found_in_three, found_in_one + 20);
@@ -74,12 +74,12 @@ TEST_F(DescriptorTreeTest, HandlesEqualDescriptors) {
   EXPECT_EQ(OwnersIn(tree, same, 1).size(), 3000u);
 }
 
-TEST_F(DescriptorTreeTest, RemovesOwners) {
+TEST_F(DescriptorTreeTest, RemovesEntriesByOwner) {
   DescriptorTree tree(1);
-  const Descriptor somewhere = Draw();
+  const Descriptor query = Draw();
   for (uint32_t i = 0; i < 2000; ++i) tree.Insert({Draw(), i % 4});
   tree.RemoveOwners(std::vector<uint8_t>{0, 1, 0, 1});
-  const auto owners = OwnersIn(tree, somewhere, kAllLeaves);
+  const auto owners = OwnersIn(tree, query, kAllLeaves);
   EXPECT_EQ(owners.count(0), 500u);
   EXPECT_EQ(owners.count(1), 0u);
   EXPECT_EQ(owners.count(2), 500u);

@@ -50,7 +50,7 @@ class PlaceIndexTest : public ::testing::Test {
   std::mt19937_64 random_{11};
 };
 
-TEST_F(PlaceIndexTest, AnEmptyIndexReturnsNothing) {
+TEST_F(PlaceIndexTest, EmptyIndexReturnsNothing) {
   PlaceIndex index;
   EXPECT_THAT(index.Query(MakePlace(100), 3), IsEmpty());
   index.Remove(KeyframeId{7});
@@ -74,7 +74,7 @@ TEST_F(PlaceIndexTest, FindsAPlaceFromAnotherView) {
   }
 }
 
-TEST_F(PlaceIndexTest, RanksViewsByWhatTheyShare) {
+TEST_F(PlaceIndexTest, RanksViewsBySharedFeatures) {
   PlaceIndex index;
   AddPlaces(index, 20);
   const auto place = MakePlace(300);
@@ -89,7 +89,7 @@ TEST_F(PlaceIndexTest, RanksViewsByWhatTheyShare) {
   EXPECT_THAT(index.Query(place, 0), IsEmpty());
 }
 
-TEST_F(PlaceIndexTest, ScoreOfTheSamePictureIsOneAndOfAStrangerAboutZero) {
+TEST_F(PlaceIndexTest, SameImageScoresAboutOneAndUnrelatedImageAboutZero) {
   PlaceIndex index;
   const auto places = AddPlaces(index, 20);
   const auto matches = index.Query(places[4], 2);
@@ -97,23 +97,23 @@ TEST_F(PlaceIndexTest, ScoreOfTheSamePictureIsOneAndOfAStrangerAboutZero) {
   EXPECT_EQ(matches[0].keyframe, KeyframeId{5});
   EXPECT_GT(matches[0].score, 0.95);
   EXPECT_LE(matches[0].score, 1.0);
-  for (const PlaceMatch& stranger : index.Query(MakePlace(300), 3)) EXPECT_LT(stranger.score, 0.01);
+  for (const PlaceMatch& match : index.Query(MakePlace(300), 3)) EXPECT_LT(match.score, 0.01);
 }
 
 TEST_F(PlaceIndexTest, CommonFeaturesHaveLowWeight) {
   PlaceIndex index;
-  const auto everywhere = MakePlace(200);  // for example a logo in every image
+  const auto common_features = MakePlace(200);  // for example a logo in every image
   std::vector<std::vector<Feature>> places;
   for (uint64_t i = 1; i <= 30; ++i) {
     places.push_back(MakePlace(40));
     auto features = View(places.back(), 1, 0.05);
     // The queried place shows the logo least clearly. Ranked only by the number of similar features, it would be last.
-    const auto logo = View(everywhere, i == 3 ? 0.5 : 1, 0.02);
+    const auto logo = View(common_features, i == 3 ? 0.5 : 1, 0.02);
     features.insert(features.end(), logo.begin(), logo.end());
     index.Add(KeyframeId{i}, features);
   }
   auto query = View(places[2], 1, 0.05);
-  query.insert(query.end(), everywhere.begin(), everywhere.end());
+  query.insert(query.end(), common_features.begin(), common_features.end());
   const auto matches = index.Query(query, 30);
   ASSERT_FALSE(matches.empty());
   EXPECT_EQ(matches[0].keyframe, KeyframeId{3});
@@ -152,7 +152,7 @@ TEST_F(PlaceIndexTest, RemovedKeyframesAreNotReturned) {
   }
 }
 
-TEST_F(PlaceIndexTest, AddingAgainReplaces) {
+TEST_F(PlaceIndexTest, AddingAKeyframeAgainReplacesItsFeatures) {
   PlaceIndex index;
   const auto places = AddPlaces(index, 10);
   const auto moved = MakePlace(300);
@@ -163,7 +163,7 @@ TEST_F(PlaceIndexTest, AddingAgainReplaces) {
   for (const PlaceMatch& match : index.Query(places[3], 10)) EXPECT_NE(match.keyframe, KeyframeId{4});
 }
 
-TEST_F(PlaceIndexTest, MemoryFollowsTheKeyframesThatAreThere) {
+TEST_F(PlaceIndexTest, MemoryDoesNotGrowWithRemovedKeyframes) {
   PlaceIndex index;
   AddPlaces(index, 40);
   const size_t full_bytes = index.bytes();
