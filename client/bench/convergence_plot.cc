@@ -43,8 +43,8 @@ struct LogAxis {
   int from_px, to_px;
 
   int Pixel(double value) const {
-    const double share = std::log(std::clamp(value, low, high) / low) / std::log(high / low);
-    return from_px + static_cast<int>(std::lround(share * (to_px - from_px)));
+    const double fraction = std::log(std::clamp(value, low, high) / low) / std::log(high / low);
+    return from_px + static_cast<int>(std::lround(fraction * (to_px - from_px)));
   }
   // The products of `digits` and powers of ten within the axis.
   std::vector<double> Ticks(std::initializer_list<int> digits) const {
@@ -157,7 +157,7 @@ cv::Mat DrawConvergence(const PaperResults& results) {
     cv::line(picture, at, at + cv::Point(30, 0), ColorOf(i), 3, cv::LINE_AA);
     Write(picture, TitleOf(results, order[i]), at + cv::Point(40, 5));
   }
-  Write(picture, "x: results of the paper on an RTX 4090, drawn at 2 s per object as stated for its own method",
+  Write(picture, "x: results of the paper on an RTX 4090, plotted at the 2 s per object that it reports",
         {kLeft_px, kPanelHeight_px + kLegendHeight_px - 14}, 0.45);
   return picture;
 }

@@ -35,15 +35,15 @@ class HullField : public FieldSampler {
 
   float ValueAt(const Eigen::Vector3f& p_object) const {
     constexpr float kSlack = 1e-5f;  // tolerance for points on the faces of the box
-    const Eigen::Array3f share = (p_object + half_extents_).array() / (2 * half_extents_.array());
-    if (!((share >= -kSlack).all() && (share <= 1 + kSlack).all())) return kOutside;
-    const Eigen::Array3f at = share * static_cast<float>(hull_.resolution) - 0.5f;  // in cells; centers are at integers
+    const Eigen::Array3f p_box = (p_object + half_extents_).array() / (2 * half_extents_.array());
+    if (!((p_box >= -kSlack).all() && (p_box <= 1 + kSlack).all())) return kOutside;
+    const Eigen::Array3f at = p_box * static_cast<float>(hull_.resolution) - 0.5f;  // in cells; centers are at integers
     const Eigen::Array3i low = at.floor().cast<int>();
-    const Eigen::Array3f part = at - low.cast<float>();
+    const Eigen::Array3f fraction = at - low.cast<float>();
     float value = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Array3i step(corner & 1, corner >> 1 & 1, corner >> 2);
-      const Eigen::Array3f weight = (step == 1).select(part, 1 - part);
+      const Eigen::Array3f weight = (step == 1).select(fraction, 1 - fraction);
       value += weight.prod() * Cell(low.x() + step.x(), low.y() + step.y(), low.z() + step.z());
     }
     return value;

@@ -143,17 +143,17 @@ absl::StatusOr<std::vector<CurvePoint>> MethodRunner::Curve(const MethodRun& run
                                                             const std::vector<Trained>& trained) const {
   std::vector<CurvePoint> curve;
   for (size_t mark = 0; mark < std::size(kMarks_s); ++mark) {
-    std::vector<Trained> then = trained;
+    std::vector<Trained> at_mark = trained;
     bool any = false;
     double train_s = 0;
-    for (Trained& one : then) {  // objects that finished earlier keep their final state
+    for (Trained& one : at_mark) {  // objects that finished earlier keep their final state
       const bool reached = mark < one.at_marks.size();
       if (reached) one.snapshot = one.at_marks[mark];
       any |= reached;
-      train_s += (reached ? kMarks_s[mark] : one.row.train_s) / static_cast<double>(then.size());
+      train_s += (reached ? kMarks_s[mark] : one.row.train_s) / static_cast<double>(at_mark.size());
     }
     if (!any) break;
-    ROMAP_ASSIGN_OR_RETURN(const Evaluation point, Evaluate(run, then, kMarks_s[mark], scratch_dir_));
+    ROMAP_ASSIGN_OR_RETURN(const Evaluation point, Evaluate(run, at_mark, kMarks_s[mark], scratch_dir_));
     if (!point.quality) continue;
     curve.push_back({run.method.id, train_s, point.quality->accuracy_cm, point.quality->completion_cm});
   }

@@ -104,7 +104,8 @@ absl::StatusOr<BenchMethod> ParseMethod(const std::string& text) {
     return std::isalnum(c) != 0 || c == '_' || c == '-';
   });
   if (colon == std::string::npos || !good_id) {
-    return InvalidArgument("row '{}': expected 'NAME: nerf.field=value ..', NAME of letters, digits, - and _", text);
+    return InvalidArgument(
+        "row '{}': expected 'NAME: nerf.field=value ..', where NAME has only letters, digits, - and _", text);
   }
   BenchMethod method{.id = id, .title = id};
   std::istringstream settings(text.substr(colon + 1));

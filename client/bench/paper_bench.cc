@@ -158,10 +158,10 @@ class PaperBench {
     run.limits_s.push_back(options_.cap_s);
     run.with_curve = first && table.id == "1" && method.trained;
     if (first) run.keep_dir = options_.out_dir + "/meshes/" + method.id;
-    const double share =
+    const double fraction =
         static_cast<double>(methods_done_) / static_cast<double>(methods_ * static_cast<size_t>(results_.runs_planned));
     const auto report = [&](const std::string& object) {
-      progress_(share, fmt::format("seed {}, subset {}: {}, {}", seed, subset, method.id, object));
+      progress_(fraction, fmt::format("seed {}, subset {}: {}, {}", seed, subset, method.id, object));
     };
     ROMAP_ASSIGN_OR_RETURN(const MethodOutcome outcome, runner_.Run(run, report, stop_));
     results_.evaluations.insert(results_.evaluations.end(), outcome.evaluations.begin(), outcome.evaluations.end());

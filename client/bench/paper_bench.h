@@ -18,7 +18,7 @@ struct PaperBenchOptions {
   int threads = 2;
   BenchClock clock = BenchClock::kCpu;
   std::vector<double> times_s = {1, 5};  // training times at which the quality is measured, ascending
-  double cap_s = 20;                     // maximal training time of one object
+  double cap_s = 20;                     // maximum training time of one object
   std::vector<std::string> tables = {"1", "4", "ablation"};
   std::vector<std::string> methods = {};       // ids; empty = all
   std::vector<std::string> settings = {};      // "section.field=value" for all methods, which may override them
@@ -33,7 +33,7 @@ PaperBenchOptions Quick(PaperBenchOptions options);
 // paper.md, paper.json and convergence.png to out_dir after each run (seed and subset), and the meshes of the first run
 // to out_dir/meshes/METHOD/objects.
 //
-// Calls `progress` with the completed share (0..1) and a description of the next step. Polls `stop`; if it returns
+// Calls `progress` with the completed fraction (0..1) and a description of the next step. Polls `stop`; if it returns
 // true, returns the partial results, with fewer runs done than planned. INVALID_ARGUMENT: invalid options, settings or
 // sequence. Otherwise as Sequence::Open and WriteFile. Errors of single objects are reported in the results.
 absl::StatusOr<PaperResults> RunPaperBench(const PaperBenchOptions& options,

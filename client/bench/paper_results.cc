@@ -12,9 +12,9 @@ namespace {
 void Spread(const std::vector<const Evaluation*>& chosen, double PublishedQuality::*figure, MethodMean& mean) {
   double sum = 0, squares = 0;
   for (const Evaluation* e : chosen) sum += (*e->quality).*figure;
-  const double n = static_cast<double>(chosen.size()), middle = sum / n;
-  for (const Evaluation* e : chosen) squares += std::pow((*e->quality).*figure - middle, 2);
-  mean.quality.*figure = middle;
+  const double n = static_cast<double>(chosen.size()), average = sum / n;
+  for (const Evaluation* e : chosen) squares += std::pow((*e->quality).*figure - average, 2);
+  mean.quality.*figure = average;
   mean.spread.*figure = chosen.size() > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
 }
 

@@ -86,8 +86,8 @@ std::string Table1(const PaperResults& r) {
     text += fmt::format("\n### After at most {:g} s of training per object\n\n{}", limit_s,
                         QualityTable(r, *table, limit_s));
   }
-  text +=
-      fmt::format("\n### At the end of the plan, or after {:g} s\n\n{}", r.cap_s, QualityTable(r, *table, kToTheEnd_s));
+  text += fmt::format("\n### At the end of the training plan, or after {:g} s\n\n{}", r.cap_s,
+                      QualityTable(r, *table, kToTheEnd_s));
   return text;
 }
 
@@ -184,12 +184,12 @@ std::string Settings(const PaperResults& r) {
 std::string ToMarkdown(const PaperResults& r) {
   std::string text = fmt::format(
       "# romap compared with the tables of the paper\n\n{}: {} objects, {} frames per subset; means over {} of {} runs "
-      "(seeds x subsets) ± standard deviation. Poses, masks and cuboids are the true ones. The figures are the means "
-      "of "
-      "`romap eval` for the surface that some camera saw.\n\nTraining time is per object, measured by {}. \"peak\" is "
+      "(seeds x subsets) ± standard deviation. Poses, masks and cuboids are ground truth. The figures are the means "
+      "of `romap eval` over the surface that was visible to at least one camera.\n\nTraining time is per object, "
+      "measured by {}. \"peak\" is "
       "this time multiplied by the peak multiply-add rate of the machine, {:.0f} GFLOP/s on {} threads, measured "
-      "between "
-      "the runs; it is comparable between machines. The figures of the paper were measured on an RTX 4090, with poses "
+      "between the runs; it is comparable between machines. The figures of the paper were measured on an RTX 4090, "
+      "with poses "
       "from its SLAM and meshes aligned with the truth by ICP: accuracy / completion / < 0.4 cm / < 1 cm.\n\n",
       r.sequence, r.objects, r.frames_per_subset, r.runs_done, r.runs_planned, ClockText(r), FmaPeak(r), r.threads);
   text += Table1(r) + Table3(r) + Table4(r) + Ablation(r) + Curves(r) + Settings(r);

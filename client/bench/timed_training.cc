@@ -35,8 +35,8 @@ absl::StatusOr<double> ProbeSecondsPerStep(const TrainingRequest& request) {
 }
 
 int StepsUntil(double target_s, double now_s, double seconds_per_step) {
-  const double left_s = std::clamp(target_s - now_s, 0.0, kLongestSlice_s);
-  return std::max(1, static_cast<int>(left_s / std::max(seconds_per_step, 1e-7)));
+  const double remaining_s = std::clamp(target_s - now_s, 0.0, kLongestSlice_s);
+  return std::max(1, static_cast<int>(remaining_s / std::max(seconds_per_step, 1e-7)));
 }
 
 }  // namespace
@@ -47,9 +47,9 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
   }
   TimedTraining result;
   nerf::NerfConfig config = request.config;
-  const double fitting = request.limit_s / std::max(seconds_per_step, 1e-7);
-  if (fitting < config.full_budget_steps) {
-    config.full_budget_steps = std::max(1, static_cast<int>(fitting));
+  const double affordable_steps = request.limit_s / std::max(seconds_per_step, 1e-7);
+  if (affordable_steps < config.full_budget_steps) {
+    config.full_budget_steps = std::max(1, static_cast<int>(affordable_steps));
     result.limited = true;
   }
   Stopwatch setup(request.clock, request.threads), training(request.clock, request.threads);
@@ -59,9 +59,9 @@ absl::StatusOr<TimedTraining> TrainWithin(const TrainingRequest& request, double
     if (request.stop && request.stop()) return absl::CancelledError("interrupted");
     const double target_s =
         marked() ? std::min(request.limit_s, request.marks_s[result.at_marks.size()]) : request.limit_s;
-    const uint64_t left = field.AllowedSteps(true) - field.steps();
+    const uint64_t remaining = field.AllowedSteps(true) - field.steps();
     const int steps = StepsUntil(target_s, training.total_s(), seconds_per_step);
-    const int slice = static_cast<int>(std::min<uint64_t>(left, static_cast<uint64_t>(steps)));
+    const int slice = static_cast<int>(std::min<uint64_t>(remaining, static_cast<uint64_t>(steps)));
     const nerf::TrainStats stats = training.Time([&] { return field.Train(slice, request.threads); });
     if (stats.steps == 0) break;  // no pixels to train on
     result.stats.Append(stats);

@@ -30,7 +30,7 @@ absl::Status RunBench(const Options& options) {
   ROMAP_ASSIGN_OR_RETURN(
       const bench::PaperResults results,
       bench::RunPaperBench(
-          bench, [&](double share, const std::string& text) { progress.Show(share, text); }, Interrupted));
+          bench, [&](double fraction, const std::string& text) { progress.Show(fraction, text); }, Interrupted));
   progress.Done();
   fmt::print("{}\nreport: {}/paper.md and paper.json\n", bench::ToMarkdown(results), bench.out_dir);
   if (results.runs_done == results.runs_planned) return absl::OkStatus();
@@ -38,15 +38,16 @@ absl::Status RunBench(const Options& options) {
       fmt::format("interrupted after {} of {} runs; wrote a partial report", results.runs_done, results.runs_planned));
 }
 
-void AddPaperPart(CLI::App& app, Command* chosen) {
+void AddPaperSubcommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<Options>();
   bench::PaperBenchOptions& bench = options->bench;
   CLI::App* command = app.add_subcommand(
-      "paper", "Reproduce Tables 1, 3 and 4, an ablation and the convergence plot (Fig. 8) of the paper");
+      "paper",
+      "Reproduce Tables 1, 3 and 4 and the convergence plot (Fig. 8) of the RO-MAP paper, and run an ablation");
   command->add_option("sequence", bench.sequence_dir, "Sequence folder with objects.yaml and gt/")->required();
   command->add_option("--out", bench.out_dir, "Output folder for paper.md, paper.json, convergence.png and meshes")
       ->required();
-  command->add_flag("--quick", options->quick, "Only one seed, one subset, the default method and the visual hull");
+  command->add_flag("--quick", options->quick, "Run only one seed, one subset, the default method and the visual hull");
   command->add_option("--seeds", bench.seeds, "Number of trainings per object, each with a different seed")
       ->capture_default_str();
   command->add_option("--subsets", bench.subsets, "Number of frame subsets; subset k starts at frame k")
@@ -69,7 +70,7 @@ void AddPaperPart(CLI::App& app, Command* chosen) {
       ->delimiter(',')
       ->check(CLI::IsMember({"1", "4", "ablation"}))
       ->capture_default_str();
-  command->add_option("--methods", bench.methods, "Only these methods, by ID")->delimiter(',');
+  command->add_option("--methods", bench.methods, "Run only the methods with these IDs")->delimiter(',');
   command
       ->add_option("--set", bench.settings,
                    "Configuration value for all methods, section.field=value; methods may override it; repeatable")
@@ -84,7 +85,7 @@ void AddPaperPart(CLI::App& app, Command* chosen) {
 void AddBenchCommand(CLI::App& app, Command* chosen) {
   CLI::App* command = app.add_subcommand("bench", "Run benchmarks");
   command->require_subcommand(1);
-  AddPaperPart(*command, chosen);
+  AddPaperSubcommand(*command, chosen);
 }
 
 }  // namespace romap::cli

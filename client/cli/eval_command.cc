@@ -24,20 +24,20 @@ absl::Status Show(const absl::StatusOr<Report>& report, const std::string& json_
   return files::WriteFile(json_path, ToJson(*report).dump(1) + "\n");
 }
 
-CLI::App* AddPart(CLI::App& app, const char* name, const char* help, std::string* json_path) {
+CLI::App* AddSubcommand(CLI::App& app, const char* name, const char* help, std::string* json_path) {
   CLI::App* command = app.add_subcommand(name, help);
   command->add_option("--json", *json_path, "Also write the results to this JSON file");
   return command;
 }
 
-void AddRunPart(CLI::App& app, Command* chosen) {
+void AddMapSubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     std::string out, sequence, json;
     bool poses_estimated = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      AddPart(app, "map", "Compare the output of romap run with the ground truth of its sequence", &options->json);
+  CLI::App* command = AddSubcommand(app, "map", "Compare the output of romap run with the ground truth of its sequence",
+                                    &options->json);
   command->add_option("map", options->out, "Output folder of romap run")->required();
   command->add_option("sequence", options->sequence, "Folder of the sequence")->required();
   command->add_flag("--poses-estimated", options->poses_estimated,
@@ -53,7 +53,7 @@ void AddRunPart(CLI::App& app, Command* chosen) {
   });
 }
 
-void AddObjectsPart(CLI::App& app, Command* chosen) {
+void AddObjectsSubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     eval::ObjectsEvalOptions eval;
     std::string json;
@@ -61,45 +61,46 @@ void AddObjectsPart(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<Options>();
   eval::ObjectsEvalOptions& eval = options->eval;
   CLI::App* command =
-      AddPart(app, "objects", "Measure accuracy, completion and completion ratio of meshes", &options->json);
+      AddSubcommand(app, "objects", "Measure accuracy, completion and completion ratio of meshes", &options->json);
   command->add_option("--pred", eval.predicted_dir, "Folder of predicted meshes")->required();
   command->add_option("--gt", eval.ground_truth_dir, "Folder of ground-truth surfaces")->required();
   command->add_option("--align", eval.alignment, "Alignment of each object by ICP: none, se3 or sim3 (default)")
       ->transform(CLI::CheckedTransformer(kAlignments));
   command->add_option("--threshold-cm", eval.thresholds_cm, "Thresholds of the completion ratio [cm]");
-  command->add_option("--est-traj", eval.estimated_trajectory, "Estimated trajectory in the world of the meshes");
+  command->add_option("--est-traj", eval.estimated_trajectory,
+                      "Estimated trajectory in the coordinate frame of the meshes");
   command->add_option("--gt-traj", eval.true_trajectory, "Ground-truth trajectory");
   command->add_option("--dataset", eval.dataset_dir,
                       "Sequence with masks and depth that determines which predicted points were visible");
-  command->add_flag("--no-cap", eval.no_cap, "Ignore ground-truth points that were inferred, not measured");
+  command->add_flag("--no-cap", eval.no_cap, "Ignore ground-truth points that were inferred instead of measured");
   command->add_option("--samples", eval.samples, "Number of samples per mesh")->capture_default_str();
   command->callback(
       [options, chosen] { *chosen = [options] { return Show(eval::EvaluateObjects(options->eval), options->json); }; });
 }
 
-void AddBoxesPart(CLI::App& app, Command* chosen) {
+void AddBoxesSubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     eval::BoxesEvalOptions eval;
     std::string json;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddPart(app, "boxes", "Measure 3D IoU, center and yaw errors of cuboids", &options->json);
+  CLI::App* command = AddSubcommand(app, "boxes", "Measure 3D IoU, center and yaw errors of cuboids", &options->json);
   command->add_option("--pred", options->eval.predicted, "Predicted cuboids (cuboids.json)")->required();
   command->add_option("--gt", options->eval.ground_truth, "Ground-truth cuboids (objects.yaml)")->required();
   command->add_option("--est-traj", options->eval.estimated_trajectory,
-                      "Estimated trajectory in the world of the cuboids");
+                      "Estimated trajectory in the coordinate frame of the cuboids");
   command->add_option("--gt-traj", options->eval.true_trajectory, "Ground-truth trajectory");
   command->callback(
       [options, chosen] { *chosen = [options] { return Show(eval::EvaluateBoxes(options->eval), options->json); }; });
 }
 
-void AddTrajectoryPart(CLI::App& app, Command* chosen) {
+void AddTrajectorySubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     eval::TrajectoryEvalOptions eval;
     std::string json;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddPart(app, "trajectory", "Measure the absolute trajectory error", &options->json);
+  CLI::App* command = AddSubcommand(app, "trajectory", "Measure the absolute trajectory error", &options->json);
   command->add_option("--est", options->eval.estimated, "Estimated trajectory, TUM format")->required();
   command->add_option("--gt", options->eval.ground_truth, "Ground-truth trajectory, TUM format")->required();
   command->add_option("--align", options->eval.alignment, "Alignment of the trajectories: none, se3 or sim3 (default)")
@@ -114,10 +115,10 @@ void AddTrajectoryPart(CLI::App& app, Command* chosen) {
 void AddEvalCommand(CLI::App& app, Command* chosen) {
   CLI::App* command = app.add_subcommand("eval", "Compare a map, meshes, cuboids or a trajectory with ground truth");
   command->require_subcommand(1);
-  AddRunPart(*command, chosen);
-  AddObjectsPart(*command, chosen);
-  AddBoxesPart(*command, chosen);
-  AddTrajectoryPart(*command, chosen);
+  AddMapSubcommand(*command, chosen);
+  AddObjectsSubcommand(*command, chosen);
+  AddBoxesSubcommand(*command, chosen);
+  AddTrajectorySubcommand(*command, chosen);
 }
 
 }  // namespace romap::cli

@@ -41,7 +41,7 @@ absl::StatusOr<cv::Mat> LoadImage(const files::Sequence& sequence, size_t index)
   cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
   if (image.empty()) return InvalidArgument("frame {}: cannot decode the image", index);
   if (!sequence.camera().HasDistortion()) return image;
-  // The map projects to undistorted images.
+  // The poses and cuboids of the map refer to undistorted images.
   const UndistortionMaps maps = MakeUndistortionMaps(sequence.camera());
   cv::Mat undistorted;
   cv::remap(image, undistorted, maps.xy, maps.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);

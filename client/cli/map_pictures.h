@@ -10,7 +10,7 @@
 
 namespace romap::cli {
 
-// Writes images to `dir`/pictures: <id>_<class>.png shows the mesh of each object next to its best view, map.png shows
+// Writes images to `dir`/pictures: <id>_<class>.png shows the mesh of each object beside its best view, map.png shows
 // the whole map from above, and cuboids_<n>.jpg are those of WriteCuboidPictures. `trajectory` has the camera poses of
 // the mapped frames. Errors as Sequence::Load and WriteFile.
 absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& sequence,

@@ -17,7 +17,7 @@ class MaskSchedule {
     MasksInput masks;
   };
 
-  // `rate_hz`: maximal rate of frames with masks; 0 = unlimited. `delay_s`: delay of the masks; 0 = send with the
+  // `rate_hz`: maximum rate of frames with masks; 0 = unlimited. `delay_s`: delay of the masks; 0 = send with the
   // frame.
   MaskSchedule(double rate_hz, double delay_s) : rate_hz_(rate_hz), delay_s_(delay_s) {}
 

@@ -29,12 +29,12 @@ void Progress::Show(double fraction, const std::string& text) {
   fraction = std::clamp(fraction, 0.0, 1.0);
   const int filled = static_cast<int>(fraction * kBarWidth);
   const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
-  std::string left;
+  std::string remaining;
   if (fraction > 0.02 && fraction < 1) {
     const double elapsed_s = std::chrono::duration<double>(now - start_).count();
-    left = fmt::format(", {:.0f} s left", elapsed_s * (1 - fraction) / fraction);
+    remaining = fmt::format(", {:.0f} s left", elapsed_s * (1 - fraction) / fraction);
   }
-  const std::string line = fmt::format("{} [{}] {:3.0f} %  {}{}", title_, bar, 100 * fraction, text, left);
+  const std::string line = fmt::format("{} [{}] {:3.0f} %  {}{}", title_, bar, 100 * fraction, text, remaining);
   fmt::print(stderr, "{}{}{}", terminal_ ? "\r\x1b[2K" : "", line, terminal_ ? "" : "\n");
   std::fflush(stderr);
   shown_ = true;

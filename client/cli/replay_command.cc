@@ -29,11 +29,11 @@ struct ReplayOptions {
   ServiceOptions service;
 };
 
-// Share of the progress bar for the frames; the remainder is for training.
-constexpr double kFrameShare = 0.6;
+// Fraction of the progress bar for the frames; the remainder is for training.
+constexpr double kFrameFraction = 0.6;
 
-// Sends all records and waits until the map is finished. Ignores the events, because the map is exported afterwards.
-absl::Status Feed(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
+// Sends all records and waits until the map is finished. Discards the events, because the map is exported afterwards.
+absl::Status SendRecords(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto stream, service.OpenMap(session_id));
   Progress progress("replaying");
   for (size_t i = 0; i < recording.size() && !Interrupted(); ++i) {
@@ -45,7 +45,7 @@ absl::Status Feed(const wire::Recording& recording, MappingService& service, con
     }
     while (stream->Next(std::chrono::milliseconds(0))) {
     }
-    progress.Show(kFrameShare * static_cast<double>(i) / static_cast<double>(recording.size()),
+    progress.Show(kFrameFraction * static_cast<double>(i) / static_cast<double>(recording.size()),
                   fmt::format("record {}/{}", i + 1, recording.size()));
   }
   if (Interrupted()) return absl::CancelledError("interrupted; no files were written");
@@ -53,7 +53,7 @@ absl::Status Feed(const wire::Recording& recording, MappingService& service, con
   while (!stream->Done() && !Interrupted()) {
     const std::optional<MapEvent> event = stream->Next(std::chrono::milliseconds(50));
     if (const auto* statistics = event ? std::get_if<Statistics>(&*event) : nullptr) {
-      progress.Show(kFrameShare + (1 - kFrameShare) * statistics->training_progress,
+      progress.Show(kFrameFraction + (1 - kFrameFraction) * statistics->training_progress,
                     fmt::format("{} objects in training", statistics->objects_training));
     }
   }
@@ -62,7 +62,7 @@ absl::Status Feed(const wire::Recording& recording, MappingService& service, con
   return stream->status();
 }
 
-// No times and no memory: two replays of one file agree in all of it.
+// Omits times and memory use, so that two replays of the same file write identical bytes.
 nlohmann::json ToJson(const wire::Recording& recording, const Statistics& statistics,
                       const std::vector<MapObject>& objects, const std::vector<std::string>& faults) {
   nlohmann::json list = nlohmann::json::array();
@@ -107,7 +107,7 @@ absl::Status RunReplay(ReplayOptions options) {
   }
   options.service.local = true;
   if (!options.threads) {
-    // Inserted in front, so that the user's settings take precedence.
+    // Inserted first, so that the user's settings take precedence.
     options.service.settings.insert(options.service.settings.begin(),
                                     {"session.single_thread=true", "nerf.training_threads=0"});
   }
@@ -115,7 +115,7 @@ absl::Status RunReplay(ReplayOptions options) {
   SessionOptions session = recording.options();
   session.mode = FrameMode::kReplay;  // the recording contains no dropped frames
   ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service->CreateSession(session));
-  ROMAP_RETURN_IF_ERROR(Feed(recording, *service, info.id));
+  ROMAP_RETURN_IF_ERROR(SendRecords(recording, *service, info.id));
   ROMAP_ASSIGN_OR_RETURN(const MapSnapshot snapshot, service->ExportMap(info.id));
   return WriteResult(options, recording, snapshot);
 }

@@ -103,8 +103,8 @@ absl::Status RunSequence(const RunOptions& options) {
 void AddInputOptions(RunOptions* options, CLI::App* command) {
   command
       ->add_option("--poses", options->poses,
-                   "Use of the camera poses of the sequence: given (exact), prior (initial values for tracking, which "
-                   "corrects them) or none (the camera is tracked from the images only)")
+                   "Use of the camera poses of the sequence: given (exact), prior (initial values, corrected by "
+                   "tracking) or none (the camera is tracked from the images only)")
       ->transform(CLI::CheckedTransformer(kPoseUses))
       ->option_text("given|prior|none [given]");
   command

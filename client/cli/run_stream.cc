@@ -22,8 +22,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
 constexpr std::chrono::seconds kMaxAckWait{5};
 constexpr double kTrainingAfterInterrupt_s = 3;
-// Share of the progress bar for the frames; the remainder is for training.
-constexpr double kFrameShare = 0.6;
+// Fraction of the progress bar for the frames; the remainder is for training.
+constexpr double kFrameFraction = 0.6;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -107,7 +107,7 @@ class Run {
   Run(const files::Sequence& sequence, MappingService& service, const StreamOptions& options, MapCollector& collector)
       : sequence_(sequence), service_(service), options_(options), collector_(collector) {}
 
-  absl::StatusOr<StreamResult> Go() {
+  absl::StatusOr<StreamResult> Execute() {
     SessionOptions session;
     session.name = options_.session_name;
     session.camera = sequence_.camera();
@@ -135,7 +135,7 @@ class Run {
     while (!(sender.done() && AllAcknowledged())) {
       ReceiveEvent();
       ShowFrames();
-      // After an interrupt or a sending error, do not wait long for a server that does not respond.
+      // After an interrupt or a sending error, limits the wait for a server that does not respond.
       if (!deadline && (Interrupted() || (sender.done() && !sender.status().ok()))) {
         deadline = Clock::now() + kMaxAckWait;
       }
@@ -204,15 +204,15 @@ class Run {
   void ShowFrames() {
     std::lock_guard lock(collector_mutex_);
     const double fraction = static_cast<double>(collector_.acknowledged()) / std::max<size_t>(1, TotalFrames());
-    progress_.Show(kFrameShare * fraction, fmt::format("frame {}/{}, {} objects", collector_.acknowledged(),
-                                                       TotalFrames(), collector_.ConfirmedObjects()));
+    progress_.Show(kFrameFraction * fraction, fmt::format("frame {}/{}, {} objects", collector_.acknowledged(),
+                                                          TotalFrames(), collector_.ConfirmedObjects()));
   }
 
   void ShowTraining() {
     std::lock_guard lock(collector_mutex_);
     const Statistics statistics = collector_.statistics().value_or(Statistics{});
     progress_.Show(
-        kFrameShare + (1 - kFrameShare) * statistics.training_progress,
+        kFrameFraction + (1 - kFrameFraction) * statistics.training_progress,
         fmt::format("{} objects, {} in training", collector_.ConfirmedObjects(), statistics.objects_training));
   }
 
@@ -233,7 +233,7 @@ absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, Map
   if (options.first_frame >= sequence.size()) {
     return InvalidArgument("--first {}: the sequence has only {} frames", options.first_frame, sequence.size());
   }
-  return Run(sequence, service, options, collector).Go();
+  return Run(sequence, service, options, collector).Execute();
 }
 
 }  // namespace romap::cli

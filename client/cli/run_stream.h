@@ -16,11 +16,11 @@ struct StreamOptions {
   PoseUse pose_use = PoseUse::kGiven;
   std::string session_name;
   bool realtime = false;    // send at the recorded rate; the server drops frames when overloaded
-  double mask_rate_hz = 0;  // maximal rate of frames with masks, by timestamps; 0 = unlimited
+  double mask_rate_hz = 0;  // maximum rate of frames with masks, by timestamps; 0 = unlimited
   double mask_delay_s = 0;  // delay of masks after their frame, by timestamps; 0 = sent with the frame
   size_t first_frame = 0;
   size_t frame_count = SIZE_MAX;
-  double max_training_s = 600;  // maximal wait for training after the last frame
+  double max_training_s = 600;  // maximum wait for training after the last frame
   bool keep_session = false;    // do not delete the session
 };
 

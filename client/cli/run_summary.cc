@@ -118,7 +118,8 @@ nlohmann::json ToJson(const RunSummary& summary) {
 
 std::string FormatSummary(const RunSummary& summary) {
   std::string text = fmt::format(
-      "{} frames ({} keyframes, {} rejected, {} dropped) in {:.1f} s: {:.1f} frames/s; training took {:.1f} s more{}\n",
+      "{} frames ({} keyframes, {} rejected, {} dropped) in {:.1f} s: {:.1f} frames/s; training took {:.1f} s after "
+      "the last frame{}\n",
       summary.frames_accepted, summary.keyframes, summary.frames_rejected, summary.frames_dropped, summary.mapping_s,
       summary.frames_per_s, summary.training_s,
       summary.interrupted         ? " (interrupted: partial map)"
@@ -148,7 +149,7 @@ std::string FormatSummary(const RunSummary& summary) {
                         SecondsText(object.first_mesh_s));
   }
   if (summary.objects.empty()) text += "(no objects mapped)\n";
-  for (const std::string& fault : summary.faults) text += "rejected: " + fault + "\n";
+  for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;
 }
 

@@ -13,7 +13,7 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
   session::ServerConfig config;
   ConfigFields fields;
   config.Fields(fields);
-  // A file may be shared with romap-server, which has these sections in addition.
+  // The file may also be used by romap-server, which has these additional sections.
   fields.IgnoreSection("transport");
   fields.IgnoreSection("log");
   ROMAP_RETURN_IF_ERROR(fields.Load(options.config_file, options.settings));

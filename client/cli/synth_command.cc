@@ -14,7 +14,7 @@ namespace {
 struct SynthCommandOptions {
   synth::SynthOptions synth;
   std::string out;
-  // Ranges FIRST:LAST as on the command line.
+  // Ranges FIRST:LAST from the command line.
   std::vector<std::string> cuts;
   std::vector<std::string> black;
   std::vector<std::string> blurred;
@@ -52,7 +52,7 @@ void AddFaultOptions(SynthCommandOptions* options, CLI::App* command) {
     command->add_option(name, value, help)->capture_default_str();
   };
   add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
-  add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
+  add("--mask-drop", synth.mask_drop_share, "Fraction of masks to drop, 0 to 1");
   command->add_flag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
   add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
   add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
@@ -60,11 +60,12 @@ void AddFaultOptions(SynthCommandOptions* options, CLI::App* command) {
   const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
     command->add_option(name, texts, help)->type_name("FIRST:LAST");
   };
-  add_ranges("--cut", options->cuts, "Omit these frames, simulating a jump of the camera");
+  add_ranges("--cut", options->cuts, "Omit these frames, simulating an abrupt camera motion");
   add_ranges("--black", options->black, "Make these frames black (covered lens)");
-  add_ranges("--blur", options->blurred, "Blur these frames until tracking is impossible");
-  add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
-  add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
+  add_ranges("--blur", options->blurred, "Blur these frames so strongly that tracking fails");
+  add("--exposure-jumps", synth.exposure_stops,
+      "Maximum size of the exposure jumps, which occur every one to two seconds [stops]");
+  add("--duplicates", synth.duplicate_share, "Fraction of frames that repeat the previous image, 0 to 1");
 }
 
 }  // namespace
@@ -87,13 +88,12 @@ void AddSynthCommand(CLI::App& app, Command* chosen) {
                                                         {"handheld", synth::PathKind::kHandheld},
                                                         {"tworounds", synth::PathKind::kTwoRounds}};
   command
-      ->add_option("--path", synth.path,
-                   "Camera path: orbit, handheld, or tworounds (two rounds through a larger room)")
+      ->add_option("--path", synth.path, "Camera path: orbit, handheld, or tworounds (two laps through a larger room)")
       ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
   add("--rounds", synth.rounds,
-      "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
+      "Number of circles (orbit), passes along the arc (handheld), or pairs of laps (tworounds)");
   add("--hand-motion", synth.hand_motion,
-      "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+      "Amplitude of the hand-held motion in height, distance, viewing direction and roll; 1 = steady hand");
   add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
   add("--width", synth.width_px, "Image width [px]");
   add("--height", synth.height_px, "Image height [px]");

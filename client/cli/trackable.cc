@@ -10,8 +10,8 @@
 namespace romap::cli {
 namespace {
 
-// Minimal intersection over union of the bounding boxes of a mask and a cuboid that fit. Low because the outline of a
-// cuboid is larger than that of the object inside.
+// Minimum intersection over union of the bounding boxes of a mask and a cuboid that match. Low, because the outline of
+// a cuboid is larger than that of the object inside it.
 constexpr double kMinOverlap = 0.35;
 
 struct Region {
@@ -54,7 +54,7 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
                                                 const std::vector<MapObject>& objects) {
   std::map<ObjectId, size_t> first;
   std::map<ObjectId, std::vector<Eigen::Vector3d>>
-      directions;  // unit vectors from which each object was visible so far
+      directions;  // unit vectors to the cameras of earlier frames in which the object was visible
   for (const PosedFrame& frame : MappedFrames(sequence, trajectory)) {
     if (first.size() == objects.size()) break;
     const std::map<int, Region> regions = MaskRegions(sequence, frame.index);

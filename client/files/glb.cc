@@ -16,7 +16,8 @@
 namespace romap::files {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "glTF is little endian, and arrays are copied as they are");
+static_assert(std::endian::native == std::endian::little,
+              "glTF is little endian, and arrays are copied without byte swapping");
 
 constexpr const char* kObjectName = "object";
 
@@ -137,7 +138,7 @@ absl::Status WriteGlb(const std::string& path, const Mesh& mesh) {
                            mesh.colors.size(), mesh.vertices.size());
   }
   const tinygltf::Model model = ToModel(mesh);
-  constexpr size_t kJsonReserve = 1 << 16;  // bytes; the JSON part and the headers stay far below
+  constexpr size_t kJsonReserve = 1 << 16;  // upper bound for the JSON chunk and the headers [bytes]
   if (model.buffers.front().data.size() + kJsonReserve > UINT32_MAX) {
     return InvalidArgument("{}: the mesh exceeds the 4 GiB limit of GLB", path);
   }

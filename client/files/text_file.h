@@ -13,7 +13,8 @@ namespace romap::files {
 // Reads a whole file. Errors: those of FileError (common/file_status.h), with the reason of the operating system.
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
-// Creates or replaces a file atomically: readers see the old or the new contents, never a part. Errors as ReadFile.
+// Creates or replaces a file atomically: readers see the old or the new contents, never a partial file. Errors as
+// ReadFile.
 absl::Status WriteFile(const std::string& path, std::string_view bytes);
 
 // Creates a folder and its missing parents. OK if it exists. Errors as ReadFile.

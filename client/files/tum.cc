@@ -35,12 +35,12 @@ absl::StatusOr<StampedPose> ParsePose(const TableLine& line, const std::string& 
 }
 
 SE3<World, Camera> Interpolate(const StampedPose& before, const StampedPose& after, int64_t timestamp_ns) {
-  const double share = static_cast<double>(timestamp_ns - before.timestamp_ns) /
-                       static_cast<double>(after.timestamp_ns - before.timestamp_ns);
+  const double fraction = static_cast<double>(timestamp_ns - before.timestamp_ns) /
+                          static_cast<double>(after.timestamp_ns - before.timestamp_ns);
   const SE3<World, Camera>& a = before.T_world_camera;
   const SE3<World, Camera>& b = after.T_world_camera;
-  return {a.rotation().slerp(share, b.rotation()),
-          Eigen::Vector3d((1 - share) * a.translation() + share * b.translation())};
+  return {a.rotation().slerp(fraction, b.rotation()),
+          Eigen::Vector3d((1 - fraction) * a.translation() + fraction * b.translation())};
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ absl::StatusOr<YAML::Node> LoadYamlMap(const std::string& path);
 // Returns map[key] as a finite number. INVALID_ARGUMENT if missing or not a finite number.
 absl::StatusOr<double> YamlNumber(const YAML::Node& map, const std::string& key, const std::string& path);
 
-// Returns map[key] as a list of `count` finite numbers. INVALID_ARGUMENT if missing or something else.
+// Returns map[key] as a list of `count` finite numbers. INVALID_ARGUMENT if missing or not such a list.
 absl::StatusOr<std::vector<double>> YamlNumbers(const YAML::Node& map, const std::string& key, size_t count,
                                                 const std::string& path);
 

@@ -55,7 +55,7 @@ CameraModel CameraOfSquare(const CameraModel& camera, const Square& square, int 
   return crop;
 }
 
-cv::Mat CutOut(const cv::Mat& image_bgr, const Square& square, int panel_side_px) {
+cv::Mat CropSquare(const cv::Mat& image_bgr, const Square& square, int panel_side_px) {
   const double scale = panel_side_px / square.side_px;
   const cv::Matx23d to_panel(scale, 0, -square.left_px * scale - 0.5, 0, scale, -square.top_px * scale - 0.5);
   cv::Mat panel;
@@ -77,7 +77,7 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
   const Square square = SquareAround(points_world, camera, T_world_camera);
   const CameraModel panel_camera = CameraOfSquare(camera, square, panel_side_px);
 
-  cv::Mat photo = CutOut(view_bgr, square, panel_side_px);
+  cv::Mat photo = CropSquare(view_bgr, square, panel_side_px);
   if (cuboid != nullptr) DrawCuboidEdges(photo, panel_camera, T_world_camera, *cuboid, cv::Scalar(60, 200, 255));
   const std::array<render::MeshInstance, 1> instances = {{{&mesh_world, 1}}};
   cv::Mat picture;

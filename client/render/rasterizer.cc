@@ -81,11 +81,11 @@ class TileRasterizer {
       const Eigen::Vector3d& to = *p[(k + 1) % 3];
       if (from.z() > options_.near_mu) bounds.extend(camera_.Project(from));
       if ((from.z() > options_.near_mu) != (to.z() > options_.near_mu)) {
-        const double share = (options_.near_mu - from.z()) / (to.z() - from.z());
-        bounds.extend(camera_.Project(from + share * (to - from)));
+        const double fraction = (options_.near_mu - from.z()) / (to.z() - from.z());
+        bounds.extend(camera_.Project(from + fraction * (to - from)));
       }
     }
-    // Written so that empty and non-finite bounds are rejected too.
+    // The negated condition also rejects empty and non-finite bounds.
     const double right_px = camera_.width_px - 1;
     const double bottom_px = camera_.height_px - 1;
     if (!(bounds.min().x() <= right_px && bounds.min().y() <= bottom_px && bounds.max().x() >= 0 &&

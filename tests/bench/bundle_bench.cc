@@ -2,8 +2,8 @@
 //
 //   bundle_bench [REPEATS]
 //
-// Prints, for each size and solver, the least user time of REPEATS (default 5) runs, iterations, and the errors before
-// and after.
+// Prints, for each problem size and solver, the shortest user time of REPEATS (default 5) runs, the number of
+// iterations, and the errors before and after.
 
 #include <fmt/format.h>
 
@@ -22,16 +22,16 @@ void Measure(const std::string& name, const slam::BundleWorldOptions& world_opti
              int repeats) {
   const slam::BundleWorld world = slam::MakeBundleWorld(world_options);
   slam::BundleSummary summary;
-  double least_s = 1e300;
+  double shortest_s = 1e300;
   for (int i = 0; i < repeats; ++i) {
     slam::BundleProblem problem = world.problem;
     const double start_s = UserSeconds();
     summary = slam::AdjustBundle(problem, options);
-    least_s = std::min(least_s, UserSeconds() - start_s);
+    shortest_s = std::min(shortest_s, UserSeconds() - start_s);
   }
   fmt::print("{:<28} {:4d} cameras {:6d} points {:7d} observations {:8.1f} ms {:3d} iterations {:7.2f} -> {:5.2f} px\n",
              name, world.problem.cameras.size(), world.problem.points.size(), world.problem.observations.size(),
-             1e3 * least_s, summary.iterations, summary.initial_rms_px, summary.final_rms_px);
+             1e3 * shortest_s, summary.iterations, summary.initial_rms_px, summary.final_rms_px);
 }
 
 slam::BundleWorldOptions Window(int cameras, int fixed_cameras, int points, int observations) {
@@ -55,7 +55,7 @@ void MeasureAll(int repeats) {
   local.max_iterations = 8;
   slam::BundleOptions local_sparse = local;
   local_sparse.dense = false;
-  // Eight observations of each point: seven cameras before the free ones still share points with them.
+  // With eight observations per point, the seven cameras before the free ones share points with them.
   for (const int points : {1000, 1500, 2500}) {
     for (const int free : {10, 20}) {
       const slam::BundleWorldOptions window = Window(free + 7, 7, points, 8);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Measures a map with many objects: maps a synthetic sequence of twelve objects at 25 Hz, with tracking and training on
 # the same machine, and prints a Markdown table that compares each object with Table 1 of the paper (accuracy 0.431 cm,
-# completion 0.248 cm, 80.85 % below 0.4 cm, 98.93 % below 1 cm), for the surface that some camera saw.
+# completion 0.248 cm, 80.85 % below 0.4 cm, 98.93 % below 1 cm), for the surface visible to at least one camera.
 #
 #   tests/bench/crowd_quality.sh BUILD_DIR OUT_DIR [SEQUENCE]
 #

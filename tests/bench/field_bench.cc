@@ -7,7 +7,7 @@
 // `first-steps` are done in a wrong box, scaled along its axes from its lowest corner and rotated, before the correct
 // box replaces it; then the rows show the last step in the wrong box, the first step in the correct one, and the
 // remaining steps. The noise applies to every view: see frame_noise.h. With OUT, meshes are written to
-// OUT/objects/<id>_<name>.ply in the World frame, for an evaluator.
+// OUT/objects/<id>_<name>.ply in the World frame, for `romap eval objects`.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>

@@ -10,7 +10,7 @@
 namespace romap::measure {
 namespace {
 
-SE3<World, Camera> Shaken(const SE3<World, Camera>& T_world_camera, const FrameNoise& noise, uint64_t frame_id) {
+SE3<World, Camera> PerturbedPose(const SE3<World, Camera>& T_world_camera, const FrameNoise& noise, uint64_t frame_id) {
   synth::Random random(noise.seed, frame_id);
   const auto normals = [&]() -> Eigen::Vector3d {
     const double x = random.Normal(), y = random.Normal();
@@ -30,7 +30,7 @@ bench::TrueFrames WithNoise(const bench::TrueFrames& frames, const FrameNoise& n
   for (const std::shared_ptr<const Frame>& frame : frames) {
     Frame changed = noise.mask_px > 0 ? *damager.Damage(*frame) : *frame;
     if (noise.pose_deg > 0 || noise.pose_cm > 0) {
-      changed.T_world_camera = Shaken(*frame->T_world_camera, noise, frame->frame_id);
+      changed.T_world_camera = PerturbedPose(*frame->T_world_camera, noise, frame->frame_id);
     }
     noisy.push_back(std::make_shared<const Frame>(std::move(changed)));
   }

@@ -9,7 +9,7 @@ namespace romap::measure {
 // Noise to add to the poses and masks of frames. None by default.
 struct FrameNoise {
   double pose_deg = 0;  // standard deviation of a camera's rotation, about each of its axes
-  double pose_cm = 0;   // and of its center, along each axis, in centimeters of the sequence's meters
+  double pose_cm = 0;   // and of its center, along each axis [cm; the sequence is in meters]
   double mask_px = 0;   // maximum displacement of mask borders, which varies smoothly along the border
   uint64_t seed = 1;
 };

@@ -1,4 +1,4 @@
-// Chooses the 256 binary tests of server/slam/features/brief_pattern.cc and prints them as the rows of its table. Runs
+// Selects the 256 binary tests of server/slam/features/brief_pattern.cc and prints them as the rows of its table. Runs
 // for about half a minute.
 //
 //   learn_brief_pattern

@@ -61,7 +61,7 @@ namespace {
 
 constexpr int kRepeats = 12;
 constexpr size_t kFloatsPerAccess = 4;  // 16 bytes
-constexpr size_t kMostLanes = 16;
+constexpr size_t kMaxLanes = 16;
 
 volatile float g_sink;
 
@@ -123,7 +123,7 @@ double RandomUpdateSeconds(size_t table_bytes) {
 }
 
 double StreamBytesPerSecond(size_t array_bytes) {
-  std::vector<float> array(array_bytes / sizeof(float) / kMostLanes * kMostLanes);
+  std::vector<float> array(array_bytes / sizeof(float) / kMaxLanes * kMaxLanes);
   constexpr int kPasses = 8;
   const double seconds = ShortestSeconds([&] {
     for (int pass = 0; pass < kPasses; ++pass) HWY_DYNAMIC_DISPATCH(UpdateAll)(array.data(), array.size());

@@ -6,7 +6,7 @@
 #
 # The environment variable POSES=none tracks the camera from the images. Without SEQUENCE, renders three synthetic
 # sequences (150 frames, five objects, seeds 1 to 3) in OUT_DIR. The figures are means over the objects, for the surface
-# that some camera saw; distances are in cm.
+# visible to at least one camera; distances are in cm.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
@@ -30,7 +30,7 @@ for _ in $(seq 100); do
   [ -n "$address" ] && break
   sleep 0.1
 done
-[ -n "$address" ] || { cat "$out/server.out" "$out/server.err" >&2; exit 1; }
+[ -n "$address" ] || { echo "romap-server did not listen within 10 s" >&2; cat "$out/server.out" "$out/server.err" >&2; exit 1; }
 
 echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | peak memory of server, client |'
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'

@@ -1,6 +1,6 @@
-// Time of training by phase, compared with the limits of this machine and with the plain form of the kernels:
-//   nerf_bench [SEQUENCE] [--preset fast|paper|both] [--set nerf.FIELD=VALUE ..] [--steps 0] [--repeats 5] [--threads
-//   2]
+// Measures the time of training by phase and compares it with the limits of this machine and with the scalar kernels:
+//   nerf_bench [SEQUENCE] [--preset fast|paper|both] [--set nerf.FIELD=VALUE ..] [--steps 0] [--repeats 5]
+//              [--threads 2]
 // Trains each object of SEQUENCE (true cuboids, poses, masks; every fourth frame) or, without one, of a synthetic
 // world. Reports the fastest of `repeats` interleaved runs. On shared machines only the ratios of the times are
 // meaningful. `steps` 0 = a default for each preset.
@@ -40,7 +40,7 @@ struct Options {
   int threads = 2;
 };
 
-// One object, ready to be trained on.
+// One object to train.
 struct Subject {
   nerf::TrainingBox box;
   std::vector<ObjectView> views;
@@ -59,7 +59,7 @@ absl::StatusOr<std::vector<Subject>> LoadSubjects(const std::string& path) {
   return subjects;
 }
 
-// Trains a new field on the subject.
+// Trains a new field for the subject.
 nerf::TrainStats TrainOnce(const Subject& subject, const nerf::NerfConfig& config, const nerf::KernelTable& kernels,
                            int steps, int threads) {
   nerf::VisualHull hull(config);
@@ -123,7 +123,7 @@ std::array<double, kPhases> PhaseLimits(const nerf::NerfConfig& config, const ne
   const double steps = stats.steps / samples;
   const double levels = config.levels, inputs = nerf::kFeaturesPerLevel * levels, hidden = config.hidden_width;
   const double probes = config.sampling == "occupied" ? nerf::kRayProbes * rays : 0;
-  constexpr double kProbeFlop = 15, kRayFlop = 60, kPlaceFlop = 30;
+  constexpr double kProbeFlop = 15, kRayFlop = 60, kPlacementFlop = 30;
   constexpr double kExponentialFlop = 16, kCompositeFlop = 60;
   constexpr double kCellFlop = 24, kBlendFlop = 36;  // of one level
   const double mlp_flop = 2 * (inputs * hidden + hidden * nerf::kOutputs);
@@ -133,7 +133,7 @@ std::array<double, kPhases> PhaseLimits(const nerf::NerfConfig& config, const ne
   const double touched = 1 - std::exp(-active * samples / stats.steps * levels * 4 / groups);
   const double bytes = steps * table_bytes * (1 + 7 * touched) / 2;  // pairs of one read and one write
   const double grid_flop = levels * (kCellFlop + kBlendFlop);
-  return {std::max((probes * kProbeFlop + rays * kRayFlop + kPlaceFlop) * limits.flop_s, probes * limits.probe_s),
+  return {std::max((probes * kProbeFlop + rays * kRayFlop + kPlacementFlop) * limits.flop_s, probes * limits.probe_s),
           std::max(grid_flop * limits.flop_s, levels * 4 * limits.load_s),
           mlp_flop * limits.flop_s,
           (5 * kExponentialFlop + kCompositeFlop) * limits.flop_s,
@@ -167,20 +167,21 @@ void BenchPreset(const char* name, const nerf::NerfConfig& config, int default_s
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     one = faster(one, TrainAll(subjects, config, nerf::SimdKernels(), steps, 1));
     many = faster(many, TrainAll(subjects, config, nerf::SimdKernels(), steps, options.threads));
-    if (repeat > 1) continue;  // the plain form is slow
+    if (repeat > 1) continue;  // the scalar kernels are slow
     plain = faster(plain, TrainAll(subjects, config, nerf::PlainKernels(), plain_steps, 1));
     short_run = faster(short_run, TrainAll(subjects, config, nerf::SimdKernels(), plain_steps, 1));
   }
   const Limits limits = MeasureLimits(nerf::MakeGridLayout(config));
-  std::printf("%s: %s kernels, %d steps, %.1f samples a ray, %.0f %% of them active\n", name,
+  std::printf("%s: %s kernels, %d steps, %.1f samples per ray, %.0f %% of them active\n", name,
               nerf::SimdKernels().name.c_str(), steps,
               static_cast<double>(one.samples) / (static_cast<double>(one.steps) * config.rays_per_step),
               100.0 * static_cast<double>(one.active_samples) / static_cast<double>(one.samples));
-  std::printf("  peaks of a core: %.0f GFLOP/s; random load %.2f ns, update %.2f ns; stream %.1f GB/s\n",
+  std::printf("  peak rates of one core: %.0f GFLOP/s; random load %.2f ns, update %.2f ns; stream %.1f GB/s\n",
               1e-9 / limits.flop_s, 1e9 * limits.load_s, 1e9 * limits.update_s, 1e-9 / limits.byte_s);
   PrintPhases(one, many, PhaseLimits(config, one, limits));
-  std::printf("  Msamples/s: 1 thread %.2f, %d threads %.2f; scaling %.2f; %.1f x the plain form\n", 1e-6 * Rate(one),
-              options.threads, 1e-6 * Rate(many), Rate(many) / Rate(one), Rate(short_run) / Rate(plain));
+  std::printf("  Msamples/s: 1 thread %.2f, %d threads %.2f; scaling %.2f; %.1f times the scalar kernels\n",
+              1e-6 * Rate(one), options.threads, 1e-6 * Rate(many), Rate(many) / Rate(one),
+              Rate(short_run) / Rate(plain));
   std::fflush(stdout);
 }
 
@@ -193,7 +194,7 @@ absl::Status Run(const Options& options) {
     config->Fields(fields);
     ROMAP_RETURN_IF_ERROR(fields.Load("", options.assignments));
   }
-  std::printf("times in ns of CPU per sample\n");
+  std::printf("times in ns of CPU time per sample\n");
   if (options.preset != "paper") BenchPreset("fast", fast, 200, subjects, options);
   if (options.preset != "fast") BenchPreset("paper", paper, 20, subjects, options);
   return absl::OkStatus();
@@ -204,7 +205,7 @@ absl::Status Run(const Options& options) {
 
 int main(int argc, char** argv) {
   romap::measure::Options options;
-  CLI::App app("Time of training by phase, compared with the limits of this machine");
+  CLI::App app("Measures the time of training by phase and compares it with the limits of this machine");
   app.add_option("sequence", options.sequence);
   app.add_option("--preset", options.preset)->check(CLI::IsMember({"fast", "paper", "both"}));
   app.add_option("--set", options.assignments)->allow_extra_args(false);

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Measures the contribution of each part of the object map: the whole, the whole without one part, and the method of the
-# paper, with undamaged masks and with all usual kinds of damage together. Prints Markdown tables.
+# Measures the contribution of each part of object mapping: everything, everything without one part, and the method of
+# the paper, each with undamaged masks and with all usual kinds of damage together. Prints Markdown tables.
 #
 #   tests/bench/object_ablation.sh BUILD_DIR SEQUENCE...
 #
-# SEEDS (5), POSES (none) and JOBS (2) in the environment as for object_quality.sh.
+# Environment: SEEDS (5), POSES (none) and JOBS (2), as for object_quality.sh.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 quality=$1/tests/bench/object_quality

@@ -44,7 +44,7 @@ std::vector<DamageKind> DamageKinds() {
   return {
       {"none", "undamaged", {}},
       {"drop", "30 % of the masks missing", {.drop_share = 0.3}},
-      {"rate", "on 5 frames per second", {.rate_hz = 5}},
+      {"rate", "only on 5 frames per second", {.rate_hz = 5}},
       {"border", "borders displaced by up to 4 px", {.border_px = 4}},
       {"flips", "10 % of the classes wrong", {.class_flip_share = 0.1}},
       {"merged", "neighbors merged in 5 % of the frames", {.merge_share = 0.05}},
@@ -101,7 +101,7 @@ absl::Status Execute(const Job& job) {
   absl::StatusOr<Sim3<World, World>> S_true_map = Sim3<World, World>();
   if (job.options.poses == PoseUse::kIgnore) S_true_map = AlignToTruth(*job.sequence, run);
   if (!S_true_map.ok()) {
-    // The camera was not tracked, so that no object is found.
+    // Without a tracked camera, no object is found.
     job.result->score = ScoreMap(truth, {}, {});
     return absl::OkStatus();
   }
@@ -151,7 +151,7 @@ class Measurement {
   absl::Status Measure(PoseUse poses) {
     std::vector<SequenceRuns> results;
     for (const files::Sequence& sequence : sequences_) {
-      // Without a trailing slash.
+      // The name of the folder, also if the path ends with a slash.
       SequenceRuns runs{(std::filesystem::path(sequence.dir()) / ".").parent_path().filename().string(), {}};
       for (const DamageKind& kind : kinds_) {
         runs.rows.push_back({kind.title, std::vector<ScoredRun>(static_cast<size_t>(options_.seeds))});

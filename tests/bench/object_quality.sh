@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures the object map, also with masks that have the errors of real detectors, and prints Markdown tables.
+# Measures the object map with undamaged masks and with simulated detector errors, and prints Markdown tables.
 #
 #   tests/bench/object_quality.sh BUILD_DIR OUT_DIR [SEQUENCE...]
 #

@@ -1,7 +1,7 @@
 #pragma once
 
-// Runs tracking, sparse map and object mapper over a recorded sequence as a session does, but in one thread and without
-// fields, so that equal options give equal maps.
+// Runs tracker, sparse mapper and object mapper over a recorded sequence like a session, but in one thread and without
+// training fields, so that equal options give equal maps.
 
 #include <cstddef>
 #include <map>
@@ -27,17 +27,17 @@ struct ObjectRunOptions {
   MaskDamage damage;
 };
 
-// Everything that was published of one object.
+// The published data of one object.
 struct PublishedObject {
   ObjectUpdate last;
   size_t updates = 0;         // ObjectUpdates published
-  size_t first_frame = 0;     // index in the sequence of the frame of the first update
+  size_t first_frame = 0;     // index of the frame with the first update
   size_t views = 0;           // training views
   size_t cuboid_changes = 0;  // training boxes sent to its field
 };
 
 struct ObjectRun {
-  std::map<ObjectId, PublishedObject> objects;  // those in the map at the end, in any state
+  std::map<ObjectId, PublishedObject> objects;  // in the final map, in any state
   std::vector<std::string> removals;            // one line per merged or removed object
   std::vector<files::StampedPose> trajectory;   // of the tracked frames, in the final map
   int frames = 0;

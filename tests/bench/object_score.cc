@@ -22,23 +22,23 @@ ObjectErrors Compare(const eval::YawBox& box, const eval::YawBox& truth) {
 
 // Index of the true object that each box is matched with, -1 = none.
 std::vector<int> Match(const std::vector<eval::YawBox>& boxes, const std::vector<eval::YawBox>& truth) {
-  constexpr double kNever = 1e6;  // more than the sum of all admissible pairs
+  constexpr double kInadmissible = 1e6;  // more than the sum of the costs of all admissible pairs
   Eigen::MatrixXd cost(boxes.size(), truth.size());
   for (size_t i = 0; i < boxes.size(); ++i) {
     for (size_t j = 0; j < truth.size(); ++j) {
       const double distance = (boxes[i].center - truth[j].center).norm() / truth[j].half_extents.norm();
       const bool admissible = distance <= 1 && eval::IntersectionOverUnion(boxes[i], truth[j]) > 0;
-      cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = admissible ? distance : kNever;
+      cost(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = admissible ? distance : kInadmissible;
     }
   }
   std::vector<int> match = AssignRows(cost);
   for (size_t i = 0; i < match.size(); ++i) {
-    if (match[i] >= 0 && cost(static_cast<Eigen::Index>(i), match[i]) >= kNever) match[i] = -1;
+    if (match[i] >= 0 && cost(static_cast<Eigen::Index>(i), match[i]) >= kInadmissible) match[i] = -1;
   }
   return match;
 }
 
-// Name of the found object that the box shares the most volume with; empty when it overlaps none.
+// Name of the found object that the box shares the most volume with; empty if it overlaps none.
 std::string MostOverlapped(const eval::YawBox& box, const std::vector<eval::YawBox>& truth,
                            const std::vector<TrueObject>& objects) {
   double most = 0;

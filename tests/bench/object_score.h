@@ -11,7 +11,7 @@
 
 namespace romap::measure {
 
-// How well one true object was mapped.
+// The errors of one mapped object.
 struct ObjectErrors {
   double iou = 0;          // of the upright boxes
   double center_cm = 0;    // distance of the centers
@@ -20,18 +20,18 @@ struct ObjectErrors {
   bool right_class = false;
 };
 
-// A true object and the errors of the mapped one matched with it.
+// A true object and the errors of the mapped object that it was matched with.
 struct TrueObject {
   std::string name;
   bool found = false;
-  ObjectErrors errors;  // when found
+  ObjectErrors errors;  // if found
 };
 
 // An object of the map.
 struct MappedObject {
   ObjectUpdate object;
   Eigen::Vector3d center_m = Eigen::Vector3d::Zero();  // in the true world
-  std::string matched;   // name of the true object it was matched with; empty: it is extra
+  std::string matched;                                 // name of the true object it was matched with; empty = extra
   std::string overlaps;  // if extra: name of the found true object that it shares the most volume with; or empty
 };
 

@@ -23,22 +23,22 @@ struct DamageRuns {
 
 struct SequenceRuns {
   std::string sequence;
-  std::vector<DamageRuns> rows;  // the others are compared with the first one
+  std::vector<DamageRuns> rows;  // the first row is the reference for the others
 };
 
 // Markdown tables. IoU and center errors are means over the found objects of all runs; yaw errors are medians, because
 // the yaw of round objects is arbitrary.
 
-// A line per sequence, for its first row of runs.
+// One line per sequence, for its first row of runs.
 std::string SequencesTable(std::span<const SequenceRuns> sequences);
-// A line per kind of damage, over all sequences, which have the same rows. Found objects are summed over the sequences
-// of each seed.
+// One line per kind of damage, over all sequences. All sequences must have the same rows. Found objects are summed over
+// the sequences of each seed.
 std::string DamageTable(std::span<const SequenceRuns> sequences);
-// A line per true object.
+// One line per true object.
 std::string ObjectsTable(const DamageRuns& row);
-// A line per object of one map: its class and position, and the true object it was matched with.
+// One line per object of one map: its class and position, and the true object it was matched with.
 std::string MapTable(const MapScore& score);
-// Missing and extra objects, one line for each run that has any. Names only the first few extra objects.
+// Missing and extra objects, one line per run that has any. Names only the first extra objects.
 std::string FaultList(std::span<const SequenceRuns> sequences);
 
 }  // namespace romap::measure

@@ -3,7 +3,7 @@
 //
 //   objects_bench DIR [--masks mask_yolo.txt --detections detections_yolo.csv] [--set SECTION.FIELD=VALUE]... [--debug]
 //
-// Prints for each published object: the nearest true one, overlap, errors, the share of the true surface (points of
+// Prints for each published object: the nearest true object, IoU, errors, the share of the true surface (points of
 // gt/*.ply seen by some camera) inside the cuboid and inside the cuboid enlarged by 10 %, the number of updates and
 // views, and the frame of the first cuboid. Also prints the user time per frame and keyframe.
 

@@ -2,8 +2,8 @@
 //
 //   yaw_bench DIR...
 //
-// Selects each object's silhouettes as the object mapper does (keyframes at least 3 degrees apart, at most 36) and
-// prints the yaw error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2
+// Selects the silhouettes of each object like the object mapper (from keyframes at least 3 degrees apart, at most 36)
+// and prints the yaw error modulo a quarter turn, the confidence, and the time: with all views, with `up` tilted by 2
 // degrees about x and about y, and for consecutive groups of a few views; and the yaw error of the principal axis of
 // the object's map points.
 
@@ -102,7 +102,7 @@ void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::s
 
 void PrintGroups(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {
   for (const size_t count : {1, 3, 6, 12}) {
-    std::printf("    by %2zu:", count);
+    std::printf("    groups of %2zu:", count);
     for (size_t first = 0; first + count <= views.size(); first += count) {
       const auto yaw = objects::YawFromLines(R_world_reference, views.subspan(first, count));
       if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence);

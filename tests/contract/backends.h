@@ -15,8 +15,8 @@ namespace romap::contract {
 struct Backend {
   std::string name;
   std::function<std::unique_ptr<MappingService>()> make;
-  // One frame with an instance suffices for an object of its class. False for a real service, which needs frames of a
-  // real scene (see the integration tests).
+  // Whether one frame with an instance creates an object. False for a real service, which needs frames of a consistent
+  // scene (see the integration tests).
   bool objects_from_one_frame = false;
   bool over_grpc = false;
 
@@ -34,7 +34,7 @@ class RunningBackend {
   MappingService& service() { return remote_ ? *remote_ : *local_; }
 
  private:
-  // Each needs the one before.
+  // Each member uses the previous one, so the order matters for destruction.
   std::unique_ptr<MappingService> local_;
   std::unique_ptr<transport::GrpcServer> server_;
   std::unique_ptr<MappingService> remote_;

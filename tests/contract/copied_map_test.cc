@@ -1,4 +1,4 @@
-// Compares copies of a changing map over gRPC with the map itself.
+// Compares client-side copies of a changing map, updated over gRPC, with the map.
 
 #include <gmock/gmock.h>
 

@@ -17,14 +17,14 @@ TEST_P(SessionContract, SessionsAreCreatedListedAndDeleted) {
   EXPECT_NE(first, second);
   EXPECT_THAT(service().ListSessions().value(), SizeIs(2));
   EXPECT_OK(service().DeleteSession(first));
-  const auto left = service().ListSessions();
-  ASSERT_THAT(left.value(), SizeIs(1));
-  EXPECT_EQ(left->front().id, second);
+  const auto remaining = service().ListSessions();
+  ASSERT_THAT(remaining.value(), SizeIs(1));
+  EXPECT_EQ(remaining->front().id, second);
 }
 
 TEST_P(SessionContract, InfoReturnsTheOptions) {
   SessionOptions options;
-  options.name = "Küche, zweiter Versuch";
+  options.name = "café, second attempt";
   options.camera = testing::SmallCamera();
   options.camera.distortion = {0.1, -0.2, 0.001, 0.002, 0.05};
   options.mode = FrameMode::kLive;
@@ -100,7 +100,7 @@ TEST_P(SessionContract, ExportContainsTheTrajectory) {
 }
 
 TEST_P(SessionContract, ExportContainsTheObjects) {
-  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "objects need frames of a real scene";
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "this service needs frames of a consistent scene";
   const std::string session = NewSession();
   const auto stream = Open(session);
   EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Fails and names the files that differ from what clang-format makes of them. `--fix` rewrites them instead.
+# Lists the files that clang-format would change, and fails if there are any. `--fix` formats them.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 formatter=$(command -v clang-format-14 || command -v clang-format) || { echo "clang-format 14 is not installed; see deploy/setup.sh"; exit 1; }

@@ -1,4 +1,5 @@
-// Keeps the folders what they are: what each may include, how long files get, and that nothing names a machine.
+// Checks the rules of the source tree: allowed includes, namespaces, unique type names, file lengths and include
+// guards.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +36,7 @@ std::vector<SourceFile> SourceFiles() {
   return files;
 }
 
-// The longest key that the path begins with decides.
+// Allowed prefixes of included paths. The longest prefix of a path applies to it.
 const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"common/", {"common/"}},
     {"common/wire/", {"common/", "romap/v1/"}},
@@ -82,12 +83,12 @@ const std::vector<std::string>& Allowed(const std::string& path) {
       length = prefix.size();
     }
   }
-  static const std::vector<std::string> kNothing;
-  EXPECT_NE(best, nullptr) << path << " is in no known folder";
-  return best == nullptr ? kNothing : *best;
+  static const std::vector<std::string> kNone;
+  EXPECT_NE(best, nullptr) << path << ": kMayInclude has no entry for this folder";
+  return best == nullptr ? kNone : *best;
 }
 
-TEST(HouseTest, FoldersIncludeOnlyAllowedFolders) {
+TEST(SourceTreeTest, FoldersIncludeOnlyAllowedFolders) {
   const std::regex include(R"(^\s*#include\s+"([^"]+)\")");
   for (const SourceFile& file : SourceFiles()) {
     const std::vector<std::string>& allowed = Allowed(file.path);
@@ -97,7 +98,7 @@ TEST(HouseTest, FoldersIncludeOnlyAllowedFolders) {
       const std::string target = match[1];
       if (target.find('/') == std::string::npos) continue;  // a file of the same folder
       if (target.starts_with("hwy/") || target.starts_with("google/")) continue;
-      // The session's pipeline alone knows the stages; transport and the command line know the session only.
+      // Only the session includes the stages; transport and the command line include only the session.
       EXPECT_TRUE(
           std::any_of(allowed.begin(), allowed.end(), [&](const std::string& a) { return target.starts_with(a); }))
           << file.path << " must not include " << target;
@@ -106,7 +107,7 @@ TEST(HouseTest, FoldersIncludeOnlyAllowedFolders) {
 }
 
 // The headers of client/sdk are installed; users of the library need neither gRPC nor protobuf.
-TEST(HouseTest, PublicHeadersOfTheSdkIncludeNoGrpc) {
+TEST(SourceTreeTest, PublicHeadersOfTheSdkIncludeNoGrpc) {
   const std::regex include(R"(^\s*#include\s+[<"](grpc|google/|romap/v1/|common/wire/|client/sdk/internal/))");
   for (const SourceFile& file : SourceFiles()) {
     const std::filesystem::path path = file.path;
@@ -115,7 +116,7 @@ TEST(HouseTest, PublicHeadersOfTheSdkIncludeNoGrpc) {
   }
 }
 
-// The folder's namespace: nothing of one folder is defined in the namespace of another.
+// The namespace of the files in a folder; empty = not checked.
 std::string NamespaceOf(const std::string& path) {
   static const std::vector<std::pair<std::string, std::string>> kNamespaces = {
       {"common/wire/", "romap::wire"},
@@ -143,7 +144,7 @@ std::string NamespaceOf(const std::string& path) {
   return "";
 }
 
-TEST(HouseTest, EachFolderHasItsNamespace) {
+TEST(SourceTreeTest, FilesUseTheNamespaceOfTheirFolder) {
   const std::regex opening(R"(^namespace (romap[\w:]*) \{)");
   for (const SourceFile& file : SourceFiles()) {
     const std::string expected = NamespaceOf(file.path);
@@ -152,7 +153,7 @@ TEST(HouseTest, EachFolderHasItsNamespace) {
       std::smatch match;
       if (!std::regex_search(line, match, opening)) continue;
       const std::string found = match[1];
-      // Highway compiles one namespace per instruction set inside the folder's own.
+      // Highway opens one nested namespace per instruction set.
       EXPECT_TRUE(found == expected || found == expected + "::HWY_NAMESPACE" ||
                   found.starts_with(expected + "::internal"))
           << file.path << " opens " << found << ", expected " << expected;
@@ -160,8 +161,8 @@ TEST(HouseTest, EachFolderHasItsNamespace) {
   }
 }
 
-// Two types of one name in one program are confusing even in different namespaces, and undefined behavior in the same.
-TEST(HouseTest, TypeNamesAreUnique) {
+// Types with the same name are confusing in different namespaces, and undefined behavior in the same namespace.
+TEST(SourceTreeTest, TypeNamesAreUnique) {
   const std::regex type(R"(^(?:class|struct|enum class) (?:alignas\(\d+\) )?(\w+)(?: final)?(?: :[^:].*)? \{)");
   std::map<std::string, std::string> defined_in;
   for (const SourceFile& file : SourceFiles()) {
@@ -178,15 +179,15 @@ TEST(HouseTest, TypeNamesAreUnique) {
   EXPECT_GT(defined_in.size(), 200u) << "the pattern no longer finds the types";
 }
 
-TEST(HouseTest, FilesStayReadable) {
+TEST(SourceTreeTest, FilesAreShort) {
   for (const SourceFile& file : SourceFiles()) EXPECT_LE(file.lines.size(), 500u) << file.path;
 }
 
-TEST(HouseTest, HeadersAreGuarded) {
+TEST(SourceTreeTest, HeadersAreGuarded) {
   for (const SourceFile& file : SourceFiles()) {
     if (!file.path.ends_with(".h") || file.path.ends_with("-inl.h")) continue;
     const bool guarded = std::any_of(file.lines.begin(), file.lines.end(), [](const std::string& line) {
-      // Files that Highway compiles once per instruction set guard by its toggle.
+      // Files that Highway compiles once per instruction set use its toggle as include guard.
       return line.starts_with("#pragma once") || line.find("HWY_TARGET_TOGGLE") != std::string::npos;
     });
     EXPECT_TRUE(guarded) << file.path;

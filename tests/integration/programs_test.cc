@@ -63,7 +63,7 @@ void ExpectMapOfThree(const std::string& out) {
   EXPECT_EQ(CountFiles(out + "/objects", ".ply"), 3u);
   EXPECT_EQ(CountFiles(out + "/objects", ".glb"), 3u);
   EXPECT_GE(CountFiles(out + "/pictures", ".png"), 2u)
-      << "the map, and the objects that are completely visible in some frame";
+      << "the overview, and objects that are completely visible in some frame";
   EXPECT_EQ(CountFiles(out + "/pictures", ".jpg"), 6u) << "cuboids in frames";
   EXPECT_GT(fs::file_size(out + "/trajectory.txt"), 1000u);
 }
@@ -108,7 +108,7 @@ TEST(ProgramsTest, TracksTheCameraFromImagesAndWritesTheCorrectedTrajectory) {
   EXPECT_LT(initializing, 40);
   EXPECT_EQ(summary["tracking"]["lost"], 0);
   EXPECT_EQ(summary["tracking"]["tracked"], 80 - initializing);
-  // The written trajectory is the final one of the map, up to a similarity.
+  // The written trajectory is the final trajectory of the map, up to a similarity.
   const auto report = eval::EvaluateTrajectory({.estimated = folder / "map/trajectory.txt",
                                                 .ground_truth = folder / "sequence/groundtruth.txt",
                                                 .alignment = eval::Alignment::kSim3});
@@ -127,7 +127,7 @@ TEST(ProgramsTest, LocalMappingNeedsNoServer) {
 TEST(ProgramsTest, InterruptWritesThePartialMap) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  // At the recorded rate sending takes two seconds. The output folder is created right before.
+  // Sending takes two seconds at the recorded rate. The folder is created just before sending starts.
   testing_support::BackgroundProcess run(
       {ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
   ASSERT_TRUE(testing::Eventually([&] { return fs::exists(folder / "map/pictures"); }));
@@ -140,11 +140,11 @@ TEST(ProgramsTest, InterruptWritesThePartialMap) {
   EXPECT_LT(summary["frames"]["sent"], 60);
 }
 
-TEST(ProgramsTest, DeployedConfigurationIsTheDefaultDumpForOperators) {
+TEST(ProgramsTest, DeployedConfigurationEqualsTheDumpedDefaults) {
   std::ifstream file(ROMAP_SOURCE_DIR "/deploy/server.yaml");
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   EXPECT_EQ(testing_support::RunProcess({ROMAP_SERVER, "--dump-config"}).out, text)
-      << "romap-server --dump-config > deploy/server.yaml";
+      << "update the file with: romap-server --dump-config > deploy/server.yaml";
   EXPECT_EQ(
       testing_support::RunProcess({ROMAP_SERVER, "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--dump-config"})
           .out,
@@ -234,7 +234,7 @@ TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "conflict.yaml"}), 2,
                 "conflict.yaml:2: nerf.backend = cuda does not support nerf.field = sdf");
   MakeSmallSequence(folder / "sequence");
-  // The sections of the server in its configuration are no fault of a local mapping.
+  // A local run ignores the sections of the configuration that only romap-server uses.
   const testing_support::ProcessResult run =
       Romap({"run", folder / "sequence", "--local", "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--set",
              "mesh.min_side_nodes=65", "--out", folder / "map"});

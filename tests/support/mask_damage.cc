@@ -71,14 +71,14 @@ Instance* Find(FrameMasks& masks, uint32_t label) {
   return found == masks.instances.end() ? nullptr : &*found;
 }
 
-// Adds an instance like `like` with an unused label; returns the label.
-uint32_t AddInstance(FrameMasks& masks, Instance like) {
+// Adds a copy of `instance` with an unused label and without a track id; returns the label.
+uint32_t AddInstance(FrameMasks& masks, Instance instance) {
   uint32_t label = 0;
-  for (const Instance& instance : masks.instances) label = std::max(label, instance.label);
-  like.label = label + 1;
-  like.track_id.reset();
-  masks.instances.push_back(like);
-  return like.label;
+  for (const Instance& other : masks.instances) label = std::max(label, other.label);
+  instance.label = label + 1;
+  instance.track_id.reset();
+  masks.instances.push_back(instance);
+  return instance.label;
 }
 
 // An image of this size, 255 in a random ellipse and 0 elsewhere.
@@ -163,16 +163,16 @@ void Leak(const MaskDamage& damage, FrameMasks& masks) {
     Random random = RandomFor(damage.seed, Fault::kLeak, masks.frame_id, label);
     if (!random.Chance(damage.leak_share)) continue;
     const cv::Mat pixels = masks.labels == static_cast<int>(label);
-    if (cv::countNonZero(pixels) == 0) continue;  // another mask leaked over all of it
+    if (cv::countNonZero(pixels) == 0) continue;  // completely covered by the blob of another mask
     // The last pixel of the mask on a random ray from its centroid.
     const cv::Point2d middle = Centroid(pixels);
     const double angle = random.Uniform(0, 2 * std::numbers::pi);
     const cv::Point2d outward(std::cos(angle), std::sin(angle));
     cv::Point2d border = middle;
     for (int step = 0; step < region.box_px.width + region.box_px.height; ++step) {
-      const cv::Point2d there = middle + step * outward;
-      const cv::Point pixel(cvRound(there.x), cvRound(there.y));
-      if (pixel.inside(region.box_px) && pixels.at<uint8_t>(pixel) != 0) border = there;
+      const cv::Point2d position = middle + step * outward;
+      const cv::Point pixel(cvRound(position.x), cvRound(position.y));
+      if (pixel.inside(region.box_px) && pixels.at<uint8_t>(pixel) != 0) border = position;
     }
     const double radius_px = kBlobRadius * std::sqrt(static_cast<double>(region.area_px));
     masks.labels.setTo(static_cast<int>(label), Blob(pixels.size(), border, radius_px, random));
@@ -192,7 +192,7 @@ cv::Mat SmoothNoise(const cv::Size& size, double amplitude, Random& random) {
   return fine(cv::Rect(offset, size));
 }
 
-// Distance of each pixel to the border of the set ones, positive inside. The border is between pixels.
+// Distance of each pixel to the border of the set pixels, positive inside. The border is halfway between pixels.
 cv::Mat SignedDistance_px(const cv::Mat& pixels) {
   cv::Mat inside, outside;
   cv::distanceTransform(pixels, inside, cv::DIST_L2, cv::DIST_MASK_PRECISE);
@@ -216,9 +216,9 @@ void DisplaceBorders(const MaskDamage& damage, FrameMasks& masks) {
                             image;
     const cv::Mat inside_px = SignedDistance_px(masks.labels(around) == static_cast<int>(label)) +
                               SmoothNoise(around.size(), damage.border_px, random);
-    const cv::Mat won = inside_px > depth_px(around);
-    displaced(around).setTo(static_cast<int>(label), won);
-    inside_px.copyTo(depth_px(around), won);
+    const cv::Mat deeper = inside_px > depth_px(around);
+    displaced(around).setTo(static_cast<int>(label), deeper);
+    inside_px.copyTo(depth_px(around), deeper);
   }
   masks.labels = displaced;
 }
@@ -255,7 +255,7 @@ void AddCrowd(const MaskDamage& damage, const std::vector<std::string>& class_na
   }
 }
 
-void KeepVisible(FrameMasks& masks) {
+void RemoveInvisibleInstances(FrameMasks& masks) {
   const std::map<uint32_t, Region> regions = Regions(masks.labels);
   std::erase_if(masks.instances, [&](const Instance& instance) { return !regions.contains(instance.label); });
 }
@@ -274,17 +274,17 @@ void PermuteLabels(const MaskDamage& damage, FrameMasks& masks) {
   Random random = RandomFor(damage.seed, Fault::kLabels, masks.frame_id);
   double highest = 0;
   cv::minMaxLoc(masks.labels, nullptr, &highest);
-  // All labels of an 8-bit image, or more if there are more.
-  std::vector<uint16_t> renamed(static_cast<size_t>(std::max(highest, 255.0)) + 1);
-  std::iota(renamed.begin(), renamed.end(), uint16_t{0});
-  for (size_t i = renamed.size() - 1; i > 1; --i) {
-    std::swap(renamed[i], renamed[1 + static_cast<size_t>(random.Below(static_cast<int>(i)))]);
+  // Permutes all labels of an 8-bit image, or of a larger range if needed.
+  std::vector<uint16_t> new_labels(static_cast<size_t>(std::max(highest, 255.0)) + 1);
+  std::iota(new_labels.begin(), new_labels.end(), uint16_t{0});
+  for (size_t i = new_labels.size() - 1; i > 1; --i) {
+    std::swap(new_labels[i], new_labels[1 + static_cast<size_t>(random.Below(static_cast<int>(i)))]);
   }
   for (int v = 0; v < masks.labels.rows; ++v) {
     auto* row = masks.labels.ptr<uint16_t>(v);
-    for (int u = 0; u < masks.labels.cols; ++u) row[u] = renamed[row[u]];
+    for (int u = 0; u < masks.labels.cols; ++u) row[u] = new_labels[row[u]];
   }
-  for (Instance& instance : masks.instances) instance.label = renamed[instance.label];
+  for (Instance& instance : masks.instances) instance.label = new_labels[instance.label];
   // Sorted, because otherwise the order of the list would identify the objects.
   std::sort(masks.instances.begin(), masks.instances.end(),
             [](const Instance& a, const Instance& b) { return a.label < b.label; });
@@ -342,7 +342,7 @@ FrameMasks MaskDamager::DamagedMasks(const Frame& frame) const {
   if (damage_.split_share > 0) Split(damage_, masks);
   if (damage_.leak_share > 0) Leak(damage_, masks);
   if (damage_.border_px > 0) DisplaceBorders(damage_, masks);
-  KeepVisible(masks);
+  RemoveInvisibleInstances(masks);
   if (damage_.class_flip_share > 0) FlipClasses(damage_, class_names_, masks);
   if (damage_.false_positive_share > 0) AddFalsePositive(damage_, class_names_, masks);
   if (damage_.crowd > 0) AddCrowd(damage_, class_names_, masks);

@@ -11,7 +11,7 @@
 namespace romap::testing {
 
 // Applies random changes of every kind that the stages make to a map: objects are created, changed, confirmed, lost,
-// merged (in chains), removed, get meshes and are moved by corrections. Some changes are late: their object was
+// merged (in chains), removed, given meshes and moved by corrections. Some changes refer to objects that were already
 // removed.
 class RandomMap {
  public:
@@ -62,7 +62,7 @@ class RandomMap {
     return mesh;
   }
 
-  // Events that are not about objects, but share the outbox with them.
+  // Publishes events that do not concern objects but use the same outbox.
   void PublishOtherEvents() {
     FrameAck ack;
     ack.frame_id = ++frames_;
@@ -100,7 +100,7 @@ class RandomMap {
     removed_.push_back(id);
   }
 
-  // These changes must have no effect.
+  // Applies changes that must have no effect.
   void ChangeRemovedObject() {
     if (removed_.empty()) return;
     const uint64_t id = removed_[static_cast<size_t>(Pick(0, static_cast<int>(removed_.size()) - 1))];

@@ -48,7 +48,7 @@ inline FrameInput MakeFrame(uint64_t frame_id, const std::string& class_name = "
   return frame;
 }
 
-// Returns the next event of type T and skips others; nullopt if the stream ends first.
+// Returns the next event of type T and skips all others; nullopt if the stream ends first.
 template <class T>
 std::optional<T> NextOf(EventStream& stream) {
   const auto deadline = std::chrono::steady_clock::now() + kTimeout;

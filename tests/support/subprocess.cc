@@ -66,12 +66,13 @@ std::string BackgroundProcess::WaitForLine(const std::string& prefix) {
       if (line.starts_with(prefix)) return line.substr(prefix.size());
     }
     if (HasEnded()) {
-      ADD_FAILURE() << "the program ended without a line that begins with '" << prefix << "'";
+      ADD_FAILURE() << "the program ended without a line that begins with '" << prefix
+                    << "'; stderr: " << ReadFile(err_path_);
       return "";
     }
     std::this_thread::sleep_for(kPollPeriod);
   }
-  ADD_FAILURE() << "no line that begins with '" << prefix << "' within 30 s";
+  ADD_FAILURE() << "no line that begins with '" << prefix << "' within 30 s; stderr: " << ReadFile(err_path_);
   return "";
 }
 

@@ -16,7 +16,7 @@ struct ProcessResult {
   std::string err;
 };
 
-// Runs a program and waits for its end. Kills it and adds a test failure after kProcessTimeout.
+// Runs a program and waits until it exits. Kills it and adds a test failure after kProcessTimeout.
 ProcessResult RunProcess(const std::vector<std::string>& command);
 
 // A program in the background; killed by the destructor.
@@ -31,7 +31,7 @@ class BackgroundProcess {
   // the program ends first or after 30 s.
   std::string WaitForLine(const std::string& prefix);
   void Signal(int signal) const;
-  // Waits for the end of the program. Kills it and adds a test failure after kProcessTimeout.
+  // Waits until the program exits. Kills it and adds a test failure after kProcessTimeout.
   ProcessResult Wait();
 
  private:

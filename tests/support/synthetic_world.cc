@@ -17,10 +17,10 @@ Eigen::Matrix3d YawMatrix(double yaw_rad) {
 }
 
 // Distance along `direction` (any length) to the solid, or infinity.
-double IntersectSolid(const SyntheticObject& object, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
-  const Eigen::Matrix3d R = YawMatrix(object.yaw_rad).transpose();
-  const Eigen::Vector3d o = (R * (origin - object.center)).cwiseQuotient(object.half_extents);
-  const Eigen::Vector3d d = (R * direction).cwiseQuotient(object.half_extents);
+double IntersectSolid(const SyntheticObject& object, const Eigen::Matrix3d& R_object_scene,
+                      const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d o = (R_object_scene * (origin - object.center)).cwiseQuotient(object.half_extents);
+  const Eigen::Vector3d d = (R_object_scene * direction).cwiseQuotient(object.half_extents);
   constexpr double kMiss = std::numeric_limits<double>::infinity();
   if (object.shape == SyntheticShape::kEllipsoid) {
     const double a = d.squaredNorm();
@@ -87,6 +87,9 @@ SyntheticWorld::SyntheticWorld(SyntheticWorldOptions options) : options_(std::mo
              .cx_px = (options_.width_px - 1) / 2.0,
              .cy_px = (options_.height_px - 1) / 2.0};
   R_world_scene_ = RotationFromZTo(options_.up_world.normalized()).toRotationMatrix();
+  for (const SyntheticObject& object : options_.objects) {
+    R_object_scene_.emplace_back(YawMatrix(object.yaw_rad).transpose());
+  }
   MakePoints();
 }
 
@@ -104,16 +107,16 @@ void SyntheticWorld::MakePoints() {
     Eigen::Vector3d mapped = surface;
     for (int axis = 0; axis < 3; ++axis) mapped[axis] += options_.point_noise_mu * normal(random);
     // An outlier is displaced along the ray of a random camera, like a wrongly triangulated point.
-    const double slide = (uniform(random) - 0.5) * options_.orbit_radius_mu;
-    const int seen_from = static_cast<int>(random() % static_cast<uint64_t>(options_.frames));
+    const double shift_mu = (uniform(random) - 0.5) * options_.orbit_radius_mu;
+    const int viewpoint = static_cast<int>(random() % static_cast<uint64_t>(options_.frames));
     if (uniform(random) < options_.outlier_share) {
-      mapped += slide * (surface - CameraPose(seen_from).translation()).normalized();
+      mapped += shift_mu * (surface - CameraPose(viewpoint).translation()).normalized();
     }
     points_.push_back({surface, mapped});
   };
   for (size_t i = 0; i < options_.objects.size(); ++i) {
-    const auto& bare = options_.textureless;
-    if (std::find(bare.begin(), bare.end(), static_cast<int>(i)) != bare.end()) continue;
+    const auto& textureless = options_.textureless;
+    if (std::find(textureless.begin(), textureless.end(), static_cast<int>(i)) != textureless.end()) continue;
     for (int n = 0; n < options_.points_per_object; ++n) add(RandomSurfacePoint(options_.objects[i], random));
   }
   for (int n = 0; n < options_.points_on_table; ++n) add({uniform(random) - 0.5, uniform(random) - 0.5, 0});
@@ -143,7 +146,7 @@ SyntheticWorld::Hit SyntheticWorld::Cast(const Eigen::Vector3d& origin_scene,
   const double table = -origin_scene.z() / direction_scene.z();
   if (table > 0) nearest = table;
   for (size_t i = 0; i < options_.objects.size(); ++i) {
-    const double t = IntersectSolid(options_.objects[i], origin_scene, direction_scene);
+    const double t = IntersectSolid(options_.objects[i], R_object_scene_[i], origin_scene, direction_scene);
     if (t >= nearest) continue;
     nearest = t;
     hit.object = static_cast<int>(i);
@@ -197,10 +200,11 @@ void SyntheticWorld::DetectInto(int index, const cv::Mat& object_index, Frame* f
                                 .track_id = {}});
   }
   auto next_label = static_cast<uint16_t>(label.size() + 1);
-  for (const auto& [ghost_frame, rectangle] : options_.ghosts) {
-    if (ghost_frame != index) continue;
+  for (const auto& [frame_index, rectangle] : options_.false_detections) {
+    if (frame_index != index) continue;
     frame->labels(rectangle & cv::Rect({}, frame->labels.size())).setTo(next_label);
-    frame->instances.push_back({.label = next_label++, .class_name = "ghost", .score = 0.5, .track_id = {}});
+    frame->instances.push_back(
+        {.label = next_label++, .class_name = kFalseDetectionClass, .score = 0.5, .track_id = {}});
   }
 }
 
@@ -243,7 +247,7 @@ KeyframeView SyntheticWorld::MakeKeyframe(int index, const TrackedFrame& tracked
     if (u < 0 || v < 0 || u >= options_.width_px || v >= options_.height_px) continue;
     const Eigen::Vector3d direction =
         R_world_scene_.transpose() * (points_[i].surface_world - tracked.T_world_camera.translation());
-    // The point is at ray parameter 1. Any surface clearly before it hides the point.
+    // The point is at ray parameter 1; a surface with a clearly smaller parameter occludes it.
     if (Cast(origin, direction).depth_mu < 0.995) continue;
     const MapPointId id{i + 1};
     view.observations.push_back({id, pixel.cast<float>(), tracked.frame->labels.at<uint16_t>(v, u)});

@@ -1,8 +1,8 @@
 #pragma once
 
 // A small synthetic world with known ground truth for the tests of every stage: boxes and ellipsoids on a table, seen
-// by a camera on an orbit, with instance masks by ray casting and sparse map points. All difficulties of real input are
-// adjustable.
+// by a camera on an orbit, with instance masks rendered by ray casting and sparse map points. Noise, outliers and
+// detector errors are adjustable.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -30,6 +30,9 @@ struct SyntheticObject {
   double yaw_rad = 0;
 };
 
+// Class name of SyntheticWorldOptions::false_detections.
+inline constexpr const char* kFalseDetectionClass = "false detection";
+
 struct SyntheticWorldOptions {
   std::vector<SyntheticObject> objects;  // empty: DefaultSyntheticObjects()
   int width_px = 320;
@@ -42,19 +45,20 @@ struct SyntheticWorldOptions {
   double start_azimuth_deg = 0;
   double sweep_deg = 360;                        // azimuth covered by all frames together
   std::vector<std::pair<int, int>> away_frames;  // [first, last): the camera points away from the table
-  Eigen::Vector3d up_world{0, 0, 1};             // the scene is rotated so that its z axis points here
+  Eigen::Vector3d up_world{0, 0, 1};             // direction of the z axis of the scene in the World frame
   int points_per_object = 60;                    // sparse map points on each surface
   int points_on_table = 250;                     // sparse map points on the table
   std::vector<int> textureless;                  // indices of objects without map points
-  double pixel_noise_px = 0;                     // standard deviation of observations
+  double pixel_noise_px = 0;                     // standard deviation of the observed pixels
   double point_noise_mu = 0;                     // standard deviation of map point positions
-  double outlier_share = 0;                      // share of the points displaced from their surface along a ray
-  int mask_jitter_px = 0;                        // each frame's masks grow or shrink by up to this much
-  double dropped_mask_share = 0;                 // share of the masks the detector misses
-  double wrong_class_share = 0;                  // share of the detections with another class name
-  bool permute_labels = true;                    // labels are shuffled from frame to frame
+  double outlier_share = 0;                      // share of the points that are displaced along a viewing ray
+  int mask_jitter_px = 0;                        // maximum dilation or erosion of the masks, random in each frame
+  double dropped_mask_share = 0;                 // share of the masks that are missing
+  double wrong_class_share = 0;                  // share of the detections with a wrong class name
+  bool permute_labels = true;                    // permute the labels in every frame
   bool with_depth = false;                       // frames carry exact dense depth
-  std::vector<std::pair<int, cv::Rect>> ghosts;  // (frame, rectangle): masks of objects that do not exist
+  // Masks of objects that do not exist: frame index and rectangle [px]. Their class is kFalseDetectionClass.
+  std::vector<std::pair<int, cv::Rect>> false_detections;
   uint64_t seed = 1;
 };
 
@@ -78,7 +82,7 @@ class SyntheticWorld {
 
   // True box of an object.
   Cuboid TrueCuboid(int object) const;
-  // `count` points of the surface of an object, world coordinates.
+  // `count` random points on the surface of an object, in the World frame.
   std::vector<Eigen::Vector3d> SurfacePoints(int object, int count) const;
 
  private:
@@ -104,6 +108,7 @@ class SyntheticWorld {
   SyntheticWorldOptions options_;
   CameraModel camera_;
   Eigen::Matrix3d R_world_scene_;
+  std::vector<Eigen::Matrix3d> R_object_scene_;  // per object
   std::vector<SparsePoint> points_;
 };
 

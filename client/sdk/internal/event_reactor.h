@@ -85,15 +85,15 @@ class EventReactor : public Reactor {
       this->RemoveHold();
       return;
     }
-    bool read_on = true;
+    bool continue_reading = true;
     {
       std::lock_guard lock(mutex_);
       Store(response_);
-      read_on = draining_ || events_.size() < kMaxEvents;
-      paused_ = !read_on;
+      continue_reading = draining_ || events_.size() < kMaxEvents;
+      paused_ = !continue_reading;
       changed_.notify_all();
     }
-    if (read_on) this->StartRead(&response_);
+    if (continue_reading) this->StartRead(&response_);
   }
 
   void OnDone(const grpc::Status& status) final {

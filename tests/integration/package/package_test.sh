@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Packs the Debian packages, unpacks them into an empty folder, builds the client of this folder against the unpacked SDK,
-# and lets it talk to the unpacked server.
+# Creates the Debian packages, unpacks them into an empty folder, builds the client in this folder against the unpacked SDK,
+# and connects it to the unpacked server.
 #
 #   package_test.sh BUILD_DIR
 set -euo pipefail
@@ -12,12 +12,12 @@ trap '[ -z "$server" ] || kill "$server" 2>/dev/null || true; rm -rf "$work"' EX
 cpack --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/cpack.log" 2>&1 || { cat "$work/cpack.log"; exit 1; }
 for package in romap-server romap libromap-dev; do
   deb=("$work"/packages/"${package}"_*.deb)
-  [ -f "${deb[0]}" ] || { echo "cpack made no package $package: $(ls "$work/packages")"; exit 1; }
+  [ -f "${deb[0]}" ] || { echo "cpack did not create the package $package: $(ls "$work/packages")"; exit 1; }
   dpkg-deb -x "${deb[0]}" "$work/root"
 done
 prefix=$work/root/usr
 for file in bin/romap bin/romap-server share/romap/server.yaml share/romap/proto/romap/v1/mapping.proto; do
-  [ -s "$prefix/$file" ] || { echo "no package holds $file"; exit 1; }
+  [ -s "$prefix/$file" ] || { echo "$file is not in any package"; exit 1; }
 done
 
 cmake -S "$here" -B "$work/client" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Debug >"$work/client.log" 2>&1 &&
@@ -36,6 +36,6 @@ done
 [ -n "$address" ] || { echo "romap-server did not listen within 30 s"; cat "$work/server.log"; exit 1; }
 
 "$work/client/my_client" "$address" >"$work/client.out"
-echo "the client was built against the packages and reached the server; sessions: $(wc -l <"$work/client.out")"
+echo "built a client against the packages and connected it to the server; sessions: $(wc -l <"$work/client.out")"
 "$work/client/my_client" 127.0.0.1:1 2>"$work/refused.out" && { echo "expected an error without a server"; exit 1; }
 grep -q UNAVAILABLE "$work/refused.out" || { echo "expected UNAVAILABLE, got:"; cat "$work/refused.out"; exit 1; }

@@ -135,7 +135,7 @@ void BlockRunner::Run(uint64_t block_number) {
     if (progress_) {
       spin_passes = 0;
     } else if (!spun_ || ++spin_passes > kMaxSpinPasses) {
-      Die("deadlock: threads wait for others that never arrive");
+      Die("deadlock: threads wait for threads that never arrive");
     }
   }
 }
@@ -178,7 +178,7 @@ void BlockRunner::ReleaseBarrier() {
 }
 
 unsigned BlockRunner::Barrier(int line, bool predicate) {
-  if (waiting_ > 0 && line != barrier_line_) Die("__syncthreads reached at two different places", line);
+  if (waiting_ > 0 && line != barrier_line_) Die("threads wait at two different __syncthreads", line);
   if (live_ != thread_count && g_options.strict_barriers) Die("__syncthreads after a thread returned", line);
   barrier_line_ = line;
   ++waiting_;
@@ -247,7 +247,7 @@ const dim3& GridDim() { return Runner().grid_dim; }
 unsigned Lane() { return Runner().current->linear % kWarpSize; }
 unsigned BlockBarrier(int line, bool predicate) { return Runner().Barrier(line, predicate); }
 void WarpBarrier(unsigned mask) { Runner().WarpArrive(mask, true); }
-void WarpMeeting(unsigned mask) { Runner().WarpArrive(mask, false); }
+void WarpRendezvous(unsigned mask) { Runner().WarpArrive(mask, false); }
 LaneSlot& SlotOfLane(unsigned lane) { return Runner().CurrentWarp().slots[lane]; }
 
 void* DynamicShared() {

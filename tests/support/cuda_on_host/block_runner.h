@@ -31,8 +31,8 @@ void SetRunOptions(const RunOptions& options);
 const RunOptions& GetRunOptions();
 
 // Runs `kernel` once per thread of the grid and returns when all threads have returned. The caller checks the launch
-// limits. Invalid kernels (a barrier at two lines, a warp collective that a lane of its mask never joins, a deadlock)
-// end the process with a message that starts with "cuda_on_host:".
+// limits. Invalid kernels (a barrier at two lines, a warp collective that some lane of its mask never calls, a
+// deadlock) end the process with a message that starts with "cuda_on_host:".
 void RunGrid(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const std::function<void()>& kernel);
 
 [[noreturn]] void Die(const char* what, int line = 0);
@@ -50,12 +50,12 @@ void* DynamicShared();  // 128-byte aligned, all NaN when the block starts
 // barrier.
 unsigned BlockBarrier(int line, bool predicate);
 
-// Waits for all existing lanes in `mask`. WarpBarrier also orders their memory accesses; WarpMeeting, which is part of
-// the other warp collectives, does not.
+// Waits for all existing lanes in `mask`. WarpBarrier also orders their memory accesses; WarpRendezvous, which is part
+// of the other warp collectives, does not.
 void WarpBarrier(unsigned mask);
-void WarpMeeting(unsigned mask);
+void WarpRendezvous(unsigned mask);
 
-// Lanes of a warp exchange values through these slots, between two WarpMeetings.
+// Lanes of a warp exchange values through these slots, between two WarpRendezvous calls.
 struct alignas(16) LaneSlot {
   unsigned char bytes[16];
   const void* pointers[2];
@@ -74,7 +74,7 @@ struct ThreadStamp {
   uint64_t block = 0;
   unsigned thread = 0;
   uint64_t block_barriers = 0;  // passed by the block
-  uint64_t warp_barriers = 0;   // passed by the warp; meetings do not count
+  uint64_t warp_barriers = 0;   // passed by the warp; rendezvous do not count
 };
 ThreadStamp CurrentStamp();
 bool InDynamicShared(uintptr_t address);

@@ -58,14 +58,14 @@ template <class T>
 T Exchange(unsigned mask, const T& value, int source) {
   static_assert(sizeof(T) <= sizeof(LaneSlot::bytes) && std::is_trivially_copyable_v<T>);
   std::memcpy(SlotOfLane(Lane()).bytes, &value, sizeof(T));
-  WarpMeeting(mask);
+  WarpRendezvous(mask);
   T result;
   if ((mask >> source & 1) != 0) {
     std::memcpy(static_cast<void*>(&result), SlotOfLane(static_cast<unsigned>(source)).bytes, sizeof(T));
   } else {
     std::memset(static_cast<void*>(&result), 0xff, sizeof(T));
   }
-  WarpMeeting(mask);
+  WarpRendezvous(mask);
   return result;
 }
 
@@ -116,12 +116,12 @@ T __shfl_xor_sync(unsigned mask, T value, int lane_mask, int width = 32) {
 inline unsigned __ballot_sync(unsigned mask, int predicate) {
   using namespace romap::cuda_on_host;
   SlotOfLane(Lane()).bytes[0] = predicate != 0;
-  WarpMeeting(mask);
+  WarpRendezvous(mask);
   unsigned votes = 0;
   for (unsigned lane = 0; lane < kWarpSize; ++lane) {
     if ((mask >> lane & 1) != 0 && SlotOfLane(lane).bytes[0] == 1) votes |= 1u << lane;
   }
-  WarpMeeting(mask);
+  WarpRendezvous(mask);
   return votes;
 }
 inline int __any_sync(unsigned mask, int predicate) { return __ballot_sync(mask, predicate) != 0; }

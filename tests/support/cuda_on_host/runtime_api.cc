@@ -22,7 +22,7 @@ struct Machine {
   bool lost = false;
   std::map<uintptr_t, size_t> allocations;  // address -> bytes
   size_t allocated_bytes = 0;
-  std::map<const void*, size_t> shared_limits;  // of kernels that requested more
+  std::map<const void*, size_t> shared_limits;  // of kernels that requested more than the default
 };
 
 Machine& TheMachine() {
@@ -76,12 +76,12 @@ cudaError_t RunKernel(dim3 grid, dim3 block, size_t dynamic_shared_bytes, const 
   {
     std::lock_guard lock(TheMachine().mutex);
     if (const cudaError_t error = CheckDevice()) return error;
-    int& left = TheMachine().traits.kernels_before_fault;
-    if (left == 0) {
+    int& remaining = TheMachine().traits.kernels_before_fault;
+    if (remaining == 0) {
       TheMachine().lost = true;
       return Fail(cudaErrorLaunchFailure);
     }
-    if (left > 0) --left;
+    if (remaining > 0) --remaining;
   }
   RunGrid(grid, block, dynamic_shared_bytes, body);
   return cudaSuccess;
@@ -236,9 +236,9 @@ cudaError_t cudaMemcpy(void* to, const void* from, size_t bytes, cudaMemcpyKind 
 }
 
 cudaError_t cudaFuncSetAttribute(const void* kernel, cudaFuncAttribute, int value) {
-  constexpr int kMostSharedBytes = 99 * 1024;  // of the smaller devices since compute capability 8.0
+  constexpr int kMaxSharedBytes = 99 * 1024;  // of the smaller devices since compute capability 8.0
   std::lock_guard lock(TheMachine().mutex);
-  if (value < 0 || value > kMostSharedBytes) return Fail(cudaErrorInvalidValue);
+  if (value < 0 || value > kMaxSharedBytes) return Fail(cudaErrorInvalidValue);
   TheMachine().shared_limits[kernel] = static_cast<size_t>(value);
   return cudaSuccess;
 }

@@ -34,7 +34,7 @@ struct fragment {
 };
 
 // Synchronizes the lanes for an operation without ordering their memory accesses.
-inline void Meet() { romap::cuda_on_host::WarpMeeting(0xffffffffu); }
+inline void Rendezvous() { romap::cuda_on_host::WarpRendezvous(0xffffffffu); }
 
 // Checks the alignment that devices require for loads and stores.
 template <class T>
@@ -48,46 +48,46 @@ void CheckAccess(const T* p, unsigned leading_dimension) {
 template <class Fragment, class T>
 void fill_fragment(Fragment& f, T value) {
   for (auto& element : f.x) element = value;
-  Meet();
+  Rendezvous();
 }
 
 template <class Use, int M, int N, int K, class T, class Layout>
 void load_matrix_sync(fragment<Use, M, N, K, T, Layout>& f, const T* p, unsigned leading_dimension) {
   CheckAccess(p, leading_dimension);
-  Meet();
+  Rendezvous();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     f.x[i] = std::is_same_v<Layout, row_major> ? p[row * leading_dimension + col] : p[col * leading_dimension + row];
   }
-  Meet();
+  Rendezvous();
 }
 
 template <int M, int N, int K, class T>
 void load_matrix_sync(fragment<accumulator, M, N, K, T>& f, const T* p, unsigned leading_dimension, layout_t layout) {
   CheckAccess(p, leading_dimension);
-  Meet();
+  Rendezvous();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     f.x[i] = layout == mem_row_major ? p[row * leading_dimension + col] : p[col * leading_dimension + row];
   }
-  Meet();
+  Rendezvous();
 }
 
 template <int M, int N, int K, class T>
 void store_matrix_sync(T* p, const fragment<accumulator, M, N, K, T>& f, unsigned leading_dimension, layout_t layout) {
   CheckAccess(p, leading_dimension);
-  Meet();
+  Rendezvous();
   const int lane = static_cast<int>(romap::cuda_on_host::Lane());
   for (int i = 0; i < f.num_elements; ++i) {
     const unsigned row = static_cast<unsigned>(f.Row(lane, i));
     const unsigned col = static_cast<unsigned>(f.Col(lane, i));
     p[layout == mem_row_major ? row * leading_dimension + col : col * leading_dimension + row] = f.x[i];
   }
-  Meet();
+  Rendezvous();
 }
 
 // Number of matrix products since the program started.
@@ -104,7 +104,7 @@ void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M,
   if (lane == 0) ++tile_products;
   SlotOfLane(lane).pointers[0] = &a;
   SlotOfLane(lane).pointers[1] = &b;
-  Meet();
+  Rendezvous();
   TD result[fragment<accumulator, M, N, K, TD>::num_elements];
   for (int i = 0; i < d.num_elements; ++i) {
     const int row = d.Row(static_cast<int>(lane), i);
@@ -117,7 +117,7 @@ void mma_sync(fragment<accumulator, M, N, K, TD>& d, const fragment<matrix_a, M,
     }
     result[i] = static_cast<TD>(static_cast<float>(c.x[i]) + sum);
   }
-  Meet();
+  Rendezvous();
   for (int i = 0; i < d.num_elements; ++i) d.x[i] = result[i];
 }
 

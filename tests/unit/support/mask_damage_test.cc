@@ -43,8 +43,8 @@ bool SameMasks(const Frame& a, const Frame& b) {
   return !a.has_masks || cv::countNonZero(a.labels != b.labels) == 0;
 }
 
-// An inconsistency of a frame's masks; empty when every instance has pixels and every masked pixel an instance.
-std::string Faults(const Frame& frame) {
+// Describes an inconsistency of the masks; empty if every instance has pixels and every labeled pixel has an instance.
+std::string InconsistencyOf(const Frame& frame) {
   std::set<uint32_t> painted;
   for (auto it = frame.labels.begin<uint16_t>(); it != frame.labels.end<uint16_t>(); ++it) painted.insert(*it);
   painted.erase(0);
@@ -75,7 +75,7 @@ TEST(MaskDamage, DoesNotModifyItsInput) {
   EXPECT_TRUE(SameMasks(frame, SixSquares(1)));
 }
 
-// All faults at once, each weak enough not to hide the others.
+// All faults at the same time, each weak enough not to hide the others.
 MaskDamage AllFaults(uint64_t seed) {
   MaskDamage damage;
   damage.drop_share = 0.2;
@@ -93,10 +93,10 @@ MaskDamage AllFaults(uint64_t seed) {
 }
 
 TEST(MaskDamage, KeepsLabelsAndInstancesConsistent) {
-  for (const auto& frame : DamagedFrames(AllFaults(3), 60)) EXPECT_EQ(Faults(*frame), "") << frame->frame_id;
+  for (const auto& frame : DamagedFrames(AllFaults(3), 60)) EXPECT_EQ(InconsistencyOf(*frame), "") << frame->frame_id;
 }
 
-TEST(MaskDamage, DependsOnSeedAndFrameIdAlone) {
+TEST(MaskDamage, DependsOnlyOnSeedAndFrameId) {
   const auto all = DamagedFrames(AllFaults(3), 30);
   const auto others = DamagedFrames(AllFaults(4), 30);
   MaskDamager damager(AllFaults(3), kClasses);
@@ -119,9 +119,9 @@ TEST(MaskDamage, OneFaultDoesNotChangeAnother) {
 }
 
 TEST(MaskDamage, DropsTheGivenShare) {
-  size_t left = 0;
-  for (const auto& frame : DamagedFrames({.drop_share = 0.3}, 200)) left += frame->instances.size();
-  EXPECT_NEAR(static_cast<double>(left) / 1200, 0.7, 0.04);
+  size_t remaining = 0;
+  for (const auto& frame : DamagedFrames({.drop_share = 0.3}, 200)) remaining += frame->instances.size();
+  EXPECT_NEAR(static_cast<double>(remaining) / 1200, 0.7, 0.04);
 }
 
 TEST(MaskDamage, RunsAtTheGivenRate) {
@@ -162,7 +162,7 @@ TEST(MaskDamage, DeliversLateMasksInOrder) {
   EXPECT_TRUE(std::is_sorted(arrived.begin(), arrived.end()));
 }
 
-TEST(MaskDamage, FlickersInRuns) {
+TEST(MaskDamage, FlickerHidesAnObjectForSeveralFrames) {
   const int run_frames = 8;
   std::map<uint32_t, int> missing_frames;
   std::map<uint32_t, int> runs;
@@ -189,7 +189,7 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
   int changed = 0;
   for (const auto& frame : DamagedFrames({.border_px = amplitude_px}, 10)) {
     const Frame truth = SixSquares(frame->frame_id);
-    for (uint32_t label = 3; label <= 6; ++label) {  // those without a neighbor
+    for (uint32_t label = 3; label <= 6; ++label) {  // the masks without a touching neighbor
       const cv::Mat is = frame->labels == static_cast<int>(label);
       const cv::Mat was = truth.labels == static_cast<int>(label);
       cv::Mat core, max_area, outline;
@@ -213,7 +213,7 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
   EXPECT_LT(mean_shift_px, 0.75 * amplitude_px);
 }
 
-TEST(MaskDamage, FlipsClassesToOtherGivenOnes) {
+TEST(MaskDamage, FlipsClassesToOtherGivenClasses) {
   int flipped = 0;
   for (const auto& frame : DamagedFrames({.class_flip_share = 0.1}, 300)) {
     const Frame truth = SixSquares(frame->frame_id);
@@ -249,7 +249,7 @@ TEST(MaskDamage, SplitsMasksIntoTwoOfTheSameClass) {
   }
 }
 
-TEST(MaskDamage, LeaksOverTheBorder) {
+TEST(MaskDamage, ExtendsMasksAcrossTheirBorder) {
   for (const auto& frame : DamagedFrames({.leak_share = 1}, 10)) {
     const Frame truth = SixSquares(frame->frame_id);
     ASSERT_EQ(frame->instances.size(), 6U);
@@ -278,10 +278,10 @@ TEST(MaskDamage, FalsePositivesPersistForSomeFramesOutsideOtherMasks) {
   EXPECT_NEAR(frames_with_false_positive / 400.0, 0.5, 0.15);
 }
 
-TEST(MaskDamage, FindsNothingInSomeFrames) {
+TEST(MaskDamage, SomeFramesHaveNoDetections) {
   int empty = 0;
   for (const auto& frame : DamagedFrames({.empty_share = 0.2}, 300)) {
-    EXPECT_TRUE(frame->has_masks) << "the detector did run";
+    EXPECT_TRUE(frame->has_masks) << "the detector processed the frame";
     ASSERT_FALSE(frame->labels.empty());
     if (!frame->instances.empty()) continue;
     EXPECT_EQ(cv::countNonZero(frame->labels), 0);
@@ -290,10 +290,10 @@ TEST(MaskDamage, FindsNothingInSomeFrames) {
   EXPECT_NEAR(empty / 300.0, 0.2, 0.07);
 }
 
-TEST(MaskDamage, AddsInstancesUpToTheCrowd) {
+TEST(MaskDamage, AddsInstancesUpToTheCrowdSize) {
   for (const auto& frame : DamagedFrames({.crowd = 200, .permute_labels = true}, 3)) {
     EXPECT_EQ(frame->instances.size(), 200U);
-    EXPECT_EQ(Faults(*frame), "");
+    EXPECT_EQ(InconsistencyOf(*frame), "");
   }
 }
 

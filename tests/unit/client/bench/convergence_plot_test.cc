@@ -9,7 +9,7 @@ namespace {
 
 // Mean position of the pixels with the color of a line, in the left (accuracy) or right (completion) panel, without the
 // legend.
-cv::Point2d PlaceOf(const cv::Mat& picture, const cv::Scalar& color, bool right) {
+cv::Point2d MeanPosition(const cv::Mat& picture, const cv::Scalar& color, bool right) {
   const int half = picture.cols / 2;
   const cv::Mat panel = picture(cv::Rect(right ? half : 0, 0, half, 500));
   cv::Mat same;
@@ -29,17 +29,17 @@ TEST(ConvergencePlotTest, BetterIsLowerAndLaterIsRight) {
   results.curves = {{"good", 0.1, 0.3, 0.5}, {"good", 0.2, 0.2, 0.4}, {"late", 2, 0.9, 0.1}, {"late", 8, 0.8, 0.05}};
   const cv::Mat picture = DrawConvergence(results);
   ASSERT_EQ(picture.type(), CV_8UC3);
-  const cv::Point2d good = PlaceOf(picture, kFirst, false), late = PlaceOf(picture, kSecond, false);
+  const cv::Point2d good = MeanPosition(picture, kFirst, false), late = MeanPosition(picture, kSecond, false);
   EXPECT_GT(good.y, late.y + 50);
   EXPECT_LT(good.x, late.x - 50);
-  EXPECT_LT(PlaceOf(picture, kFirst, true).y, PlaceOf(picture, kSecond, true).y - 50);
+  EXPECT_LT(MeanPosition(picture, kFirst, true).y, MeanPosition(picture, kSecond, true).y - 50);
 }
 
 TEST(ConvergencePlotTest, AxesAreLogarithmic) {
   const auto x_of = [](double train_s) {
     PaperResults results;
     results.curves = {{"low", 0.01, 0.3, 0.3}, {"at", train_s, 0.3, 0.3}, {"high", 100, 0.3, 0.3}};
-    return PlaceOf(DrawConvergence(results), kSecond, false).x;
+    return MeanPosition(DrawConvergence(results), kSecond, false).x;
   };
   EXPECT_NEAR(x_of(1) - x_of(0.1), x_of(10) - x_of(1), 2);
 }

@@ -35,7 +35,7 @@ struct HullFieldTest : public ::testing::Test {
   FieldSnapshot snapshot;
 };
 
-TEST_F(HullFieldTest, IsFullInsideAndEmptyOutside) {
+TEST_F(HullFieldTest, IsOccupiedInsideAndEmptyOutside) {
   EXPECT_EQ(snapshot.object.value, 1u);
   EXPECT_EQ(snapshot.cameras.size(), views.size());
   EXPECT_FLOAT_EQ(RawAt({0, 0, 0}), 10);
@@ -61,7 +61,7 @@ TEST_F(HullFieldTest, ValuesAreContinuousBetweenCells) {
   EXPECT_GE(between, 5);
 }
 
-// Cells are empty if some view sees their center as background, so the hull is the ball within about a pixel.
+// A cell is empty if its center is background in some view, so the hull agrees with the ball to about a pixel.
 TEST_F(HullFieldTest, SurfaceIsCloseToTheBall) {
   const absl::StatusOr<Mesh> mesh = mesh::ExtractMesh(snapshot, mesh::MeshConfig());
   ASSERT_TRUE(mesh.ok()) << Message(mesh.status());

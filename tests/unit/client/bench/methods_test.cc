@@ -57,7 +57,7 @@ TEST(MethodsTest, EveryAblationChangesSomething) {
 }
 
 // [33] as reimplemented in the paper: the same model without the density loss.
-TEST(MethodsTest, OfflineMethodOnlyLacksTheDensityLoss) {
+TEST(MethodsTest, OfflineMethodDiffersOnlyInTheDensityLoss) {
   EngineConfig offline = ConfigOf("offline");
   EXPECT_EQ(offline.nerf.density_weight, 0);
   EXPECT_TRUE(offline.nerf.random_background);

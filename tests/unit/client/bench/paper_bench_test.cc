@@ -71,7 +71,7 @@ TEST(PaperBenchTest, WritesReportPlotAndMeshes) {
   EXPECT_EQ(results->curves.back().accuracy_cm, MeanOf(*results, "fast", kToTheEnd_s)->quality.accuracy_cm);
 }
 
-TEST(PaperBenchTest, RunsEverySeedOnEverySubset) {
+TEST(PaperBenchTest, RunsAllSeedsOnAllSubsets) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.seeds = 2;
@@ -94,7 +94,7 @@ TEST(PaperBenchTest, RunsEverySeedOnEverySubset) {
   EXPECT_EQ(MeanOf(*results, "hull", kToTheEnd_s)->evaluations, 2) << "the hull does not depend on the seed";
 }
 
-TEST(PaperBenchTest, EqualMethodsRunOnce) {
+TEST(PaperBenchTest, MethodsWithEqualSettingsRunOnce) {
   const testing::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.tables = {"1", "ablation"};
@@ -154,22 +154,22 @@ TEST(PaperBenchTest, RunsAdditionalRowsAndRejectsInvalidOnes) {
 
 TEST(PaperBenchTest, NamesInvalidInput) {
   const testing::TinySequence data;
-  const auto fault = [&](const std::function<void(PaperBenchOptions&)>& spoil) {
+  const auto error_of = [&](const std::function<void(PaperBenchOptions&)>& change) {
     PaperBenchOptions options = TinyBench(data);
-    spoil(options);
+    change(options);
     return Message(RunBench(options).status());
   };
-  EXPECT_THAT(fault([](auto& o) { o.methods = {"fats"}; }),
+  EXPECT_THAT(error_of([](auto& o) { o.methods = {"fats"}; }),
               HasSubstr("unknown method 'fats'; expected one of all-parts, "));
-  EXPECT_THAT(fault([](auto& o) { o.subsets = 5; }), HasSubstr("subsets is 5; expected 1 to 4"));
-  EXPECT_THAT(fault([](auto& o) { o.seeds = 0; }), HasSubstr("seeds is 0"));
-  EXPECT_THAT(fault([](auto& o) { o.times_s = {5, 1}; }), HasSubstr("times contain 1 s"));
-  EXPECT_THAT(fault([](auto& o) { o.cap_s = 0; }), HasSubstr("cap is 0 s"));
-  EXPECT_THAT(fault([](auto& o) { o.settings = {"nerf.levles=3"}; }), HasSubstr("nerf.levels"));
-  EXPECT_THAT(fault([](auto& o) { o.methods = {"size-14-1"}; }), HasSubstr("no method selected")) << "of Table 1";
-  EXPECT_THAT(fault([](auto& o) { o.sequence_dir += "/nowhere"; }), HasSubstr("nowhere"));
+  EXPECT_THAT(error_of([](auto& o) { o.subsets = 5; }), HasSubstr("subsets is 5; expected 1 to 4"));
+  EXPECT_THAT(error_of([](auto& o) { o.seeds = 0; }), HasSubstr("seeds is 0"));
+  EXPECT_THAT(error_of([](auto& o) { o.times_s = {5, 1}; }), HasSubstr("times contain 1 s"));
+  EXPECT_THAT(error_of([](auto& o) { o.cap_s = 0; }), HasSubstr("cap is 0 s"));
+  EXPECT_THAT(error_of([](auto& o) { o.settings = {"nerf.levles=3"}; }), HasSubstr("nerf.levels"));
+  EXPECT_THAT(error_of([](auto& o) { o.methods = {"size-14-1"}; }), HasSubstr("no method selected")) << "of Table 1";
+  EXPECT_THAT(error_of([](auto& o) { o.sequence_dir += "/nowhere"; }), HasSubstr("nowhere"));
   fs::remove_all(data.dir() + "/gt");
-  EXPECT_THAT(fault([](auto&) {}), HasSubstr("gt"));
+  EXPECT_THAT(error_of([](auto&) {}), HasSubstr("gt"));
 }
 
 TEST(PaperBenchTest, QuickReducesTheRun) {

@@ -46,7 +46,7 @@ struct TimedTrainingTest : public ::testing::Test {
   double seconds_per_step = 0;
 };
 
-TEST_F(TimedTrainingTest, TrainsTheWholePlanLikeTheEngine) {
+TEST_F(TimedTrainingTest, TrainsTheWholePlanLikeObjectField) {
   const absl::StatusOr<TimedTraining> training = TrainWithin(request, seconds_per_step);
   ASSERT_TRUE(training.ok()) << Message(training.status());
   EXPECT_EQ(training->stats.steps, 30);
@@ -65,17 +65,17 @@ TEST_F(TimedTrainingTest, TrainsTheWholePlanLikeTheEngine) {
 
 // A shortened plan lets the learning rate schedule complete.
 TEST_F(TimedTrainingTest, ShortensAPlanThatDoesNotFit) {
-  seconds_per_step = 1;  // as if measured earlier
+  seconds_per_step = 1;  // the estimate of an earlier training
   request.limit_s = 12.5;
-  const absl::StatusOr<TimedTraining> cut = TrainWithin(request, seconds_per_step);
-  ASSERT_TRUE(cut.ok());
-  EXPECT_TRUE(cut->limited);
-  EXPECT_EQ(cut->stats.steps, 12);
+  const absl::StatusOr<TimedTraining> shortened = TrainWithin(request, seconds_per_step);
+  ASSERT_TRUE(shortened.ok());
+  EXPECT_TRUE(shortened->limited);
+  EXPECT_EQ(shortened->stats.steps, 12);
   request.config.full_budget_steps = 12;
   request.limit_s = kForever_s;
   const absl::StatusOr<TimedTraining> planned = TrainWithin(request, seconds_per_step);
   EXPECT_FALSE(planned->limited);
-  EXPECT_EQ(RawOf(cut->snapshot), RawOf(planned->snapshot));
+  EXPECT_EQ(RawOf(shortened->snapshot), RawOf(planned->snapshot));
 }
 
 TEST_F(TimedTrainingTest, RespectsTheLimitIfStepsAreSlowerThanExpected) {
@@ -97,11 +97,11 @@ TEST_F(TimedTrainingTest, TakesSnapshotsAtTheMarks) {
 }
 
 TEST_F(TimedTrainingTest, StopsOnRequest) {
-  int asked = 0;
-  request.stop = [&] { return ++asked > 1; };
+  int polls = 0;
+  request.stop = [&] { return ++polls > 1; };
   seconds_per_step = 0.1;
   EXPECT_EQ(TrainWithin(request, seconds_per_step).status().code(), absl::StatusCode::kCancelled);
-  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(polls, 2);
 }
 
 TEST_F(TimedTrainingTest, RejectsAnObjectWithoutViews) {

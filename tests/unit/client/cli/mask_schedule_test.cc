@@ -55,7 +55,7 @@ TEST(MaskScheduleTest, UsesTheNextFrameWithMasksIfAFrameHasNone) {
 
 TEST(MaskScheduleTest, DelaysMasksByFrameTimestamps) {
   MaskSchedule schedule(0, 0.1);
-  std::vector<std::pair<uint64_t, uint64_t>> late;  // frame, and the frame before which its masks were due
+  std::vector<std::pair<uint64_t, uint64_t>> late;  // frame of the masks, and the first frame after they were due
   for (uint64_t id = 1; id <= 5; ++id) {
     FrameInput frame = Frame(id);
     while (const auto due = schedule.TakeDueBy(frame.timestamp_ns)) {

@@ -85,7 +85,7 @@ TEST(GlbTest, StoresTheMeshAccordingToTheSpecification) {
   EXPECT_TRUE(glb.document["accessors"][color]["normalized"].get<bool>());
   const auto colors = glb.Read<uint16_t>(color, 4);
   EXPECT_EQ(colors[0], 65535);
-  EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half the linear intensity";
+  EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half of the maximum linear intensity";
   EXPECT_EQ(colors[3], 65535) << "opaque";
 }
 

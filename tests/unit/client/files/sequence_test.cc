@@ -75,7 +75,7 @@ TEST_F(SequenceTest, AssociatesMasksAndDetectionsByTime) {
   EXPECT_TRUE(sequence->has_mask(0));
   EXPECT_FALSE(sequence->has_mask(1));
   EXPECT_TRUE(sequence->has_mask(2));
-  EXPECT_FALSE(sequence->has_mask(3)) << "a mask 0.6 s later belongs to another frame";
+  EXPECT_FALSE(sequence->has_mask(3)) << "the nearest mask is 0.6 s later";
   const auto frame = sequence->Load(0);
   ASSERT_TRUE(frame.ok());
   ASSERT_EQ(frame->instances.size(), 2u);
@@ -136,7 +136,7 @@ TEST_F(SequenceTest, PermutedLabelsKeepShapesAndClasses) {
       EXPECT_EQ(labels.at<uint8_t>(12, column), instance.label);
       if (instance.class_name == "cup") cup_labels.insert(instance.label);
     }
-    EXPECT_EQ(labels.at<uint8_t>(12, 25), 0) << "background stays background";
+    EXPECT_EQ(labels.at<uint8_t>(12, 25), 0) << "background";
   }
   EXPECT_GT(cup_labels.size(), 1u);
   EXPECT_EQ(sequence->Load(1)->label_png, sequence->Load(1)->label_png) << "the same seed gives the same labels";

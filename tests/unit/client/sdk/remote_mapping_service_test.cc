@@ -44,7 +44,7 @@ class RemoteMappingServiceTest : public ::testing::Test {
   std::unique_ptr<RemoteMappingService> client_ = RemoteMappingService::Connect(server_->address()).value();
 };
 
-TEST_F(RemoteMappingServiceTest, ConnectFailsWithInstructionsWithoutServer) {
+TEST_F(RemoteMappingServiceTest, ConnectWithoutServerReportsHowToStartIt) {
   const std::string address = server_->address();
   server_->Shutdown();
   const auto client = RemoteMappingService::Connect(address, {.connect_timeout = std::chrono::milliseconds(200)});
@@ -117,7 +117,7 @@ TEST_F(RemoteMappingServiceTest, SendsAFrameJustBelowTheSizeLimit) {
   EXPECT_TRUE(ack->accepted);
 }
 
-TEST_F(RemoteMappingServiceTest, BuffersEventsForALateReader) {
+TEST_F(RemoteMappingServiceTest, DeliversAllEventsToALateReader) {
   constexpr uint64_t kFrames = 500;  // three events each, more than the client buffers
   const auto stream = client_->OpenMap(NewSession()).value();
   for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());

@@ -230,17 +230,17 @@ TEST(ObjectMapper, MatchesAnObjectThatWasOutOfViewForLong) {
 
 TEST(ObjectMapper, DoesNotPublishShortFalseDetections) {
   SyntheticWorldOptions options;
-  options.ghosts = {{10, {20, 20, 40, 40}}, {11, {22, 20, 40, 40}}, {30, {250, 150, 30, 60}}};
+  options.false_detections = {{10, {20, 20, 40, 40}}, {11, {22, 20, 40, 40}}, {30, {250, 150, 30, 60}}};
   const SyntheticWorld world(options);
   const Published published = MapWorld(world);
   ExpectFound(world, published);
-  for (const auto& [id, object] : published.objects) EXPECT_NE(object.class_name, "ghost");
+  for (const auto& [id, object] : published.objects) EXPECT_NE(object.class_name, kFalseDetectionClass);
 }
 
 TEST(ObjectMapper, PublishesUnconfirmedObjectsAsProvisionalWithoutTraining) {
   SyntheticWorldOptions options;
   // A false detection that persists for some frames.
-  for (int i = 6; i < 11; ++i) options.ghosts.push_back({i, {20 + 2 * i, 190, 30, 30}});
+  for (int i = 6; i < 11; ++i) options.false_detections.push_back({i, {20 + 2 * i, 190, 30, 30}});
   const SyntheticWorld world(options);
   ObjectMapper mapper({});
   Published published;

@@ -51,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(Orders, CudaOnHost,
                                          cuda_on_host::RunOptions{cuda_on_host::ThreadOrder::kShuffled, 4, 2, true}),
                          [](const auto& info) { return "Order" + std::to_string(info.index); });
 
-TEST_P(CudaOnHost, AtomicAddsOfFloatsLoseNothing) {
+TEST_P(CudaOnHost, AtomicAddsOfFloatsSumExactly) {
   const int n = 5000;
   const unsigned entries = 1 << 10;
   DeviceArray<float> table(std::vector<float>(entries, 0.0f));
@@ -66,7 +66,7 @@ TEST_P(CudaOnHost, AtomicAddsOfFloatsLoseNothing) {
   EXPECT_EQ(table.Read(), expected);  // sixteenths: exact in any order
 }
 
-TEST_P(CudaOnHost, AtomicAddsOfHalvesLoseNothing) {
+TEST_P(CudaOnHost, AtomicAddsOfHalvesSumExactly) {
   const int n = 2000;
   const unsigned entries = 1 << 9;
   DeviceArray<__half2> table(std::vector<__half2>(entries, __half2{0.0f, 0.0f}));
@@ -98,7 +98,7 @@ TEST_P(CudaOnHost, ReductionsSumEachBlock) {
   EXPECT_EQ(again.Read(), expected);
 }
 
-TEST_P(CudaOnHost, TensorCoreProductEqualsThePlainProduct) {
+TEST_P(CudaOnHost, TensorCoreProductEqualsTheScalarProduct) {
   const int m = 32, n = 32, k = 48;
   std::vector<__half> a(m * k), b(n * k);
   for (int i = 0; i < m * k; ++i) a[i] = static_cast<float>(i * 37 % 17 - 8) * 0.125f;

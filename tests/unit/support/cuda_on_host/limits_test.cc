@@ -17,33 +17,34 @@ class CudaLimits : public testing::Test {
 };
 using CudaLimitsDeathTest = CudaLimits;
 
-__global__ void Nothing() {}
+__global__ void EmptyKernel() {}
 
-cudaError_t LaunchNothing(dim3 grid, dim3 block, size_t shared_bytes) {
-  ROMAP_LAUNCH(Nothing, grid, block, shared_bytes, nullptr);
+cudaError_t LaunchEmptyKernel(dim3 grid, dim3 block, size_t shared_bytes) {
+  ROMAP_LAUNCH(EmptyKernel, grid, block, shared_bytes, nullptr);
   return cudaGetLastError();
 }
 
 TEST_F(CudaLimits, LaunchesBeyondTheLimitsAreRejected) {
-  EXPECT_EQ(LaunchNothing(dim3(1), dim3(1024), 48 * 1024), cudaSuccess);
-  EXPECT_EQ(LaunchNothing(dim3(1), dim3(1025), 0), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(LaunchNothing(dim3(1), dim3(32, 33), 0), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(LaunchNothing(dim3(1), dim3(1, 1, 65), 0), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(LaunchNothing(dim3(0), dim3(32), 0), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(LaunchNothing(dim3(1, 65536), dim3(32), 0), cudaErrorInvalidConfiguration);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1), dim3(1024), 48 * 1024), cudaSuccess);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1), dim3(1025), 0), cudaErrorInvalidConfiguration);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1), dim3(32, 33), 0), cudaErrorInvalidConfiguration);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1), dim3(1, 1, 65), 0), cudaErrorInvalidConfiguration);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(0), dim3(32), 0), cudaErrorInvalidConfiguration);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1, 65536), dim3(32), 0), cudaErrorInvalidConfiguration);
 }
 
-__global__ void NothingShared() {}
+__global__ void EmptyKernelWithSharedMemory() {}
 
 TEST_F(CudaLimits, MoreSharedMemoryMustBeRequested) {
   const auto launch = [] {
-    ROMAP_LAUNCH(NothingShared, dim3(1), dim3(1), 60 * 1024, nullptr);
+    ROMAP_LAUNCH(EmptyKernelWithSharedMemory, dim3(1), dim3(1), 60 * 1024, nullptr);
     return cudaGetLastError();
   };
   EXPECT_EQ(launch(), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(cudaFuncSetAttribute(NothingShared, cudaFuncAttributeMaxDynamicSharedMemorySize, 60 * 1024), cudaSuccess);
+  EXPECT_EQ(cudaFuncSetAttribute(EmptyKernelWithSharedMemory, cudaFuncAttributeMaxDynamicSharedMemorySize, 60 * 1024),
+            cudaSuccess);
   EXPECT_EQ(launch(), cudaSuccess);
-  EXPECT_EQ(cudaFuncSetAttribute(NothingShared, cudaFuncAttributeMaxDynamicSharedMemorySize, 1 << 20),
+  EXPECT_EQ(cudaFuncSetAttribute(EmptyKernelWithSharedMemory, cudaFuncAttributeMaxDynamicSharedMemorySize, 1 << 20),
             cudaErrorInvalidValue);
 }
 
@@ -79,7 +80,7 @@ TEST_F(CudaLimits, WithoutADeviceEveryCallFails) {
   EXPECT_EQ(count, 0);
   void* p = nullptr;
   EXPECT_EQ(cudaMalloc(&p, 10), cudaErrorNoDevice);
-  EXPECT_EQ(LaunchNothing(dim3(1), dim3(1), 0), cudaErrorNoDevice);
+  EXPECT_EQ(LaunchEmptyKernel(dim3(1), dim3(1), 0), cudaErrorNoDevice);
   EXPECT_STREQ(cudaGetErrorString(cudaErrorNoDevice), "no CUDA-capable device is detected");
 }
 
@@ -119,7 +120,8 @@ TEST_F(CudaLimitsDeathTest, InvalidKernelsEndTheProcess) {
   int* out = nullptr;
   ASSERT_EQ(cudaMalloc(&out, 2048), cudaSuccess);
   ASSERT_EQ(cudaMemset(out, 0, 2048), cudaSuccess);
-  EXPECT_DEATH(ROMAP_LAUNCH(BarrierInBothBranches, dim3(1), dim3(32), 0, nullptr), "reached at two different places");
+  EXPECT_DEATH(ROMAP_LAUNCH(BarrierInBothBranches, dim3(1), dim3(32), 0, nullptr),
+               "threads wait at two different __syncthreads");
   EXPECT_DEATH(ROMAP_LAUNCH(ShuffleThatSomeSkip, dim3(1), dim3(32), 0, nullptr, out),
                "contains a lane that has returned");
   EXPECT_DEATH(ROMAP_LAUNCH(WaitForever, dim3(1), dim3(2), 0, nullptr, out), "deadlock");

@@ -1,4 +1,4 @@
-// Streams, which execute as late as possible, graphs, and failing devices.
+// Tests of streams, which execute as late as possible, of graphs, and of failing devices.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -52,7 +52,7 @@ TEST_F(CudaStreams, WorkRunsAtTheNextSynchronization) {
 TEST_F(CudaStreams, SourcesOfCopiesAreReadAtSynchronization) {
   int source = 5;
   EXPECT_EQ(cudaMemcpyAsync(device_, &source, sizeof(source), cudaMemcpyHostToDevice, stream_), cudaSuccess);
-  source = 6;  // a mistake that must have an effect
+  source = 6;  // a mistake of the caller that must be visible
   EXPECT_EQ(cudaDeviceSynchronize(), cudaSuccess);
   EXPECT_EQ(Value(), 6);
 }
@@ -85,7 +85,7 @@ TEST_F(CudaStreams, GraphsReplayCapturedWork) {
   EXPECT_EQ(cudaGraphExecDestroy(executable), cudaSuccess);
 }
 
-TEST_F(CudaStreams, AFaultPersistsUntilTheDeviceIsReplaced) {
+TEST_F(CudaStreams, AFaultPersistsUntilTheDeviceIsReset) {
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 1});
   Launch();
   Launch();

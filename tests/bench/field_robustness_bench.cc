@@ -1,7 +1,7 @@
-// The effect of wrong input on fields: trains the objects of a sequence with true cuboids, poses and masks, except for
-// the damage of a scenario, and writes the meshes for an evaluator (romap eval objects):
-//   field_life_bench SEQUENCE OUT [--scenario NAME ..] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0]
-//                    [--seed 1] [--threads 2] [--depth]
+// Measures the effect of wrong input on fields: trains the objects of a sequence with true cuboids, poses and masks,
+// except for the damage of a scenario, and writes the meshes for `romap eval objects`:
+//   field_robustness_bench SEQUENCE OUT [--scenario NAME ..] [--set nerf.FIELD=VALUE ..] [--every 4] [--offset 0]
+//                          [--seed 1] [--threads 2] [--depth]
 // Meshes are written to OUT/<scenario>/objects. Scenarios: clean; pose (one view is rotated by 5 degrees about its
 // vertical axis); mask (one view has the mask of another object); black (one view is black); depth_scale (depths are 20
 // % too large); depth_noise (a third of the depths is missing, a tenth is random); arrivals (views arrive one by one
