@@ -89,6 +89,7 @@ SyntheticWorld::SyntheticWorld(SyntheticWorldOptions options) : options_(std::mo
   R_world_scene_ = RotationFromZTo(options_.up_world.normalized()).toRotationMatrix();
   for (const SyntheticObject& object : options_.objects) {
     R_object_scene_.emplace_back(YawMatrix(object.yaw_rad).transpose());
+    all_objects_.push_back(static_cast<int>(all_objects_.size()));
   }
   MakePoints();
 }
@@ -139,22 +140,38 @@ SE3<World, Camera> SyntheticWorld::CameraPose(int index) const {
   return {Eigen::Matrix3d(R_world_scene_ * R_scene_camera), R_world_scene_ * position};
 }
 
-SyntheticWorld::Hit SyntheticWorld::Cast(const Eigen::Vector3d& origin_scene,
-                                         const Eigen::Vector3d& direction_scene) const {
+SyntheticWorld::Hit SyntheticWorld::Cast(const Eigen::Vector3d& origin_scene, const Eigen::Vector3d& direction_scene,
+                                         std::span<const int> candidates) const {
   Hit hit;
   double nearest = std::numeric_limits<double>::infinity();
   const double table = -origin_scene.z() / direction_scene.z();
   if (table > 0) nearest = table;
-  for (size_t i = 0; i < options_.objects.size(); ++i) {
-    const double t = IntersectSolid(options_.objects[i], R_object_scene_[i], origin_scene, direction_scene);
+  for (const int i : candidates) {
+    const auto k = static_cast<size_t>(i);
+    const double t = IntersectSolid(options_.objects[k], R_object_scene_[k], origin_scene, direction_scene);
     if (t >= nearest) continue;
     nearest = t;
-    hit.object = static_cast<int>(i);
+    hit.object = i;
   }
   if (!std::isfinite(nearest)) return hit;
   hit.depth_mu = nearest;  // directions have z = 1 in the camera, so the ray parameter is the z depth
   hit.point_scene = origin_scene + nearest * direction_scene;
   return hit;
+}
+
+cv::Rect SyntheticWorld::BoundsInImage(int object, const SE3<World, Camera>& T_world_camera) const {
+  constexpr int kMargin_px = 2;  // for rounding
+  const cv::Rect image(0, 0, options_.width_px, options_.height_px);
+  std::vector<cv::Point2f> pixels;
+  for (const Eigen::Vector3d& corner : CuboidCorners(TrueCuboid(object))) {
+    const Eigen::Vector3d p_camera = T_world_camera.Inverse() * corner;
+    if (p_camera.z() <= 0) return image;
+    const Eigen::Vector2d pixel = camera_.Project(p_camera);
+    pixels.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+  }
+  const cv::Rect bounds = cv::boundingRect(pixels);
+  return cv::Rect(bounds.tl() - cv::Point(kMargin_px, kMargin_px), bounds.br() + cv::Point(kMargin_px, kMargin_px)) &
+         image;
 }
 
 void SyntheticWorld::RenderInto(const SE3<World, Camera>& T_world_camera, cv::Mat* image_bgr, cv::Mat* object_index,
@@ -164,9 +181,16 @@ void SyntheticWorld::RenderInto(const SE3<World, Camera>& T_world_camera, cv::Ma
   depth_mu->create(options_.height_px, options_.width_px, CV_32FC1);
   const Eigen::Matrix3d R_scene_camera = R_world_scene_.transpose() * T_world_camera.RotationMatrix();
   const Eigen::Vector3d origin = R_world_scene_.transpose() * T_world_camera.translation();
+  std::vector<cv::Rect> bounds;  // per object
+  for (const int i : all_objects_) bounds.push_back(BoundsInImage(i, T_world_camera));
+  std::vector<int> candidates;
   for (int v = 0; v < options_.height_px; ++v) {
     for (int u = 0; u < options_.width_px; ++u) {
-      const Hit hit = Cast(origin, R_scene_camera * camera_.Unproject(u, v));
+      candidates.clear();
+      for (const int i : all_objects_) {
+        if (bounds[static_cast<size_t>(i)].contains({u, v})) candidates.push_back(i);
+      }
+      const Hit hit = Cast(origin, R_scene_camera * camera_.Unproject(u, v), candidates);
       object_index->at<int16_t>(v, u) = static_cast<int16_t>(hit.object);
       depth_mu->at<float>(v, u) = static_cast<float>(hit.depth_mu);
       image_bgr->at<cv::Vec3b>(v, u) = hit.depth_mu > 0 ? Texture(hit.point_scene, hit.object) : cv::Vec3b(90, 90, 90);
@@ -248,7 +272,7 @@ KeyframeView SyntheticWorld::MakeKeyframe(int index, const TrackedFrame& tracked
     const Eigen::Vector3d direction =
         R_world_scene_.transpose() * (points_[i].surface_world - tracked.T_world_camera.translation());
     // The point is at ray parameter 1; a surface with a clearly smaller parameter occludes it.
-    if (Cast(origin, direction).depth_mu < 0.995) continue;
+    if (Cast(origin, direction, all_objects_).depth_mu < 0.995) continue;
     const MapPointId id{i + 1};
     view.observations.push_back({id, pixel.cast<float>(), tracked.frame->labels.at<uint16_t>(v, u)});
     view.points.push_back({id, points_[i].mapped_world, 3, 0.2});

@@ -93,7 +93,11 @@ class SyntheticWorld {
   };
 
   SE3<World, Camera> CameraPose(int index) const;
-  Hit Cast(const Eigen::Vector3d& origin_scene, const Eigen::Vector3d& direction_scene) const;
+  // The first hit of a ray with the table or one of the candidate objects.
+  Hit Cast(const Eigen::Vector3d& origin_scene, const Eigen::Vector3d& direction_scene,
+           std::span<const int> candidates) const;
+  // Pixels that may show the object; avoids intersections with objects elsewhere in the image.
+  cv::Rect BoundsInImage(int object, const SE3<World, Camera>& T_world_camera) const;
   std::mt19937_64 Random(uint64_t stream, uint64_t index) const;
   void MakePoints();
   void RenderInto(const SE3<World, Camera>& T_world_camera, cv::Mat* image_bgr, cv::Mat* object_index,
@@ -109,6 +113,7 @@ class SyntheticWorld {
   CameraModel camera_;
   Eigen::Matrix3d R_world_scene_;
   std::vector<Eigen::Matrix3d> R_object_scene_;  // per object
+  std::vector<int> all_objects_;                 // 0, 1, ..
   std::vector<SparsePoint> points_;
 };
 
