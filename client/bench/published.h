@@ -5,7 +5,7 @@
 
 namespace romap::bench {
 
-// Results published for RO-MAP (Han et al., RA-L 2023), measured on an RTX 4090 with camera poses of its own SLAM and
+// Results published for RO-MAP (Han et al., RA-L 2023), measured on an RTX 4090 with camera poses from its SLAM and
 // meshes aligned with the truth by ICP.
 
 struct PublishedQuality {

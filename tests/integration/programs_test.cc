@@ -153,7 +153,7 @@ TEST(ProgramsTest, DeployedConfigurationEqualsTheDumpedDefaults) {
   EXPECT_LE(std::distance(std::sregex_iterator(text.begin(), text.end(), setting), std::sregex_iterator()), 24);
 }
 
-TEST(ProgramsTest, DumpOfAllSettingsReadsBack) {
+TEST(ProgramsTest, DumpOfAllSettingsCanBeLoaded) {
   const testing_support::TemporaryFolder folder;
   const testing_support::ProcessResult dump = testing_support::RunProcess(
       {ROMAP_SERVER, "--dump-config", "--expert", "--set", "nerf.preset=paper", "--log-level", "error"});

@@ -98,7 +98,7 @@ TEST_F(ReplayTest, ReplaysATruncatedRecordingUpToItsEnd) {
   EXPECT_THAT(replay.out, HasSubstr("39 frames replayed"));
 }
 
-TEST_F(ReplayTest, RejectsInvalidRecordingsWithOneLine) {
+TEST_F(ReplayTest, RejectsInvalidRecordingsWithAOneLineMessage) {
   const std::string text = folder_ / "notes.txt";
   std::ofstream(text) << "not a recording at all";
   std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\x9\0\0\0", 4);

@@ -47,7 +47,7 @@ TEST(ScoreMap, MeasuresTheErrorsOfMatchedObjects) {
   const double shared = 0.17 * 0.1 * 0.06;
   EXPECT_NEAR(score.objects[1].errors.iou, shared / (2 * 0.002 - shared), 1e-9);
   EXPECT_TRUE(score.objects[1].errors.right_class);
-  EXPECT_NEAR(score.objects[0].errors.iou, 1, 1e-9) << "half a turn does not change a box";
+  EXPECT_NEAR(score.objects[0].errors.iou, 1, 1e-9) << "a rotation by 180 degrees does not change a box";
   EXPECT_NEAR(score.objects[0].errors.yaw_deg, 0, 1e-9);
 }
 
@@ -57,7 +57,7 @@ TEST(ScoreMap, ADuplicateIsExtra) {
   const MapScore score = ScoreMap(TwoBooks(), objects, {});
   EXPECT_EQ(score.Found(), 2U);
   EXPECT_EQ(score.Extra(), 1U);
-  EXPECT_EQ(score.mapped[0].matched, "") << "the duplicate is nearer";
+  EXPECT_EQ(score.mapped[0].matched, "") << "the duplicate is closer";
   EXPECT_EQ(score.mapped[0].overlaps, "left");
   EXPECT_EQ(score.mapped[1].matched, "left");
 }
@@ -66,7 +66,7 @@ TEST(ScoreMap, DoesNotMatchDistantObjects) {
   const std::vector<ObjectUpdate> objects = {Mapped(1, {0, 0, 0.16}), Mapped(2, {0.47, 0, 0.05})};
   const MapScore score = ScoreMap(TwoBooks(), objects, {});
   EXPECT_EQ(score.Found(), 0U)
-      << "one shares no volume, the center of the other one is farther away than half a diagonal";
+      << "one does not overlap, and the center of the other is farther away than half the diagonal";
   EXPECT_EQ(score.Extra(), 2U);
   EXPECT_EQ(score.mapped[1].overlaps, "");
 }

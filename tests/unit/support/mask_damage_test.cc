@@ -179,7 +179,8 @@ TEST(MaskDamage, FlickerHidesAnObjectForSeveralFrames) {
   int frames = 0;
   for (uint32_t label = 1; label <= 6; ++label) {
     frames += missing_frames[label];
-    EXPECT_GE(missing_frames[label], (run_frames - 1) * runs[label]) << "runs of " << label << " are short";
+    EXPECT_GE(missing_frames[label], (run_frames - 1) * runs[label])
+        << "missing for too few frames in a row: mask " << label;
   }
   EXPECT_NEAR(frames / 4800.0, 0.3, 0.06);
 }
@@ -197,8 +198,8 @@ TEST(MaskDamage, MovesBordersSmoothlyByUpToTheAmplitude) {
       const cv::Mat square = cv::Mat::ones(size_px, size_px, CV_8UC1);
       cv::erode(was, core, square);
       cv::dilate(was, max_area, square);
-      EXPECT_EQ(cv::countNonZero(core & ~is), 0) << "a hole in " << label;
-      EXPECT_EQ(cv::countNonZero(is & ~max_area), 0) << "more than the amplitude outside of " << label;
+      EXPECT_EQ(cv::countNonZero(core & ~is), 0) << "pixels missing inside mask " << label;
+      EXPECT_EQ(cv::countNonZero(is & ~max_area), 0) << "displaced by more than the amplitude: mask " << label;
       changed += cv::countNonZero(is != was);
       // Smooth: one component, and a morphological opening removes only its corners.
       cv::Mat components;
@@ -242,7 +243,7 @@ TEST(MaskDamage, SplitsMasksIntoTwoOfTheSameClass) {
     std::map<std::string, int> count;
     for (const Instance& instance : frame->instances) {
       ++count[instance.class_name];
-      EXPECT_NEAR(Area_px(*frame, instance.label), 800, 120) << "cut through the middle";
+      EXPECT_NEAR(Area_px(*frame, instance.label), 800, 120) << "split at the centroid";
     }
     EXPECT_EQ(count["cup"], 4);
     EXPECT_EQ(count["vase"], 2);

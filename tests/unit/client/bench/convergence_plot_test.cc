@@ -24,7 +24,7 @@ cv::Point2d MeanPosition(const cv::Mat& picture, const cv::Scalar& color, bool r
 
 const cv::Scalar kFirst(178, 114, 0), kSecond(0, 94, 213);
 
-TEST(ConvergencePlotTest, BetterIsLowerAndLaterIsRight) {
+TEST(ConvergencePlotTest, SmallErrorsAreLowAndLateTimesAreRight) {
   PaperResults results;
   results.curves = {{"good", 0.1, 0.3, 0.5}, {"good", 0.2, 0.2, 0.4}, {"late", 2, 0.9, 0.1}, {"late", 8, 0.8, 0.05}};
   const cv::Mat picture = DrawConvergence(results);

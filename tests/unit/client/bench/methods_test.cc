@@ -66,7 +66,7 @@ TEST(MethodsTest, OfflineMethodDiffersOnlyInTheDensityLoss) {
   EXPECT_EQ(Dump(ConfigOf("offline-depth")), Dump(ConfigOf("offline")));
 }
 
-TEST(MethodsTest, DepthIsUsedByTheNamedMethods) {
+TEST(MethodsTest, OnlyTheNamedMethodsUseDepth) {
   std::vector<std::string> with_depth, untrained;
   for (const BenchMethod& method : Table1Methods()) {
     if (method.with_depth) with_depth.push_back(method.id);

@@ -20,7 +20,7 @@ using Triangles = std::vector<std::array<uint32_t, 3>>;
 const Triangles kOne = {{0, 1, 2}};
 Positions Facing(float z) { return {{-1, -1, z}, {-1, 3, z}, {3, -1, z}}; }
 
-TEST(RasterizeTest, PlaneHasItsDepthEverywhere) {
+TEST(RasterizeTest, PlaneHasConstantDepth) {
   const Positions positions = {{-9, -9, 2}, {-9, 9, 2}, {9, 9, 2}, {9, -9, 2}};
   const Triangles triangles = {{0, 1, 2}, {0, 2, 3}};
   const VisibilityImage image = Rasterize(SmallCamera(), {}, {positions, triangles}, {.cull_back_faces = true});
@@ -97,7 +97,7 @@ TEST(RasterizeTest, DrawsAFloorThatExtendsBehindTheCamera) {
   }
 }
 
-TEST(RasterizeTest, IgnoresTrianglesBehindOrTooNear) {
+TEST(RasterizeTest, IgnoresTrianglesBehindOrTooCloseToTheCamera) {
   const Positions behind = Facing(-2);
   const Positions near = Facing(0.05F);
   for (const Positions& positions : {behind, near}) {
