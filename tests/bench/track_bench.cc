@@ -238,7 +238,7 @@ class Run {
       Write(std::filesystem::path(options_.out) / "live.txt", live_);
     }
     const size_t after = frames_ - initializing_;
-    fmt::print("frames {}: initializing {}, tracked {} of the {} after ({:.1f} %), lost {}, first tracked {}\n",
+    fmt::print("frames {}: initializing {}, tracked {} of {} later frames ({:.1f} %), lost {}, first tracked {}\n",
                frames_, initializing_, after - lost_, after,
                100.0 * static_cast<double>(after - lost_) / static_cast<double>(std::max<size_t>(1, after)), lost_,
                first_tracked_);

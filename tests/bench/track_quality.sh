@@ -13,7 +13,7 @@ while [ $# -gt 0 ] && [ "$1" != -- ]; do sequences+=("$1"); shift; done
 mkdir -p "$out"
 middle() { sort -n | awk '{ v[NR] = $1 } END { print v[int((NR + 1) / 2)] }'; }
 
-echo '| sequence | first tracked frame | tracked after | ATE rmse: median, worst [cm] | of the path | up direction error | time per frame: median, p99 [ms] | over cv::ORB | local adjustment: mean [ms] |'
+echo '| sequence | first tracked frame | tracked after that | ATE rmse: median, worst [cm] | of the path length | up direction error | time per frame: median, p99 [ms] | relative to cv::ORB | local adjustment: mean [ms] |'
 echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- |'
 for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
@@ -22,7 +22,7 @@ for sequence in "${sequences[@]}"; do
   done
   all() { cat "$out/$name".[1-5].txt; }
   echo "| $name | $(all | sed -n 's/.*first tracked \([0-9]*\).*/\1/p' | middle)" \
-       "| $(all | sed -n 's/.* after (\([0-9.]*\) %.*/\1/p' | middle) %" \
+       "| $(all | sed -n 's/.* later frames (\([0-9.]*\) %.*/\1/p' | middle) %" \
        "| $(all | sed -n 's/^ATE rmse \([0-9.]*\) cm.*/\1/p' | middle), $(all | sed -n 's/^ATE rmse \([0-9.]*\) cm.*/\1/p' | sort -n | tail -1)" \
        "| $(all | sed -n 's/^ATE rmse .* cm, \([0-9.]*\) %.*/\1/p' | middle) %" \
        "| $(all | sed -n 's/^up direction error \([0-9.]*\) deg/\1/p' | middle) deg" \
