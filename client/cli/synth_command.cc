@@ -14,7 +14,10 @@ namespace {
 struct SynthCommandOptions {
   synth::SynthOptions synth;
   std::string out;
-  // Ranges FIRST:LAST from the command line.
+  // As on the command line; empty = default.
+  std::string table_texture;
+  std::string jump;
+  // Ranges FIRST:LAST.
   std::vector<std::string> cuts;
   std::vector<std::string> black;
   std::vector<std::string> blurred;
@@ -30,10 +33,25 @@ absl::Status ReadRanges(const char* option, const std::vector<std::string>& text
   return absl::OkStatus();
 }
 
-absl::Status RunSynth(SynthCommandOptions options) {
+// Parses the options that the command line holds as text.
+absl::Status ReadTexts(SynthCommandOptions& options) {
+  if (!options.table_texture.empty()) {
+    const absl::StatusOr<synth::TableTexture> table = synth::ParseTableTexture(options.table_texture);
+    if (!table.ok()) return InvalidArgument("--table-texture: {}", Message(table.status()));
+    options.synth.surroundings.table = *table;
+  }
+  if (!options.jump.empty()) {
+    const absl::StatusOr<synth::CameraJump> jump = synth::ParseCameraJump(options.jump);
+    if (!jump.ok()) return InvalidArgument("--jump: {}", Message(jump.status()));
+    options.synth.jump = *jump;
+  }
   ROMAP_RETURN_IF_ERROR(ReadRanges("--cut", options.cuts, &options.synth.cuts));
   ROMAP_RETURN_IF_ERROR(ReadRanges("--black", options.black, &options.synth.black));
-  ROMAP_RETURN_IF_ERROR(ReadRanges("--blur", options.blurred, &options.synth.blurred));
+  return ReadRanges("--blur", options.blurred, &options.synth.blurred);
+}
+
+absl::Status RunSynth(SynthCommandOptions options) {
+  ROMAP_RETURN_IF_ERROR(ReadTexts(options));
   Progress progress("rendering");
   const absl::Status status = synth::MakeSequence(options.synth, options.out, [&](int done, int total) {
     progress.Show(static_cast<double>(done) / total, fmt::format("frame {}/{}", done, total));
@@ -46,67 +64,132 @@ absl::Status RunSynth(SynthCommandOptions options) {
   return status;
 }
 
-void AddFaultOptions(SynthCommandOptions* options, CLI::App* command) {
-  synth::SynthOptions& synth = options->synth;
-  const auto add = [&](const char* name, auto& value, const char* help) {
-    command->add_option(name, value, help)->capture_default_str();
-  };
-  add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
-  add("--mask-drop", synth.mask_drop_share, "Fraction of masks to drop, 0 to 1");
-  command->add_flag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
-  add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
-  add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
-  add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
-  const auto add_ranges = [&](const char* name, std::vector<std::string>& texts, const char* help) {
-    command->add_option(name, texts, help)->type_name("FIRST:LAST");
-  };
-  add_ranges("--cut", options->cuts, "Omit these frames, simulating an abrupt camera motion");
-  add_ranges("--black", options->black, "Make these frames black (covered lens)");
-  add_ranges("--blur", options->blurred, "Blur these frames so strongly that tracking fails");
-  add("--exposure-jumps", synth.exposure_stops,
-      "Maximum size of the exposure jumps, which occur every one to two seconds [stops]");
-  add("--duplicates", synth.duplicate_share, "Fraction of frames that repeat the previous image, 0 to 1");
+// The options of one group in the help text.
+class OptionGroup {
+ public:
+  OptionGroup(CLI::App* command, const char* name) : command_(command), name_(name) {}
+
+  template <class Value>
+  void Add(const char* name, Value& value, const char* help) const {
+    command_->add_option(name, value, help)->capture_default_str()->group(name_);
+  }
+  template <class Choice>
+  void AddChoice(const char* name, Choice& value, const std::map<std::string, Choice>& choices,
+                 const char* help) const {
+    command_->add_option(name, value, help)
+        ->transform(CLI::CheckedTransformer(choices, CLI::ignore_case))
+        ->group(name_);
+  }
+  template <class Text>
+  void AddText(const char* name, Text& text, const char* format, const char* help) const {
+    command_->add_option(name, text, help)->type_name(format)->group(name_);
+  }
+  void AddFlag(const char* name, bool& value, const char* help) const {
+    command_->add_flag(name, value, help)->group(name_);
+  }
+
+ private:
+  CLI::App* command_;
+  const char* name_;
+};
+
+void AddSceneOptions(SynthCommandOptions& options, CLI::App* command) {
+  synth::SynthOptions& synth = options.synth;
+  const OptionGroup scene(command, "Scene");
+  scene.Add("--seed", synth.seed, "Random seed; determines the whole sequence");
+  scene.Add("--objects", synth.objects, "Number of objects, 1 to 16");
+  scene.Add("--identical-pairs", synth.identical_pairs, "Number of pairs of identical objects");
+  scene.AddText(
+      "--table-texture", options.table_texture, "distinct|repeat:N|plain|faint",
+      "Texture of the table: distinct = random (default), repeat:N = N x N identical tiles, plain = one light "
+      "color, faint = one light color with 2 % grain");
+  scene.AddChoice<synth::Walls>(
+      "--walls", synth.surroundings.walls,
+      {{"distinct", synth::Walls::kDistinct}, {"identical", synth::Walls::kIdentical}, {"none", synth::Walls::kNone}},
+      "Walls: distinct (default), identical (four equal walls) or none (black, without "
+      "ceiling)");
+  scene.AddChoice<synth::Background>(
+      "--background", synth.surroundings.background,
+      {{"room", synth::Background::kRoom}, {"black", synth::Background::kBlack}, {"gray", synth::Background::kGray}},
+      "Background of the objects: room with table (default), or black or gray pixels "
+      "without depth");
+}
+
+void AddPathOptions(SynthCommandOptions& options, CLI::App* command) {
+  synth::SynthOptions& synth = options.synth;
+  const OptionGroup path(command, "Camera path");
+  path.Add("--frames", synth.frames, "Number of frames");
+  path.Add("--fps", synth.fps, "Frames per second");
+  path.AddChoice<synth::PathKind>("--path", synth.path,
+                                  {{"orbit", synth::PathKind::kOrbit},
+                                   {"handheld", synth::PathKind::kHandheld},
+                                   {"tworounds", synth::PathKind::kTwoRounds},
+                                   {"rotation", synth::PathKind::kRotation}},
+                                  "Camera path: orbit (level circle), handheld (arc with hand motion), tworounds (two "
+                                  "rounds through a larger room), or rotation (fast rotation of a hand in place)");
+  path.Add("--rounds", synth.rounds,
+           "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
+  path.Add("--arc", synth.arc_deg,
+           "Angle of one circle (orbit) or one pass (handheld) [deg]; up to 300 visits no place twice, 720 makes two "
+           "rounds; 0 = 360 (orbit) or random 120 to 200 (handheld)");
+  path.Add("--hand-motion", synth.hand_motion,
+           "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+  path.Add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
+  path.Add("--rotate-first", synth.rotation.first_frames,
+           "Number of frames that only rotate the camera before the path starts");
+  path.Add("--rotation-speed", synth.rotation.speed_deg,
+           "Peak speed of the rotation in place [deg/frame], for --path rotation and --rotate-first");
+  path.Add("--rotation-range", synth.rotation.range_deg, "Amplitude of the rotation in place [deg]");
+  path.Add("--sway", synth.rotation.sway_mm, "Displacement of the camera during the rotation in place [mm]");
+  path.Add("--shake-deg", synth.shake_deg, "Peak rotation of a fast random shake, added to any path [deg/frame]");
+  path.Add("--shake-mm", synth.shake_mm, "Peak translation of a fast random shake, added to any path [mm/frame]");
+  path.AddText("--jump", options.jump, "FRAME:DEGREES",
+               "Turn the camera by this angle about the vertical axis from this frame on; 180 = view a part of the "
+               "room that was not visible before");
+}
+
+void AddCameraOptions(SynthCommandOptions& options, CLI::App* command) {
+  synth::SynthOptions& synth = options.synth;
+  const OptionGroup camera(command, "Camera");
+  camera.Add("--width", synth.width_px, "Image width [px]");
+  camera.Add("--height", synth.height_px, "Image height [px]");
+  camera.AddChoice<synth::SynthLens>("--lens", synth.lens,
+                                     {{"pinhole", synth::SynthLens::kPinhole},
+                                      {"radtan", synth::SynthLens::kRadialTangential},
+                                      {"fisheye", synth::SynthLens::kFisheye}},
+                                     "Camera lens: pinhole, radtan or fisheye");
+  camera.AddChoice<synth::ImageFormat>("--format", synth.format,
+                                       {{"png", synth::ImageFormat::kPng}, {"jpeg", synth::ImageFormat::kJpeg}},
+                                       "Format of the color images: png or jpeg");
+}
+
+void AddFaultOptions(SynthCommandOptions& options, CLI::App* command) {
+  synth::SynthOptions& synth = options.synth;
+  const OptionGroup faults(command, "Faults");
+  faults.Add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
+  faults.Add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
+  faults.AddFlag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
+  faults.Add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
+  faults.Add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
+  faults.Add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
+  faults.AddText("--cut", options.cuts, "FIRST:LAST", "Omit these frames, simulating a jump of the camera");
+  faults.AddText("--black", options.black, "FIRST:LAST", "Make these frames black (covered lens)");
+  faults.AddText("--blur", options.blurred, "FIRST:LAST", "Blur these frames until tracking is impossible");
+  faults.Add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
+  faults.Add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
 }
 
 }  // namespace
 
 void AddSynthCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<SynthCommandOptions>();
-  synth::SynthOptions& synth = options->synth;
   CLI::App* command = app.add_subcommand(
       "synth", "Render a synthetic sequence of textured objects on a table, with exact ground truth");
   command->add_option("--out", options->out, "Output folder")->required();
-  const auto add = [&](const char* name, auto& value, const char* help) {
-    command->add_option(name, value, help)->capture_default_str();
-  };
-  add("--seed", synth.seed, "Random seed; determines the whole sequence");
-  add("--objects", synth.objects, "Number of objects, 1 to 16");
-  add("--identical-pairs", synth.identical_pairs, "Number of pairs of identical objects");
-  add("--frames", synth.frames, "Number of frames");
-  add("--fps", synth.fps, "Frames per second");
-  const std::map<std::string, synth::PathKind> paths = {{"orbit", synth::PathKind::kOrbit},
-                                                        {"handheld", synth::PathKind::kHandheld},
-                                                        {"tworounds", synth::PathKind::kTwoRounds}};
-  command
-      ->add_option("--path", synth.path, "Camera path: orbit, handheld, or tworounds (two laps through a larger room)")
-      ->transform(CLI::CheckedTransformer(paths, CLI::ignore_case));
-  add("--rounds", synth.rounds,
-      "Number of circles (orbit), passes along the arc (handheld), or pairs of laps (tworounds)");
-  add("--hand-motion", synth.hand_motion,
-      "Amplitude of the hand-held motion in height, distance, viewing direction and roll; 1 = steady hand");
-  add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
-  add("--width", synth.width_px, "Image width [px]");
-  add("--height", synth.height_px, "Image height [px]");
-  const std::map<std::string, synth::SynthLens> lenses = {{"pinhole", synth::SynthLens::kPinhole},
-                                                          {"radtan", synth::SynthLens::kRadialTangential},
-                                                          {"fisheye", synth::SynthLens::kFisheye}};
-  command->add_option("--lens", synth.lens, "Camera lens: pinhole, radtan or fisheye")
-      ->transform(CLI::CheckedTransformer(lenses, CLI::ignore_case));
-  const std::map<std::string, synth::ImageFormat> formats = {{"png", synth::ImageFormat::kPng},
-                                                             {"jpeg", synth::ImageFormat::kJpeg}};
-  command->add_option("--format", synth.format, "Format of the color images: png or jpeg")
-      ->transform(CLI::CheckedTransformer(formats, CLI::ignore_case));
-  AddFaultOptions(options.get(), command);
+  AddSceneOptions(*options, command);
+  AddPathOptions(*options, command);
+  AddCameraOptions(*options, command);
+  AddFaultOptions(*options, command);
   command->callback([options, chosen] { *chosen = [options] { return RunSynth(*options); }; });
 }
 

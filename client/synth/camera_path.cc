@@ -10,6 +10,7 @@ namespace romap::synth {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kDegree = kPi / 180;
 
 // A camera pose relative to its target.
 struct Viewpoint {
@@ -32,16 +33,11 @@ SE3<World, Camera> PoseOf(const Viewpoint& view) {
   return {rotation, view.target_m + view.distance_m * to_camera};
 }
 
-// A smooth random function of time with values of about -1..1 that varies over `period_s`.
-double SmoothNoise(double time_s, double period_s, uint32_t seed) {
-  const Eigen::Vector3f along(static_cast<float>(time_s), 0.37F, 0.71F);
-  return FractalNoise(along, static_cast<float>(period_s), 2, 0.4F, 1e-6F, seed);
-}
-
 Viewpoint OrbitView(const SynthOptions& options, double share, double start_rad, double distance_m) {
+  const double circle_rad = options.arc_deg > 0 ? options.arc_deg * kDegree : 2 * kPi;
   Viewpoint view;
-  view.azimuth_rad = start_rad + 2 * kPi * options.rounds * share;
-  view.elevation_rad = options.elevation_deg * kPi / 180;
+  view.azimuth_rad = start_rad + circle_rad * options.rounds * share;
+  view.elevation_rad = options.elevation_deg * kDegree;
   view.distance_m = distance_m;
   return view;
 }
@@ -55,7 +51,7 @@ Viewpoint HandheldView(const SynthOptions& options, double share, double time_s,
                      0.05 * SmoothNoise(time_s, 3, seed + 10) + 0.002 * SmoothNoise(time_s, 0.4, seed + 20);
   const double motion = options.hand_motion;
   const double elevation_deg = options.elevation_deg + 13 * motion * SmoothNoise(time_s, 4.5, seed + 30);
-  view.elevation_rad = std::clamp(elevation_deg, 5.0, 80.0) * kPi / 180 + 0.002 * SmoothNoise(time_s, 0.4, seed + 40);
+  view.elevation_rad = std::clamp(elevation_deg, 5.0, 80.0) * kDegree + 0.002 * SmoothNoise(time_s, 0.4, seed + 40);
   view.distance_m = distance_m * std::max(0.97 + 0.14 * motion * SmoothNoise(time_s, 5, seed + 50), 0.5);
   view.roll_rad = 0.05 * motion * SmoothNoise(time_s, 2.5, seed + 60) + 0.002 * SmoothNoise(time_s, 0.3, seed + 70);
   view.target_m = 0.07 * motion * distance_m *
@@ -66,9 +62,10 @@ Viewpoint HandheldView(const SynthOptions& options, double share, double time_s,
 
 // A walk around the room on a circle that starts near the table. The camera faces the table at first and turns to the
 // walls on the far side, where everything is visible only briefly. The plain wall is at +y.
-Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s, const Scene& scene) {
-  constexpr double kStart_rad = -10 * kPi / 180;  // the camera faces the plain wall after about a third of the path
-  constexpr double kSwing_rad = 150 * kPi / 180;
+Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s, double room_half_m,
+                        double table_height_m) {
+  constexpr double kStart_rad = -10 * kDegree;  // the camera faces the plain wall after about a third of the path
+  constexpr double kSwing_rad = 150 * kDegree;
   const auto seed = static_cast<uint32_t>(Scramble(options.seed));
   const double motion = options.hand_motion;
   const double turn_rad = 2 * 2 * kPi * options.rounds * share;
@@ -77,14 +74,14 @@ Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s
   const Eigen::Vector2d sway_m =
       0.08 * motion * Eigen::Vector2d(SmoothNoise(time_s, 3, seed + 10), SmoothNoise(time_s, 3, seed + 20));
   const Eigen::Vector2d position_m =
-      scene.room_half_m * (0.48 * toward(kStart_rad + turn_rad) - 0.14 * toward(kStart_rad)) + sway_m;
+      room_half_m * (0.48 * toward(kStart_rad + turn_rad) - 0.14 * toward(kStart_rad)) + sway_m;
   const double heading_rad = std::atan2(-position_m.y(), -position_m.x()) + kSwing_rad * away +
                              0.06 * motion * SmoothNoise(time_s, 2.5, seed + 30) +
                              0.002 * SmoothNoise(time_s, 0.4, seed + 40);
   Viewpoint view;
   view.distance_m = 0;
   view.target_m = {position_m.x(), position_m.y(),
-                   scene.table_height_m + 0.55 + 0.1 * motion * SmoothNoise(time_s, 4, seed + 50)};
+                   table_height_m + 0.55 + 0.1 * motion * SmoothNoise(time_s, 4, seed + 50)};
   view.azimuth_rad = heading_rad + kPi;
   view.elevation_rad = std::lerp(0.45, 0.1, away) + 0.06 * motion * SmoothNoise(time_s, 3.5, seed + 60) +
                        0.002 * SmoothNoise(time_s, 0.4, seed + 70);
@@ -94,32 +91,13 @@ Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s
 
 }  // namespace
 
-CameraModel SynthCamera(const SynthOptions& options) {
-  CameraModel camera;
-  camera.width_px = options.width_px;
-  camera.height_px = options.height_px;
-  switch (options.lens) {
-    case SynthLens::kPinhole:
-      camera.fx_px = 0.9 * options.width_px;
-      break;
-    case SynthLens::kRadialTangential:
-      camera.fx_px = 0.6 * options.width_px;
-      camera.distortion = {-0.28, 0.07, 4e-4, 2e-4, 0};
-      break;
-    case SynthLens::kFisheye:
-      camera.fx_px = 0.45 * options.width_px;
-      camera.lens = LensModel::kFisheye;
-      camera.distortion = {3.4e-3, 7e-4, -2e-3, 2e-4, 0};
-      break;
-  }
-  camera.fy_px = camera.fx_px;
-  camera.cx_px = 0.5 * (options.width_px - 1);
-  camera.cy_px = 0.5 * (options.height_px - 1);
-  return camera;
-}
-
-std::vector<SE3<World, Camera>> MakeCameraPath(const SynthOptions& options, const Scene& scene,
-                                               const CameraModel& camera) {
+CameraPath::CameraPath(const SynthOptions& options, const Scene& scene, const CameraModel& camera)
+    : options_(options),
+      room_half_m_(scene.room_half_m),
+      table_height_m_(scene.table_height_m),
+      rotating_frames_(options.path == PathKind::kRotation ? options.frames : options.rotation.first_frames),
+      bursts_(options.rotation, rotating_frames_, options.seed),
+      shake_(options) {
   double tallest_m = 0;
   for (const SceneObject& object : scene.objects) tallest_m = std::max(tallest_m, 2 * object.half_extents_m.z());
   const double half_side_px = 0.5 * std::min(camera.width_px, camera.height_px);
@@ -127,29 +105,38 @@ std::vector<SE3<World, Camera>> MakeCameraPath(const SynthOptions& options, cons
   // The bounding sphere of all objects fills most of the smaller image side. The distance has a minimum for small
   // objects.
   const double radius_m = std::hypot(scene.layout_radius_m, 0.4 * tallest_m);
-  const double distance_m = std::clamp(0.88 * radius_m / std::sin(half_view_rad), 0.4, 0.8 * scene.room_half_m);
-  const Eigen::Vector3d target_m(0, 0, scene.table_height_m + 0.35 * tallest_m);
+  distance_m_ = std::clamp(0.88 * radius_m / std::sin(half_view_rad), 0.4, 0.8 * scene.room_half_m);
+  target_m_ = {0, 0, scene.table_height_m + 0.35 * tallest_m};
 
   Random random(options.seed, 3);
-  const double start_rad = random.Uniform(-kPi, kPi);
-  const double sweep_rad = random.Uniform(120, 200) * kPi / 180 * (random.Chance(0.5) ? 1 : -1);
-  std::vector<SE3<World, Camera>> path;
-  path.reserve(static_cast<size_t>(options.frames));
-  for (int i = 0; i < options.frames; ++i) {
-    if (options.path == PathKind::kTwoRounds) {
-      const double path_share =
-          static_cast<double>(i) / std::max(options.frames - 1, 1);  // the last frame is at the start
-      path.push_back(PoseOf(TwoRoundsView(options, path_share, i / options.fps, scene)));
-      continue;
-    }
-    const double share = static_cast<double>(i) / options.frames;
-    Viewpoint view = options.path == PathKind::kOrbit
-                         ? OrbitView(options, share, start_rad, distance_m)
-                         : HandheldView(options, share, i / options.fps, start_rad, sweep_rad, distance_m);
-    view.target_m += target_m;
-    path.push_back(PoseOf(view));
+  start_rad_ = random.Uniform(-kPi, kPi);
+  const double random_sweep_rad = random.Uniform(120, 200) * kDegree;
+  sweep_rad_ = (options.arc_deg > 0 ? options.arc_deg * kDegree : random_sweep_rad) * (random.Chance(0.5) ? 1 : -1);
+}
+
+SE3<World, Camera> CameraPath::PoseOnPath(double time) const {
+  const int frames = std::max(options_.frames - rotating_frames_, 1);
+  const double time_s = time / options_.fps;
+  if (options_.path == PathKind::kTwoRounds) {
+    const double share = time / std::max(frames - 1, 1);  // the last frame is at the start
+    return PoseOf(TwoRoundsView(options_, share, time_s, room_half_m_, table_height_m_));
   }
-  return path;
+  const double share = time / frames;
+  Viewpoint view = options_.path == PathKind::kHandheld
+                       ? HandheldView(options_, share, time_s, start_rad_, sweep_rad_, distance_m_)
+                       : OrbitView(options_, share, start_rad_, distance_m_);
+  view.target_m += target_m_;
+  return PoseOf(view);
+}
+
+SE3<World, Camera> CameraPath::Pose(int frame, double offset_frames) const {
+  const double time = frame + offset_frames;
+  const SE3<World, Camera> pose = PoseOnPath(std::max(time - rotating_frames_, 0.0));
+  Eigen::Quaterniond rotation = pose.rotation() * bursts_.Rotation(time) * shake_.Rotation(time);
+  if (options_.jump.frame > 0 && frame + 1 >= options_.jump.frame) {
+    rotation = Eigen::AngleAxisd(options_.jump.turn_deg * kDegree, Eigen::Vector3d::UnitZ()) * rotation;
+  }
+  return {rotation, pose.translation() + bursts_.Sway_m(time) + shake_.Displacement_m(time)};
 }
 
 }  // namespace romap::synth

@@ -132,7 +132,10 @@ Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<Wor
   }
   Rgb sum = Rgb::Zero();
   for (int k = 0; k < kSamples; ++k) {
-    if (hits[k] == render::VisibilityImage::kNothing) continue;
+    if (hits[k] == render::VisibilityImage::kNothing) {
+      sum += scene_.background;
+      continue;
+    }
     const Eigen::Vector3d ray = RayThrough(fine_camera_, fine_rays_, u_px * kSamplesAcross + k % kSamplesAcross,
                                            v_px * kSamplesAcross + k / kSamplesAcross);
     sum += Radiance(hits[k], ray, T_world_camera, inverse_depths[k], 1.0F / kSamplesAcross);

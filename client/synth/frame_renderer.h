@@ -21,7 +21,7 @@ struct TrueFrame {
 };
 
 // Renders a scene with baked light. Uses a z-buffer for a pinhole camera and ray tracing for a lens. Pixels of a lens
-// that receive no rays are black.
+// that receive no rays have the color of the background.
 class FrameRenderer {
  public:
   // `scene` must outlive the renderer and not change.

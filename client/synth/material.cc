@@ -227,14 +227,22 @@ Rgb PatternColor(const Material& m, const Spot& s) {
   return m.colors[0];
 }
 
+// The equivalent point in the first period of the texture.
+Eigen::Vector3f InFirstPeriod(const Material& m, Eigen::Vector3f p_m) {
+  for (int k = 0; k < 2; ++k) {
+    if (m.period_m[k] > 0) p_m[k] -= m.period_m[k] * std::floor(p_m[k] / m.period_m[k]);
+  }
+  return p_m;
+}
+
 }  // namespace
 
 Rgb Albedo(const Material& material, const Eigen::Vector3f& p_local_m, const Eigen::Vector3f& n_local,
            float footprint_m) {
-  const Spot spot{p_local_m, n_local, footprint_m};
+  const Spot spot{InFirstPeriod(material, p_local_m), n_local, footprint_m};
   Rgb color = PatternColor(material, spot);
   if (material.grain > 0) {
-    const float grain = FractalNoise(p_local_m, 0.012F, 3, 0.75F, footprint_m, material.seed + 77);
+    const float grain = FractalNoise(spot.p_m, 0.012F, 3, 0.75F, footprint_m, material.seed + 77);
     color *= 1 + material.grain * grain;
   }
   return color.cwiseMax(0.01F).cwiseMin(0.95F);

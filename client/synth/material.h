@@ -36,6 +36,7 @@ struct Material {
   float grain = 0.1F;     // strength of the fine noise added to the pattern, 0..1
   uint32_t seed = 0;
   Wrapping wrapping = Wrapping::kBox;
+  Eigen::Vector2f period_m = Eigen::Vector2f::Zero();  // the texture repeats in x and y with this period; 0 = never
 };
 
 // The color at `p_local_m` on a surface with unit normal `n_local`, filtered for a pixel that covers a side length of

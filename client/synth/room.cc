@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "client/synth/scene.h"
@@ -57,12 +58,26 @@ Material WoodMaterial(Random& random, float scale_m) {
   return wood;
 }
 
-// A wall with posters and furniture. Modeled at x = half_m, facing -x, then rotated about z by `turn_rad`.
-void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
-  const Eigen::Quaternionf turn = Turn(turn_rad, Point::UnitZ());
-  const auto add = [&](const Mesh& mesh, const Material& material) {
+// Adds a part of a wall, modeled at x = half_m, facing -x, and rotated about z by `turn_rad`.
+using AddWallPart = std::function<void(const Mesh& mesh, const Material& material)>;
+
+// Textures in the frame of the room: walls differ even with equal materials.
+AddWallPart WallInRoomFrame(Scene& scene, float turn_rad) {
+  return [&scene, turn = Turn(turn_rad, Point::UnitZ())](const Mesh& mesh, const Material& material) {
     AddPart(scene, Moved(mesh, turn, Point::Zero()), material);
   };
+}
+
+// Textures in the frame of the wall: equal materials give equal walls.
+AddWallPart WallInOwnFrame(Scene& scene, float turn_rad) {
+  const SE3<World, Object> T_world_wall(Turn(turn_rad, Point::UnitZ()).cast<double>(), Eigen::Vector3d::Zero());
+  return [&scene, T_world_wall](const Mesh& mesh, const Material& material) {
+    AddSurface(scene, mesh, T_world_wall, material, 0);
+  };
+}
+
+// A wall with posters and furniture.
+void AddWall(const AddWallPart& add, Random& random, float half_m) {
   constexpr Pattern kPatterns[] = {Pattern::kSpeckle, Pattern::kTiles, Pattern::kMarble, Pattern::kStripes};
   add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F),
       Backdrop(kPatterns[random.Below(4)], In(random, 0.12, 0.3), random));
@@ -88,11 +103,7 @@ void AddWall(Scene& scene, Random& random, float half_m, float turn_rad) {
 }
 
 // An almost textureless wall: one color with weak grain and a few small notes.
-void AddPlainWall(Scene& scene, Random& random, float half_m, float turn_rad) {
-  const Eigen::Quaternionf turn = Turn(turn_rad, Point::UnitZ());
-  const auto add = [&](const Mesh& mesh, const Material& material) {
-    AddPart(scene, Moved(mesh, turn, Point::Zero()), material);
-  };
+void AddPlainWall(const AddWallPart& add, Random& random, float half_m) {
   Material paint = Backdrop(Pattern::kPlain, 0.1F, random);
   paint.grain = 0.03F;
   add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F), paint);
@@ -103,14 +114,47 @@ void AddPlainWall(Scene& scene, Random& random, float half_m, float turn_rad) {
   }
 }
 
-void AddTable(Scene& scene, Random& random) {
+void AddWalls(Scene& scene, const SceneOptions& options, Random& random) {
+  const auto half_m = static_cast<float>(scene.room_half_m);
+  const bool identical = options.surroundings.walls == Walls::kIdentical;
+  const Random at_first_wall = random;
+  for (int side = 0; side < 4; ++side) {
+    const float turn_rad = 0.5F * kPi * static_cast<float>(side);
+    if (identical) random = at_first_wall;
+    const AddWallPart add = identical ? WallInOwnFrame(scene, turn_rad) : WallInRoomFrame(scene, turn_rad);
+    const bool plain = options.plain_wall && !identical && side == 1;
+    (plain ? AddPlainWall : AddWall)(add, random, half_m);
+  }
+}
+
+Material TableMaterial(const TableTexture& texture, const Eigen::Vector2f& half_m, Random& random) {
+  constexpr Pattern kCloths[] = {Pattern::kFabric, Pattern::kMarble, Pattern::kTiles, Pattern::kSpeckle};
+  const auto cloth = [&] { return Backdrop(kCloths[random.Below(4)], In(random, 0.05, 0.1), random); };
+  Material top;
+  switch (texture.kind) {
+    case TableTexture::Kind::kDistinct:
+      top = random.Chance(0.4) ? WoodMaterial(random, 0.018F) : cloth();
+      top.grain = 0.25F;
+      break;
+    case TableTexture::Kind::kRepeated:
+      top = cloth();
+      top.grain = 0.25F;
+      top.period_m = 2 * half_m / static_cast<float>(texture.repeats);
+      break;
+    case TableTexture::Kind::kPlain:
+    case TableTexture::Kind::kFaint:
+      top.colors[0] = FromHsv(random.Uniform(), random.Uniform(0.02, 0.08), random.Uniform(0.85, 0.93));
+      top.grain = texture.kind == TableTexture::Kind::kFaint ? 0.02F : 0;
+      break;
+  }
+  return top;
+}
+
+void AddTable(Scene& scene, const TableTexture& texture, Random& random) {
   const auto height_m = static_cast<float>(scene.table_height_m);
   const auto half_x = static_cast<float>(scene.layout_radius_m) + In(random, 0.15, 0.3);
   const auto half_y = static_cast<float>(scene.layout_radius_m) + In(random, 0.08, 0.18);
-  constexpr Pattern kCloths[] = {Pattern::kFabric, Pattern::kMarble, Pattern::kTiles, Pattern::kSpeckle};
-  Material top = random.Chance(0.4) ? WoodMaterial(random, 0.018F)
-                                    : Backdrop(kCloths[random.Below(4)], In(random, 0.05, 0.1), random);
-  top.grain = 0.25F;
+  const Material top = TableMaterial(texture, {half_x, half_y}, random);
   const Material frame = WoodMaterial(random, 0.02F);
   // Fine cells resolve the shadows around the objects.
   AddPart(scene, Sheet(Point(-half_x, -half_y, height_m), Point(2 * half_x, 0, 0), Point(0, 2 * half_y, 0), 0.007F),
@@ -129,24 +173,31 @@ void AddTable(Scene& scene, Random& random) {
   }
 }
 
+// Floor, ceiling, walls and table.
+void AddSurfaces(Scene& scene, const SceneOptions& options, Random& random) {
+  const auto half_m = static_cast<float>(scene.room_half_m);
+  const Material floor = random.Chance(0.5) ? Backdrop(Pattern::kTiles, In(random, 0.2, 0.35), random)
+                                            : Backdrop(Pattern::kFabric, In(random, 0.12, 0.25), random);
+  AddPart(scene, Sheet(Point(-half_m, -half_m, 0), Point(2 * half_m, 0, 0), Point(0, 2 * half_m, 0), 0.05F), floor);
+  if (options.surroundings.walls != Walls::kNone) {
+    Material ceiling;
+    ceiling.colors[0] = Rgb::Constant(0.8F);
+    AddPart(scene,
+            Sheet(Point(-half_m, half_m, kRoomHeight_m), Point(2 * half_m, 0, 0), Point(0, -2 * half_m, 0), 0.3F),
+            ceiling);
+    AddWalls(scene, options, random);
+  }
+  AddTable(scene, options.surroundings.table, random);
+}
+
 }  // namespace
 
 void AddRoom(Scene& scene, const SceneOptions& options, Random& random) {
   const float half_m =
       std::max(static_cast<float>(options.min_room_half_m), static_cast<float>(4.2 * scene.layout_radius_m) + 0.4F);
   scene.room_half_m = half_m;
-  const Material floor = random.Chance(0.5) ? Backdrop(Pattern::kTiles, In(random, 0.2, 0.35), random)
-                                            : Backdrop(Pattern::kFabric, In(random, 0.12, 0.25), random);
-  AddPart(scene, Sheet(Point(-half_m, -half_m, 0), Point(2 * half_m, 0, 0), Point(0, 2 * half_m, 0), 0.05F), floor);
-  Material ceiling;
-  ceiling.colors[0] = Rgb::Constant(0.8F);
-  AddPart(scene, Sheet(Point(-half_m, half_m, kRoomHeight_m), Point(2 * half_m, 0, 0), Point(0, -2 * half_m, 0), 0.3F),
-          ceiling);
-  for (int side = 0; side < 4; ++side) {
-    const bool plain = options.plain_wall && side == 1;
-    (plain ? AddPlainWall : AddWall)(scene, random, half_m, 0.5F * kPi * static_cast<float>(side));
-  }
-  AddTable(scene, random);
+  if (options.surroundings.background == Background::kRoom) AddSurfaces(scene, options, random);
+  if (options.surroundings.background == Background::kGray) scene.background = FromHsv(0, 0, 0.5);
 
   // A warm panel above the table and cool daylight from one side. Both are rotated relative to the table: the samples
   // of a light parallel to an edge would align and produce steps in its shadow.

@@ -8,6 +8,7 @@
 
 #include "client/render/rasterizer.h"
 #include "client/synth/material.h"
+#include "client/synth/options.h"
 #include "client/synth/solid.h"
 #include "common/geometry.h"
 
@@ -43,7 +44,8 @@ struct SceneOptions {
   int objects = 6;
   int identical_pairs = 0;
   double min_room_half_m = 2;  // minimal half side of the room, which grows with the objects on the table
-  bool plain_wall = false;     // makes the wall at +y almost textureless
+  bool plain_wall = false;     // makes the wall at +y almost textureless; distinct walls only
+  Surroundings surroundings = {};
 };
 
 struct Scene {
@@ -52,6 +54,7 @@ struct Scene {
   double layout_radius_m = 0;  // radius around the z axis that contains all objects
   double room_half_m = 0;      // the room spans -half..half in x and y
   std::vector<AreaLight> lights;
+  Rgb background = Rgb::Zero();  // of pixels that show no triangle
 
   // The triangles to render. Per vertex:
   std::vector<Eigen::Vector3f> positions_world;  // meters
@@ -75,7 +78,8 @@ void AddSurface(Scene& scene, const Mesh& mesh_local, const SE3<World, Object>& 
 // identical objects. The seed determines everything. Leaves Scene::irradiance empty.
 Scene MakeScene(const SceneOptions& options);
 
-// Sets room_half_m and lights, and adds the surfaces of floor, walls, furniture and table. Defined in room.cc.
+// Sets room_half_m, lights and background, and adds the surfaces of floor, walls, furniture and table, except those
+// that `options.surroundings` removes. Defined in room.cc.
 void AddRoom(Scene& scene, const SceneOptions& options, Random& random);
 
 }  // namespace romap::synth

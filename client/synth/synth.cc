@@ -21,6 +21,7 @@
 #include "client/synth/ground_truth.h"
 #include "client/synth/lighting.h"
 #include "client/synth/scene.h"
+#include "client/synth/synth_camera.h"
 #include "common/file_status.h"
 
 namespace romap::synth {
@@ -67,7 +68,8 @@ class SequenceMaker {
  public:
   SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
       : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)), renderer_(scene, camera_) {
-    path_ = MakeCameraPath(options, scene, camera_);
+    const CameraPath path(options, scene, camera_);
+    for (int i = 0; i < options.frames; ++i) path_.push_back(path.Pose(i));
     plans_ = PlanFrames(options);
     detections_.resize(path_.size());
     for (const SceneObject& object : scene.objects) {
@@ -217,8 +219,10 @@ absl::Status MakeSequence(const SynthOptions& options, const std::string& dir,
                           const std::function<void(int done, int total)>& progress) {
   ROMAP_RETURN_IF_ERROR(ValidateSynthOptions(options));
   ROMAP_RETURN_IF_ERROR(MakeFolders(dir));
-  SceneOptions scene_options{
-      .seed = options.seed, .objects = options.objects, .identical_pairs = options.identical_pairs};
+  SceneOptions scene_options{.seed = options.seed,
+                             .objects = options.objects,
+                             .identical_pairs = options.identical_pairs,
+                             .surroundings = options.surroundings};
   if (options.path == PathKind::kTwoRounds) {
     scene_options.min_room_half_m = kTwoRoundsRoomHalf_m;
     scene_options.plain_wall = true;

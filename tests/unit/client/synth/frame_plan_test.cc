@@ -8,23 +8,6 @@
 namespace romap::synth {
 namespace {
 
-TEST(ParseFrameRangeTest, ParsesTwoNumbers) {
-  const auto range = ParseFrameRange("100:130");
-  ASSERT_TRUE(range.ok()) << range.status();
-  EXPECT_EQ(*range, (FrameRange{100, 130}));
-  EXPECT_TRUE(range->Contains(100));
-  EXPECT_TRUE(range->Contains(130));
-  EXPECT_FALSE(range->Contains(131));
-}
-
-TEST(ParseFrameRangeTest, RejectsMalformedRanges) {
-  for (const char* text : {"", "100", "100:", ":5", "1:2:3", "a:b", "1-2", "1:2 ", "99999999999:1"}) {
-    const auto range = ParseFrameRange(text);
-    EXPECT_EQ(range.status().code(), absl::StatusCode::kInvalidArgument) << text;
-    EXPECT_NE(Message(range.status()).find("FIRST:LAST"), std::string::npos) << text;
-  }
-}
-
 TEST(PlanFramesTest, ChangesNothingByDefault) {
   const auto plans = PlanFrames({.frames = 20});
   ASSERT_EQ(plans.size(), 20U);

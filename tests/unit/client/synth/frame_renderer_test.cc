@@ -5,10 +5,10 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "client/synth/camera_path.h"
 #include "client/synth/lens_rays.h"
 #include "client/synth/lighting.h"
 #include "client/synth/solid.h"
+#include "client/synth/synth_camera.h"
 
 namespace romap::synth {
 namespace {
@@ -104,6 +104,21 @@ TEST(FrameRendererTest, LensDistortsColorMaskAndDepthAlike) {
     const int v = static_cast<int>(std::lround(pixel_px.y()));
     EXPECT_EQ(frame.labels.at<uint8_t>(v, u), 1);
     EXPECT_NEAR(frame.depth_m.at<float>(v, u), 0.8, 2e-3);
+  }
+}
+
+TEST(FrameRendererTest, PixelsWithoutSurfaceHaveTheBackgroundColor) {
+  Scene scene = BallScene();
+  scene.background = FromHsv(0, 0, 0.5);
+  CameraModel camera = SynthCamera({.width_px = 40, .height_px = 30});
+  const SE3<World, Camera> upward(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1));
+  for (const double distortion : {0.0, 1e-9}) {
+    camera.distortion[0] = distortion;
+    const TrueFrame frame = FrameRenderer(scene, camera).Render(upward);
+    EXPECT_EQ(cv::countNonZero(frame.depth_m), 0);
+    for (const cv::Vec3b& pixel : cv::Mat_<cv::Vec3b>(frame.color_bgr)) {
+      for (int k = 0; k < 3; ++k) ASSERT_NEAR(pixel[k], 128, 3);
+    }
   }
 }
 

@@ -7,8 +7,9 @@
 #include <set>
 #include <string>
 
-#include "client/synth/camera_path.h"
+#include "client/synth/bvh.h"
 #include "client/synth/lighting.h"
+#include "client/synth/noise.h"
 
 namespace romap::synth {
 namespace {
@@ -92,90 +93,131 @@ TEST(BakeLightTest, CastsShadowsBelowAndBesideObjects) {
   EXPECT_GT(irradiance_at(0, 0.3F), 2 * irradiance_at(0.12F, 0)) << "outside the shadow";
 }
 
-TEST(MakeCameraPathTest, OrbitHasTheGivenElevationAndFacesTheTable) {
-  const Scene scene = MakeScene({.seed = 2, .objects = 3});
-  SynthOptions options{.seed = 2, .objects = 3, .frames = 36, .elevation_deg = 30};
-  const CameraModel camera = SynthCamera(options);
-  const auto path = MakeCameraPath(options, scene, camera);
-  ASSERT_EQ(path.size(), 36U);
-  for (size_t i = 0; i < path.size(); ++i) {
-    const Eigen::Vector3d forward = path[i].rotation() * Eigen::Vector3d::UnitZ();
-    EXPECT_NEAR(std::asin(-forward.z()) * 180 / M_PI, 30, 1e-6);
-    EXPECT_NEAR((path[i].rotation() * Eigen::Vector3d::UnitX()).z(), 0, 1e-9) << "level";
-    const Eigen::Vector3d next_forward = path[(i + 1) % 36].rotation() * Eigen::Vector3d::UnitZ();
-    const double turn_rad = std::acos(forward.head<2>().normalized().dot(next_forward.head<2>().normalized()));
-    EXPECT_NEAR(turn_rad, 2 * M_PI / 36, 1e-6);
-    for (const SceneObject& object : scene.objects) {
-      const Eigen::Vector3d p = path[i].Inverse() * object.T_world_object.translation();
-      ASSERT_GT(p.z(), 0);
-      const Eigen::Vector2d pixel = camera.Project(p);
-      EXPECT_TRUE(pixel.x() > 0 && pixel.x() < camera.width_px && pixel.y() > 0 && pixel.y() < camera.height_px);
+// The triangles of the room and their surfaces.
+std::vector<Eigen::Vector3f> CentersOfRoom(const Scene& scene) {
+  std::vector<Eigen::Vector3f> centers;
+  for (size_t i = 0; i < scene.triangles.size(); ++i) {
+    if (scene.surfaces[scene.surface_of_triangle[i]].label != 0) continue;
+    const auto& [a, b, c] = scene.triangles[i];
+    centers.emplace_back((scene.positions_world[a] + scene.positions_world[b] + scene.positions_world[c]) / 3);
+  }
+  return centers;
+}
+
+// The surface of the top of the table and its bounds in x and y.
+struct TableTop {
+  const Material* material = nullptr;
+  Eigen::AlignedBox3f bounds;
+};
+
+TableTop FindTableTop(const Scene& scene) {
+  TableTop top;
+  for (size_t i = 0; i < scene.triangles.size(); ++i) {
+    const SceneSurface& surface = scene.surfaces[scene.surface_of_triangle[i]];
+    const Eigen::Vector3f& p = scene.positions_world[scene.triangles[i][0]];
+    if (surface.label != 0 || std::abs(p.z() - scene.table_height_m) > 1e-6) continue;
+    top.material = &surface.material;
+    for (const uint32_t corner : scene.triangles[i]) top.bounds.extend(scene.positions_world[corner]);
+  }
+  return top;
+}
+
+// Albedo of the table at a share 0..1 of its sides.
+Rgb TableAlbedo(const TableTop& top, float x, float y) {
+  const Eigen::Vector3f p = top.bounds.min() + top.bounds.sizes().cwiseProduct(Eigen::Vector3f(x, y, 0));
+  return Albedo(*top.material, p, Eigen::Vector3f::UnitZ(), 0.001F);
+}
+
+TEST(SurroundingsTest, RepeatedTableTextureHasTheGivenNumberOfTiles) {
+  std::set<float> first_values;
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    const TableTexture texture{.kind = TableTexture::Kind::kRepeated, .repeats = 2};
+    const Scene scene = MakeScene({.seed = seed, .objects = 2, .surroundings = {.table = texture}});
+    const TableTop top = FindTableTop(scene);
+    ASSERT_NE(top.material, nullptr);
+    float highest_difference = 0, contrast = 0;
+    for (int k = 0; k < 200; ++k) {
+      const float x = 0.01F + 0.48F * CellUniform(k, 0, 0, 1);
+      const float y = 0.01F + 0.48F * CellUniform(k, 1, 0, 1);
+      const Rgb color = TableAlbedo(top, x, y);
+      for (const auto& [dx, dy] : {std::pair{0.5F, 0.0F}, {0.0F, 0.5F}, {0.5F, 0.5F}}) {
+        highest_difference = std::max(highest_difference, (TableAlbedo(top, x + dx, y + dy) - color).norm());
+      }
+      contrast = std::max(contrast, (TableAlbedo(top, x + 0.25F, y) - color).norm());
     }
+    EXPECT_LT(highest_difference, 0.02F) << "seed " << seed;
+    EXPECT_GT(contrast, 0.1F) << "a quarter of the table is not a period";
+    first_values.insert(TableAlbedo(top, 0.3F, 0.4F).x());
+  }
+  EXPECT_EQ(first_values.size(), 4U) << "seeds differ";
+}
+
+TEST(SurroundingsTest, PlainTableIsLightAndConstant) {
+  for (const auto& [kind, limit] : {std::pair{TableTexture::Kind::kPlain, 1e-6F}, {TableTexture::Kind::kFaint, 0.1F}}) {
+    const Scene scene = MakeScene({.seed = 3, .objects = 2, .surroundings = {.table = {.kind = kind}}});
+    const TableTop top = FindTableTop(scene);
+    ASSERT_NE(top.material, nullptr);
+    Eigen::AlignedBox3f colors;
+    for (int k = 0; k < 500; ++k) colors.extend(TableAlbedo(top, CellUniform(k, 0, 0, 1), CellUniform(k, 1, 0, 1)));
+    EXPECT_GT(colors.min().minCoeff(), 0.5F) << "light";
+    EXPECT_LE(colors.sizes().maxCoeff(), limit);
+    EXPECT_EQ(colors.sizes().maxCoeff() > 0, kind == TableTexture::Kind::kFaint);
   }
 }
 
-TEST(MakeCameraPathTest, HandheldPathIsSmoothAndInsideTheRoom) {
-  for (uint64_t seed = 1; seed <= 3; ++seed) {
-    const Scene scene = MakeScene({.seed = seed, .objects = 6});
-    SynthOptions options{.seed = seed, .frames = 300, .path = PathKind::kHandheld};
-    const auto path = MakeCameraPath(options, scene, SynthCamera(options));
-    double lowest_m = 1e9, highest_m = 0;
-    for (size_t i = 0; i < path.size(); ++i) {
-      const Eigen::Vector3d& p = path[i].translation();
-      EXPECT_LT(p.head<2>().cwiseAbs().maxCoeff(), scene.room_half_m - 0.3);
-      lowest_m = std::min(lowest_m, p.z());
-      highest_m = std::max(highest_m, p.z());
-      if (i == 0) continue;
-      EXPECT_LT((p - path[i - 1].translation()).norm(), 0.06);
-      EXPECT_LT(path[i].rotation().angularDistance(path[i - 1].rotation()), 0.06);
-    }
-    EXPECT_GT(lowest_m, scene.table_height_m);
-    EXPECT_LT(highest_m, 2.5);
-    EXPECT_GT(highest_m - lowest_m, 0.05) << "height changes";
-  }
-}
-
-TEST(MakeCameraPathTest, HandMotionScalesTheVariation) {
-  const Scene scene = MakeScene({.seed = 1, .objects = 3});
-  const auto spread_m = [&](double hand_motion) {
-    const SynthOptions options{.seed = 1, .frames = 300, .path = PathKind::kHandheld, .hand_motion = hand_motion};
-    double nearest_m = 1e9, farthest_m = 0;
-    for (const auto& pose : MakeCameraPath(options, scene, SynthCamera(options))) {
-      const double distance_m = (pose.translation() - Eigen::Vector3d(0, 0, scene.table_height_m)).norm();
-      nearest_m = std::min(nearest_m, distance_m);
-      farthest_m = std::max(farthest_m, distance_m);
-    }
-    return farthest_m - nearest_m;
+// The color of a wall at y and z, seen from the center of the room; `side` counts quarter turns.
+Rgb WallColor(const Scene& scene, const Bvh& bvh, int side, float y_m, float z_m) {
+  const auto turn = Turn(static_cast<float>(M_PI / 2 * side), Point::UnitZ());
+  const Point direction = turn * Point(static_cast<float>(scene.room_half_m), y_m, z_m - 1.5F);
+  const auto hit = bvh.Nearest(Point(0, 0, 1.5F), direction);
+  if (!hit) return Rgb::Zero();
+  const auto& corner = scene.triangles[hit->triangle];
+  const auto center_of = [&](const std::vector<Eigen::Vector3f>& positions) -> Point {
+    return (positions[corner[0]] + positions[corner[1]] + positions[corner[2]]) / 3;
   };
-  EXPECT_GT(spread_m(2.5), 1.5 * spread_m(1));
+  const auto& local = scene.positions_local;
+  const Point normal = (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
+  const Material& material = scene.surfaces[scene.surface_of_triangle[hit->triangle]].material;
+  return Albedo(material, center_of(local), normal, 0.002F);
 }
 
-TEST(MakeCameraPathTest, TwoRoundsPassThePlainWallAndReturn) {
-  const Scene scene = MakeScene({.seed = 4, .objects = 4, .min_room_half_m = kTwoRoundsRoomHalf_m, .plain_wall = true});
-  ASSERT_GE(scene.room_half_m, kTwoRoundsRoomHalf_m);
-  const SynthOptions options{.seed = 4, .frames = 1200, .path = PathKind::kTwoRounds};
-  const auto path = MakeCameraPath(options, scene, SynthCamera(options));
-  double way_m = 0;
-  int at_plain_wall = 0, at_table = 0;
-  for (size_t i = 0; i < path.size(); ++i) {
-    const Eigen::Vector3d& p = path[i].translation();
-    ASSERT_LT(p.head<2>().cwiseAbs().maxCoeff(), scene.room_half_m - 0.4) << "furniture";
-    const Eigen::Vector3d forward = path[i].rotation() * Eigen::Vector3d::UnitZ();
-    // Intersection of the optical axis with the plane of the wall at y = half.
-    const double s = (scene.room_half_m - p.y()) / forward.y();
-    if (s > 0 && std::abs(p.x() + s * forward.x()) < 0.7 * scene.room_half_m) ++at_plain_wall;
-    if (forward.head<2>().normalized().dot(-p.head<2>().normalized()) > 0.95) ++at_table;
-    if (i == 0) continue;
-    way_m += (p - path[i - 1].translation()).norm();
-    ASSERT_LT((p - path[i - 1].translation()).norm(), 0.05);
-    ASSERT_LT(path[i].rotation().angularDistance(path[i - 1].rotation()), 0.05);
+TEST(SurroundingsTest, IdenticalWallsDifferOnlyByRotation) {
+  for (const Walls walls : {Walls::kDistinct, Walls::kIdentical}) {
+    const Scene scene = MakeScene({.seed = 2, .objects = 2, .surroundings = {.walls = walls}});
+    const Bvh bvh(scene.positions_world, scene.triangles);
+    int different = 0, total = 0;
+    for (float y_m = -1.5F; y_m <= 1.5F; y_m += 0.137F) {
+      for (float z_m = 0.9F; z_m <= 2.3F; z_m += 0.171F) {
+        for (int side = 1; side < 4; ++side) {
+          const Rgb difference = WallColor(scene, bvh, side, y_m, z_m) - WallColor(scene, bvh, 0, y_m, z_m);
+          different += difference.norm() > 0.02F ? 1 : 0;
+          ++total;
+        }
+      }
+    }
+    if (walls == Walls::kIdentical) {
+      EXPECT_LT(different, total / 50) << "rays that hit an edge";
+    } else {
+      EXPECT_GT(different, total / 2);
+    }
   }
-  EXPECT_GT(way_m, 15);
-  EXPECT_LT((path.front().translation() - path.back().translation()).norm(), 0.3);
-  EXPECT_LT(path.front().rotation().angularDistance(path.back().rotation()), 0.35);
-  EXPECT_GT(at_plain_wall, 60);
-  EXPECT_LT(at_plain_wall, 400);
-  EXPECT_GT(at_table, 200);
+}
+
+TEST(SurroundingsTest, WithoutWallsOnlyFloorAndTableRemain) {
+  const Scene scene = MakeScene({.seed = 2, .objects = 2, .surroundings = {.walls = Walls::kNone}});
+  const auto centers = CentersOfRoom(scene);
+  EXPECT_FALSE(centers.empty());
+  for (const Eigen::Vector3f& center : centers) ASSERT_LE(center.z(), scene.table_height_m + 1e-5);
+}
+
+TEST(SurroundingsTest, BlackAndGrayBackgroundsHaveOnlyObjects) {
+  for (const Background background : {Background::kBlack, Background::kGray}) {
+    const Scene scene = MakeScene({.seed = 2, .objects = 2, .surroundings = {.background = background}});
+    EXPECT_TRUE(CentersOfRoom(scene).empty());
+    EXPECT_EQ(scene.objects.size(), 2U);
+    EXPECT_FALSE(scene.lights.empty());
+    EXPECT_EQ(scene.background.isZero(), background == Background::kBlack);
+  }
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "client/files/ply.h"
@@ -262,6 +263,20 @@ TEST_F(MakeSequenceTest, NamesInvalidOptions) {
   twins.objects = 3;
   twins.identical_pairs = 2;
   EXPECT_NE(Message(ValidateSynthOptions(twins)).find("identical_pairs"), std::string::npos);
+}
+
+TEST_F(MakeSequenceTest, BlackBackgroundShowsOnlyObjects) {
+  SynthOptions options = Small();
+  options.frames = 1;
+  options.surroundings.background = Background::kBlack;
+  ASSERT_TRUE(MakeSequence(options, Dir()).ok());
+  const cv::Mat color = Read(Dir() + "/rgb/000001.png");
+  cv::Mat near_object;
+  cv::dilate(Read(Dir() + "/mask/000001.png") > 0, near_object, cv::Mat());
+  cv::Mat visible;
+  cv::cvtColor(color, visible, cv::COLOR_BGR2GRAY);
+  EXPECT_GT(cv::countNonZero(visible), 1000);
+  EXPECT_EQ(cv::countNonZero((visible > 0) & ~near_object), 0);
 }
 
 TEST_F(MakeSequenceTest, ReportsAMissingParentFolder) {
