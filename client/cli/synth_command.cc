@@ -17,6 +17,8 @@ struct SynthCommandOptions {
   // As on the command line; empty = default.
   std::string table_texture;
   std::string jump;
+  std::string crop;
+  std::string gain_steps;
   // Ranges FIRST:LAST.
   std::vector<std::string> cuts;
   std::vector<std::string> black;
@@ -44,6 +46,16 @@ absl::Status ReadTexts(SynthCommandOptions& options) {
     const absl::StatusOr<synth::CameraJump> jump = synth::ParseCameraJump(options.jump);
     if (!jump.ok()) return InvalidArgument("--jump: {}", Message(jump.status()));
     options.synth.jump = *jump;
+  }
+  if (!options.crop.empty()) {
+    const absl::StatusOr<synth::ImageCrop> crop = synth::ParseImageCrop(options.crop);
+    if (!crop.ok()) return InvalidArgument("--crop: {}", Message(crop.status()));
+    options.synth.crop = *crop;
+  }
+  if (!options.gain_steps.empty()) {
+    const absl::StatusOr<synth::GainRange> gain = synth::ParseGainRange(options.gain_steps);
+    if (!gain.ok()) return InvalidArgument("--gain-steps: {}", Message(gain.status()));
+    options.synth.gain_steps = *gain;
   }
   ROMAP_RETURN_IF_ERROR(ReadRanges("--cut", options.cuts, &options.synth.cuts));
   ROMAP_RETURN_IF_ERROR(ReadRanges("--black", options.black, &options.synth.black));
@@ -76,8 +88,12 @@ class OptionGroup {
   template <class Choice>
   void AddChoice(const char* name, Choice& value, const std::map<std::string, Choice>& choices,
                  const char* help) const {
+    std::string names;
+    for (const auto& [choice, _] : choices) names += (names.empty() ? "" : "|") + choice;
+    // Without description: the help text lists the names only.
     command_->add_option(name, value, help)
-        ->transform(CLI::CheckedTransformer(choices, CLI::ignore_case))
+        ->transform(CLI::CheckedTransformer(choices, CLI::ignore_case).description(""))
+        ->type_name(names)
         ->group(name_);
   }
   template <class Text>
@@ -158,24 +174,44 @@ void AddCameraOptions(SynthCommandOptions& options, CLI::App* command) {
                                       {"radtan", synth::SynthLens::kRadialTangential},
                                       {"fisheye", synth::SynthLens::kFisheye}},
                                      "Camera lens: pinhole, radtan or fisheye");
+  camera.Add("--fx", synth.fx_px, "Horizontal focal length [px]; 0 = default of the lens; larger = narrower view");
+  camera.Add("--fy", synth.fy_px, "Vertical focal length [px]; 0 = the same as --fx");
+  camera.AddText("--crop", options.crop, "X:Y:WIDTH:HEIGHT",
+                 "Render only this part of the image [px], from the same viewpoints");
+  camera.Add("--rolling-shutter", synth.readout,
+             "Time between the first and last image row, as a share of the frame interval, 0 to 1; the true pose is "
+             "that of the middle row");
+  camera.Add("--exposure", synth.exposure,
+             "Exposure time as a share of the frame interval, 0 to 1: motion blur as the mean of images during the "
+             "exposure; the true pose is that at its middle");
   camera.AddChoice<synth::ImageFormat>("--format", synth.format,
                                        {{"png", synth::ImageFormat::kPng}, {"jpeg", synth::ImageFormat::kJpeg}},
                                        "Format of the color images: png or jpeg");
+  camera.Add("--jpeg-quality", synth.jpeg_quality, "Quality of JPEG images, 1 to 100");
 }
 
 void AddFaultOptions(SynthCommandOptions& options, CLI::App* command) {
   synth::SynthOptions& synth = options.synth;
   const OptionGroup faults(command, "Faults");
+  faults.Add("--occluder", synth.occluder_share,
+             "Share of the image that a textured blob covers while it moves across, 0 to 0.9");
+  faults.Add("--gripper", synth.gripper_share,
+             "Share of the image that a textured object fixed to the camera covers, 0 to 0.9");
+  faults.Add("--depth-noise", synth.depth_noise_mm,
+             "Standard deviation of the depth at 1 m [mm]; grows with the square of the depth");
   faults.Add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
   faults.Add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
   faults.AddFlag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
   faults.Add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
-  faults.Add("--motion-blur", synth.motion_blur_px, "Length of the motion blur [px]");
+  faults.Add("--motion-blur", synth.motion_blur_px,
+             "Length of motion blur of constant length along the image motion [px]; see also --exposure");
   faults.Add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
   faults.AddText("--cut", options.cuts, "FIRST:LAST", "Omit these frames, simulating a jump of the camera");
   faults.AddText("--black", options.black, "FIRST:LAST", "Make these frames black (covered lens)");
   faults.AddText("--blur", options.blurred, "FIRST:LAST", "Blur these frames until tracking is impossible");
   faults.Add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
+  faults.AddText("--gain-steps", options.gain_steps, "LOW:HIGH",
+                 "Change the gain in steps within this range every second or two, e.g. 0.3:1.6");
   faults.Add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
 }
 

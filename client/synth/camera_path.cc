@@ -100,8 +100,8 @@ CameraPath::CameraPath(const SynthOptions& options, const Scene& scene, const Ca
       shake_(options) {
   double tallest_m = 0;
   for (const SceneObject& object : scene.objects) tallest_m = std::max(tallest_m, 2 * object.half_extents_m.z());
-  const double half_side_px = 0.5 * std::min(camera.width_px, camera.height_px);
-  const double half_view_rad = std::atan(half_side_px / camera.fx_px);
+  const double half_view_rad =
+      std::atan(0.5 * std::min(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px));
   // The bounding sphere of all objects fills most of the smaller image side. The distance has a minimum for small
   // objects.
   const double radius_m = std::hypot(scene.layout_radius_m, 0.4 * tallest_m);

@@ -124,4 +124,16 @@ void DegradeImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOpt
   }
 }
 
+void DegradeDepth(cv::Mat& depth_m, const SynthOptions& options, Random& random) {
+  if (options.depth_noise_mm <= 0) return;
+  for (int v = 0; v < depth_m.rows; ++v) {
+    for (int u = 0; u < depth_m.cols; ++u) {
+      float& z_m = depth_m.at<float>(v, u);
+      // The error of a depth from triangulation (structured light, stereo) grows with the square of the depth.
+      const double sigma_m = 1e-3 * options.depth_noise_mm * z_m * z_m;
+      z_m = std::max(z_m + static_cast<float>(sigma_m * random.Normal()), 0.0F);
+    }
+  }
+}
+
 }  // namespace romap::synth

@@ -31,4 +31,7 @@ FaultyMask DegradeMask(const cv::Mat& true_labels, int object_count, const Synth
 void DegradeImage(cv::Mat& color_bgr, const cv::Vec2d& motion_px, const SynthOptions& options, Random& random,
                   const FramePlan& plan = {});
 
+// Adds the depth noise of `options` to a CV_32FC1 image of depths [m] in place. Pixels without depth keep the value 0.
+void DegradeDepth(cv::Mat& depth_m, const SynthOptions& options, Random& random);
+
 }  // namespace romap::synth

@@ -31,11 +31,32 @@ void PlanExposure(const SynthOptions& options, std::vector<FramePlan>& plans) {
   }
 }
 
+// Simulates an automatic exposure that changes in steps. Starts with a gain of 1.
+void PlanGainSteps(const SynthOptions& options, std::vector<FramePlan>& plans) {
+  Random random(options.seed, 10);
+  const double log_low = std::log(options.gain_steps.low);
+  const double log_range = std::log(options.gain_steps.high) - log_low;
+  double next_step_s = random.Uniform(0.8, 2.2);
+  double share = random.Uniform();  // of the range
+  double gain = 1;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    const double time_s = static_cast<double>(i) / options.fps;
+    if (time_s >= next_step_s) {
+      share += random.Uniform(0.25, 0.75);
+      share -= std::floor(share);
+      gain = std::exp(log_low + share * log_range);
+      next_step_s = time_s + random.Uniform(0.8, 2.2);
+    }
+    plans[i].gain *= gain;
+  }
+}
+
 }  // namespace
 
 std::vector<FramePlan> PlanFrames(const SynthOptions& options) {
   std::vector<FramePlan> plans(static_cast<size_t>(options.frames));
   if (options.exposure_stops > 0) PlanExposure(options, plans);
+  if (options.gain_steps != GainRange{}) PlanGainSteps(options, plans);
   Random random(options.seed, 7);
   for (size_t i = 0; i < plans.size(); ++i) {
     FramePlan& plan = plans[i];

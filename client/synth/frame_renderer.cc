@@ -1,123 +1,63 @@
 #include "client/synth/frame_renderer.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
+#include <memory>
 
-#include "client/synth/lens_rays.h"
+#include "client/synth/shading.h"
 
 namespace romap::synth {
 namespace {
-
-constexpr int kSamplesAcross = 2;
-constexpr int kSamples = kSamplesAcross * kSamplesAcross;
-
-// Converts linear intensity 0..1 to an 8-bit sRGB value (IEC 61966-2-1).
-uint8_t ToSrgb8(float linear) {
-  static const std::array<uint8_t, 4096> kTable = [] {
-    std::array<uint8_t, 4096> table;
-    for (size_t i = 0; i < table.size(); ++i) {
-      const double x = static_cast<double>(i) / static_cast<double>(table.size() - 1);
-      const double y = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-      table[i] = static_cast<uint8_t>(std::lround(255 * y));
-    }
-    return table;
-  }();
-  return kTable[static_cast<size_t>(std::clamp(linear, 0.0F, 1.0F) * 4095 + 0.5F)];
-}
 
 bool ShareVertex(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
   return std::any_of(a.begin(), a.end(), [&](uint32_t i) { return i == b[0] || i == b[1] || i == b[2]; });
 }
 
+std::shared_ptr<const Bvh> BvhForLens(const Scene& scene, const CameraModel& camera) {
+  if (!camera.HasDistortion()) return nullptr;
+  return std::make_shared<const Bvh>(scene.positions_world, scene.triangles);
+}
+
+}  // namespace
+
+FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera)
+    : FrameRenderer(scene, camera, BvhForLens(scene, camera)) {}
+
+FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera, const std::shared_ptr<const Bvh>& bvh)
+    : scene_(scene),
+      camera_(camera),
+      pixel_rad_(static_cast<float>(1 / std::sqrt(camera.fx_px * camera.fy_px))),
+      centers_(scene, camera, 1, bvh),
+      fine_(scene, camera, kSamplesAcross, bvh),
+      blur_(scene, camera, bvh) {}
+
 // Whether all samples of a pixel hit the same smooth surface, so that one color evaluation suffices.
-bool SameSurface(const Scene& scene, const std::array<int32_t, kSamples>& hits) {
+bool FrameRenderer::SameSurface(const std::array<int32_t, kSamples>& hits) const {
   if (hits[0] == render::VisibilityImage::kNothing) return false;
   for (const int32_t hit : hits) {
     if (hit == hits[0]) continue;
     if (hit == render::VisibilityImage::kNothing) return false;
     const auto a = static_cast<size_t>(hits[0]);
     const auto b = static_cast<size_t>(hit);
-    if (scene.surface_of_triangle[a] != scene.surface_of_triangle[b]) return false;
+    if (scene_.surface_of_triangle[a] != scene_.surface_of_triangle[b]) return false;
     // Adjacent triangles of a smooth surface share a vertex; triangles at an occlusion within a surface do not.
-    if (!ShareVertex(scene.triangles[a], scene.triangles[b])) return false;
+    if (!ShareVertex(scene_.triangles[a], scene_.triangles[b])) return false;
   }
   return true;
 }
 
-Eigen::Vector3d RayThrough(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays, int u_px,
-                           int v_px) {
-  if (lens_rays.empty()) return camera.Unproject(u_px, v_px);
-  return lens_rays[static_cast<size_t>(v_px) * static_cast<size_t>(camera.width_px) + static_cast<size_t>(u_px)]
-      .homogeneous();
+Rgb FrameRenderer::CenterColor(const render::VisibilityImage& centers, const ImagePoses& poses, int u_px,
+                               int v_px) const {
+  const size_t index = centers.Index(u_px, v_px);
+  const int32_t triangle = centers.triangle[index];
+  if (triangle == render::VisibilityImage::kNothing) return scene_.background;
+  return Radiance(scene_, triangle, poses.Row(v_px), centers_.Ray(u_px, v_px), centers.inverse_depth_mu[index],
+                  pixel_rad_);
 }
 
-}  // namespace
-
-FrameRenderer::FrameRenderer(const Scene& scene, const CameraModel& camera)
-    : scene_(scene), camera_(camera), fine_camera_(render::Supersampled(camera, kSamplesAcross)) {
-  if (!camera.HasDistortion()) return;
-  bvh_ = std::make_unique<Bvh>(scene.positions_world, scene.triangles);
-  center_rays_ = LensRays(camera, 1);
-  fine_rays_ = LensRays(camera, kSamplesAcross);
-}
-
-render::VisibilityImage FrameRenderer::Visibility(const CameraModel& camera,
-                                                  const std::vector<Eigen::Vector2d>& lens_rays,
-                                                  const SE3<World, Camera>& T_world_camera) const {
-  if (!bvh_) return render::Rasterize(camera, T_world_camera, scene_.Soup(), {.cull_back_faces = true});
-  render::VisibilityImage image;
-  image.width_px = camera.width_px;
-  image.height_px = camera.height_px;
-  image.triangle.assign(lens_rays.size(), render::VisibilityImage::kNothing);
-  image.inverse_depth_mu.assign(lens_rays.size(), 0.0F);
-  const Eigen::Vector3f origin_m = T_world_camera.translation().cast<float>();
-  const Eigen::Matrix3d rotation = T_world_camera.RotationMatrix();
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, lens_rays.size(), 1024), [&](const auto& range) {
-    for (size_t i = range.begin(); i < range.end(); ++i) {
-      const Eigen::Vector3d direction = rotation * lens_rays[i].homogeneous();
-      const std::optional<Bvh::Hit> hit = bvh_->Nearest(origin_m, direction.cast<float>());
-      if (!hit) continue;
-      image.triangle[i] = static_cast<int32_t>(hit->triangle);
-      image.inverse_depth_mu[i] = 1 / hit->t;  // the ray has z = 1 in the camera frame
-    }
-  });
-  return image;
-}
-
-// Radiance at the intersection of the ray with the triangle, filtered for an area with a side of `pixel_share` pixels.
-Rgb FrameRenderer::Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera,
-                            const SE3<World, Camera>& T_world_camera, float inverse_depth, float pixel_share) const {
-  const std::array<uint32_t, 3>& corner = scene_.triangles[static_cast<size_t>(triangle)];
-  const std::array<Eigen::Vector3f, 3> world = {scene_.positions_world[corner[0]], scene_.positions_world[corner[1]],
-                                                scene_.positions_world[corner[2]]};
-  const Eigen::Vector3d ray = T_world_camera.rotation() * ray_camera;
-  // The pixel center may be outside the triangle that a sample hit.
-  Eigen::Vector3f weights = render::Barycentrics(world, T_world_camera.translation(), ray).cwiseMax(0.0F);
-  weights /= weights.sum();
-  const auto blend = [&](const auto& attribute) -> Eigen::Vector3f {
-    return weights.x() * attribute[corner[0]] + weights.y() * attribute[corner[1]] + weights.z() * attribute[corner[2]];
-  };
-  const Eigen::Vector3f normal_world = (world[1] - world[0]).cross(world[2] - world[0]).normalized();
-  const auto& local = scene_.positions_local;
-  const Eigen::Vector3f normal_local =
-      (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
-  // On a slanted surface the footprint of a pixel is longer in one direction; use the geometric mean of both.
-  const float cosine = std::abs(normal_world.dot(ray.cast<float>().normalized()));
-  const float footprint_m =
-      pixel_share / (inverse_depth * static_cast<float>(camera_.fx_px) * std::sqrt(std::max(cosine, 0.05F)));
-  const Material& material = scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].material;
-  return Albedo(material, blend(local), normal_local, footprint_m).cwiseProduct(blend(scene_.irradiance));
-}
-
-// Mean color of the samples of pixel (u, v).
-Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
-                              int v_px) const {
+Rgb FrameRenderer::MeanColor(const render::VisibilityImage& fine, const ImagePoses& poses, int u_px, int v_px) const {
   std::array<int32_t, kSamples> hits;
   std::array<float, kSamples> inverse_depths;
   for (int k = 0; k < kSamples; ++k) {
@@ -126,9 +66,9 @@ Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<Wor
     hits[k] = fine.triangle[index];
     inverse_depths[k] = fine.inverse_depth_mu[index];
   }
-  if (SameSurface(scene_, hits)) {
-    const Eigen::Vector3d center = RayThrough(camera_, center_rays_, u_px, v_px);
-    if (center.allFinite()) return Radiance(hits[0], center, T_world_camera, inverse_depths[0], 1);
+  if (SameSurface(hits)) {
+    const Eigen::Vector3d center = centers_.Ray(u_px, v_px);
+    if (center.allFinite()) return Radiance(scene_, hits[0], poses.Row(v_px), center, inverse_depths[0], pixel_rad_);
   }
   Rgb sum = Rgb::Zero();
   for (int k = 0; k < kSamples; ++k) {
@@ -136,32 +76,57 @@ Rgb FrameRenderer::PixelColor(const render::VisibilityImage& fine, const SE3<Wor
       sum += scene_.background;
       continue;
     }
-    const Eigen::Vector3d ray = RayThrough(fine_camera_, fine_rays_, u_px * kSamplesAcross + k % kSamplesAcross,
-                                           v_px * kSamplesAcross + k / kSamplesAcross);
-    sum += Radiance(hits[k], ray, T_world_camera, inverse_depths[k], 1.0F / kSamplesAcross);
+    const int v_sample = v_px * kSamplesAcross + k / kSamplesAcross;
+    const Eigen::Vector3d ray = fine_.Ray(u_px * kSamplesAcross + k % kSamplesAcross, v_sample);
+    sum += Radiance(scene_, hits[k], poses.Row(fine_.Row_px(v_sample)), ray, inverse_depths[k],
+                    pixel_rad_ / kSamplesAcross);
   }
   return sum / kSamples;
 }
 
-TrueFrame FrameRenderer::Render(const SE3<World, Camera>& T_world_camera) const {
-  const render::VisibilityImage centers = Visibility(camera_, center_rays_, T_world_camera);
-  const render::VisibilityImage fine = Visibility(fine_camera_, fine_rays_, T_world_camera);
+std::vector<Rgb> FrameRenderer::SharpColors(const ImagePoses& poses) const {
+  const render::VisibilityImage fine = fine_.Find(poses);
+  const auto width = static_cast<size_t>(camera_.width_px);
+  std::vector<Rgb> colors(width * static_cast<size_t>(camera_.height_px));
+  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+    for (int u = 0; u < camera_.width_px; ++u) {
+      colors[static_cast<size_t>(v) * width + static_cast<size_t>(u)] = MeanColor(fine, poses, u, v);
+    }
+  });
+  return colors;
+}
+
+// One sample per pixel and moment is sufficient, because the moments have different sample positions.
+std::vector<Rgb> FrameRenderer::ExposedColors(const render::VisibilityImage& centers, const ImagePoses& poses,
+                                              std::span<const ImagePoses> exposure) const {
+  std::vector<Rgb> colors(centers.triangle.size());
+  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+    for (int u = 0; u < camera_.width_px; ++u) colors[centers.Index(u, v)] = CenterColor(centers, poses, u, v);
+  });
+  return blur_.Average({poses, centers, colors}, exposure);
+}
+
+TrueFrame FrameRenderer::Render(const ImagePoses& poses, std::span<const ImagePoses> exposure) const {
+  const render::VisibilityImage centers = centers_.Find(poses);
+  const std::vector<Rgb> colors = exposure.empty() ? SharpColors(poses) : ExposedColors(centers, poses, exposure);
+
   TrueFrame frame;
   frame.color_bgr.create(camera_.height_px, camera_.width_px, CV_8UC3);
   frame.labels.create(camera_.height_px, camera_.width_px, CV_8UC1);
   frame.depth_m.create(camera_.height_px, camera_.width_px, CV_32FC1);
-  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+  for (int v = 0; v < camera_.height_px; ++v) {
     for (int u = 0; u < camera_.width_px; ++u) {
-      const int32_t triangle = centers.triangle[centers.Index(u, v)];
+      const size_t index = centers.Index(u, v);
+      const int32_t triangle = centers.triangle[index];
       frame.depth_m.at<float>(v, u) = centers.Depth(u, v);
       frame.labels.at<uint8_t>(v, u) =
           triangle == render::VisibilityImage::kNothing
               ? uint8_t{0}
               : scene_.surfaces[scene_.surface_of_triangle[static_cast<size_t>(triangle)]].label;
-      const Rgb color = PixelColor(fine, T_world_camera, u, v);
+      const Rgb& color = colors[index];
       frame.color_bgr.at<cv::Vec3b>(v, u) = {ToSrgb8(color.z()), ToSrgb8(color.y()), ToSrgb8(color.x())};
     }
-  });
+  }
   return frame;
 }
 

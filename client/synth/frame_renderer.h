@@ -1,15 +1,16 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <memory>
+#include <array>
 #include <opencv2/core/mat.hpp>
+#include <span>
 #include <vector>
 
 #include "client/render/rasterizer.h"
-#include "client/synth/bvh.h"
+#include "client/synth/exposure_blur.h"
+#include "client/synth/image_poses.h"
 #include "client/synth/scene.h"
+#include "client/synth/visibility.h"
 #include "common/camera_model.h"
-#include "common/geometry.h"
 
 namespace romap::synth {
 
@@ -20,32 +21,36 @@ struct TrueFrame {
   cv::Mat depth_m;    // CV_32FC1 z depth at the pixel center [m]; 0 = nothing
 };
 
-// Renders a scene with baked light. Uses a z-buffer for a pinhole camera and ray tracing for a lens. Pixels of a lens
-// that receive no rays have the color of the background.
+// Renders a scene with baked light. Pixels that show no surface have the color of the background.
 class FrameRenderer {
  public:
   // `scene` must outlive the renderer and not change.
   FrameRenderer(const Scene& scene, const CameraModel& camera);
 
-  // Thread-safe.
-  TrueFrame Render(const SE3<World, Camera>& T_world_camera) const;
+  // Labels and depth are those of `poses`. The color is that of `poses` too if `exposure` is empty, otherwise the mean
+  // of the images at these moments. Thread-safe.
+  TrueFrame Render(const ImagePoses& poses, std::span<const ImagePoses> exposure = {}) const;
 
  private:
-  // The visible triangle of each sample of an image. `lens_rays` is empty for a pinhole camera.
-  render::VisibilityImage Visibility(const CameraModel& camera, const std::vector<Eigen::Vector2d>& lens_rays,
-                                     const SE3<World, Camera>& T_world_camera) const;
-  Rgb PixelColor(const render::VisibilityImage& fine, const SE3<World, Camera>& T_world_camera, int u_px,
-                 int v_px) const;
-  Rgb Radiance(int32_t triangle, const Eigen::Vector3d& ray_camera, const SE3<World, Camera>& T_world_camera,
-               float inverse_depth, float pixel_share) const;
+  static constexpr int kSamplesAcross = 2;
+  static constexpr int kSamples = kSamplesAcross * kSamplesAcross;
+
+  FrameRenderer(const Scene& scene, const CameraModel& camera, const std::shared_ptr<const Bvh>& bvh);
+  bool SameSurface(const std::array<int32_t, kSamples>& hits) const;
+  // The color at the pixel center.
+  Rgb CenterColor(const render::VisibilityImage& centers, const ImagePoses& poses, int u_px, int v_px) const;
+  // The mean color of the samples of a pixel.
+  Rgb MeanColor(const render::VisibilityImage& fine, const ImagePoses& poses, int u_px, int v_px) const;
+  std::vector<Rgb> ExposedColors(const render::VisibilityImage& centers, const ImagePoses& poses,
+                                 std::span<const ImagePoses> exposure) const;
+  std::vector<Rgb> SharpColors(const ImagePoses& poses) const;
 
   const Scene& scene_;
   const CameraModel camera_;
-  const CameraModel fine_camera_;  // its pixels are the samples of camera_
-  // For a camera with a lens only:
-  std::unique_ptr<Bvh> bvh_;
-  std::vector<Eigen::Vector2d> center_rays_;
-  std::vector<Eigen::Vector2d> fine_rays_;
+  const float pixel_rad_;  // tangent of the angle that a pixel covers
+  const Visibility centers_;
+  const Visibility fine_;
+  const ExposureBlur blur_;
 };
 
 }  // namespace romap::synth

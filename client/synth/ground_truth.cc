@@ -76,19 +76,16 @@ SurfacePoints::SurfacePoints(const SceneObject& object, uint64_t seed) : label_(
   seen_ = std::vector<std::atomic<uint8_t>>(positions_world_.size());
 }
 
-void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera,
-                             const SE3<World, Camera>& T_world_camera) {
+void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera, const ImagePoses& poses) {
   constexpr double kMinCosine = 0.05;  // surfaces at more grazing angles are not considered visible
   constexpr double kTolerance_m = 3e-4;
   constexpr double kMaxSlack_m = 3e-3;  // less than the thickness of any wall
-  const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();
+  const double focal_px = std::min(camera.fx_px, camera.fy_px);
   for (size_t i = 0; i < positions_world_.size(); ++i) {
     if (seen(i)) continue;
-    const Eigen::Vector3d p = T_camera_world * positions_world_[i].cast<double>();
+    const Eigen::Vector3d p_world = positions_world_[i].cast<double>();
+    const Eigen::Vector3d p = poses.CameraPoint(p_world);
     if (p.z() <= 0) continue;
-    const Eigen::Vector3d normal = T_camera_world.rotation() * normals_world_[i].cast<double>();
-    const double cosine = -normal.dot(p) / p.norm();
-    if (cosine < kMinCosine) continue;
     Eigen::Vector2d pixel = camera.Project(p);
     if (camera.HasDistortion()) pixel = DistortPixel(camera, pixel);
     if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < camera.width_px - 0.5 &&
@@ -98,8 +95,11 @@ void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera,
     const int u = static_cast<int>(std::lround(pixel.x()));
     const int v = static_cast<int>(std::lround(pixel.y()));
     if (frame.labels.at<uint8_t>(v, u) != label_) continue;
+    const Eigen::Vector3d to_camera = poses.Row(pixel.y()).translation() - p_world;
+    const double cosine = normals_world_[i].cast<double>().dot(to_camera) / to_camera.norm();
+    if (cosine < kMinCosine) continue;
     // The depth image is sampled at the pixel center; the depth of a slanted surface changes within half a pixel.
-    const double slack_m = 0.71 * p.z() / camera.fx_px * std::sqrt(1 - cosine * cosine) / cosine;
+    const double slack_m = 0.71 * p.z() / focal_px * std::sqrt(1 - cosine * cosine) / cosine;
     const double tolerance_m = kTolerance_m + std::min(slack_m, kMaxSlack_m);
     if (std::abs(frame.depth_m.at<float>(v, u) - p.z()) < tolerance_m) seen_[i].store(1, std::memory_order_relaxed);
   }

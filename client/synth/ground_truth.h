@@ -19,7 +19,7 @@ class SurfacePoints {
 
   // Marks the points that are visible in the frame: they face the camera, agree with the depth image at their pixel,
   // and are in the mask of the object. Thread-safe; the result does not depend on the order of calls.
-  void MarkSeen(const TrueFrame& frame, const CameraModel& camera, const SE3<World, Camera>& T_world_camera);
+  void MarkSeen(const TrueFrame& frame, const CameraModel& camera, const ImagePoses& poses);
 
   const std::vector<Eigen::Vector3f>& positions_world() const { return positions_world_; }  // meters
   const std::vector<Eigen::Vector3f>& normals_world() const { return normals_world_; }      // unit length

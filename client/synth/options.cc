@@ -1,11 +1,34 @@
 #include "client/synth/options.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 
 namespace romap::synth {
+
+namespace {
+
+// Parses numbers that are separated by colons. nullopt if malformed.
+template <size_t kCount>
+std::optional<std::array<double, kCount>> ParseNumbers(const std::string& text) {
+  std::array<double, kCount> numbers;
+  const char* next = text.data();
+  const char* const end = text.data() + text.size();
+  for (size_t i = 0; i < kCount; ++i) {
+    if (i > 0 && (next == end || *next++ != ':')) return std::nullopt;
+    const auto [rest, error] = std::from_chars(next, end, numbers[i]);
+    if (error != std::errc()) return std::nullopt;
+    next = rest;
+  }
+  if (next != end) return std::nullopt;
+  return numbers;
+}
+
+}  // namespace
 
 absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text) {
   FrameRange range;
@@ -16,6 +39,23 @@ absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text) {
     if (last_error == std::errc() && rest == end) return range;
   }
   return InvalidArgument("'{}': expected FIRST:LAST, two frame numbers from 1, e.g. 100:130", text);
+}
+
+absl::StatusOr<ImageCrop> ParseImageCrop(const std::string& text) {
+  ImageCrop crop;
+  const std::optional<std::array<double, 4>> numbers = ParseNumbers<4>(text);
+  if (!numbers ||
+      std::any_of(numbers->begin(), numbers->end(), [](double n) { return n < 0 || n > 4096 || n != std::floor(n); })) {
+    return InvalidArgument("'{}': expected X:Y:WIDTH:HEIGHT in pixels, e.g. 160:120:320:240", text);
+  }
+  return ImageCrop{static_cast<int>((*numbers)[0]), static_cast<int>((*numbers)[1]), static_cast<int>((*numbers)[2]),
+                   static_cast<int>((*numbers)[3])};
+}
+
+absl::StatusOr<GainRange> ParseGainRange(const std::string& text) {
+  const std::optional<std::array<double, 2>> numbers = ParseNumbers<2>(text);
+  if (!numbers) return InvalidArgument("'{}': expected LOW:HIGH, two factors, e.g. 0.3:1.6", text);
+  return GainRange{(*numbers)[0], (*numbers)[1]};
 }
 
 absl::StatusOr<TableTexture> ParseTableTexture(const std::string& text) {
@@ -33,12 +73,9 @@ absl::StatusOr<TableTexture> ParseTableTexture(const std::string& text) {
 }
 
 absl::StatusOr<CameraJump> ParseCameraJump(const std::string& text) {
-  CameraJump jump;
-  const char* const end = text.data() + text.size();
-  const auto [colon, error] = std::from_chars(text.data(), end, jump.frame);
-  if (error == std::errc() && colon != end && *colon == ':') {
-    const auto [rest, turn_error] = std::from_chars(colon + 1, end, jump.turn_deg);
-    if (turn_error == std::errc() && rest == end && jump.frame >= 1) return jump;
+  const std::optional<std::array<double, 2>> numbers = ParseNumbers<2>(text);
+  if (numbers && (*numbers)[0] >= 1 && (*numbers)[0] <= 1e6 && (*numbers)[0] == std::floor((*numbers)[0])) {
+    return CameraJump{static_cast<int>((*numbers)[0]), (*numbers)[1]};
   }
   return InvalidArgument("'{}': expected FRAME:DEGREES, a frame number from 1 and an angle, e.g. 150:180", text);
 }
@@ -75,6 +112,22 @@ absl::Status ValidateSynthOptions(const SynthOptions& options) {
   require("jump.frame", options.jump.frame, 0, options.frames);
   require("jump.turn_deg", options.jump.turn_deg, -360, 360);
   require("surroundings.table.repeats", options.surroundings.table.repeats, 1, 100);
+  if (options.fx_px != 0) require("fx_px", options.fx_px, 10, 100000);
+  if (options.fy_px != 0) require("fy_px", options.fy_px, 10, 100000);
+  if (options.crop != ImageCrop{}) {
+    require("crop.x_px", options.crop.x_px, 0, options.width_px - 32);
+    require("crop.y_px", options.crop.y_px, 0, options.height_px - 32);
+    require("crop.width_px", options.crop.width_px, 32, options.width_px - options.crop.x_px);
+    require("crop.height_px", options.crop.height_px, 32, options.height_px - options.crop.y_px);
+  }
+  require("readout", options.readout, 0, 1);
+  require("exposure", options.exposure, 0, 1);
+  require("jpeg_quality", options.jpeg_quality, 1, 100);
+  require("gripper_share", options.gripper_share, 0, 0.9);
+  require("occluder_share", options.occluder_share, 0, 0.9);
+  require("gain_steps.low", options.gain_steps.low, 0.01, 100);
+  require("gain_steps.high", options.gain_steps.high, options.gain_steps.low, 100);
+  require("depth_noise_mm", options.depth_noise_mm, 0, 100);
   const auto require_ranges = [&](const char* name, const std::vector<FrameRange>& ranges) {
     for (const FrameRange& range : ranges) {
       if (range.first >= 1 && range.first <= range.last && range.last <= options.frames) continue;

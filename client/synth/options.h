@@ -79,6 +79,29 @@ struct RotationOptions {
   double sway_mm = 10;    // approximate maximal displacement of the camera during the rotation [mm], 0..500
 };
 
+// A rectangle of image pixels.
+struct ImageCrop {
+  int x_px = 0, y_px = 0;           // of the upper left corner
+  int width_px = 0, height_px = 0;  // 0 = the whole image
+
+  bool operator==(const ImageCrop&) const = default;
+};
+
+// Parses "X:Y:WIDTH:HEIGHT". INVALID_ARGUMENT if malformed.
+absl::StatusOr<ImageCrop> ParseImageCrop(const std::string& text);
+
+// Range of the gain of an automatic exposure. The gain is constant for 0.8 to 2.2 s, then changes by at least a quarter
+// of the range, on a logarithmic scale.
+struct GainRange {
+  double low = 1;   // 0.01..100
+  double high = 1;  // low..100
+
+  bool operator==(const GainRange&) const = default;
+};
+
+// Parses "LOW:HIGH". INVALID_ARGUMENT if malformed.
+absl::StatusOr<GainRange> ParseGainRange(const std::string& text);
+
 // A jump of the camera to new territory: from frame `frame` on, the camera is turned about the vertical axis through
 // its own position.
 struct CameraJump {
@@ -110,10 +133,23 @@ struct SynthOptions {
   double shake_mm = 0;
   CameraJump jump = {};
   Surroundings surroundings = {};
-  int width_px = 640;                      // 32..4096
-  int height_px = 480;                     // 32..4096
-  SynthLens lens = SynthLens::kPinhole;    // applies to images, masks and depth
+  int width_px = 640;                    // 32..4096
+  int height_px = 480;                   // 32..4096
+  SynthLens lens = SynthLens::kPinhole;  // applies to images, masks and depth
+  double fx_px = 0;                      // focal length, 10..100000; 0 = default of the lens, see SynthCamera()
+  double fy_px = 0;                      // the same; 0 = fx_px
+  ImageCrop crop = {};                   // the part of the image to render; the camera path does not depend on it
+  // Rolling shutter: the time between the first and the last row, as a share of the frame interval, 0..1. Each row has
+  // its own pose. The pose in the ground truth is that of the middle row.
+  double readout = 0;
+  // Exposure time of each row as a share of the frame interval, 0..1: motion blur as the mean of images during the
+  // exposure. The pose in the ground truth is that at the middle of the exposure.
+  double exposure = 0;
   ImageFormat format = ImageFormat::kPng;  // of the color images
+  int jpeg_quality = 95;                   // 1..100
+  // Objects in front of the camera, without label. They hide the scene in color, masks and depth.
+  double gripper_share = 0;   // share of the image that a textured object fixed to the camera covers, 0..0.9
+  double occluder_share = 0;  // share of the image that a textured blob covers while it moves across, 0..0.9
   // Faults, all disabled by default.
   double mask_jitter_px = 0;             // approximate maximal displacement of mask borders, 0..50
   double mask_drop_share = 0;            // probability that the mask of an object is missing in a frame, 0..1
@@ -124,8 +160,10 @@ struct SynthOptions {
   std::vector<FrameRange> cuts = {};     // omitted frames: the camera jumps
   std::vector<FrameRange> black = {};    // frames with a covered lens: black, without masks and depth
   std::vector<FrameRange> blurred = {};  // frames blurred so strongly that almost no corners remain
-  double exposure_stops = 0;             // maximal jump of the gain every second or two, with a change of gamma; 0..4
-  double duplicate_share = 0;            // probability that a frame repeats the previous image, 0..1
+  GainRange gain_steps = {};             // steps of the gain without change of gamma; disabled if low = high = 1
+  double depth_noise_mm = 0;   // standard deviation of the depth at 1 m; grows with the square of the depth; 0..100
+  double exposure_stops = 0;   // maximal jump of the gain every second or two, with a change of gamma; 0..4
+  double duplicate_share = 0;  // probability that a frame repeats the previous image, 0..1
 };
 
 // INVALID_ARGUMENT names every option that is out of range.

@@ -20,7 +20,9 @@
 #include "client/synth/frame_renderer.h"
 #include "client/synth/ground_truth.h"
 #include "client/synth/lighting.h"
+#include "client/synth/overlays.h"
 #include "client/synth/scene.h"
+#include "client/synth/shutter.h"
 #include "client/synth/synth_camera.h"
 #include "common/file_status.h"
 
@@ -28,6 +30,7 @@ namespace romap::synth {
 namespace {
 
 constexpr double kDepthUnit_m = 1e-4;
+constexpr double kTypicalDepth_m = 1;  // of the scene, for the length of the motion blur
 
 absl::Status MakeFolders(const std::string& dir) {
   // Not recursive: a missing parent of `dir` is probably a typing error.
@@ -67,9 +70,14 @@ cv::Mat DepthUnits(const cv::Mat& depth_m) {
 class SequenceMaker {
  public:
   SequenceMaker(const SynthOptions& options, const std::string& dir, const Scene& scene)
-      : options_(options), dir_(dir), scene_(scene), camera_(SynthCamera(options)), renderer_(scene, camera_) {
-    const CameraPath path(options, scene, camera_);
-    for (int i = 0; i < options.frames; ++i) path_.push_back(path.Pose(i));
+      : options_(options),
+        dir_(dir),
+        scene_(scene),
+        camera_(SynthCamera(options)),
+        renderer_(scene, camera_),
+        overlays_(options, camera_),
+        motion_(options, scene, UncroppedCamera(options)) {
+    for (int i = 0; i < options.frames; ++i) path_.push_back(motion_.Pose(i));
     plans_ = PlanFrames(options);
     detections_.resize(path_.size());
     for (const SceneObject& object : scene.objects) {
@@ -140,25 +148,27 @@ class SequenceMaker {
   absl::Status MakeFrame(int i) {
     const FramePlan& plan = plans_[static_cast<size_t>(i)];
     if (plan.missing || plan.shown != static_cast<size_t>(i)) return absl::OkStatus();
-    const SE3<World, Camera>& T_world_camera = path_[static_cast<size_t>(i)];
-    TrueFrame frame = renderer_.Render(T_world_camera);
+    const ImagePoses poses = PosesOfImage(motion_, camera_, options_, i);
+    TrueFrame frame = renderer_.Render(poses, PosesDuringExposure(motion_, camera_, options_, i, kTypicalDepth_m));
+    overlays_.Apply(i, frame);
     const cv::Vec2d motion_px = SceneMotion(static_cast<size_t>(i), CenterDepth_m(frame.depth_m));
     if (plan.black) {
       frame.labels.setTo(0);
       frame.depth_m.setTo(0);
     }
-    for (const auto& surface : surfaces_) surface->MarkSeen(frame, camera_, T_world_camera);
+    for (const auto& surface : surfaces_) surface->MarkSeen(frame, camera_, poses);
 
     // One random stream per frame, because frames are rendered in any order.
     Random random(options_.seed, 100000U + static_cast<uint64_t>(i));
     const FaultyMask mask = DegradeMask(frame.labels, static_cast<int>(scene_.objects.size()), options_, random);
     DegradeImage(frame.color_bgr, motion_px, options_, random, plan);
+    DegradeDepth(frame.depth_m, options_, random);
     detections_[static_cast<size_t>(i)] = mask.detections;
 
     const std::vector<int> fast_png = {cv::IMWRITE_PNG_COMPRESSION, 2};
-    const std::vector<int> high_quality_jpeg = {cv::IMWRITE_JPEG_QUALITY, 95};
+    const std::vector<int> jpeg = {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality};
     ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("rgb", i, ImageExtension()), frame.color_bgr,
-                                     options_.format == ImageFormat::kPng ? fast_png : high_quality_jpeg));
+                                     options_.format == ImageFormat::kPng ? fast_png : jpeg));
     ROMAP_RETURN_IF_ERROR(WriteImage(dir_ + "/" + FrameFile("mask", i, ".png"), mask.labels, fast_png));
     return WriteImage(dir_ + "/" + FrameFile("depth", i, ".png"), DepthUnits(frame.depth_m), fast_png);
   }
@@ -207,7 +217,9 @@ class SequenceMaker {
   const Scene& scene_;
   const CameraModel camera_;
   const FrameRenderer renderer_;
-  std::vector<SE3<World, Camera>> path_;
+  const Overlays overlays_;
+  const CameraPath motion_;
+  std::vector<SE3<World, Camera>> path_;  // pose of each frame in the ground truth
   std::vector<FramePlan> plans_;
   std::vector<std::vector<SynthDetection>> detections_;   // per frame
   std::vector<std::unique_ptr<SurfacePoints>> surfaces_;  // per object

@@ -2,7 +2,7 @@
 
 namespace romap::synth {
 
-CameraModel SynthCamera(const SynthOptions& options) {
+CameraModel UncroppedCamera(const SynthOptions& options) {
   CameraModel camera;
   camera.width_px = options.width_px;
   camera.height_px = options.height_px;
@@ -20,9 +20,20 @@ CameraModel SynthCamera(const SynthOptions& options) {
       camera.distortion = {3.4e-3, 7e-4, -2e-3, 2e-4, 0};
       break;
   }
-  camera.fy_px = camera.fx_px;
+  if (options.fx_px > 0) camera.fx_px = options.fx_px;
+  camera.fy_px = options.fy_px > 0 ? options.fy_px : camera.fx_px;
   camera.cx_px = 0.5 * (options.width_px - 1);
   camera.cy_px = 0.5 * (options.height_px - 1);
+  return camera;
+}
+
+CameraModel SynthCamera(const SynthOptions& options) {
+  CameraModel camera = UncroppedCamera(options);
+  if (options.crop == ImageCrop{}) return camera;
+  camera.width_px = options.crop.width_px;
+  camera.height_px = options.crop.height_px;
+  camera.cx_px -= options.crop.x_px;
+  camera.cy_px -= options.crop.y_px;
   return camera;
 }
 

@@ -156,5 +156,26 @@ TEST(DegradeImageTest, DefocusSpreadsADot) {
   EXPECT_GT(cv::countNonZero(image.reshape(1) > 20), 3 * before / 2);
 }
 
+TEST(DegradeDepthTest, NoiseGrowsWithTheSquareOfTheDepth) {
+  for (const double z_m : {0.5, 1.0, 3.0}) {
+    Random random(1);
+    cv::Mat depth_m(100, 100, CV_32FC1, cv::Scalar(z_m));
+    depth_m.row(0).setTo(0);
+    DegradeDepth(depth_m, {.depth_noise_mm = 2}, random);
+    EXPECT_EQ(cv::countNonZero(depth_m.row(0)), 0) << "pixels without depth";
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(depth_m.rowRange(1, 100), mean, deviation);
+    EXPECT_NEAR(mean[0], z_m, 1e-3);
+    EXPECT_NEAR(deviation[0], 0.002 * z_m * z_m, 1e-4 * z_m * z_m);
+  }
+}
+
+TEST(DegradeDepthTest, ChangesNothingByDefault) {
+  Random random(1);
+  cv::Mat depth_m(10, 10, CV_32FC1, cv::Scalar(1.5));
+  DegradeDepth(depth_m, {}, random);
+  EXPECT_EQ(cv::countNonZero(depth_m != 1.5), 0);
+}
+
 }  // namespace
 }  // namespace romap::synth

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -56,6 +57,29 @@ TEST(PlanFramesTest, ExposureJumpsWithinItsBounds) {
   // 20 seconds with a jump every 0.8 to 2.2 s.
   EXPECT_GE(gains.size(), 9U);
   EXPECT_LE(gains.size(), 26U);
+}
+
+TEST(PlanFramesTest, GainChangesInStepsWithinItsRange) {
+  const auto plans = PlanFrames({.frames = 750, .fps = 25, .gain_steps = {0.3, 1.6}});
+  EXPECT_EQ(plans[0].gain, 1);
+  std::set<double> gains;
+  double lowest = 1, highest = 1;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    gains.insert(plans[i].gain);
+    lowest = std::min(lowest, plans[i].gain);
+    highest = std::max(highest, plans[i].gain);
+    EXPECT_EQ(plans[i].gamma, 1);
+    if (i > 0 && plans[i].gain != plans[i - 1].gain && plans[i - 1].gain != 1) {
+      EXPECT_GT(std::abs(std::log(plans[i].gain / plans[i - 1].gain)), 0.24 * std::log(1.6 / 0.3)) << "a clear step";
+    }
+  }
+  EXPECT_GE(lowest, 0.3);
+  EXPECT_LE(highest, 1.6);
+  EXPECT_LT(lowest, 0.45);
+  EXPECT_GT(highest, 1.2);
+  // 30 seconds with a step every 0.8 to 2.2 s.
+  EXPECT_GE(gains.size(), 13U);
+  EXPECT_LE(gains.size(), 39U);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "client/synth/lens_rays.h"
 #include "client/synth/lighting.h"
@@ -71,9 +72,9 @@ SE3<World, Camera> Above() {
 TEST(FrameRendererTest, WeakDistortionRendersLikeAPinhole) {
   const Scene scene = BallScene();
   CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120});
-  const TrueFrame pinhole = FrameRenderer(scene, camera).Render(Above());
+  const TrueFrame pinhole = FrameRenderer(scene, camera).Render(ImagePoses(Above()));
   camera.distortion[0] = 1e-9;  // enables ray tracing
-  const TrueFrame lens = FrameRenderer(scene, camera).Render(Above());
+  const TrueFrame lens = FrameRenderer(scene, camera).Render(ImagePoses(Above()));
   EXPECT_GT(cv::countNonZero(pinhole.labels), 1000);
   EXPECT_LE(cv::countNonZero(pinhole.labels != lens.labels), 4) << "ties at edges";
   EXPECT_LE(cv::countNonZero(cv::abs(pinhole.depth_m - lens.depth_m) > 1e-3), 4);
@@ -86,7 +87,7 @@ TEST(FrameRendererTest, LensDistortsColorMaskAndDepthAlike) {
   const Scene scene = BallScene();
   for (const SynthLens lens : {SynthLens::kRadialTangential, SynthLens::kFisheye}) {
     const CameraModel camera = SynthCamera({.width_px = 320, .height_px = 240, .lens = lens});
-    const TrueFrame frame = FrameRenderer(scene, camera).Render(Above());
+    const TrueFrame frame = FrameRenderer(scene, camera).Render(ImagePoses(Above()));
     // The top of the wall is at z = -0.45, at a depth of 1.65 m for every pixel.
     int wall_pixels = 0;
     for (int v = 0; v < 240; v += 7) {
@@ -107,6 +108,76 @@ TEST(FrameRendererTest, LensDistortsColorMaskAndDepthAlike) {
   }
 }
 
+// Poses with the given rotation of the camera about its vertical axis and a fixed position.
+SE3<World, Camera> AboveTurned(double yaw_rad) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY()));
+  return {Above().rotation() * turn, Above().translation()};
+}
+
+TEST(FrameRendererTest, RowsOfARollingShutterAreRowsOfStillImages) {
+  const Scene scene = BallScene();
+  for (const SynthLens lens : {SynthLens::kPinhole, SynthLens::kRadialTangential}) {
+    const CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120, .lens = lens});
+    const FrameRenderer renderer(scene, camera);
+    std::vector<SE3<World, Camera>> rows;
+    for (int v = 0; v < 120; ++v) rows.push_back(AboveTurned(0.1 * (v / 119.0 - 0.5)));
+    const TrueFrame rolling = renderer.Render(ImagePoses(camera, rows));
+    for (const int v : {10, 40, 59, 100}) {
+      const TrueFrame still = renderer.Render(ImagePoses(rows[static_cast<size_t>(v)]));
+      EXPECT_LE(cv::countNonZero(rolling.labels.row(v) != still.labels.row(v)), 1) << v;
+      EXPECT_LE(cv::countNonZero(cv::abs(rolling.depth_m.row(v) - still.depth_m.row(v)) > 2e-3), 2) << v;
+      cv::Mat difference;
+      cv::absdiff(rolling.color_bgr.row(v), still.color_bgr.row(v), difference);
+      EXPECT_LE(cv::countNonZero(difference.reshape(1) > 16), 16) << v << ", pixels at edges";
+    }
+    const TrueFrame middle = renderer.Render(ImagePoses(AboveTurned(0)));
+    EXPECT_GT(cv::countNonZero(rolling.labels != middle.labels), 25) << "the shape of the ball is skewed";
+  }
+}
+
+// CV_32FC3, linear intensity 0..1.
+cv::Mat Linear(const cv::Mat& color_bgr) {
+  cv::Mat linear;
+  color_bgr.convertTo(linear, CV_32F, 1.0 / 255);
+  cv::pow(linear, 2.2, linear);
+  return linear;
+}
+
+double RootMeanSquare(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b) / std::sqrt(static_cast<double>(a.total()));
+}
+
+TEST(FrameRendererTest, ExposureIsTheMeanOfImages) {
+  const Scene scene = BallScene();
+  const CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120});
+  const FrameRenderer renderer(scene, camera);
+  std::vector<ImagePoses> moments;
+  cv::Mat mean = cv::Mat::zeros(120, 160, CV_32FC3);
+  constexpr int kMoments = 8;
+  for (int k = 0; k < kMoments; ++k) {
+    moments.emplace_back(AboveTurned(0.06 * ((k + 0.5) / kMoments - 0.5)));
+    mean += Linear(renderer.Render(moments.back()).color_bgr) / kMoments;
+  }
+  const TrueFrame sharp = renderer.Render(ImagePoses(AboveTurned(0)));
+  const TrueFrame blurred = renderer.Render(ImagePoses(AboveTurned(0)), moments);
+  EXPECT_EQ(cv::countNonZero(sharp.labels != blurred.labels), 0);
+  EXPECT_EQ(cv::countNonZero(sharp.depth_m != blurred.depth_m), 0);
+  const double difference = RootMeanSquare(Linear(blurred.color_bgr), mean);
+  EXPECT_LT(difference, 0.03);
+  EXPECT_GT(RootMeanSquare(Linear(sharp.color_bgr), mean), 3 * difference);
+}
+
+TEST(FrameRendererTest, ExposureWithoutMotionChangesLittle) {
+  const Scene scene = BallScene();
+  const CameraModel camera = SynthCamera({.width_px = 160, .height_px = 120});
+  const FrameRenderer renderer(scene, camera);
+  const std::vector<ImagePoses> moments(4, ImagePoses(Above()));
+  const TrueFrame sharp = renderer.Render(ImagePoses(Above()));
+  cv::Mat difference;
+  cv::absdiff(sharp.color_bgr, renderer.Render(ImagePoses(Above()), moments).color_bgr, difference);
+  EXPECT_LT(cv::mean(difference)[1], 4);
+}
+
 TEST(FrameRendererTest, PixelsWithoutSurfaceHaveTheBackgroundColor) {
   Scene scene = BallScene();
   scene.background = FromHsv(0, 0, 0.5);
@@ -114,7 +185,7 @@ TEST(FrameRendererTest, PixelsWithoutSurfaceHaveTheBackgroundColor) {
   const SE3<World, Camera> upward(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1));
   for (const double distortion : {0.0, 1e-9}) {
     camera.distortion[0] = distortion;
-    const TrueFrame frame = FrameRenderer(scene, camera).Render(upward);
+    const TrueFrame frame = FrameRenderer(scene, camera).Render(ImagePoses(upward));
     EXPECT_EQ(cv::countNonZero(frame.depth_m), 0);
     for (const cv::Vec3b& pixel : cv::Mat_<cv::Vec3b>(frame.color_bgr)) {
       for (int k = 0; k < 3; ++k) ASSERT_NEAR(pixel[k], 128, 3);

@@ -54,6 +54,24 @@ TEST(ParseCameraJumpTest, RejectsMalformedTexts) {
   }
 }
 
+TEST(ParseImageCropTest, ParsesFourNumbers) {
+  EXPECT_EQ(ParseImageCrop("160:120:320:240").value(), (ImageCrop{160, 120, 320, 240}));
+  for (const char* text : {"", "1:2:3", "1:2:3:4:5", "-1:0:64:64", "1.5:0:64:64", "1:2:3:x"}) {
+    const auto crop = ParseImageCrop(text);
+    EXPECT_EQ(crop.status().code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_NE(Message(crop.status()).find("X:Y:WIDTH:HEIGHT"), std::string::npos) << text;
+  }
+}
+
+TEST(ParseGainRangeTest, ParsesTwoFactors) {
+  EXPECT_EQ(ParseGainRange("0.3:1.6").value(), (GainRange{0.3, 1.6}));
+  for (const char* text : {"", "0.3", "0.3:", "0.3-1.6", "a:b"}) {
+    const auto range = ParseGainRange(text);
+    EXPECT_EQ(range.status().code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_NE(Message(range.status()).find("LOW:HIGH"), std::string::npos) << text;
+  }
+}
+
 TEST(ValidateSynthOptionsTest, NamesOptionsOutOfRange) {
   SynthOptions options;
   options.arc_deg = -1;
@@ -62,10 +80,22 @@ TEST(ValidateSynthOptionsTest, NamesOptionsOutOfRange) {
   options.shake_mm = std::numeric_limits<double>::quiet_NaN();
   options.jump.frame = options.frames + 1;
   options.surroundings.table.repeats = 0;
+  options.fx_px = 5;
+  options.crop = {.x_px = 600, .y_px = 0, .width_px = 100, .height_px = 100};
+  options.readout = 1.5;
+  options.exposure = -0.1;
+  options.jpeg_quality = 0;
+  options.gripper_share = 1;
+  options.occluder_share = -1;
+  options.gain_steps = {1.6, 0.3};
+  options.depth_noise_mm = -1;
   const absl::Status status = ValidateSynthOptions(options);
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  for (const char* name : {"arc_deg is -1", "rotation.first_frames", "rotation.speed_deg", "shake_mm", "jump.frame",
-                           "surroundings.table.repeats is 0; expected 1..100"}) {
+  for (const char* name :
+       {"arc_deg is -1", "rotation.first_frames", "rotation.speed_deg", "shake_mm", "jump.frame",
+        "surroundings.table.repeats is 0; expected 1..100", "fx_px is 5", "crop.width_px is 100; expected 32..40",
+        "readout is 1.5", "exposure is -0.1", "jpeg_quality", "gripper_share", "occluder_share",
+        "gain_steps.high is 0.3", "depth_noise_mm"}) {
     EXPECT_NE(Message(status).find(name), std::string::npos) << status;
   }
   EXPECT_TRUE(ValidateSynthOptions({}).ok());

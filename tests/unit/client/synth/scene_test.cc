@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "client/render/rasterizer.h"
 #include "client/synth/bvh.h"
 #include "client/synth/lighting.h"
 #include "client/synth/noise.h"
@@ -169,16 +170,19 @@ TEST(SurroundingsTest, PlainTableIsLightAndConstant) {
 Rgb WallColor(const Scene& scene, const Bvh& bvh, int side, float y_m, float z_m) {
   const auto turn = Turn(static_cast<float>(M_PI / 2 * side), Point::UnitZ());
   const Point direction = turn * Point(static_cast<float>(scene.room_half_m), y_m, z_m - 1.5F);
-  const auto hit = bvh.Nearest(Point(0, 0, 1.5F), direction);
+  const Point origin(0, 0, 1.5F);
+  const auto hit = bvh.Nearest(origin, direction);
   if (!hit) return Rgb::Zero();
   const auto& corner = scene.triangles[hit->triangle];
-  const auto center_of = [&](const std::vector<Eigen::Vector3f>& positions) -> Point {
-    return (positions[corner[0]] + positions[corner[1]] + positions[corner[2]]) / 3;
-  };
+  const auto& world = scene.positions_world;
   const auto& local = scene.positions_local;
+  const Eigen::Vector3f weights = render::Barycentrics({world[corner[0]], world[corner[1]], world[corner[2]]},
+                                                       origin.cast<double>(), direction.cast<double>());
+  const Point p_local =
+      weights.x() * local[corner[0]] + weights.y() * local[corner[1]] + weights.z() * local[corner[2]];
   const Point normal = (local[corner[1]] - local[corner[0]]).cross(local[corner[2]] - local[corner[0]]).normalized();
   const Material& material = scene.surfaces[scene.surface_of_triangle[hit->triangle]].material;
-  return Albedo(material, center_of(local), normal, 0.002F);
+  return Albedo(material, p_local, normal, 0.002F);
 }
 
 TEST(SurroundingsTest, IdenticalWallsDifferOnlyByRotation) {

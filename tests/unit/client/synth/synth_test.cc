@@ -279,6 +279,53 @@ TEST_F(MakeSequenceTest, BlackBackgroundShowsOnlyObjects) {
   EXPECT_EQ(cv::countNonZero((visible > 0) & ~near_object), 0);
 }
 
+TEST_F(MakeSequenceTest, RollingShutterAndCropAgreeWithTheGroundTruth) {
+  SynthOptions options = Small();
+  options.shake_deg = 4;
+  options.readout = 0.8;
+  options.exposure = 0.3;
+  options.fx_px = 170;
+  options.fy_px = 150;
+  options.crop = {.x_px = 20, .y_px = 10, .width_px = 120, .height_px = 100};
+  ASSERT_TRUE(MakeSequence(options, Dir()).ok());
+  const auto sequence = files::Sequence::Open(Dir(), {.use_depth = true});
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  EXPECT_EQ(sequence->camera().width_px, 120);
+  EXPECT_EQ(sequence->camera().fx_px, 170);
+  EXPECT_EQ(sequence->camera().fy_px, 150);
+  const cv::Mat mask = Read(Dir() + "/mask/000001.png");
+  EXPECT_EQ(mask.size(), cv::Size(120, 100));
+  size_t seen_points = 0;
+  for (const files::ObjectRecord& object : sequence->objects()->objects) {
+    const auto cloud = files::ReadPly(Dir() + "/gt/" + object.name + ".ply");
+    ASSERT_TRUE(cloud.ok()) << cloud.status();
+    const std::vector<double>& seen = cloud->scalars.at("seen");
+    seen_points += static_cast<size_t>(std::count(seen.begin(), seen.end(), 1.0));
+  }
+  EXPECT_GT(seen_points, 500U) << "visibility uses the pose of each row";
+}
+
+TEST_F(MakeSequenceTest, OverlaysHideObjectsInAllImages) {
+  SynthOptions options = Small();
+  options.frames = 1;
+  options.gripper_share = 0.5;
+  ASSERT_TRUE(MakeSequence(options, Dir()).ok());
+  const cv::Mat depth = Read(Dir() + "/depth/000001.png");
+  const cv::Mat gripper = depth == 1500;  // 0.15 m
+  EXPECT_NEAR(cv::countNonZero(gripper), 0.5 * 160 * 120, 200);
+  EXPECT_EQ(cv::countNonZero(Read(Dir() + "/mask/000001.png") & gripper), 0);
+}
+
+TEST_F(MakeSequenceTest, JpegQualityChangesTheSizeOfImages) {
+  SynthOptions options = Small();
+  options.frames = 1;
+  options.format = ImageFormat::kJpeg;
+  ASSERT_TRUE(MakeSequence(options, Dir("high")).ok());
+  options.jpeg_quality = 30;
+  ASSERT_TRUE(MakeSequence(options, Dir("low")).ok());
+  EXPECT_LT(2 * fs::file_size(Dir("low") + "/rgb/000001.jpg"), fs::file_size(Dir("high") + "/rgb/000001.jpg"));
+}
+
 TEST_F(MakeSequenceTest, ReportsAMissingParentFolder) {
   const absl::Status status = MakeSequence(Small(), Dir("missing") + "/sequence");
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
