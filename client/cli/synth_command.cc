@@ -14,7 +14,7 @@ namespace {
 struct SynthCommandOptions {
   synth::SynthOptions synth;
   std::string out;
-  // As on the command line; empty = default.
+  // Texts from the command line; empty = default.
   std::string table_texture;
   std::string jump;
   std::string crop;
@@ -142,14 +142,14 @@ void AddPathOptions(SynthCommandOptions& options, CLI::App* command) {
                                    {"tworounds", synth::PathKind::kTwoRounds},
                                    {"rotation", synth::PathKind::kRotation}},
                                   "Camera path: orbit (level circle), handheld (arc with hand motion), tworounds (two "
-                                  "rounds through a larger room), or rotation (fast rotation of a hand in place)");
+                                  "laps through a larger room), or rotation (fast rotation of a hand in place)");
   path.Add("--rounds", synth.rounds,
-           "Number of circles (orbit), passes along the arc (handheld), or pairs of rounds (tworounds)");
+           "Number of circles (orbit), passes along the arc (handheld), or pairs of laps (tworounds)");
   path.Add("--arc", synth.arc_deg,
            "Angle of one circle (orbit) or one pass (handheld) [deg]; up to 300 visits no place twice, 720 makes two "
            "rounds; 0 = 360 (orbit) or random 120 to 200 (handheld)");
   path.Add("--hand-motion", synth.hand_motion,
-           "Amplitude of the hand-held motion in height, distance, aim and roll; 1 = calm");
+           "Amplitude of the hand-held motion in height, distance, viewing direction and roll; 1 = steady hand");
   path.Add("--elevation", synth.elevation_deg, "Elevation of the camera above the table [deg]");
   path.Add("--rotate-first", synth.rotation.first_frames,
            "Number of frames that only rotate the camera before the path starts");
@@ -179,10 +179,10 @@ void AddCameraOptions(SynthCommandOptions& options, CLI::App* command) {
   camera.AddText("--crop", options.crop, "X:Y:WIDTH:HEIGHT",
                  "Render only this part of the image [px], from the same viewpoints");
   camera.Add("--rolling-shutter", synth.readout,
-             "Time between the first and last image row, as a share of the frame interval, 0 to 1; the true pose is "
+             "Time between the first and last image row, as a fraction of the frame interval, 0 to 1; the true pose is "
              "that of the middle row");
   camera.Add("--exposure", synth.exposure,
-             "Exposure time as a share of the frame interval, 0 to 1: motion blur as the mean of images during the "
+             "Exposure time as a fraction of the frame interval, 0 to 1: motion blur as the mean of images during the "
              "exposure; the true pose is that at its middle");
   camera.AddChoice<synth::ImageFormat>("--format", synth.format,
                                        {{"png", synth::ImageFormat::kPng}, {"jpeg", synth::ImageFormat::kJpeg}},
@@ -194,25 +194,26 @@ void AddFaultOptions(SynthCommandOptions& options, CLI::App* command) {
   synth::SynthOptions& synth = options.synth;
   const OptionGroup faults(command, "Faults");
   faults.Add("--occluder", synth.occluder_share,
-             "Share of the image that a textured blob covers while it moves across, 0 to 0.9");
+             "Fraction of the image that a textured blob covers while it moves across, 0 to 0.9");
   faults.Add("--gripper", synth.gripper_share,
-             "Share of the image that a textured object fixed to the camera covers, 0 to 0.9");
+             "Fraction of the image that a textured object fixed to the camera covers, 0 to 0.9");
   faults.Add("--depth-noise", synth.depth_noise_mm,
              "Standard deviation of the depth at 1 m [mm]; grows with the square of the depth");
   faults.Add("--mask-jitter", synth.mask_jitter_px, "Typical displacement of mask borders [px]");
-  faults.Add("--mask-drop", synth.mask_drop_share, "Share of masks to drop, 0 to 1");
+  faults.Add("--mask-drop", synth.mask_drop_share, "Fraction of masks to drop, 0 to 1");
   faults.AddFlag("--permute-labels", synth.permute_labels, "Permute the labels at random in each frame");
   faults.Add("--noise", synth.noise_sigma, "Standard deviation of the image noise [8-bit levels]");
   faults.Add("--motion-blur", synth.motion_blur_px,
              "Length of motion blur of constant length along the image motion [px]; see also --exposure");
   faults.Add("--defocus", synth.defocus_px, "Standard deviation of the defocus blur [px]");
-  faults.AddText("--cut", options.cuts, "FIRST:LAST", "Omit these frames, simulating a jump of the camera");
+  faults.AddText("--cut", options.cuts, "FIRST:LAST", "Omit these frames, simulating an abrupt camera motion");
   faults.AddText("--black", options.black, "FIRST:LAST", "Make these frames black (covered lens)");
-  faults.AddText("--blur", options.blurred, "FIRST:LAST", "Blur these frames until tracking is impossible");
-  faults.Add("--exposure-jumps", synth.exposure_stops, "Exposure jumps every second or two [stops]");
+  faults.AddText("--blur", options.blurred, "FIRST:LAST", "Blur these frames so strongly that tracking fails");
+  faults.Add("--exposure-jumps", synth.exposure_stops,
+             "Maximum size of the exposure jumps, which occur every one to two seconds [stops]");
   faults.AddText("--gain-steps", options.gain_steps, "LOW:HIGH",
-                 "Change the gain in steps within this range every second or two, e.g. 0.3:1.6");
-  faults.Add("--duplicates", synth.duplicate_share, "Share of frames that repeat the previous image, 0 to 1");
+                 "Change the gain in steps within this range every one to two seconds, e.g. 0.3:1.6");
+  faults.Add("--duplicates", synth.duplicate_share, "Fraction of frames that repeat the previous image, 0 to 1");
 }
 
 }  // namespace
