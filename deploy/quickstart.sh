@@ -1,29 +1,29 @@
 #!/usr/bin/env bash
-# From a bare Debian 12 to meshes of objects: installs, builds, makes a sample sequence, starts romap-server on loopback,
-# streams the sample through it, and shows what came out. Safe to run again.
+# From a fresh Debian 12 to meshes of objects: installs packages, builds romap, renders a sample sequence, starts
+# romap-server on loopback, streams the sample through it, and prints the results. Can be repeated safely.
 #
 #   ./deploy/quickstart.sh [FOLDER]     FOLDER for the sample and its results, default romap_out
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-romap_out}
-say() { printf '\n== %s\n' "$*"; }
+heading() { printf '\n== %s\n' "$*"; }
 start=$SECONDS
 
-say "1/4 packages"
+heading "1/4 packages"
 ./deploy/setup.sh
-echo "all there"
+echo "all packages are installed"
 
-say "2/4 build"
+heading "2/4 build"
 cmake --preset release -DROMAP_BUILD_TESTS=OFF >build-configure.log 2>&1 || { cat build-configure.log; exit 1; }
 rm -f build-configure.log
 cmake --build --preset release --target romap romap-server
 bin=build/release
 
-say "3/4 sample sequence"
+heading "3/4 sample sequence"
 mkdir -p "$out"
 "$bin/client/cli/romap" synth --out "$out/sample" --frames 150 --objects 5 --seed 1
 
-say "4/4 server and client"
+heading "4/4 server and client"
 server_log=$out/server.log
 "$bin/server/romap-server" --listen 127.0.0.1:0 >"$server_log" 2>&1 &
 server=$!

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Installs what romap needs to build, run and test on Debian 12: only packages of the distribution. Safe to run again:
-# when everything is there it changes nothing and needs no network.
+# Installs the packages that romap needs to build, run and test on Debian 12, all from the distribution. Can be repeated
+# safely: if all packages are installed, it changes nothing and needs no network.
 #
-#   deploy/setup.sh          what the build needs
-#   deploy/setup.sh tests    what the tests need too
+#   deploy/setup.sh          the packages for the build
+#   deploy/setup.sh tests    also the packages for the tests
 set -euo pipefail
 
 packages=(
@@ -27,7 +27,7 @@ fi
 
 sudo=()
 if [ "$(id -u)" -ne 0 ]; then
-  command -v sudo >/dev/null || { echo "setup: need root or sudo to install: ${missing[*]}" >&2; exit 1; }
+  command -v sudo >/dev/null || { echo "setup: root or sudo is required to install: ${missing[*]}" >&2; exit 1; }
   sudo=(sudo)
 fi
 echo "setup: installing ${#missing[@]} packages: ${missing[*]}"
@@ -36,7 +36,7 @@ if ! { "${sudo[@]}" apt-get update -q &&
        "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"; } \
      >"$log" 2>&1; then
   tail -n 20 "$log" >&2
-  echo "setup: apt-get failed (whole log: $log)" >&2
+  echo "setup: apt-get failed (full log: $log)" >&2
   exit 1
 fi
 rm -f "$log"

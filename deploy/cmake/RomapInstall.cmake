@@ -1,4 +1,5 @@
-# What `cmake --install` lays out and what `cpack` packs. Three components: server, client, dev (the client SDK).
+# The files that `cmake --install` installs and `cpack` packages. Three components: server, client, dev (the client
+# SDK).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -6,8 +7,8 @@ install(TARGETS romap-server RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONE
 install(FILES deploy/server.yaml DESTINATION ${CMAKE_INSTALL_DATADIR}/romap COMPONENT server)
 install(TARGETS romap RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT client)
 
-# The SDK. Its headers include each other as "common/..." and "client/sdk/...", so they are installed as a tree of their
-# own below include/romap.
+# The SDK. Its headers include each other as "common/..." and "client/sdk/...", so they are installed as a separate tree
+# below include/romap.
 set_target_properties(romap_sdk PROPERTIES EXPORT_NAME client)
 install(TARGETS romap_sdk romap_wire romap_common romap_opencv romap_proto EXPORT romapTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/romap COMPONENT dev

@@ -1,4 +1,4 @@
-# Compiler settings, the libraries of the distribution, and the helpers that make one target per folder.
+# Compiler settings, the libraries of the distribution, and functions that create one target per folder.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -24,8 +24,8 @@ endif()
 if(ROMAP_SANITIZER)
   add_compile_options(-fsanitize=${ROMAP_SANITIZER} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ROMAP_SANITIZER})
-  # Eigen has an allocator of its own under AddressSanitizer. The installed libraries (Ceres) do not, and their matrices
-  # are freed by our code.
+  # Under AddressSanitizer, Eigen would use its own allocator, but the installed libraries (Ceres) do not, and our code
+  # frees their matrices.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
@@ -49,14 +49,15 @@ find_package(tinyobjloader CONFIG REQUIRED)
 find_package(utf8cpp CONFIG REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 
-# OpenCV's headers warn under C++20, so they come in as system headers.
+# OpenCV's headers cause warnings under C++20, so they are included as system headers.
 add_library(romap_opencv INTERFACE)
 target_include_directories(romap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(romap_opencv INTERFACE opencv_core opencv_imgproc opencv_imgcodecs opencv_features2d
                                              opencv_calib3d)
 
-# Eigen, OpenCV's matrices and Abseil take five seconds of every compilation; they are parsed once instead. All targets
-# share the one precompiled header, so the definitions that its libraries bring must be the same everywhere.
+# Eigen, OpenCV's matrices and Abseil would take five seconds of every compilation, so they are parsed only once. All
+# targets share the one precompiled header, so the compile definitions of these libraries must be the same in all
+# targets.
 file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cc "")
 add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
 target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
@@ -65,7 +66,7 @@ target_precompile_headers(romap_precompiled PRIVATE
   <algorithm> <chrono> <cmath> <cstdint> <functional> <map> <memory> <mutex> <optional> <string> <thread> <vector>
   <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>)
 
-# Tests also share GoogleTest. Their own code needs no speed, so they are compiled with little optimization.
+# Tests also share GoogleTest. The speed of test code does not matter, so it is compiled with little optimization.
 set(ROMAP_TEST_OPTIMIZATION -O1)
 if(ROMAP_BUILD_TESTS)
   find_package(GTest CONFIG REQUIRED)
@@ -107,7 +108,7 @@ function(romap_library name)
 endfunction()
 
 # romap_tests(folder [LIBS targets...]): one GoogleTest program `<folder with _>_test` of all *_test.cc in the current
-# folder; every test case is a ctest of its own so that they run in parallel.
+# folder; every test case is a separate ctest, so that they run in parallel.
 function(romap_tests name)
   cmake_parse_arguments(ARG "" "" "LIBS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cc)
