@@ -81,7 +81,7 @@ std::string StoreNumber(const ConfigField& field, T* target, const std::string& 
   return "";
 }
 
-// Puts the value into the field; returns what is wrong with it, or "".
+// Stores the value in the field. Returns the error message if the value is invalid, otherwise "".
 std::string StoreValue(const ConfigField& field, const std::string& text) {
   struct Visitor {
     const ConfigField& field;
@@ -130,7 +130,7 @@ std::string ValueText(const FieldPointer& pointer) {
   return std::visit([](auto* v) { return Visitor{}(v); }, pointer);
 }
 
-// Reads the entries of a section whose fields set others (`setters`), or those whose fields do not.
+// Reads the entries of a section: with `setters` those of fields that set other fields, otherwise all others.
 void LoadEntries(const std::string& section, const YAML::Node& entries, const std::string& origin, bool setters,
                  std::vector<ConfigField>& fields, std::vector<std::string>& faults) {
   for (const auto& entry : entries) {

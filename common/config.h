@@ -26,7 +26,7 @@ namespace romap {
 //     void Validate(ConfigRules& rules) const { rules.RequireAtMost(&min_side_nodes, &resolution); }
 //   };
 
-// Who sets a field: an operator for a machine and its clients, or an expert for an experiment.
+// Who sets a field: an operator, for a machine and its clients, or an expert, for experiments.
 enum class Audience { kExpert, kOperator };
 
 struct FieldInfo {
@@ -37,7 +37,7 @@ struct FieldInfo {
   std::vector<std::string> choices = {};  // for strings; empty: any
   Audience audience = Audience::kExpert;
   std::string help = {};
-  // For strings that stand for the values of other fields: called with the value after it is stored.
+  // For a field that sets other fields, such as a preset: called with the value after it is stored.
   std::function<void(const std::string& value)> on_set = {};
 };
 
@@ -74,7 +74,7 @@ class ConfigRules {
   std::vector<std::string> faults_;
 };
 
-// The fields of all stages. The pointers and the rules live as long as the structs they refer to.
+// The fields of all stages. Pointers and rules are valid as long as the structs they refer to.
 class ConfigFields {
  public:
   // Fields added until the next call belong to this section.
@@ -90,14 +90,14 @@ class ConfigFields {
   // If the file cannot be read, the status is that of FileError().
   absl::Status Load(const std::string& path, std::span<const std::string> assignments);
 
-  // The parts of Load(). The YAML has the form `section: {field: value}`. A field that sets others goes before the
-  // other fields of its section in any order of the file, so that explicit values take precedence.
+  // The parts of Load(). The YAML has the form `section: {field: value}`. A field that sets others is applied before
+  // the other fields of its section, independent of their order in the file, so that explicit values take precedence.
   absl::Status LoadYaml(const std::string& text, const std::string& origin);
   absl::Status Set(std::span<const std::string> assignments);
   absl::Status Validate() const;
 
-  // The configuration in effect as YAML, each field with its unit, range and help as a comment. For operators: their
-  // settings, and those of experts that were set. Reading it back gives the same configuration.
+  // The effective configuration as YAML, each field with its unit, range and help as a comment. kOperator: the settings
+  // for operators, and all others that were set explicitly. Reading it back gives the same configuration.
   std::string DumpYaml(Audience audience = Audience::kExpert) const;
 
   const std::vector<ConfigField>& fields() const { return fields_; }

@@ -22,8 +22,9 @@ class FieldSampler {
  public:
   virtual ~FieldSampler() = default;
   // raw[i] = value of the field at p_object[i] (Object frame, map units) in the field's own unit (log density, signed
-  // distance, ...). It increases inwards; the surface is where it crosses FieldSnapshot::surface_level. SurfaceOptics
-  // converts it to density. Points outside the box get -1e4. rgb is empty (not wanted) or as long as p_object.
+  // distance, ...). It increases inward; the surface is where it crosses FieldSnapshot::surface_level. SurfaceOptics
+  // converts it to density. Points outside the box get -1e4. rgb is empty (colors are not needed) or as long as
+  // p_object.
   virtual void Sample(std::span<const Eigen::Vector3f> p_object, std::span<float> raw, std::span<Rgb8> rgb) const = 0;
 };
 
@@ -59,10 +60,10 @@ struct FieldSnapshot {
   double loss = 0;           // mean color loss of the last slice
   int views = 0;
   // Product of all corrections of the object's space since its first ObjectViews. Comparing it with the current product
-  // gives the motion of whatever was computed from this snapshot.
+  // gives the motion of everything that was computed from this snapshot.
   Sim3<World, World> S_new_first;
   bool converged = false;  // no further training unless a new view arrives
-  std::string warning;     // human-readable: what is wrong with the object's input; empty = nothing
+  std::string warning;     // human-readable: problems with the object's input; empty = none
   SE3<World, Object> T_world_object;
   Eigen::Vector3f box_half_extents = Eigen::Vector3f::Zero();  // of the trained box (cuboid enlarged), map units
   float surface_level = 0;                                     // raw value at the surface, see FieldSampler

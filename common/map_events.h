@@ -40,7 +40,7 @@ struct ObjectUpdate {
   uint64_t revision = 0;  // increases with every change of this object: cuboid, mesh, merge or removal
   ObjectState state = ObjectState::kProvisional;
   std::string class_name;
-  double class_score = 0;  // share of the evidence for class_name, 0..1
+  double class_score = 0;  // share of the detections, weighted by score, that support class_name, 0..1
   Cuboid cuboid;
   uint64_t observations = 0;  // number of frames in which the object was detected
   // Pose of the mesh frame; nullopt while there is no mesh. It follows corrections of the map, so that a mesh that was
@@ -67,7 +67,7 @@ struct ObjectRemoved {
   std::string reason;
 };
 
-// `from` was recognized as the same object as `into` and removed; `into` takes over its observations.
+// `from` was merged into `into`, because both are the same object; `into` takes over its observations.
 struct ObjectMerged {
   ObjectId from;
   ObjectId into;

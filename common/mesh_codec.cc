@@ -82,10 +82,9 @@ void FillDraco(const Mesh& mesh, draco::Mesh& target) {
   if (!mesh.colors.empty()) AddAttribute(GeometryAttribute::COLOR, draco::DT_UINT8, mesh.colors, target);
 }
 
-// Draco allocates memory for the counts in the stream before it checks whether the data can be there, so the counts are
-// checked first.
-// Layout of a 2.2 stream: "DRACO", major, minor, geometry, method, flags (2 bytes), then for edgebreaker: traversal,
-// vertex count and triangle count (varints).
+// Draco allocates memory for the counts in the header before it checks whether the stream is long enough, so the counts
+// are checked first. Layout of a 2.2 stream: "DRACO", major, minor, geometry, method, flags (2 bytes), then for
+// edgebreaker: traversal, vertex count and triangle count (varints).
 absl::Status CheckHeader(const std::string& bytes) {
   draco::DecoderBuffer buffer;
   buffer.Init(bytes.data(), bytes.size());
@@ -107,7 +106,7 @@ absl::Status CheckHeader(const std::string& bytes) {
         major, minor, geometry, method, flags);
   }
   if (triangles > kMaxCodecTriangles || vertices > 3 * kMaxCodecTriangles) {
-    return InvalidArgument("Draco mesh claims {} triangles and {} vertices; the limits are {} and {}", triangles,
+    return InvalidArgument("Draco header has {} triangles and {} vertices; the limits are {} and {}", triangles,
                            vertices, kMaxCodecTriangles, 3 * kMaxCodecTriangles);
   }
   return absl::OkStatus();

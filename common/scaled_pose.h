@@ -10,7 +10,7 @@ SE3<To, From> ScaleTranslation(const SE3<To, From>& T, double scale) {
   return {T.rotation(), scale * T.translation()};
 }
 
-// A keyframe's pose and how the scale of the map around it changed since the keyframe was made.
+// A keyframe's pose and the change of the map's scale around it since the keyframe was created.
 struct ScaledPose {
   SE3<World, Camera> T_world_camera;
   double scale = 1;  // product of all scale corrections, > 0

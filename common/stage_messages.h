@@ -1,7 +1,7 @@
 #pragma once
 
-// What the stages of a session pass on to each other, in the order of the data path. All are plain values. A cv::Mat in
-// a message is never written to after the message was sent, because several messages may share its pixels.
+// The messages between the stages of a session, in the order of the data path. All are plain values. A cv::Mat in a
+// message is never written to after the message was sent, because several messages may share its pixels.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -26,7 +26,7 @@ namespace romap {
 struct Frame {
   uint64_t frame_id = 0;
   int64_t timestamp_ns = 0;
-  CameraModel camera;  // after undistortion: distortion is all zero and all pixels below obey the pinhole model
+  CameraModel camera;  // after undistortion: distortion is all zero and all pixels below follow the pinhole model
   cv::Mat image_bgr;   // CV_8UC3
   // The image before undistortion, for stages that undistort points instead of images. Empty for a pinhole lens: then
   // image_bgr is that image.

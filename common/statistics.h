@@ -9,7 +9,7 @@
 namespace romap {
 
 // Quantiles by partial sorting. `values` must not be empty, and no value may be NaN; `share` is in 0..1. The functions
-// differ in the result if `share` falls between two values.
+// differ only if `share` falls between two values.
 
 // The value at `rank` in ascending order; rank 0 is the smallest.
 template <class T>

@@ -4,7 +4,7 @@
 
 namespace romap {
 
-// CPU time used by the calling thread [s]. A system call of a few hundred nanoseconds.
+// CPU time used by the calling thread [s]. Makes a system call, which takes a few hundred nanoseconds.
 inline double ThreadCpuSeconds() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -13,7 +13,7 @@ namespace romap::wire {
 // or a number that is not finite. `where` is the path of the message, e.g. "event".
 
 v1::MapEvent ToProto(MapEvent event);
-// Also INVALID_ARGUMENT: an event kind that this release does not know (compatibility rule 3).
+// Also INVALID_ARGUMENT: an unknown event kind (compatibility rule 3).
 absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where);
 
 v1::FrameAck ToProto(FrameAck ack);

@@ -102,14 +102,14 @@ absl::StatusOr<Recording> Recording::Open(const std::string& path) {
   if (error) return FileError(path, "read the recording", error);
   Recording recording;
   recording.path_ = path;
-  ROMAP_RETURN_IF_ERROR(recording.ReadHead(file));
+  ROMAP_RETURN_IF_ERROR(recording.ReadHeader(file));
   ROMAP_RETURN_IF_ERROR(recording.FindRecords(file, file_bytes));
   return recording;
 }
 
-absl::Status Recording::ReadHead(std::ifstream& file) {
+absl::Status Recording::ReadHeader(std::ifstream& file) {
   if (ReadBytes(file, kMagicBytes) != kMagic) {
-    return InvalidArgument("{}: not a recording: must begin with {}", path_, kMagic);
+    return InvalidArgument("{}: not a recording: must start with {}", path_, kMagic);
   }
   const std::optional<uint32_t> version = ReadNumber(file);
   if (!version) return InvalidArgument("{}: recording is truncated within its header", path_);

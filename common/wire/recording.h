@@ -41,7 +41,7 @@ class RecordingWriter {
   std::ofstream file_;
 };
 
-// Reads such a file. Only the positions of the records are kept in memory. Load() is thread-safe.
+// Reads a recording. Only the positions of the records are kept in memory. Load() is thread-safe.
 class Recording {
  public:
   // Checks every record. Errors as FileError() if the file cannot be read. INVALID_ARGUMENT: not a recording, an
@@ -64,7 +64,7 @@ class Recording {
     uint32_t length = 0;  // bytes
   };
 
-  absl::Status ReadHead(std::ifstream& file);
+  absl::Status ReadHeader(std::ifstream& file);
   absl::Status FindRecords(std::ifstream& file, uint64_t file_bytes);
 
   std::string path_;

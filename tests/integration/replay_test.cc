@@ -102,7 +102,7 @@ TEST_F(ReplayTest, RejectsInvalidRecordingsWithAOneLineMessage) {
   const std::string text = folder_ / "notes.txt";
   std::ofstream(text) << "not a recording at all";
   std::ofstream(folder_ / "old.romaprec") << "ROMAPREC" << std::string("\x9\0\0\0", 4);
-  for (const auto& [file, fault, exit_code] : {std::tuple{text, "must begin with ROMAPREC", 2},
+  for (const auto& [file, fault, exit_code] : {std::tuple{text, "must start with ROMAPREC", 2},
                                                std::tuple{folder_ / "old.romaprec", "version must be 1 to 2, is 9", 2},
                                                std::tuple{folder_ / "missing.romaprec", "missing.romaprec", 3}}) {
     const testing_support::ProcessResult replay = Romap({"replay", file, "--out", folder_ / "out"});

@@ -35,7 +35,7 @@ TEST(BoundedQueueTest, PushWaitsWhileTheQueueIsFull) {
   EXPECT_TRUE(pushed);
 }
 
-TEST(BoundedQueueTest, CloseEndsAWaitingPush) {
+TEST(BoundedQueueTest, CloseEndsABlockedPush) {
   BoundedQueue<int> queue(1);
   ASSERT_TRUE(queue.Push(1));
   bool taken = true;

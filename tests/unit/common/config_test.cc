@@ -67,7 +67,7 @@ TEST(ConfigTest, NotANumberIsOutOfRange) {
   EXPECT_EQ(sample.rate, 0.02);
 }
 
-TEST(ConfigTest, BrokenYamlNamesTheLine) {
+TEST(ConfigTest, ErrorsInYamlNameTheLine) {
   Sample sample;
   EXPECT_THAT(Message(sample.Fields().LoadYaml("nerf:\n  rays: [1\n", "a.yaml")), HasSubstr("a.yaml:"));
   EXPECT_THAT(Message(sample.Fields().LoadYaml("- 1\n- 2\n", "a.yaml")), HasSubstr("sections"));
@@ -84,7 +84,7 @@ TEST(ConfigTest, SetAppliesAssignments) {
               AllOf(HasSubstr("did you mean 'nerf.rays'"), HasSubstr("expected section.field=value")));
 }
 
-TEST(ConfigTest, ValuesThatAreNoMultipleAreRejected) {
+TEST(ConfigTest, ValuesThatAreNotAMultipleAreRejected) {
   Sample sample;
   const std::vector<std::string> assignments = {"nerf.width=40"};
   EXPECT_EQ(Message(sample.Fields().Set(assignments)), "--set nerf.width: 40 is not a multiple of 16");
@@ -118,7 +118,7 @@ TEST(ConfigTest, RulesDoNotApplyToInvalidSettings) {
   EXPECT_EQ(Message(sample.Fields().Load("", assignments)), "--set nerf.rate: 'fast' is not a number");
 }
 
-TEST(ConfigTest, UnreadableFilesGetTheReasonOfTheSystem) {
+TEST(ConfigTest, UnreadableFilesAreReportedWithTheSystemError) {
   const testing_support::TemporaryFolder folder;
   Sample sample;
   const absl::Status missing = sample.Fields().Load(folder / "a.yaml", {});
@@ -135,7 +135,7 @@ TEST(ConfigTest, IgnoredSectionsAreNotChecked) {
   EXPECT_FALSE(fields.LoadYaml("transports:\n  port: 1\n", "a.yaml").ok());
 }
 
-TEST(ConfigTest, DumpForOperatorsHasTheirSettingsAndThoseThatWereSet) {
+TEST(ConfigTest, DumpForOperatorsHasOperatorSettingsAndExplicitlySetOnes) {
   Sample sample;
   EXPECT_EQ(sample.Fields().DumpYaml(Audience::kOperator),
             "nerf:\n  # Rays per step [rays, 1 to 65536]\n  rays: 1024\n");
@@ -147,7 +147,7 @@ TEST(ConfigTest, DumpForOperatorsHasTheirSettingsAndThoseThatWereSet) {
             "  # Width of the layer [16 to 256, multiple of 16]\n  width: 48\n");
 }
 
-TEST(ConfigTest, DumpReadsBackToTheSameValues) {
+TEST(ConfigTest, LoadingTheDumpGivesTheSameValues) {
   Sample sample;
   sample.rays = 77;
   sample.kind = "sdf";

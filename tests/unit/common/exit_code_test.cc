@@ -5,7 +5,7 @@
 namespace romap {
 namespace {
 
-TEST(ExitCodeTest, FollowsTheDocumentedTable) {
+TEST(ExitCodeTest, MatchesTheDocumentedTable) {
   EXPECT_EQ(ToExitCode(absl::OkStatus()), 0);
   EXPECT_EQ(ToExitCode(absl::InternalError("")), 1);
   EXPECT_EQ(ToExitCode(absl::FailedPreconditionError("")), 1);

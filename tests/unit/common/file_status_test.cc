@@ -16,19 +16,19 @@ TEST(FileErrorTest, NamesPathActionAndReason) {
   EXPECT_EQ(Message(status), "/data/map.ply: cannot open for reading: No such file or directory");
 }
 
-TEST(FileErrorTest, ChoosesTheCodeByErrno) {
+TEST(FileErrorTest, DerivesTheCodeFromErrno) {
   EXPECT_EQ(FileError("f", "write", EACCES).code(), absl::StatusCode::kPermissionDenied);
   EXPECT_EQ(FileError("f", "write", EISDIR).code(), absl::StatusCode::kPermissionDenied);
   EXPECT_EQ(FileError("f", "write", ENOSPC).code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(FileError("f", "write", EIO).code(), absl::StatusCode::kResourceExhausted);
 }
 
-TEST(FileErrorTest, TakesErrnoOfAFailedStream) {
+TEST(FileErrorTest, UsesErrnoOfAFailedStream) {
   std::ifstream file("/nonexistent/file");
   EXPECT_EQ(FileError("/nonexistent/file", "open for reading").code(), absl::StatusCode::kNotFound);
 }
 
-TEST(FileErrorTest, TakesErrorCodeOfFilesystemFunctions) {
+TEST(FileErrorTest, AcceptsErrorCodesOfFilesystemFunctions) {
   std::error_code error;
   EXPECT_EQ(std::filesystem::file_size("/nonexistent/file", error), static_cast<uintmax_t>(-1));
   const absl::Status status = FileError("/nonexistent/file", "read the size", error);

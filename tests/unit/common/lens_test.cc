@@ -78,7 +78,7 @@ TEST_P(LensTest, DistortPixelAgreesWithOpenCv) {
   }
 }
 
-TEST_P(LensTest, MapsMoveADotToItsPinholePixel) {
+TEST_P(LensTest, RemappedDotIsAtItsPinholePixel) {
   const CameraModel camera = GetParam();
   const Eigen::Vector2d pinhole_px(250, 310);
   const Eigen::Vector2d distorted_px = DistortPixel(camera, pinhole_px);
@@ -116,7 +116,7 @@ TEST(Lens, FisheyeWithoutCoefficientsHasDistortion) {
 
 TEST(Lens, PixelsWithoutAPinholeEquivalentAreNaN) {
   CameraModel wide = Camera(LensModel::kFisheye, {});
-  wide.fx_px = wide.fy_px = 150;  // rays at the corners point backwards
+  wide.fx_px = wide.fy_px = 150;  // rays at the corners point backward
   const std::array<Eigen::Vector2f, 2> distorted_px{Eigen::Vector2f(2, 2), Eigen::Vector2f(300, 200)};
   const std::vector<Eigen::Vector2f> pinhole_px = UndistortPixels(wide, distorted_px);
   EXPECT_FALSE(pinhole_px[0].allFinite());

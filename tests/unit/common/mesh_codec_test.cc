@@ -92,7 +92,7 @@ TEST(MeshCodec, RoundTripKeepsOrientation) {
   EXPECT_NEAR(Volume(RoundTrip(mesh)), Volume(mesh), -1e-3 * Volume(mesh));
 }
 
-TEST(MeshCodec, MoreBitsArePreciser) {
+TEST(MeshCodec, MoreBitsAreMorePrecise) {
   const Mesh mesh = Torus(24, 100.0f, 50.0f, {0, 0, 0});
   const auto error = [&](int bits) {
     const Mesh decoded = RoundTrip(mesh, {.position_bits = bits});
@@ -159,7 +159,7 @@ TEST(MeshCodec, InvalidMeshesAreRejectedWithTheReason) {
               HasSubstr("position_bits must be 1..30, got 31"));
 }
 
-TEST(MeshCodec, BytesThatAreNotADracoMeshAreRejected) {
+TEST(MeshCodec, OtherBytesThanADracoMeshAreRejected) {
   EXPECT_THAT(DecodeError(""), HasSubstr("not a Draco mesh: the 0 bytes"));
   EXPECT_THAT(DecodeError("hello, world"), HasSubstr("do not start with DRACO"));
   EXPECT_THAT(DecodeError("DRACO\x02\x02"), HasSubstr("truncated after 7 bytes"));
@@ -167,11 +167,11 @@ TEST(MeshCodec, BytesThatAreNotADracoMeshAreRejected) {
   EXPECT_THAT(DecodeError(sequential), HasSubstr("method 0"));
 }
 
-TEST(MeshCodec, ClaimedSizesAreCheckedBeforeAllocation) {
+TEST(MeshCodec, SizesInTheHeaderAreCheckedBeforeAllocation) {
   std::string bytes("DRACO\x02\x02\x01\x01\x00\x00\x00", 12);
   bytes += std::string("\x10", 1) + "\xff\xff\xff\xff\x07";  // 16 vertices, 2^31 - 1 triangles
   bytes += std::string(64, '\x01');
-  EXPECT_THAT(DecodeError(bytes), HasSubstr("claims 2147483647 triangles"));
+  EXPECT_THAT(DecodeError(bytes), HasSubstr("header has 2147483647 triangles"));
 }
 
 TEST(MeshCodec, EveryTruncatedStreamIsRejected) {

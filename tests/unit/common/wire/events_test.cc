@@ -111,10 +111,10 @@ TEST(WireEvents, MeshUpdateRoundTrips) {
 }
 
 TEST(WireEvents, RemovalAndMergeRoundTrip) {
-  const auto removed = RoundTrip(ObjectRemoved{.id = ObjectId{1}, .revision = 2, .reason = "not detected again"});
+  const auto removed = RoundTrip(ObjectRemoved{.id = ObjectId{1}, .revision = 2, .reason = "not observed again"});
   EXPECT_EQ(removed.id, ObjectId{1});
   EXPECT_EQ(removed.revision, 2u);
-  EXPECT_EQ(removed.reason, "not detected again");
+  EXPECT_EQ(removed.reason, "not observed again");
   const auto merged = RoundTrip(ObjectMerged{.from = ObjectId{3}, .into = ObjectId{4}, .revision = 5});
   EXPECT_EQ(merged.from, ObjectId{3});
   EXPECT_EQ(merged.into, ObjectId{4});

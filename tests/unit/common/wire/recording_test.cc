@@ -160,7 +160,7 @@ TEST_F(RecordingTest, RejectsOtherFiles) {
   SetBytes("");
   EXPECT_NE(OpenError().find("not a recording"), std::string::npos);
   SetBytes("\x89PNG\r\n\x1a\n and more");
-  EXPECT_NE(OpenError().find(path() + ": not a recording: must begin with ROMAPREC"), std::string::npos);
+  EXPECT_NE(OpenError().find(path() + ": not a recording: must start with ROMAPREC"), std::string::npos);
   std::filesystem::remove(path());
   std::filesystem::create_directory(path());
   EXPECT_EQ(Recording::Open(path()).status().code(), absl::StatusCode::kPermissionDenied);

@@ -155,7 +155,7 @@ TEST(WireSessions, UnknownPartOfAnExportIsSkipped) {
 
 TEST(WireStatus, EveryCodeRoundTripsWithItsMessage) {
   for (int code = 0; code <= 16; ++code) {
-    const absl::Status sent(static_cast<absl::StatusCode>(code), "what and where");
+    const absl::Status sent(static_cast<absl::StatusCode>(code), "field: error");
     EXPECT_EQ(FromGrpc(ToGrpc(sent)), sent);
   }
 }
