@@ -11,7 +11,7 @@
 namespace romap::objects {
 namespace {
 
-constexpr uint64_t kRecentFrames = 15;  // the box of an observation at most this old still predicts the next one
+constexpr uint64_t kRecentFrames = 15;  // maximum age of an observation whose box predicts the next one
 constexpr double kMinMatchScore = 0.3;  // between a detection and a landmark
 constexpr size_t kMinBodyPoints = 4;
 constexpr double kMinShareInImage = 0.3;  // of the body points: enough to compare the body with masks
@@ -176,7 +176,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
     scores[static_cast<Eigen::Index>(d)] = factor * score.Value();
     if (score.Value() > 0 && spdlog::should_log(spdlog::level::debug)) {
       spdlog::debug(
-          "objects: frame {}: label {} scores {:.2f} as landmark {} (body {:.2f}, cuboid {:.2f}, last {:.2f})",
+          "objects: frame {}: label {} scores {:.2f} with landmark {} (body {:.2f}, cuboid {:.2f}, last box {:.2f})",
           scene.tracked.frame->frame_id, detection.label, score.Value(), landmark.key, body.share_in_detection[d],
           BoxIou(scene.projected[l], detection.box_px), BoxIou(predicted, detection.box_px));
     }
@@ -184,7 +184,7 @@ void ScoreLandmark(const Scene& scene, size_t l, Eigen::Ref<Eigen::RowVectorXd> 
 }
 
 // Whether another pair with the landmark or the detection scores almost as well. Landmarks that were never observed
-// together are not rivals: they may be duplicates of one object, and would block each other's updates forever.
+// together are not rivals: they may be duplicates of one object, and would permanently block each other's updates.
 bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index landmark, Eigen::Index detection) {
   constexpr double kMargin = 0.1;
   const auto& observed_with = scene.landmarks[static_cast<size_t>(landmark)]->evidence.observed_with;
@@ -199,8 +199,8 @@ bool IsAmbiguous(const Scene& scene, const Eigen::MatrixXd& scores, Eigen::Index
   return false;
 }
 
-// Whether the mask of detection `d`, matched to landmark `l`, also covers another object: that object has no mask of
-// its own, its body projects into mask `d`, and the mask fits both objects together better than `l` alone. (An object
+// Whether the mask of detection `d`, matched to landmark `l`, also covers another object: that object has no separate
+// mask, its body projects into mask `d`, and the mask fits both objects together better than `l` alone. (An object
 // behind `l` also projects into its mask, but does not make the mask larger.)
 bool CoversAnother(const Scene& scene, size_t d, size_t l, const std::vector<bool>& matched) {
   const cv::Rect& box = scene.detections[d].box_px;
@@ -243,8 +243,8 @@ void MarkParts(const Scene& scene, std::vector<Match>* matches) {
   }
 }
 
-// Mean of the share of the body in the mask and of the overlap of the mask's box with the cuboid's. nullopt where the
-// image or other masks cut off the landmark.
+// Mean of the share of the body in the mask and of the overlap of the mask's box with the cuboid's. nullopt if the
+// landmark is cut off by the border of the image or by other masks.
 std::optional<double> Agreement(const Scene& scene, size_t d, size_t l) {
   constexpr double kMinWhole = 0.95;          // share of the body in the image and not under other masks
   constexpr double kMaxOtherPerInMask = 0.1;  // body points under other masks, per point in this one: masks touch
@@ -324,10 +324,10 @@ std::vector<Match> MatchGlobally(const Scene& scene) {
     } else if (IsAmbiguous(scene, scores, static_cast<Eigen::Index>(l), detection_of[l])) {
       match.doubt = "another match scores nearly as well";
     }
-    spdlog::debug("objects: frame {}: label {} ({}) is landmark {}, score {:.2f}{}{}", scene.tracked.frame->frame_id,
-                  scene.detections[d].label, scene.detections[d].class_name, scene.landmarks[l]->key,
-                  scores(static_cast<Eigen::Index>(l), detection_of[l]), match.doubt ? ", doubt: " : "",
-                  match.doubt ? match.doubt : "");
+    spdlog::debug("objects: frame {}: label {} ({}) matched to landmark {}, score {:.2f}{}{}",
+                  scene.tracked.frame->frame_id, scene.detections[d].label, scene.detections[d].class_name,
+                  scene.landmarks[l]->key, scores(static_cast<Eigen::Index>(l), detection_of[l]),
+                  match.doubt ? ", doubt: " : "", match.doubt ? match.doubt : "");
   }
   MarkParts(scene, &matches);
   return matches;

@@ -7,8 +7,8 @@
 namespace romap::objects {
 namespace {
 
-// Cost per map unit by which an outline falls short of a mask or extends beyond it: optimal if 19 of 20 masks are
-// covered.
+// Cost per map unit by which an outline falls short of a mask or extends beyond it. With these weights a face is
+// optimal if it covers 19 of 20 masks.
 constexpr float kFallShortWeight = 0.95F;
 constexpr float kReachFartherWeight = 1 - kFallShortWeight;
 // A corner that extends beyond the mask by more than this share of the object's size is treated as not filled by the
@@ -28,7 +28,7 @@ constexpr double kSupportWeight = 2;
 constexpr double kPreviousWeight = 0.02;
 // Largest cost of one point outside the box, in terms of the object's size: the point may be an outlier.
 constexpr double kOutlierShare = 0.02;
-constexpr size_t kMaxPoints = 120;  // used, for speed
+constexpr size_t kMaxPoints = 120;  // more points are subsampled to limit the run time
 
 }  // namespace
 

@@ -143,7 +143,7 @@ std::optional<Interval> CoveringHeights(const CuboidEvidence& evidence, const st
   return Interval{NearestQuantile(bottoms, kOutlinesOutside), NearestQuantile(tops, 1 - kOutlinesOutside)};
 }
 
-// The heights between which a hull is broad. Above and below, every visual hull tapers like a cone.
+// The range of heights in which a hull is broad. Above and below it, every visual hull tapers like a cone.
 Interval BroadHeights(const std::vector<Eigen::Vector3d>& cells, double cell_height) {
   constexpr double kBroadShare = 0.2;          // of the largest layer's area
   std::vector<std::pair<double, int>> layers;  // height and number of cells; cells are ordered by layers
@@ -229,7 +229,7 @@ std::optional<UprightBox> FindOuterBox(const CuboidEvidence& evidence, const std
   const Interval broad = BroadHeights(evidence.hull_cells, evidence.cell_size.z());
   const bool enough_points = HasEnoughPoints(evidence);
   const Interval points = enough_points ? TrimmedBounds(evidence.points, up) : broad;
-  // A small number of points may all be low on the object; a large number is spread over its height.
+  // A few points may all be in the lower part of the object; many points are spread over its height.
   constexpr size_t kManyPoints = 3;  // times the minimum
   const bool points_reach_top = evidence.points.size() >= kManyPoints * static_cast<size_t>(evidence.min_points);
   Interval heights{support.value_or(points.low), points_reach_top ? points.high : std::max(points.high, broad.high)};
@@ -268,12 +268,12 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
                                                    : evidence.center.z() + kMaxAboveCenter * evidence.object_size_mu;
   const double floor = std::min(hull.low, ceiling) - kMaxBelowHull * evidence.object_size_mu;
   const double layer_mu = kLayer * evidence.object_size_mu;
-  // An object below this one hides the surface around it, and the points of that object are not background.
-  std::optional<double> carrier;
-  for (double top : evidence.carrier_tops) {
-    if (top >= floor && top <= ceiling + layer_mu) carrier = std::max(top, carrier.value_or(top));
+  // An object below this one occludes the surface around it, and the points of that object are not background.
+  std::optional<double> supporting_top;
+  for (double top : evidence.supporting_tops) {
+    if (top >= floor && top <= ceiling + layer_mu) supporting_top = std::max(top, supporting_top.value_or(top));
   }
-  if (carrier) return carrier;
+  if (supporting_top) return supporting_top;
   std::vector<double> heights;
   for (const Eigen::Vector3d& p : evidence.background) {
     if ((p - evidence.center).head<2>().norm() > kMaxDistance * evidence.object_size_mu) continue;

@@ -18,11 +18,11 @@ struct CuboidEvidence {
   std::vector<Eigen::Vector3d> points;               // map points on the object, outliers removed
   std::vector<Eigen::Vector3d> background;           // map points that belong to no object
   std::vector<double> neighbor_bottoms;              // heights of the bottoms of other objects
-  std::vector<double> carrier_tops;                  // heights of the tops of other objects below its center
+  std::vector<double> supporting_tops;               // heights of the tops of objects that may support it
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // where the rays through the middles of the masks intersect
   double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
   std::optional<double> edge_yaw_rad;                // of its straight edges; only when they agree
-  int min_points = 8;                                // fewer points do not bound the object
+  int min_points = 8;                                // with fewer points, the points do not bound the object
 };
 
 struct CuboidFit {
@@ -37,7 +37,7 @@ struct CuboidFit {
 // occlude the object or all cameras are on one side, and cone-shaped above every flat top. The yaw is that of the
 // straight edges, or without edges that of the smallest rectangle around the footprint; `previous` decides between
 // equally good ones and between the four equivalent yaws of a box. The confidence is the share of silhouettes that
-// agree with the cuboid. nullopt when the evidence leaves no volume.
+// agree with the cuboid. nullopt if the evidence excludes the whole volume.
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous);
 

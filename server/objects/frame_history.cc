@@ -11,7 +11,7 @@ namespace {
 
 // Ids of stand-in keyframes must differ from those of the camera's map, which count from 1.
 constexpr uint64_t kFirstStandIn = uint64_t{1} << 62;
-constexpr int kMaskErosion_px = 2;  // a point nearer to the rim of a mask gets no label
+constexpr int kMaskErosion_px = 2;  // a point nearer to the border of a mask gets no label
 
 }  // namespace
 
@@ -24,8 +24,8 @@ void FrameHistory::Add(const TrackedFrame& tracked) {
                       .keyframe = {},
                       .observations = {}});
   if (frame.has_masks) entries_.back().tracked.frame = nullptr;
-  const auto patience_ns = static_cast<int64_t>(1e9 * patience_s_);
-  while (entries_.size() > 1 && frame.timestamp_ns - entries_.front().timestamp_ns > patience_ns) entries_.pop_front();
+  const auto retention_ns = static_cast<int64_t>(1e9 * retention_s_);
+  while (entries_.size() > 1 && frame.timestamp_ns - entries_.front().timestamp_ns > retention_ns) entries_.pop_front();
 }
 
 void FrameHistory::AddKeyframe(const KeyframeView& view) {
@@ -38,7 +38,7 @@ void FrameHistory::AddKeyframe(const KeyframeView& view) {
   entry.observations = view.observations;
 }
 
-std::optional<FrameHistory::Masked> FrameHistory::TakeLateMasks(const FrameMasks& masks) {
+std::optional<FrameHistory::Masked> FrameHistory::AddLateMasks(const FrameMasks& masks) {
   const auto entry =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.frame_id == masks.frame_id; });
   if (entry == entries_.end() || entry->has_masks) return std::nullopt;
@@ -57,7 +57,8 @@ std::optional<FrameHistory::Masked> FrameHistory::TakeLateMasks(const FrameMasks
   view.T_world_camera = entry->tracked.T_world_camera;
   view.up_world = entry->tracked.up_world;
   view.observations = entry->observations;
-  for (PointObservation& seen : view.observations) seen.label = LabelAt(masks.labels, seen.pixel_px, kMaskErosion_px);
+  for (PointObservation& observation : view.observations)
+    observation.label = LabelAt(masks.labels, observation.pixel_px, kMaskErosion_px);
   return masked;
 }
 
@@ -81,7 +82,7 @@ bool FrameHistory::MarkReplaced(int64_t until_ns) {
   return any;
 }
 
-std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, const PointRegistry& points) {
+std::optional<KeyframeView> FrameHistory::MakeStandIn(const TrackedFrame& masked, const PointRegistry& points) {
   const Frame& frame = *masked.frame;
   if (!MarkReplaced(frame.timestamp_ns)) return std::nullopt;
   KeyframeView view;
@@ -92,8 +93,8 @@ std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, co
   if (masked.reference) stand_ins_[view.id] = {masked.reference, masked.T_world_camera};
   const Entry* source = NearestKeyframe(frame.timestamp_ns);
   const SE3<Camera, World> T_camera_world = masked.T_world_camera.Inverse();
-  for (const PointObservation& seen : source->observations) {
-    const Eigen::Vector3d* p_world = points.Find(seen.point);
+  for (const PointObservation& observation : source->observations) {
+    const Eigen::Vector3d* p_world = points.Find(observation.point);
     if (p_world == nullptr) continue;
     const Eigen::Vector3d p_camera = T_camera_world * *p_world;
     if (!(p_camera.z() > 1e-9)) continue;
@@ -102,7 +103,7 @@ std::optional<KeyframeView> FrameHistory::StandIn(const TrackedFrame& masked, co
                         pixel_px.y() <= frame.camera.height_px - 1;
     if (!inside) continue;
     const uint16_t label = LabelAt(frame.labels, pixel_px, kMaskErosion_px);
-    view.observations.push_back({.point = seen.point, .pixel_px = pixel_px, .label = label});
+    view.observations.push_back({.point = observation.point, .pixel_px = pixel_px, .label = label});
   }
   return view;
 }

@@ -19,8 +19,8 @@ namespace romap::objects {
 // anchored to the same keyframe as that of its frame, so that it follows corrections.
 class FrameHistory {
  public:
-  // `patience_s`: how long a frame without masks is kept, with its image, in time of the frames.
-  explicit FrameHistory(double patience_s) : patience_s_(patience_s) {}
+  // `retention_s`: how long a frame without masks is kept, with its image, measured by the timestamps of the frames.
+  explicit FrameHistory(double retention_s) : retention_s_(retention_s) {}
 
   // Adds a frame. Call for every frame with a pose, in order.
   void Add(const TrackedFrame& tracked);
@@ -31,12 +31,12 @@ class FrameHistory {
     TrackedFrame tracked;
     std::optional<KeyframeView> view;  // if it is a keyframe; its observations have labels
   };
-  // Adds late masks to their frame. nullopt when the frame is unknown, too old, or has masks already.
-  std::optional<Masked> TakeLateMasks(const FrameMasks& masks);
+  // Adds late masks to their frame. nullopt if the frame is unknown, too old, or already has masks.
+  std::optional<Masked> AddLateMasks(const FrameMasks& masks);
 
   // Returns a keyframe made from a masked frame that is not a keyframe; nullopt unless it replaces a keyframe without
   // masks.
-  std::optional<KeyframeView> StandIn(const TrackedFrame& masked, const PointRegistry& points);
+  std::optional<KeyframeView> MakeStandIn(const TrackedFrame& masked, const PointRegistry& points);
 
   // Applies a map correction to the stored frames. Adds the corrections of stand-ins to `corrections`.
   void Correct(KeyframeCorrections* corrections);
@@ -61,7 +61,7 @@ class FrameHistory {
   const Entry* NearestKeyframe(int64_t timestamp_ns) const;
   bool MarkReplaced(int64_t until_ns);
 
-  double patience_s_;
+  double retention_s_;
   std::deque<Entry> entries_;
   std::map<KeyframeId, StandInPose> stand_ins_;
   uint64_t stand_ins_made_ = 0;

@@ -51,7 +51,7 @@ struct LandmarkGeometry {
   std::vector<MapPointId> points;           // its map points without outliers, ascending
 };
 
-// An object of the map, or a hypothesis of one.
+// An object of the map, or a hypothesis that there is one.
 struct Landmark {
   Landmark(LandmarkKey new_key, const ObjectsConfig& config) : key(new_key), shape(config) {}
 

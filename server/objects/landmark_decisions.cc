@@ -48,15 +48,15 @@ std::vector<Eigen::Vector3d> PointsOf(const Landmark& landmark, const PointRegis
   return points_world;
 }
 
-// Whether the map points of both landmarks may belong to one object seen from two sides (SamePlace); nullopt when there
-// are too few points to decide.
+// Whether the map points of both landmarks may belong to one object observed from two sides (MeansAgree); nullopt if
+// there are too few points to decide.
 std::optional<bool> PointsAgree(const Landmark& a, const Landmark& b, const PointRegistry& points) {
   constexpr double kAlpha = 0.05;            // significance level
   constexpr double kShiftShare = 0.25;       // of the size, between the mean points of two view directions
   constexpr double kPointSigmaShare = 0.02;  // of the size: standard deviation of a map point
   const double size_mu = 2 * (a.geometry.cuboid ? a : b).geometry.cuboid->half_extents.maxCoeff();
-  return SamePlace(PointsOf(a, points), PointsOf(b, points), kAlpha, kShiftShare * size_mu,
-                   std::max(kPointSigmaShare * size_mu, 1e-9));
+  return MeansAgree(PointsOf(a, points), PointsOf(b, points), kAlpha, kShiftShare * size_mu,
+                    std::max(kPointSigmaShare * size_mu, 1e-9));
 }
 
 // A landmark without a cuboid is compared by its map points alone.

@@ -13,7 +13,7 @@ namespace romap::objects {
 
 // The life-cycle decisions about landmarks, as pure functions of their evidence: confirm, lose, prune, merge.
 
-// A decision and its reason, as text for logs and clients. Negative decisions also have a reason.
+// A decision and its reason, as text for logs and clients. Negative decisions have a reason too.
 struct Decision {
   bool yes = false;
   const char* reason = "";
@@ -29,8 +29,8 @@ Decision DecideConfirmation(const LandmarkEvidence& evidence, const LandmarkGeom
 // observations.
 Decision DecideAnnouncement(const LandmarkEvidence& evidence, const LandmarkGeometry& geometry);
 
-// Whether a confirmed object is lost: it was not detected in too many frames since its last observation that should
-// have shown it.
+// Whether a confirmed object is lost: since its last observation, too many frames that should show it had no detection
+// of it.
 Decision DecideLoss(ObjectState state, const LandmarkEvidence& evidence, const ObjectsConfig& config);
 
 // Whether a landmark is removed as a false detection; never true for confirmed objects. `frame_index`: of the current

@@ -73,7 +73,7 @@ void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetecti
   const CameraModel& camera = view.frame->camera;
   const cv::Mat& labels = view.frame->labels;
   for (const PointObservation& observation : view.observations) {
-    // An observation near the rim of a mask also has label 0, but is no evidence for the background.
+    // An observation near the border of a mask also has label 0, but is no evidence for the background.
     if (observation.label == 0 && !labels.empty()) {
       const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
       const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);

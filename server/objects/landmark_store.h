@@ -43,7 +43,7 @@ class LandmarkStore {
   void SetUp(const Eigen::Vector3d& up_world);
 
   // Counts the landmarks that had a mask in the same frame, and those covered by the mask of another landmark.
-  // `covered_by`: see Association, for the first landmarks of the store.
+  // `covered_by`: see Association; may be shorter than the list of landmarks, because new ones are appended.
   void CountCoVisibility(const FrameDetections& frame, const std::vector<int>& covered_by);
 
   // Adds evidence, points and, with `adopt_silhouettes`, the shape of `from` to `into`. `from` stays until

@@ -45,11 +45,11 @@ ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   current_ = {};
   if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return {};
   history_.Add(tracked);
-  // A frame on which no detector ran is no evidence that objects are missing.
+  // If no detector ran on a frame, the frame is no evidence that objects are missing.
   if (!tracked.frame->has_masks) return {};
   ObjectOutput output = ObserveMaskedFrame(tracked);
   if (tracked.is_keyframe) return output;
-  const auto stand_in = history_.StandIn(tracked, store_.points());
+  const auto stand_in = history_.MakeStandIn(tracked, store_.points());
   if (stand_in) output.Append(ObserveMaskedKeyframe(*stand_in));
   return output;
 }
@@ -66,13 +66,13 @@ ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
 
 ObjectOutput ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
   current_ = {};
-  auto masked = history_.TakeLateMasks(masks);
+  auto masked = history_.AddLateMasks(masks);
   if (!masked) {
     spdlog::debug("objects: late masks of frame {} ignored", masks.frame_id);
     return {};
   }
   ObjectOutput output = ObserveMaskedFrame(masked->tracked);
-  if (!masked->view) masked->view = history_.StandIn(masked->tracked, store_.points());
+  if (!masked->view) masked->view = history_.MakeStandIn(masked->tracked, store_.points());
   if (masked->view) output.Append(ObserveMaskedKeyframe(*masked->view));
   return output;
 }
@@ -269,7 +269,7 @@ void ObjectMapper::MergeDuplicates(ObjectOutput* output) {
         continue;
       }
       const bool keep_second = publisher_.MergeRank(second) < publisher_.MergeRank(first);
-      spdlog::debug("objects: landmarks {} and {} merge: {}", first.key, second.key, merged.reason);
+      spdlog::debug("objects: landmarks {} and {} merged: {}", first.key, second.key, merged.reason);
       keep_second ? Merge(first, second, output) : Merge(second, first, output);
     }
   }

@@ -16,9 +16,9 @@
 
 namespace romap::objects {
 
-// Maps objects: tracks instance masks from frame to frame, decides which are real objects, fits a cuboid to each, and
-// picks the views that its field trains on. Source: section "Lightweight Object SLAM" of the RO-MAP paper; differences
-// are explained in association.h, cuboid_fitter.h and view_picker.h.
+// Maps objects: tracks instance masks from frame to frame, decides which of them are real objects, fits a cuboid to
+// each, and selects the training views of its field. Source: section "Lightweight Object SLAM" of the RO-MAP paper;
+// differences are explained in association.h, cuboid_fitter.h and view_picker.h.
 //
 // Single-threaded and deterministic: equal input gives equal output. Frames without a reliable pose (initializing, lost
 // or not finite) and masks whose size differs from the image are ignored.
@@ -40,7 +40,7 @@ class ObjectMapper {
   ObjectOutput Correct(const MapCorrection& correction);
   // Removes every object after a reset of the map, which invalidates all earlier poses. Ids are never reused.
   ObjectOutput Reset();
-  // Call after the last frame. Makes the last fits and publishes all pending views and corrections.
+  // Call after the last frame. Performs the last fits and publishes all pending views and corrections.
   ObjectOutput Finish();
 
  private:

@@ -19,12 +19,11 @@ namespace romap::objects {
 
 // Owns the published state of the landmarks: ids, the last update of each object, the training views that were sent,
 // and the corrections that are not published yet.
-//
-// Small changes are not published at once; they accumulate until their sum is noticeable.
+// Small changes are not published immediately; they accumulate until their sum is noticeable.
 class ObjectPublisher {
  public:
   enum class When {
-    kChanged,  // only if something changed noticeably
+    kChanged,  // only after a noticeable change
     kAlways,
   };
 

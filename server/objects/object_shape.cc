@@ -42,19 +42,19 @@ Eigen::Vector3d ViewDirection(const Silhouette& silhouette) {
 // Minimum number of silhouettes that must contain a cell. The cell may be occluded or outside the image in the others.
 int MinInside(int silhouettes) { return std::max(1, silhouettes * 3 / 10); }
 
-// A few wrong masks must not remove part of the object, but tolerating more wrong silhouettes makes the hull wider.
+// A few wrong masks must not remove part of the object, but every tolerated wrong silhouette makes the hull wider.
 hull::CarvingRule StrictRule(size_t silhouettes) {
-  constexpr int kAllRightBelow = 8;  // silhouettes; with fewer the hull is too wide if any may be wrong
-  constexpr int kPerWrongOne = 20;   // silhouettes, of which one may be wrong
+  constexpr int kMinToTolerateErrors = 8;   // silhouettes; with fewer, tolerating an error makes the hull too wide
+  constexpr int kSilhouettesPerError = 20;  // one of this many silhouettes may be wrong
   const auto count = static_cast<int>(silhouettes);
-  return {.min_background = count < kAllRightBelow ? 1 : 1 + std::max(1, count / kPerWrongOne),
+  return {.min_background = count < kMinToTolerateErrors ? 1 : 1 + std::max(1, count / kSilhouettesPerError),
           .min_object = MinInside(count)};
 }
 
 hull::CarvingRule LenientRule(size_t silhouettes) {
-  constexpr int kPerWrongOne = 4;
+  constexpr int kSilhouettesPerError = 4;
   const auto count = static_cast<int>(silhouettes);
-  return {.min_background = 1 + std::max(1, count / kPerWrongOne), .min_object = MinInside(count)};
+  return {.min_background = 1 + std::max(1, count / kSilhouettesPerError), .min_object = MinInside(count)};
 }
 
 // Confidence, 0..1, that the evidence determines a cuboid.
@@ -78,7 +78,7 @@ bool ObjectShape::IsRedundant(const Silhouette& silhouette) const {
   });
 }
 
-bool ObjectShape::WantsSegments(const Silhouette& silhouette) const {
+bool ObjectShape::NeedsSegments(const Silhouette& silhouette) const {
   constexpr double kCertainConfidence = 0.5;  // of the yaw, see YawEstimate
   constexpr size_t kCertainViews = 8;
   constexpr double kAngleFactor = 1.5;  // edges need fewer directions than silhouettes
@@ -190,7 +190,7 @@ void ObjectShape::Carve(const HullRegion& region, const Surroundings& surroundin
 }
 
 // Map corrections tilt the grid with its object, but a fit requires an upright grid.
-void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
+void ObjectShape::MakeRegionUpright(const Surroundings& surroundings) {
   constexpr double kMaxTiltRad = 0.3 * kRadPerDeg;
   HullRegion region = hull_.region();
   const Eigen::Vector3d z = region.R_world_grid.col(2);
@@ -201,13 +201,13 @@ void ObjectShape::StraightenRegion(const Surroundings& surroundings) {
 
 // Moves the grid to the hull when the hull reaches the grid's border, or when many silhouettes were added since it was
 // carved: then the hull fills only a small part of the grid.
-void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surroundings) {
+void ObjectShape::FitRegionToHull(const Extent& extent, const Surroundings& surroundings) {
   constexpr double kMaxHalfExtent = 1.3;    // of the grid, in terms of the object's size
-  constexpr double kBorder = 0.97;          // share of the grid's half extent from which the hull touches the border
+  constexpr double kBorder = 0.97;          // share of the grid's half extent; a hull beyond it touches the border
   constexpr double kGrowthAtBorder = 1.6;   // of the hull's half extent, where it is cut off
   constexpr double kGrowth = 1.25;          // of the hull's half extent elsewhere
-  constexpr double kManySilhouettes = 2.0;  // times as many as when the hull was carved
-  constexpr double kAtMaximum = 0.99;       // share of the largest half extent: no growth left
+  constexpr double kManySilhouettes = 2.0;  // relative to the number when the hull was carved
+  constexpr double kAtMaximum = 0.99;       // share of the largest half extent above which the grid cannot grow
   const Eigen::AlignedBox3d hull = hull_.Bounds(StrictRule(silhouettes_.size()));
   if (hull.isEmpty()) return;
   const Eigen::Vector3d& low = hull.min();
@@ -228,7 +228,7 @@ void ObjectShape::RefocusRegion(const Extent& extent, const Surroundings& surrou
   Carve(next, surroundings);
 }
 
-// Growing the forest takes longer than evaluating it, so it is kept while the number of points is about the same.
+// Growing the forest takes longer than evaluating it, so it is reused while the number of points is about the same.
 std::vector<double> ObjectShape::AnomalyScores(const std::vector<Eigen::Vector3d>& points_grid) {
   constexpr size_t kMinPoints = 4;
   constexpr double kMaxChange = 0.1;  // of the number of points
@@ -311,7 +311,7 @@ CuboidEvidence ObjectShape::CollectEvidence(const Extent& extent, const Surround
     evidence.neighbor_bottoms.push_back(bottom - center_height);
     const Eigen::Vector3d center = cuboid.T_world_object.Inverse() * extent.center_world;
     const bool is_below = (center.head<2>().cwiseAbs().array() <= cuboid.half_extents.head<2>().array()).all();
-    if (is_below) evidence.carrier_tops.push_back(evidence.neighbor_bottoms.back() + 2 * cuboid.half_extents.z());
+    if (is_below) evidence.supporting_tops.push_back(evidence.neighbor_bottoms.back() + 2 * cuboid.half_extents.z());
   }
   evidence.center = evidence.region.ToGrid(extent.center_world);
   const auto edge_yaw = EdgeYaw(silhouettes_, evidence.region.R_world_grid);
@@ -335,8 +335,8 @@ std::optional<ObjectShape::Fit> ObjectShape::Update(const Surroundings& surround
   changed_silhouettes_ = 0;
   if (hull_.empty()) carve_from_scratch();
   AddMissingVotes();
-  StraightenRegion(surroundings);
-  RefocusRegion(*extent, surroundings);
+  MakeRegionUpright(surroundings);
+  FitRegionToHull(*extent, surroundings);
   std::vector<Eigen::Vector3d> hull_cells = hull_.Cells(StrictRule(silhouettes_.size()));
   if (hull_cells.empty()) hull_cells = hull_.Cells(LenientRule(silhouettes_.size()));
   if (hull_cells.empty()) {

@@ -42,7 +42,7 @@ class ObjectShape {
   const std::vector<Silhouette>& silhouettes() const { return silhouettes_; }
   // Whether to detect straight edges on this mask, which must not be redundant. False if a silhouette from about the
   // same direction has edges, or once the yaw is certain.
-  bool WantsSegments(const Silhouette& silhouette) const;
+  bool NeedsSegments(const Silhouette& silhouette) const;
   // Number of silhouettes on which edges were detected.
   size_t SegmentViews() const;
   // Number of silhouettes that were added or corrected since the last Update().
@@ -68,8 +68,8 @@ class ObjectShape {
   void RemoveVote(size_t i);
   void AddMissingVotes();
   void Carve(const HullRegion& region, const Surroundings& surroundings);
-  void StraightenRegion(const Surroundings& surroundings);
-  void RefocusRegion(const Extent& extent, const Surroundings& surroundings);
+  void MakeRegionUpright(const Surroundings& surroundings);
+  void FitRegionToHull(const Extent& extent, const Surroundings& surroundings);
   std::vector<bool> FindInliers(std::span<const Eigen::Vector3d> points_world);
   std::vector<double> AnomalyScores(const std::vector<Eigen::Vector3d>& points_grid);
   CuboidEvidence CollectEvidence(const Extent& extent, const Surroundings& surroundings,

@@ -62,7 +62,7 @@ struct ObjectsConfig {
                 .min = 1,
                 .max = 254,
                 .audience = Audience::kOperator,
-                .help = "Maximum number of masks used per frame; the smallest ones above it are ignored"});
+                .help = "Maximum number of masks used per frame; beyond it, the smallest masks are ignored"});
     fields.Add("association", &association,
                {.choices = {"scored", "greedy_iou"},
                 .help = "Matching of masks to objects: best assignment by all evidence, or greedy by the overlap of "
@@ -72,8 +72,8 @@ struct ObjectsConfig {
                 .min = 0,
                 .max = 10,
                 .audience = Audience::kOperator,
-                .help = "Maximum age of a frame, relative to the newest one, when its masks arrive; later masks are "
-                        "rejected"});
+                .help = "Maximum age of a frame, relative to the newest frame, when its masks arrive; masks of older "
+                        "frames are rejected"});
   }
 
   void ConfirmationFields(ConfigFields& fields) {
@@ -125,8 +125,8 @@ struct ObjectsConfig {
                {.unit = "points", .min = 3, .max = 1000, .help = "Minimum number of map points that locate an object"});
     fields.Add("outlier_removal", &outlier_removal,
                {.choices = {"hull_and_forest", "forest", "none"},
-                .help = "Which map points under the masks of an object are assigned to the background: those outside "
-                        "its visual hull and those its isolation forest rejects"});
+                .help = "Map points under the masks of an object that are assigned to the background: those outside "
+                        "its visual hull and those rejected by an isolation forest"});
     fields.Add(
         "cuboid_from", &cuboid_from,
         {.choices = {"silhouettes", "points"},
@@ -145,7 +145,7 @@ struct ObjectsConfig {
                 .max = 90,
                 .help = "Minimum angle between the viewing directions of two training views (paper: 25)"});
     fields.Add("first_view_angle_deg", &first_view_angle_deg,
-               {.unit = "deg", .min = 1, .max = 90, .help = "The same for the first training views of an object"});
+               {.unit = "deg", .min = 1, .max = 90, .help = "Minimum angle for the first training views of an object"});
     fields.Add("first_views", &first_views,
                {.unit = "views", .min = 0, .max = 100, .help = "Number of views that use first_view_angle_deg"});
     fields.Add("max_views", &max_views,

@@ -17,7 +17,7 @@ inline constexpr LandmarkKey kBackgroundKey = 0;
 inline constexpr LandmarkKey kNoLandmark = ~LandmarkKey{0};
 
 // Assigns map points to landmarks. Every observation of a point in a keyframe is a vote: masks are wrong near their
-// rims and labels are sometimes swapped, but rarely for the same point in most keyframes.
+// borders and labels are sometimes swapped, but rarely for the same point in most keyframes.
 class PointRegistry {
  public:
   // Applies the new positions and removals of a keyframe. Points without a finite position are removed.

@@ -99,7 +99,7 @@ void ShapeFitter::AddSilhouettes(const KeyframeView& view, const FrameDetections
 void ShapeFitter::FindSegments(const KeyframeView& view, std::vector<NewSilhouette>* silhouettes) {
   std::vector<NewSilhouette*> candidates;
   for (NewSilhouette& entry : *silhouettes) {
-    if (entry.landmark->shape.WantsSegments(entry.silhouette)) candidates.push_back(&entry);
+    if (entry.landmark->shape.NeedsSegments(entry.silhouette)) candidates.push_back(&entry);
   }
   // Edge detection costs more than the other work on a silhouette, so it runs only for the landmarks with the fewest
   // searched silhouettes.

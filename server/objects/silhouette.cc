@@ -21,9 +21,9 @@ std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
   const int top = box.y / stride;
   const int right = std::min(masks.cols - 1, (box.x + box.width - 1) / stride);
   const int bottom = std::min(masks.rows - 1, (box.y + box.height - 1) / stride);
-  std::vector<Eigen::Vector2d> rim_px;
+  std::vector<Eigen::Vector2d> outline_px;
   const auto is_mask = [&](int u, int v) { return masks.at<uint8_t>(v, u) == silhouette.index; };
-  const auto add = [&](int u, int v) { rim_px.emplace_back(u * stride, v * stride); };
+  const auto add = [&](int u, int v) { outline_px.emplace_back(u * stride, v * stride); };
   for (int v = top; v <= bottom; ++v) {
     int first = left;
     int last = right;
@@ -42,10 +42,10 @@ std::vector<Eigen::Vector3d> OutlineRays(const Silhouette& silhouette) {
     add(u, first);
     add(u, last);
   }
-  const size_t step = rim_px.size() / kMaxOutlineRays + 1;
+  const size_t step = outline_px.size() / kMaxOutlineRays + 1;
   std::vector<Eigen::Vector3d> rays;
-  for (size_t i = 0; i < rim_px.size(); i += step) {
-    const Eigen::Vector3d direction = silhouette.camera.Unproject(rim_px[i].x(), rim_px[i].y());
+  for (size_t i = 0; i < outline_px.size(); i += step) {
+    const Eigen::Vector3d direction = silhouette.camera.Unproject(outline_px[i].x(), outline_px[i].y());
     rays.push_back((silhouette.T_world_camera.rotation() * direction).normalized());
   }
   return rays;
@@ -75,9 +75,9 @@ std::shared_ptr<const KeyframeMasks> SubsampleMasks(const cv::Mat& labels, const
   }
   const int stride = masks->stride_px;
   const cv::Size size((labels.cols + stride - 1) / stride, (labels.rows + stride - 1) / stride);
-  masks->framed.create(size.height + 2, size.width + 2, CV_8UC1);
-  masks->framed.setTo(kOtherMask);
-  masks->index = masks->framed(cv::Rect({1, 1}, size));
+  masks->padded.create(size.height + 2, size.width + 2, CV_8UC1);
+  masks->padded.setTo(kOtherMask);
+  masks->index = masks->padded(cv::Rect({1, 1}, size));
   for (int v = 0; v < masks->index.rows; ++v) {
     const auto* from = labels.ptr<uint16_t>(v * stride);
     auto* to = masks->index.ptr<uint8_t>(v);
@@ -209,13 +209,13 @@ double ParallaxRad(const std::vector<Silhouette>& silhouettes, const Eigen::Vect
     directions.push_back((silhouette.CameraCenter() - p_world).normalized());
   }
   // Compares cosines, because there are many pairs and an angle is expensive.
-  double least_cosine = 1;
+  double min_cosine = 1;
   double largest = 0;
   for (size_t i = 0; i < directions.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
       const double cosine = directions[i].dot(directions[j]);
-      if (cosine >= least_cosine) continue;
-      least_cosine = cosine;
+      if (cosine >= min_cosine) continue;
+      min_cosine = cosine;
       largest = AngleBetween(directions[i], directions[j]);
     }
   }

@@ -20,7 +20,7 @@ namespace romap::objects {
 struct KeyframeMasks {
   // CV_8UC1, every stride_px-th pixel: 0 background, i + 1 detection i of the keyframe, kOtherMask other masks.
   cv::Mat index;
-  cv::Mat framed;  // `index` with a border of one pixel of kOtherMask; shares its memory
+  cv::Mat padded;  // `index` with a border of one pixel of kOtherMask; shares its memory
   int stride_px = 1;
   std::vector<LandmarkKey> keys;  // landmark of each detection
 };
@@ -55,7 +55,7 @@ struct Silhouette {
   std::vector<std::optional<UnitBox>> neighbors;
   cv::Rect box_px;
   bool cut_by_border = false;
-  std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels of the mask's rim
+  std::vector<Eigen::Vector3d> outline_rays_world;  // unit directions through pixels on the mask's outline
   MaskExtents extents;
   bool has_segments = false;  // straight edges were detected; there may be none
   std::vector<LineSegment> segments;

@@ -22,14 +22,14 @@ class RowEvidence {
                    grid),
         masks_(static_cast<size_t>(grid.cells)),
         evidence_(static_cast<size_t>(grid.cells)) {
-    hiders_.reserve(silhouette.neighbors.size());
+    occluders_.reserve(silhouette.neighbors.size());
     for (const auto& neighbor : silhouette.neighbors) {
-      hiders_.emplace_back();
+      occluders_.emplace_back();
       if (!neighbor) continue;
       const Eigen::Vector3d from = *neighbor * silhouette.CameraCenter();
-      hiders_.back() = Hider{.from = from.cast<float>(),
-                             .M = (neighbor->M * region.R_world_grid).cast<float>(),
-                             .offset = (*neighbor * region.center_world - from).cast<float>()};
+      occluders_.back() = Occluder{.from = from.cast<float>(),
+                                   .M = (neighbor->M * region.R_world_grid).cast<float>(),
+                                   .offset = (*neighbor * region.center_world - from).cast<float>()};
     }
   }
 
@@ -54,7 +54,7 @@ class RowEvidence {
 
  private:
   // A neighbor's box as the map from the grid to its unit cube, relative to the camera center in that cube.
-  struct Hider {
+  struct Occluder {
     Eigen::Vector3f from;  // camera center in the unit cube
     Eigen::Matrix3f M;
     Eigen::Vector3f offset;
@@ -62,8 +62,8 @@ class RowEvidence {
 
   // Sets masks_ to the mask index under each cell of the projected row, kOtherMask outside the image.
   void ReadMasks() {
-    const cv::Mat& image = silhouette_.masks->framed;
-    // Pixels outside the image are clamped to its one-pixel frame of kOtherMask; 1.5 = the frame and half a pixel.
+    const cv::Mat& image = silhouette_.masks->padded;
+    // Pixels outside the image are clamped to its one-pixel border of kOtherMask; 1.5 = the border and half a pixel.
     u_ = (projector_.u_px() + 1.5F).max(0.0F).min(static_cast<float>(image.cols - 1)).cast<int>();
     v_ = (projector_.v_px() + 1.5F).max(0.0F).min(static_cast<float>(image.rows - 1)).cast<int>();
     offset_ = v_ * static_cast<int>(image.step) + u_;
@@ -82,11 +82,11 @@ class RowEvidence {
   // Silhouette::MayOcclude() for a point of the grid.
   bool MayOcclude(uint8_t mask, const Eigen::Vector3f& p_grid) const {
     const size_t neighbor = static_cast<size_t>(mask) - 1;
-    if (neighbor >= hiders_.size() || !hiders_[neighbor]) return true;
-    const Hider& hider = *hiders_[neighbor];
-    const Eigen::Array3f inverse_step = (hider.M * p_grid + hider.offset).array().inverse();
-    const Eigen::Array3f t0 = (-1 - hider.from.array()) * inverse_step;
-    const Eigen::Array3f t1 = (1 - hider.from.array()) * inverse_step;
+    if (neighbor >= occluders_.size() || !occluders_[neighbor]) return true;
+    const Occluder& occluder = *occluders_[neighbor];
+    const Eigen::Array3f inverse_step = (occluder.M * p_grid + occluder.offset).array().inverse();
+    const Eigen::Array3f t0 = (-1 - occluder.from.array()) * inverse_step;
+    const Eigen::Array3f t1 = (1 - occluder.from.array()) * inverse_step;
     const float near = t0.min(t1).maxCoeff();
     const float far = t0.max(t1).minCoeff();
     return near <= far && far >= 0 && near <= 1;
@@ -98,7 +98,7 @@ class RowEvidence {
   Eigen::ArrayXi u_, v_, offset_;
   std::vector<uint8_t> masks_;
   std::vector<CellEvidence> evidence_;
-  std::vector<std::optional<Hider>> hiders_;
+  std::vector<std::optional<Occluder>> occluders_;
 };
 
 }  // namespace

@@ -22,9 +22,9 @@ struct HullRegion {
   Eigen::Vector3d ToWorld(const Eigen::Vector3d& p_grid) const { return center_world + R_world_grid * p_grid; }
 };
 
-// The visual hull of an object from the silhouettes of its keyframes, over a regular grid of a region. A silhouette
-// shows the object or background at the pixel under a cell's center. Another mask at that pixel is background too,
-// unless its object may stand in front of the cell. Adding or removing a silhouette costs one pass over the grid.
+// The visual hull of an object from the silhouettes of its keyframes, over a regular grid of a region. The pixel under
+// the center of a cell is evidence for the object or the background. Another mask at that pixel counts as background,
+// unless its object may be in front of the cell. Adding or removing a silhouette costs one pass over the grid.
 class SilhouetteHull {
  public:
   // Removes all silhouettes. `cells` per side.

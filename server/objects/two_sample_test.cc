@@ -91,8 +91,8 @@ std::optional<MeanTest> HotellingTest(const PointMoments& a, const PointMoments&
   return test;
 }
 
-std::optional<bool> SamePlace(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
-                              double min_shift_mu, double point_sigma_mu) {
+std::optional<bool> MeansAgree(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
+                               double min_shift_mu, double point_sigma_mu) {
   const auto test = HotellingTest(PointMoments::Of(a), PointMoments::Of(b), point_sigma_mu, min_shift_mu);
   if (!test) return std::nullopt;
   return test->p_value >= alpha;

@@ -11,9 +11,9 @@ namespace romap::objects {
 //
 // A rejection means that the sets are farther apart than their scatter explains. Limits: (1) The tests cannot show that
 // two sets are of one object. "Not rejected" with ten points each means that the means differ by less than about one
-// standard deviation; the means of two objects in one place (a bowl and the apple in it) are equal. (2) They do not
-// measure the difference. With many points any difference is significant, and the mean points of one object from two
-// directions do differ, by up to half the object's size. SamePlace() allows for that. (3) They assume independent
+// standard deviation; the means of two objects at the same position (a bowl and the apple in it) are equal. (2) They do
+// not measure the difference. With many points any difference is significant, and the mean points of one object from
+// two directions do differ, by up to half the object's size. MeansAgree() allows for that. (3) They assume independent
 // points. Neighboring features of one image share its pose error, so p-values are too small rather than too large.
 
 // Count, mean and unbiased covariance of points, map units. The covariance of fewer than two points is 0.
@@ -60,10 +60,10 @@ std::optional<MeanTest> HotellingTest(const PointMoments& a, const PointMoments&
                                       double min_shift_mu = 0);
 
 // Whether `a` and `b` may be points of one object: their means do not differ significantly (level `alpha`) by more than
-// `min_shift_mu`. For one object seen from two directions this should be a share of its size: a quarter for directions
-// 60 degrees apart, half for opposite ones. nullopt when there are too few points (see HotellingTest); the caller must
-// then use other evidence.
-std::optional<bool> SamePlace(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
-                              double min_shift_mu, double point_sigma_mu);
+// `min_shift_mu`. For one object observed from two directions this should be a share of its size: a quarter for
+// directions 60 degrees apart, half for opposite ones. nullopt when there are too few points (see HotellingTest); the
+// caller must then use other evidence.
+std::optional<bool> MeansAgree(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, double alpha,
+                               double min_shift_mu, double point_sigma_mu);
 
 }  // namespace romap::objects

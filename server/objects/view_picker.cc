@@ -44,7 +44,7 @@ const char* FindDoubt(const ViewCandidate& candidate, const ViewContext& context
   if (inside < kMinVisible * in_image) return "mostly occluded";
   const cv::Rect expected = ProjectCuboid(context.cuboid, kCuboidEnlargement, camera, candidate.T_world_camera);
   const double covered = (expected & candidate.box_px).area();
-  if (covered < kMinInCuboid * candidate.box_px.area()) return "the mask extends beyond its cuboid";
+  if (covered < kMinInCuboid * candidate.box_px.area()) return "the mask extends beyond the cuboid";
   return nullptr;
 }
 
@@ -81,7 +81,8 @@ void MarkMissedNeighbors(const ViewCandidate& candidate, const ViewContext& cont
   }
 }
 
-// Labels of neighbors entirely behind the object: their rays pass the object's box without hitting it, like background.
+// Labels of neighbors entirely behind the object: their rays pass through the object's box without ending in it, like
+// background rays.
 std::vector<uint16_t> LabelsBehind(const ViewCandidate& candidate, const ViewContext& context) {
   const SE3<Camera, World> T_camera_world = candidate.T_world_camera.Inverse();
   const double far_depth = DepthRange(context.cuboid, T_camera_world).second;
@@ -190,13 +191,13 @@ std::vector<ObjectView> ViewPicker::Take(const ViewContext& context) {
     if (!IsNewDirection(camera_center, center, angle_rad)) continue;
     if (!IsSharp(candidate) && !IsNewDirection(camera_center, center, kMaxGapFactor * angle_rad)) continue;
     if (const char* doubt = FindDoubt(candidate, context)) {
-      spdlog::debug("objects: {}: {} rejected as a view: {}", context.object.ToString(), candidate.keyframe.ToString(),
-                    doubt);
+      spdlog::debug("objects: {}: {} rejected as a training view: {}", context.object.ToString(),
+                    candidate.keyframe.ToString(), doubt);
       continue;
     }
     views.push_back(MakeView(candidate, context));
     picked_.push_back({views.back(), views.back().T_world_camera});
-    spdlog::debug("objects: {}: {} becomes view {}", context.object.ToString(), candidate.keyframe.ToString(),
+    spdlog::debug("objects: {}: {} is training view {}", context.object.ToString(), candidate.keyframe.ToString(),
                   picked_.size());
   }
   waiting_.clear();

@@ -15,7 +15,7 @@
 
 namespace romap::objects {
 
-// A keyframe with a mask of an object: a training view of the object's field, if it is picked.
+// A keyframe with a mask of an object: a candidate for a training view of the object's field.
 struct ViewCandidate {
   KeyframeId keyframe;
   std::shared_ptr<const Frame> frame;
@@ -44,11 +44,11 @@ struct ViewContext {
 
 // Picks the training views of one object from its keyframes. The paper picks a keyframe whose direction differs by 25
 // degrees from that of the last view. Here it must differ by ObjectsConfig::view_angle_deg from every view, or be at a
-// clearly different distance. A smaller angle is affordable, because a camera that returns to an earlier direction adds
-// no views. The first few views may be closer together, so that a slow camera soon gives a first shape. Keyframes are
-// rejected if their mask contradicts the object's shape, if they show too little of it, or if they are blurred while a
-// sharper one may still arrive. No views are picked beyond ObjectsConfig::max_views, because sent views cannot be
-// withdrawn.
+// clearly different distance. The angle can be smaller, because a camera that returns to an earlier direction adds no
+// views. The first few views may be closer together, so that a first shape is available early even if the camera moves
+// slowly. Keyframes are rejected if their mask contradicts the object's shape, if they show too little of it, or if
+// they are blurred while a sharper one may still arrive. No views are picked beyond ObjectsConfig::max_views, because
+// sent views cannot be withdrawn.
 class ViewPicker {
  public:
   explicit ViewPicker(const ObjectsConfig& config) : config_(config) {}

@@ -12,7 +12,7 @@ namespace {
 constexpr int kDetectorBorder_px = 4;
 
 std::vector<cv::Vec4f> DetectLines(const cv::Mat& gray, double min_length_px) {
-  // A new detector for each crop: a reused one keeps tables of the last image, so that results would depend on earlier
+  // A new detector for each crop: a reused one keeps tables of the previous image, so results would depend on earlier
   // images.
   const cv::Ptr<cv::ximgproc::EdgeDrawing> detector = cv::ximgproc::createEdgeDrawing();
   detector->params.EdgeDetectionOperator = cv::ximgproc::EdgeDrawing::SOBEL;
@@ -60,7 +60,7 @@ std::vector<LineSegment> SegmentsOf(const cv::Mat& crop_bgr, double min_length_p
 
 std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Mat& labels, uint16_t label,
                                           const cv::Rect& box_px, const LineSegmentOptions& options) {
-  const int margin_px = options.rim_px + kDetectorBorder_px;
+  const int margin_px = options.dilation_px + kDetectorBorder_px;
   const cv::Rect wide(box_px.x - margin_px, box_px.y - margin_px, box_px.width + 2 * margin_px,
                       box_px.height + 2 * margin_px);
   const cv::Rect crop = wide & cv::Rect({}, image_bgr.size());
@@ -68,8 +68,8 @@ std::vector<LineSegment> FindLineSegments(const cv::Mat& image_bgr, const cv::Ma
       std::max(options.min_length_px, options.min_length_share * std::hypot(box_px.width, box_px.height));
   if (std::min(crop.width, crop.height) <= 2 * kDetectorBorder_px) return {};
   cv::Mat mask = labels(crop) == label;
-  const int rim_size_px = 2 * options.rim_px + 1;
-  cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {rim_size_px, rim_size_px}));
+  const int kernel_size_px = 2 * options.dilation_px + 1;
+  cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {kernel_size_px, kernel_size_px}));
 
   std::vector<LineSegment> segments = SegmentsOf(image_bgr(crop), min_length_px, options.max_crop_px2);
   std::erase_if(segments, [&](const LineSegment& segment) {

@@ -66,14 +66,14 @@ Ballot CollectVotes(const Eigen::Matrix3d& R_world_reference, std::span<const Li
     const auto ray = [&](const Eigen::Vector2d& p_px) -> Eigen::Vector3d {
       return (R_reference_camera * view.camera.Unproject(p_px.x(), p_px.y())).normalized();
     };
-    Eigen::Vector3d look = Eigen::Vector3d::Zero();
+    Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();
     for (const LineSegment& segment : view.segments) {
       const Eigen::Vector3d from = ray(segment.from_px);
       const Eigen::Vector3d to = ray(segment.to_px);
-      look += from + to;
+      view_direction += from + to;
       if (const auto vote = VoteOf(from, to, noise_rad, options)) ballot.votes.push_back(*vote);
     }
-    ballot.view_azimuths_rad.resize(ballot.votes.size(), std::atan2(look.y(), look.x()));
+    ballot.view_azimuths_rad.resize(ballot.votes.size(), std::atan2(view_direction.y(), view_direction.x()));
   }
   return ballot;
 }

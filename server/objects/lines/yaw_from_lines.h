@@ -9,7 +9,7 @@
 
 namespace romap::objects {
 
-// The straight edges of one object in one image. The position of the camera does not matter.
+// The straight edges of one object in one image. The position of the camera has no effect.
 struct LineView {
   CameraModel camera;
   Eigen::Matrix3d R_world_camera;
@@ -26,25 +26,25 @@ struct LineYawOptions {
 
 struct YawEstimate {
   double yaw_rad = 0;  // of the horizontal edges, relative to the reference's x axis, in [-pi/4, pi/4]
-  // 0..1: the share of the edges that this yaw explains minus the share that its best rival explains, reduced for few
-  // edges. In our experiments it is above 0.25 only for box-like objects; round and irregular ones stay below 0.2 when
-  // seen from three or more directions.
+  // 0..1: the share of the edges that agree with this yaw minus the share that agrees with its best rival, reduced for
+  // few edges. In our experiments it is above 0.25 only for box-like objects; round and irregular ones stay below 0.2
+  // if they are observed from three or more directions.
   double confidence = 0;
-  double share = 0;  // of the edges, by weight, that this yaw explains
+  double share = 0;  // of the edges, by weight, that agree with this yaw
   int edges = 0;     // number of edges that voted
 };
 
 // Yaw of an upright cuboid from straight edges in several images at once.
 //
 // A segment and the camera center span a plane. A horizontal edge in this plane has one possible direction, at any
-// depth: h = n x up, n the normal of the plane. So each segment votes for one yaw (modulo a quarter turn, because the
-// edges of a cuboid are at right angles), with an uncertainty that follows from its length and position. The votes of
-// all images are summed with Tukey's biweight kernel; the maximum of the sampled curve is refined to the nearest
-// stationary point. Vertical edges do not depend on yaw and are ignored.
+// depth: h = n x up, n the normal of the plane. Therefore each segment votes for one yaw (modulo a quarter turn,
+// because the edges of a cuboid are at right angles), with an uncertainty that follows from its length and position.
+// The votes of all images are summed with Tukey's biweight kernel; the maximum of the sampled curve is refined to the
+// nearest stationary point. Vertical edges do not depend on yaw and are ignored.
 //
 // The confidence compares the result with two rivals: another yaw, and a solid of revolution. The outlines of the
-// latter (rims seen as ellipses, slanted sides) move with the camera: their yaws are spread symmetrically around the
-// view direction.
+// latter (circular edges that project to ellipses, slanted sides) move with the camera: their yaws are spread
+// symmetrically around the view direction.
 //
 // This is the alignment of the paper's equations (2) and (3), with two changes: the angle at the camera center replaces
 // the difference of slopes, which ignores perspective and the assignment of edges, and outliers are modeled.

@@ -79,7 +79,7 @@ TEST_F(AssociationTest, OnlyLandmarksObservedTogetherAreRivals) {
   AddCube(0, "cup");
   AddCube(0.005, "cup");
   AddMask(1, BoxOf(*landmarks_[0]), "cup");
-  EXPECT_EQ(Run().matches[0].doubt, nullptr) << "possibly one object twice";
+  EXPECT_EQ(Run().matches[0].doubt, nullptr) << "they may be one object";
   landmarks_[0]->evidence.observed_with[landmarks_[1]->key] = 3;
   landmarks_[1]->evidence.observed_with[landmarks_[0]->key] = 3;
   EXPECT_THAT(Run().matches[0].doubt, NotNull());
@@ -192,7 +192,7 @@ TEST_F(AssociationTest, ADistantMaskMatchesNoLandmark) {
   EXPECT_EQ(Run().matches[0].landmark, -1);
 }
 
-TEST_F(AssociationTest, GreedyIouMatchesOnlyTheFrameBefore) {
+TEST_F(AssociationTest, GreedyIouMatchesOnlyThePreviousFrame) {
   config_.association = "greedy_iou";
   AddCube(-0.15, "cup");
   AddCube(0.15, "cup").evidence.last_frame = 7;

@@ -31,7 +31,7 @@ SyntheticWorldOptions SmallWorld() {
   return options;
 }
 
-// A mapper with its input and what it published.
+// A mapper with its input and its published output.
 class CorrectedMapping {
  public:
   explicit CorrectedMapping(const SyntheticWorldOptions& options) : world(options) {}

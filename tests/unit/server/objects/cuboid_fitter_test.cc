@@ -112,10 +112,10 @@ TEST(FindSupportHeightTest, IsTheTopOfTheObjectBelow) {
   ObservedObject observed = ObserveBox();
   for (Eigen::Vector3d& p : observed.evidence.background) p.z() -= kBook_mu;
   const double own_bottom = observed.evidence.region.ToGrid(Eigen::Vector3d::Zero()).z();
-  observed.evidence.carrier_tops = {own_bottom + 0.002};
+  observed.evidence.supporting_tops = {own_bottom + 0.002};
   EXPECT_NEAR(FindSupportHeight(observed.evidence).value_or(9), own_bottom + 0.002, 1e-9);
   // An object whose top is higher is behind it, or a duplicate of it.
-  observed.evidence.carrier_tops = {own_bottom + 0.07};
+  observed.evidence.supporting_tops = {own_bottom + 0.07};
   EXPECT_NEAR(FindSupportHeight(observed.evidence).value_or(9), own_bottom - kBook_mu, 1e-9);
 }
 

@@ -25,18 +25,19 @@ TEST(FitScheduleTest, OrdersByUrgency) {
   EXPECT_THAT(OrderByUrgency({well_known, little_known, unconfirmed, long_waiting}), ElementsAre(4, 3, 2, 1));
 }
 
-TEST(FitScheduleTest, OlderLandmarkFirstWhenEquallyUrgent) {
+TEST(FitScheduleTest, TheOlderOfEquallyUrgentLandmarksComesFirst) {
   EXPECT_THAT(OrderByUrgency({{.key = 9, .silhouettes = 3, .changed = 1}, {.key = 4, .silhouettes = 3, .changed = 1}}),
               ElementsAre(4, 9));
 }
 
-TEST(FitScheduleTest, WellKnownLandmarksNeedMoreChanges) {
+TEST(FitScheduleTest, LandmarksWithManySilhouettesNeedMoreChanges) {
   EXPECT_FALSE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 36, .changed = 1}));
   EXPECT_TRUE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 36, .changed = 4}));
   EXPECT_TRUE(IsDueForFit({.key = 1, .confirmed = true, .silhouettes = 6, .changed = 1}));
 }
 
-// Every landmark gets a silhouette at every keyframe, which for unconfirmed ones is a large share of all they have.
+// Every landmark gets a silhouette at every keyframe. For unconfirmed ones this is a large share of all their
+// silhouettes.
 TEST(FitScheduleTest, EveryLandmarkIsFittedEventually) {
   constexpr int kObjects = 12;
   constexpr int kFitsPerKeyframe = 2;

@@ -41,17 +41,17 @@ FrameMasks MakeMasks(uint64_t id) {
 TEST(FrameHistory, LateMasksAreAcceptedOnceAndWithinTheMaximumDelay) {
   FrameHistory history(0.5);
   for (uint64_t id = 1; id <= 20; ++id) history.Add(MakeTracked(id, id == 19, {}));
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(3))) << "640 ms old";
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(19))) << "has masks";
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(21))) << "unknown frame";
-  const auto masked = history.TakeLateMasks(MakeMasks(12));
+  EXPECT_FALSE(history.AddLateMasks(MakeMasks(3))) << "640 ms old";
+  EXPECT_FALSE(history.AddLateMasks(MakeMasks(19))) << "has masks";
+  EXPECT_FALSE(history.AddLateMasks(MakeMasks(21))) << "unknown frame";
+  const auto masked = history.AddLateMasks(MakeMasks(12));
   ASSERT_TRUE(masked);
   EXPECT_EQ(masked->tracked.frame->frame_id, 12u);
   EXPECT_TRUE(masked->tracked.frame->has_masks);
   EXPECT_EQ(masked->tracked.frame->labels.at<uint16_t>(3, 3), 5);
   ASSERT_EQ(masked->tracked.frame->instances.size(), 1u);
   EXPECT_FALSE(masked->view) << "not a keyframe";
-  EXPECT_FALSE(history.TakeLateMasks(MakeMasks(12))) << "twice";
+  EXPECT_FALSE(history.AddLateMasks(MakeMasks(12))) << "twice";
 }
 
 TEST(FrameHistory, LateMasksLabelTheObservationsOfTheirKeyframe) {
@@ -60,14 +60,14 @@ TEST(FrameHistory, LateMasksLabelTheObservationsOfTheirKeyframe) {
   history.Add(tracked);
   history.AddKeyframe(MakeView(tracked, 7));
   history.Add(MakeTracked(2, false, KeyframeId{7}));
-  const auto masked = history.TakeLateMasks(MakeMasks(1));
+  const auto masked = history.AddLateMasks(MakeMasks(1));
   ASSERT_TRUE(masked && masked->view);
   EXPECT_EQ(masked->view->id, KeyframeId{7});
   ASSERT_EQ(masked->view->observations.size(), 1u);
   EXPECT_EQ(masked->view->observations[0].label, 5);
 }
 
-TEST(FrameHistory, AMaskedFrameStandsInForAKeyframeWithoutMasks) {
+TEST(FrameHistory, AMaskedFrameReplacesAKeyframeWithoutMasks) {
   FrameHistory history(1);
   PointRegistry points;
   const TrackedFrame first = MakeTracked(1, false, {});
@@ -77,13 +77,13 @@ TEST(FrameHistory, AMaskedFrameStandsInForAKeyframeWithoutMasks) {
   history.AddKeyframe(view);
   const TrackedFrame masked = MakeTracked(4, true, KeyframeId{7});
   history.Add(masked);
-  const auto stand_in = history.StandIn(masked, points);
+  const auto stand_in = history.MakeStandIn(masked, points);
   ASSERT_TRUE(stand_in);
   EXPECT_NE(stand_in->id, KeyframeId{7});
   ASSERT_EQ(stand_in->observations.size(), 1u);
   EXPECT_EQ(stand_in->observations[0].label, 9);
   EXPECT_NEAR(stand_in->observations[0].pixel_px.x(), 32 + 50 * (0.1 - 0.04) / 2, 1e-4);
-  EXPECT_FALSE(history.StandIn(masked, points)) << "one stand-in per keyframe";
+  EXPECT_FALSE(history.MakeStandIn(masked, points)) << "one stand-in per keyframe";
 
   // It moves with its keyframe.
   const Sim3<World, World> S(2, Eigen::Quaterniond::Identity(), {0, 1, 0});
@@ -102,7 +102,7 @@ TEST(FrameHistory, AKeyframeWithMasksNeedsNoStandIn) {
   history.AddKeyframe(MakeView(first, 7));
   const TrackedFrame masked = MakeTracked(4, true, KeyframeId{7});
   history.Add(masked);
-  EXPECT_FALSE(history.StandIn(masked, {}));
+  EXPECT_FALSE(history.MakeStandIn(masked, {}));
 }
 
 TEST(FrameHistory, FramesWithoutMasksFollowCorrections) {
@@ -115,8 +115,8 @@ TEST(FrameHistory, FramesWithoutMasksFollowCorrections) {
   KeyframeCorrections corrections;
   corrections[KeyframeId{7}] = {.id = KeyframeId{7}, .T_world_camera = S.Moved(first.T_world_camera), .S_new_old = S};
   history.Correct(&corrections);
-  const auto keyframe = history.TakeLateMasks(MakeMasks(1));
-  const auto other = history.TakeLateMasks(MakeMasks(3));
+  const auto keyframe = history.AddLateMasks(MakeMasks(1));
+  const auto other = history.AddLateMasks(MakeMasks(3));
   ASSERT_TRUE(keyframe && keyframe->view && other);
   EXPECT_NEAR(keyframe->view->T_world_camera.translation().z(), 0.5, 1e-12);
   EXPECT_NEAR(other->tracked.T_world_camera.translation().z(), 0.5, 1e-12);

@@ -18,7 +18,7 @@ namespace {
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// Everything the mapper published in a run.
+// All output that the mapper published in a run.
 struct Published {
   std::map<ObjectId, ObjectUpdate> objects;
   std::map<ObjectId, std::vector<ObjectView>> views;
@@ -217,7 +217,7 @@ TEST(ObjectMapper, LateMasksOnSomeFramesSuffice) {
   EXPECT_GT(ExpectFound(world, MapWithSlowDetector(world, /*every=*/5, /*late=*/12)), 0.6);
 }
 
-TEST(ObjectMapper, MatchesAnObjectThatWasOutOfViewForLong) {
+TEST(ObjectMapper, MatchesAnObjectThatWasOutOfViewForALongTime) {
   SyntheticWorldOptions options;
   options.frames = 120;
   options.sweep_deg = 240;
@@ -225,7 +225,7 @@ TEST(ObjectMapper, MatchesAnObjectThatWasOutOfViewForLong) {
   const SyntheticWorld world(options);
   const Published published = MapWorld(world);
   EXPECT_GT(ExpectFound(world, published), 0.6);
-  EXPECT_EQ(published.lost, 0) << "out of view is not lost";
+  EXPECT_EQ(published.lost, 0) << "an object that is out of view is not lost";
 }
 
 TEST(ObjectMapper, DoesNotPublishShortFalseDetections) {
@@ -269,7 +269,7 @@ TEST(ObjectMapper, PublishesUnconfirmedObjectsAsProvisionalWithoutTraining) {
   EXPECT_EQ(published.objects.size(), 4u);
 }
 
-TEST(ObjectMapper, UpNeedNotBeZ) {
+TEST(ObjectMapper, TheUpDirectionMayDifferFromZ) {
   SyntheticWorldOptions options;
   options.up_world = {0.3, -0.9, 0.2};
   const SyntheticWorld world(options);

@@ -52,7 +52,7 @@ TEST_F(ObjectPublisherTest, AProvisionalObjectHasNoField) {
   EXPECT_THAT(output.views, IsEmpty());
 }
 
-TEST_F(ObjectPublisherTest, HoldsBackSmallChanges) {
+TEST_F(ObjectPublisherTest, DoesNotPublishSmallChanges) {
   Landmark& landmark = AddLandmark();
   Publish(landmark);
   landmark.geometry.cuboid->half_extents.x() += 0.001;

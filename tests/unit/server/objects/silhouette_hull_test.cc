@@ -69,7 +69,7 @@ Silhouette RandomSilhouette(std::mt19937& random) {
 
 enum class MaskHit { kUnknown /* outside the image or occluded */, kInside, kOutside };
 
-// What the mask of a silhouette shows at a point, in double precision.
+// The part of a mask to which a point projects, in double precision.
 MaskHit MaskAt(const Silhouette& silhouette, const Eigen::Vector3d& p_world) {
   const Eigen::Matrix<double, 3, 4>& P = silhouette.P_image_world;
   const int mask_index = silhouette.IndexAt(P.leftCols<3>() * p_world + P.col(3));

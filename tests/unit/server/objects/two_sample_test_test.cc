@@ -89,7 +89,7 @@ double RejectedShare(size_t count_a, size_t count_b, const Eigen::Vector3d& shif
   int rejected = 0;
   for (int i = 0; i < kPairs; ++i) {
     const Pair pair = Draw(random, count_a, count_b, {1, 0.5, 0.2}, {0.3, 0.6, 0.6}, shift);
-    rejected += !SamePlace(pair.a, pair.b, 0.05, tolerance_mu, 1e-3).value();
+    rejected += !MeansAgree(pair.a, pair.b, 0.05, tolerance_mu, 1e-3).value();
   }
   return static_cast<double>(rejected) / kPairs;
 }
@@ -112,14 +112,14 @@ TEST(HotellingTest, AllowsUnequalCovariances) {
   EXPECT_NEAR(rejected / 2000.0, 0.05, 0.017);
 }
 
-TEST(SamePlaceTest, DetectsOnlyShiftsBeyondTheTolerance) {
+TEST(MeansAgreeTest, DetectsOnlyShiftsBeyondTheTolerance) {
   const Eigen::Vector3d shift(0.3, 0.3, 0.1);
   EXPECT_GT(RejectedShare(40, 40, shift, 0), 0.8);
   EXPECT_LT(RejectedShare(40, 40, shift, shift.norm()), 0.055) << "the level holds for shifts up to the tolerance";
   EXPECT_GT(RejectedShare(40, 40, 4 * shift, shift.norm()), 0.9);
 }
 
-TEST(SamePlaceTest, ToleranceReducesTheDifferenceWhereItIsLeastSignificant) {
+TEST(MeansAgreeTest, ToleranceReducesTheDifferenceWhereItIsLeastSignificant) {
   const PointMoments a = PointMoments::Of(kA), b = PointMoments::Of(kB);
   double before = HotellingTest(a, b, 0.01)->statistic;
   const Eigen::Vector3d d = a.mean - b.mean;
@@ -134,27 +134,27 @@ TEST(SamePlaceTest, ToleranceReducesTheDifferenceWhereItIsLeastSignificant) {
   EXPECT_EQ(HotellingTest(a, b, 0.01, d.norm() + 1e-9)->p_value, 1);
 }
 
-TEST(SamePlaceTest, PointSigmaLimitsTheSignificanceAcrossAPlane) {
+TEST(MeansAgreeTest, PointSigmaLimitsTheSignificanceAcrossAPlane) {
   Points low, high;
   for (int i = 0; i < 20; ++i) {
     low.emplace_back(std::sin(i), std::cos(1.7 * i), 0.0);
     high.emplace_back(std::sin(i + 0.3), std::cos(1.7 * i + 0.2), 0.01);
   }
-  EXPECT_FALSE(SamePlace(low, high, 0.05, 0, 0).has_value()) << "singular";
+  EXPECT_FALSE(MeansAgree(low, high, 0.05, 0, 0).has_value()) << "singular";
   const auto test = HotellingTest(PointMoments::Of(low), PointMoments::Of(high), 0.03);
   ASSERT_TRUE(test);
   EXPECT_TRUE(test->regularized);
   EXPECT_GT(test->p_value, 0.05) << "0.01 apart, sigma 0.03";
-  EXPECT_FALSE(SamePlace(low, high, 0.05, 0, 0.002).value()) << "0.01 apart, sigma 0.002";
+  EXPECT_FALSE(MeansAgree(low, high, 0.05, 0, 0.002).value()) << "0.01 apart, sigma 0.002";
 }
 
-TEST(SamePlaceTest, ReturnsNothingForTooFewOrInvalidPoints) {
+TEST(MeansAgreeTest, ReturnsNothingForTooFewOrInvalidPoints) {
   const Points few(kA.begin(), kA.begin() + 4);
-  EXPECT_FALSE(SamePlace(few, kB, 0.05, 0, 0.01).has_value());
-  EXPECT_FALSE(SamePlace(kA, {}, 0.05, 0, 0.01).has_value());
+  EXPECT_FALSE(MeansAgree(few, kB, 0.05, 0, 0.01).has_value());
+  EXPECT_FALSE(MeansAgree(kA, {}, 0.05, 0, 0.01).has_value());
   Points broken = kA;
   broken[3].y() = std::nan("");
-  EXPECT_FALSE(SamePlace(broken, kB, 0.05, 0, 0.01).has_value());
+  EXPECT_FALSE(MeansAgree(broken, kB, 0.05, 0, 0.01).has_value());
 }
 
 }  // namespace

@@ -89,11 +89,11 @@ INSTANTIATE_TEST_SUITE_P(Turns, RotatedSquareTest, ::testing::Values(0.0, 0.15, 
 TEST(LineSegmentsTest, IgnoresSegmentsBesideTheMask) {
   TestImage image = DrawSquare({320, 240}, 40, 0.3);
   const std::vector<LineSegment> before = Find(image);
-  // Inside the crop, but outside of the mask and its rim.
+  // Inside the crop, but outside of the dilated mask.
   cv::line(image.image_bgr, {270, 285}, {300, 295}, cv::Scalar(255, 255, 255), 2);
   EXPECT_THAT(Find(image), SizeIs(before.size()));
   LineSegmentOptions wide;
-  wide.rim_px = 40;
+  wide.dilation_px = 40;
   EXPECT_GT(Find(image, wide).size(), before.size());
 }
 

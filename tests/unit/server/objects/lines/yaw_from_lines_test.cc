@@ -139,7 +139,7 @@ const Eigen::Vector3d kBox(0.15, 0.1, 0.06);
 
 class BoxYawTest : public ::testing::TestWithParam<double> {};
 
-TEST_P(BoxYawTest, IsFoundDespiteClutter) {
+TEST_P(BoxYawTest, IsRobustToClutter) {
   Scene scene;
   scene.AddRing(20, 0, 2 * kPi);
   scene.AddCuboid(GetParam(), kBox);
@@ -151,7 +151,7 @@ TEST_P(BoxYawTest, IsFoundDespiteClutter) {
   EXPECT_GT(yaw->confidence, 0.25);
 }
 
-TEST_P(BoxYawTest, IsFoundFromOneSide) {
+TEST_P(BoxYawTest, IsFoundFromViewsOfOneSide) {
   Scene scene;
   scene.AddRing(6, 0.3, 0.9);
   scene.AddCuboid(GetParam(), kBox);
