@@ -19,15 +19,15 @@ constexpr float kEnoughWeight = 2.0f;
 // A vertex is hidden if the depth buffer is this many cells in front of it, plus the depth range of its own surface
 // within two cells at the viewing angle, limited to a maximum slope.
 constexpr float kHiddenCells = 1.5f;
-constexpr float kMostSlope = 4.0f;
+constexpr float kMaxSlope = 4.0f;
 // At most this many views are used, because more views add little; their weights are scaled up.
-constexpr size_t kMostViews = 16;
+constexpr size_t kMaxViews = 16;
 // Size of a bin of the depth buffer, large enough that a surface that faces the view leaves no bin empty.
 constexpr float kBinCells = 2.0f;
 // Largest side of the depth buffer. A larger one would be needed only if the camera were inside the object.
-constexpr int kMostSide = 512;
+constexpr int kMaxSide = 512;
 // Larger pixel coordinates are outside any image, and conversions to int could overflow.
-constexpr float kMostPixel = 1e6f;
+constexpr float kMaxPixel = 1e6f;
 
 // Vertices projected at a time, few enough to stay in the L1 cache.
 constexpr Eigen::Index kBlock = 256;
@@ -58,7 +58,7 @@ struct FacingVertices {
   std::vector<uint32_t> vertex;
   std::vector<float> depth_mu, cosine, u_px, v_px;  // pixels of the full image
   float nearest_mu;
-  Eigen::Vector2f least_px, most_px;
+  Eigen::Vector2f min_px, max_px;
 
   explicit FacingVertices(size_t capacity)
       : vertex(capacity), depth_mu(capacity), cosine(capacity), u_px(capacity), v_px(capacity) {}
@@ -87,8 +87,8 @@ struct FacingVertices {
         cosine[count] = block_cosine[i];
         u_px[count] = u[i];
         v_px[count] = v[i];
-        count += static_cast<size_t>((block_cosine[i] > 0) & (depth[i] > 0) & (std::abs(u[i]) < kMostPixel) &
-                                     (std::abs(v[i]) < kMostPixel));
+        count += static_cast<size_t>((block_cosine[i] > 0) & (depth[i] > 0) & (std::abs(u[i]) < kMaxPixel) &
+                                     (std::abs(v[i]) < kMaxPixel));
       }
     }
     FindBounds();
@@ -101,8 +101,8 @@ struct FacingVertices {
     };
     if (count == 0) return;
     nearest_mu = of(depth_mu).minCoeff();
-    least_px = {of(u_px).minCoeff(), of(v_px).minCoeff()};
-    most_px = {of(u_px).maxCoeff(), of(v_px).maxCoeff()};
+    min_px = {of(u_px).minCoeff(), of(v_px).minCoeff()};
+    max_px = {of(u_px).maxCoeff(), of(v_px).maxCoeff()};
   }
 };
 
@@ -110,15 +110,15 @@ struct FacingVertices {
 class DepthBuffer {
  public:
   DepthBuffer(const FacingVertices& facing, float bin_px)
-      : least_px_(facing.least_px), per_px_(1.0f / bin_px), bin_(facing.count) {
-    const Eigen::Vector2f size = (facing.most_px - least_px_) * per_px_;
-    const int width = std::min(static_cast<int>(size.x()), kMostSide - 1) + 1;
-    const int height = std::min(static_cast<int>(size.y()), kMostSide - 1) + 1;
+      : min_px_(facing.min_px), per_px_(1.0f / bin_px), bin_(facing.count) {
+    const Eigen::Vector2f size = (facing.max_px - min_px_) * per_px_;
+    const int width = std::min(static_cast<int>(size.x()), kMaxSide - 1) + 1;
+    const int height = std::min(static_cast<int>(size.y()), kMaxSide - 1) + 1;
     nearest_mu_.assign(static_cast<size_t>(width) * static_cast<size_t>(height),
                        std::numeric_limits<float>::infinity());
     for (size_t i = 0; i < facing.count; ++i) {
-      const int x = std::min(static_cast<int>((facing.u_px[i] - least_px_.x()) * per_px_), width - 1);
-      const int y = std::min(static_cast<int>((facing.v_px[i] - least_px_.y()) * per_px_), height - 1);
+      const int x = std::min(static_cast<int>((facing.u_px[i] - min_px_.x()) * per_px_), width - 1);
+      const int y = std::min(static_cast<int>((facing.v_px[i] - min_px_.y()) * per_px_), height - 1);
       bin_[i] = static_cast<uint32_t>(y * width + x);
       float& nearest = nearest_mu_[bin_[i]];
       nearest = std::min(nearest, facing.depth_mu[i]);
@@ -129,7 +129,7 @@ class DepthBuffer {
   float NearestAt(size_t i) const { return nearest_mu_[bin_[i]]; }
 
  private:
-  Eigen::Vector2f least_px_;
+  Eigen::Vector2f min_px_;
   float per_px_;
   std::vector<uint32_t> bin_;  // of each facing vertex
   std::vector<float> nearest_mu_;
@@ -163,7 +163,7 @@ class Observation {
     if (behind_cells <= kHiddenCells) return false;
     const float cosine = facing_.cosine[i];
     const float slope = std::sqrt(std::max(1.0f - cosine * cosine, 0.0f)) / cosine;
-    return behind_cells > kHiddenCells + 2.0f * std::min(slope, kMostSlope);
+    return behind_cells > kHiddenCells + 2.0f * std::min(slope, kMaxSlope);
   }
 
   const VertexArrays arrays_;
@@ -178,16 +178,17 @@ void SetConfidence(std::span<const TrainingCamera> views, const Eigen::Vector3f&
                    Mesh& mesh) {
   mesh.confidence.assign(mesh.vertices.size(), 0.0f);
   Observation observation(mesh, box_half_extents, cell_mu);
-  const size_t used = std::min(views.size(), kMostViews);
+  const size_t used = std::min(views.size(), kMaxViews);
   if (used == 0) return;
   for (size_t i = 0; i < used; ++i) observation.Add(views[i * views.size() / used], mesh.confidence);
   const float per_weight = static_cast<float>(views.size()) / static_cast<float>(used) / kEnoughWeight;
   for (float& confidence : mesh.confidence) confidence = 1.0f - std::exp(-confidence * per_weight);
 }
 
-void TrimUnseen(float least, Mesh& mesh) {
+void TrimUnseen(float min_confidence, Mesh& mesh) {
   std::erase_if(mesh.triangles, [&](const std::array<uint32_t, 3>& triangle) {
-    return std::all_of(triangle.begin(), triangle.end(), [&](uint32_t v) { return mesh.confidence[v] < least; });
+    return std::all_of(triangle.begin(), triangle.end(),
+                       [&](uint32_t v) { return mesh.confidence[v] < min_confidence; });
   });
   std::vector<uint8_t> used(mesh.vertices.size(), 0);
   for (const auto& triangle : mesh.triangles) {

@@ -24,8 +24,8 @@ namespace romap::mesh {
 void SetConfidence(std::span<const TrainingCamera> views, const Eigen::Vector3f& box_half_extents, float cell_mu,
                    Mesh& mesh);
 
-// Removes the triangles all of whose vertices have a confidence below `least`, and vertices without triangles. The
-// result may be open or empty. mesh.confidence must be set.
-void TrimUnseen(float least, Mesh& mesh);
+// Removes the triangles all of whose vertices have a confidence below `min_confidence`, and vertices without triangles.
+// The result may be open or empty. mesh.confidence must be set.
+void TrimUnseen(float min_confidence, Mesh& mesh);
 
 }  // namespace romap::mesh

@@ -24,7 +24,7 @@
 namespace romap::mesh {
 namespace {
 
-constexpr float kMaxOpticalDepth = 0.2f;  // towards a view; a point with a larger one is invisible
+constexpr float kMaxOpticalDepth = 0.2f;  // toward a view; a point with a larger one is invisible
 
 absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   const std::string object = snapshot.object.ToString();
@@ -35,12 +35,12 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
                            box.z());
   }
   if (!std::isfinite(snapshot.surface_level) || !std::isfinite(snapshot.connect_level)) {
-    return InvalidArgument("{}: surface level {} and connect level {} must be finite", object, snapshot.surface_level,
+    return InvalidArgument("{}: surface_level {} and connect_level {} must be finite", object, snapshot.surface_level,
                            snapshot.connect_level);
   }
   const auto& [density, per_efold] = snapshot.optics;
   if (!std::isfinite(density) || !std::isfinite(per_efold) || !(density > 0) || !(per_efold > 0)) {
-    return InvalidArgument("{}: surface density {} and raw per e-fold {} must be finite and positive", object, density,
+    return InvalidArgument("{}: surface density {} and raw_per_efold {} must be finite and positive", object, density,
                            per_efold);
   }
   const size_t side = std::max(snapshot.hull.resolution, 0);
@@ -51,7 +51,7 @@ absl::Status Validate(const FieldSnapshot& snapshot, const MeshConfig& config) {
   return absl::OkStatus();
 }
 
-// Adds the thread's CPU time since the last call to one phase after the other.
+// Measures the CPU time of the thread in consecutive phases.
 class PhaseClock {
  public:
   explicit PhaseClock(MeshStats& stats) : stats_(stats), last_s_(ThreadCpuSeconds()) {}

@@ -22,7 +22,7 @@ struct MeshStats {
 };
 
 // The surface of a trained field: a closed, colored mesh with unit normals and confidence in the Object frame (map
-// units), oriented outwards. Where the field extends beyond its box, the surface is closed at the box. With
+// units), oriented outward. Where the field extends beyond its box, the surface is closed at the box. With
 // config.trim_unseen the parts of the surface that no view observed are removed, so the mesh is open there.
 //
 // Steps: sample the field on a grid, fill cavities and invisible space, cut below the visible base, remove floaters,

@@ -15,7 +15,7 @@ struct Run {
   uint32_t size;    // nodes inside the surface; for the root those of the whole component
 };
 
-// The connected components of matter: runs that touch over faces, edges or corners of cells, joined row by row
+// The connected components of solid nodes: runs that touch over faces, edges or corners of cells, joined row by row
 // (Rosenfeld and Pfaltz, 1966).
 class Components {
  public:
@@ -99,12 +99,12 @@ class Components {
 
 size_t RemoveFloaters(FieldGrid& grid, float connect_value, double min_share) {
   Components components(grid, connect_value);
-  const double least = min_share * static_cast<double>(components.Largest());
+  const double min_size = min_share * static_cast<double>(components.Largest());
   size_t remaining = 0;
   components.ForEachRun([&](size_t first, size_t nodes, size_t component_size) {
     for (size_t node = first; node < first + nodes; ++node) {
       if (!(grid.value[node] > 0)) continue;
-      if (static_cast<double>(component_size) < least) {
+      if (static_cast<double>(component_size) < min_size) {
         grid.Edit(node, kEmpty);
       } else {
         ++remaining;

@@ -10,8 +10,8 @@
 namespace romap::mesh {
 namespace {
 
-// This quantile of the views by resolution counts as well resolved: the few sharpest views see only parts of the
-// object, and the farthest add no detail.
+// Quantile of the views by resolution that counts as well resolved: the few sharpest views show only parts of the
+// object, and the farthest ones add no detail.
 constexpr double kGoodViewShare = 0.75;
 
 // Length in pixels of the longest side of the box in a well-resolved view, as if parallel to the image; 0 without
@@ -33,15 +33,15 @@ Eigen::Vector3i ChooseNodes(const FieldSnapshot& snapshot, const MeshConfig& con
   double longest = config.resolution;
   if (config.adapt_resolution) {
     const double side_px = LongestSide_px(snapshot);
-    const double most = snapshot.converged ? 2.0 * longest : longest;
-    if (side_px > 0) longest = std::clamp(side_px / config.pixels_per_node, 0.5 * longest, most);
+    const double limit = snapshot.converged ? 2.0 * longest : longest;
+    if (side_px > 0) longest = std::clamp(side_px / config.pixels_per_node, 0.5 * longest, limit);
   }
-  const int most = std::max(2, static_cast<int>(std::lround(longest)));
-  const int least = std::clamp(config.min_side_nodes, 2, most);
+  const int max_nodes = std::max(2, static_cast<int>(std::lround(longest)));
+  const int min_nodes = std::clamp(config.min_side_nodes, 2, max_nodes);
   const Eigen::Vector3d share = (snapshot.box_half_extents / snapshot.box_half_extents.maxCoeff()).cast<double>();
   Eigen::Vector3i nodes;
   for (int axis = 0; axis < 3; ++axis) {
-    nodes[axis] = std::clamp(1 + static_cast<int>(std::lround(share[axis] * (most - 1))), least, most);
+    nodes[axis] = std::clamp(1 + static_cast<int>(std::lround(share[axis] * (max_nodes - 1))), min_nodes, max_nodes);
   }
   return nodes;
 }

@@ -13,7 +13,7 @@
 namespace romap::mesh {
 namespace {
 
-// Smaller values only mean "empty"; their size does not indicate the distance to the surface.
+// Smaller values mean only that the node is empty; they do not indicate the distance to the surface.
 constexpr float kClampBelow = -6.0f;
 
 constexpr int kGroup = 8;  // nodes processed together: one word with one byte per node

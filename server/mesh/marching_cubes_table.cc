@@ -8,7 +8,7 @@
 namespace romap::mesh {
 namespace {
 
-// The corners of the six faces, counter-clockwise seen from outside the cell.
+// The corners of the six faces, counter-clockwise viewed from outside the cell.
 constexpr int kFaceCorners[6][4] = {
     {0, 4, 6, 2}, {1, 3, 7, 5},  // x = 0, x = 1
     {0, 1, 5, 4}, {2, 6, 7, 3},  // y = 0, y = 1
@@ -28,7 +28,7 @@ int EdgeBetween(int corner_a, int corner_b) {
 
 bool Inside(int pattern, int corner) { return (pattern >> corner & 1) != 0; }
 
-// next[e] = the cell edge that follows e on the surface's border, walked counter-clockwise seen from outside the
+// next[e] = the cell edge that follows e on the surface's border, walked counter-clockwise viewed from outside the
 // surface; kNone for edges that the surface does not cross.
 std::array<int, kCellEdges> LinkEdges(int pattern) {
   std::array<int, kCellEdges> next;

@@ -27,17 +27,17 @@ inline constexpr int EdgeCorner(int edge) {
 }
 
 // Enough for every pattern: a single loop crosses at most seven cell edges.
-inline constexpr size_t kMostCellTriangles = 5;
+inline constexpr size_t kMaxCellTriangles = 5;
 
-// The triangles of one cell, each given by three cell edges, counter-clockwise seen from outside. Fixed size, so that
+// The triangles of one cell, each given by three cell edges, counter-clockwise viewed from outside. Fixed size, so that
 // the whole table is one block of 4 KB.
 class CellTriangles {
  public:
   using Triangle = std::array<uint8_t, 3>;
 
-  // At most kMostCellTriangles.
+  // At most kMaxCellTriangles.
   void Add(const Triangle& triangle) {
-    assert(count_ < kMostCellTriangles);
+    assert(count_ < kMaxCellTriangles);
     triangles_[count_++] = triangle;
   }
   size_t size() const { return count_; }
@@ -47,7 +47,7 @@ class CellTriangles {
 
  private:
   uint8_t count_ = 0;
-  std::array<Triangle, kMostCellTriangles> triangles_;
+  std::array<Triangle, kMaxCellTriangles> triangles_;
 };
 
 // Triangles of a cell for each of the 256 patterns of inside corners (bit c = corner c is inside).

@@ -34,13 +34,13 @@ struct MeshConfig {
                 .help = "Number of grid nodes along the longest side of the object's box"});
     fields.Add("adapt_resolution", &adapt_resolution,
                {.audience = Audience::kOperator,
-                .help = "Scale the resolution with the size of the object in its views, by 0.5 to 1 during training "
-                        "and by 0.5 to 2 when it is completed"});
+                .help = "Scale the resolution with the size of the object in its views, by a factor of 0.5 to 1 during "
+                        "training and of 0.5 to 2 after it"});
     fields.Add("pixels_per_node", &pixels_per_node,
                {.unit = "px",
                 .min = 0.5,
                 .max = 50,
-                .help = "Spacing of the grid nodes in a good view, with adapt_resolution"});
+                .help = "Spacing of the grid nodes in a well-resolved view, if adapt_resolution is on"});
     fields.Add("min_side_nodes", &min_side_nodes,
                {.unit = "nodes",
                 .min = 2,
@@ -50,13 +50,14 @@ struct MeshConfig {
 
   void SurfaceFields(ConfigFields& fields) {
     fields.Add("fill_unseen", &fill_unseen,
-               {.help = "Make empty space solid if it is invisible in all training views (undersides, insides)"});
+               {.help = "Make empty space solid if it is invisible in all training views (undersides, interiors)"});
     fields.Add("cut_below_support", &cut_below_support,
-               {.help = "End the object at the lowest height where a training view sees its surface"});
-    fields.Add("min_component_share", &min_component_share,
-               {.min = 0,
-                .max = 1,
-                .help = "Minimum size of a separate piece, as a share of the largest one; smaller ones are removed"});
+               {.help = "Remove everything below the lowest height at which a training view observes the surface"});
+    fields.Add(
+        "min_component_share", &min_component_share,
+        {.min = 0,
+         .max = 1,
+         .help = "Minimum size of a separate component, as a share of the largest one; smaller ones are removed"});
     fields.Add("trim_unseen", &trim_unseen,
                {.help = "Remove surface that is invisible in all training views; the mesh is then open"});
     fields.Add("trim_confidence", &trim_confidence,

@@ -17,8 +17,8 @@ namespace {
 constexpr size_t kBatchPoints = 8192;
 // A node with a smaller value (e^-6 of the surface's density) is not near the surface.
 constexpr float kClearlyEmpty = -6.0f;
-// Nodes outside the hull or the box enter a mean as this value: empty, but finite.
-constexpr float kLeastForMean = -16.0f;
+// Nodes outside the hull or the box contribute this value to a mean: empty, but finite.
+constexpr float kMinForMean = -16.0f;
 
 // kDecided: outside the hull or in the ring.
 enum State : uint8_t { kDecided, kUnknown, kInterpolated, kSampled };
@@ -44,7 +44,7 @@ class FieldSampling {
   SampledField Run() && {
     Sample(LatticeNodes());
     InterpolateBetweenLattice();
-    FollowSpace();
+    SampleReachableSpace();
     FillUnreachedSpace();
     return {std::move(grid_), samples_};
   }
@@ -97,19 +97,19 @@ class FieldSampling {
     }};
     ForEachUnknown([&](int x, int y, int z, size_t node) {
       const int axis = (y & 1) == (z & 1) ? 0 : (x & 1) == (z & 1) ? 1 : 2;
-      float most = kBeyondBox, sum = 0;
+      float largest = kBeyondBox, sum = 0;
       for (const ptrdiff_t step : neighbors[axis]) {
-        most = std::max(most, grid_.value[node + step]);
-        sum += std::max(grid_.value[node + step], kLeastForMean);
+        largest = std::max(largest, grid_.value[node + step]);
+        sum += std::max(grid_.value[node + step], kMinForMean);
       }
-      if (most >= kClearlyEmpty) return;
+      if (largest >= kClearlyEmpty) return;
       grid_.value[node] = sum / 6.0f;
       state_[node] = kInterpolated;
     });
   }
 
-  // Samples all nodes that can be reached from outside the hull through empty space, and the matter that bounds it.
-  void FollowSpace() {
+  // Samples all nodes that can be reached from outside the hull through empty space, and the solid nodes that bound it.
+  void SampleReachableSpace() {
     std::vector<size_t> wave = HullBorder();
     while (!wave.empty()) {
       std::vector<size_t> unknown;
@@ -122,10 +122,10 @@ class FieldSampling {
           const size_t neighbor = node + step;
           if (state_[neighbor] == kDecided) continue;
           // An interpolated value next to a node that is not clearly empty may be wrong.
-          const bool doubtful = state_[neighbor] == kInterpolated && grid_.value[node] > kClearlyEmpty;
-          if (doubtful) state_[neighbor] = kUnknown;
+          const bool uncertain = state_[neighbor] == kInterpolated && grid_.value[node] > kClearlyEmpty;
+          if (uncertain) state_[neighbor] = kUnknown;
           const bool enter = reached_[neighbor] == 0 && !(grid_.value[node] > 0);
-          if (!doubtful && !enter) continue;
+          if (!uncertain && !enter) continue;
           reached_[neighbor] = 1;
           next.push_back(neighbor);
         }

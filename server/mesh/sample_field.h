@@ -20,10 +20,10 @@ struct SampledField {
 //
 // The field is evaluated only near the surface. The first nodes to be evaluated form a body-centered lattice: the nodes
 // whose three coordinates are all even or all odd, a quarter of all, at most 1.12 cells from any point. A node between
-// six lattice nodes that are all clearly empty is assigned their mean. Then a flood fill follows empty space inwards
-// from the hull and evaluates each node that it reaches and the nodes that bound it. A node next to matter or to nearly
-// solid space is never interpolated. Parts thinner than the lattice spacing are therefore detected by the density
-// around them and followed to their ends.
+// six lattice nodes that are all clearly empty is assigned their mean. Then a flood fill through empty space starts at
+// the border of the hull and evaluates each node that it reaches and the nodes that bound it. A node next to solid or
+// nearly solid nodes is never interpolated. Parts thinner than the lattice spacing are therefore detected by the
+// density around them and followed to their ends.
 SampledField SampleField(const FieldSnapshot& snapshot, const SurfaceProbe& probe, const Eigen::Vector3i& box_nodes);
 
 }  // namespace romap::mesh

@@ -9,7 +9,7 @@ namespace romap::mesh {
 namespace {
 
 // Larger than any trained value; keeps differences of values finite.
-constexpr float kMost = 1e4f;
+constexpr float kMaxValue = 1e4f;
 
 }  // namespace
 
@@ -17,14 +17,14 @@ SurfaceProbe::SurfaceProbe(const FieldSnapshot& snapshot)
     : field_(*snapshot.field),
       level_(snapshot.surface_level),
       per_raw_(1.0f / snapshot.optics.raw_per_efold),
-      connect_value_(std::clamp((snapshot.connect_level - level_) * per_raw_, -kMost, 0.0f)) {}
+      connect_value_(std::clamp((snapshot.connect_level - level_) * per_raw_, -kMaxValue, 0.0f)) {}
 
 void SurfaceProbe::Sample(std::span<const Eigen::Vector3f> points, std::span<float> values,
                           std::span<Rgb8> colors) const {
   field_.Sample(points, values, colors);
   for (float& value : values) {
     const float above = (value - level_) * per_raw_;
-    value = std::isnan(above) ? kEmpty : std::clamp(above, kEmpty, kMost);
+    value = std::isnan(above) ? kEmpty : std::clamp(above, kEmpty, kMaxValue);
   }
 }
 

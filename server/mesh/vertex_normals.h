@@ -4,7 +4,7 @@
 
 namespace romap::mesh {
 
-// Sets unit normals of a mesh whose triangles are counter-clockwise seen from outside: the mean of the adjacent
+// Sets unit normals of a mesh whose triangles are counter-clockwise viewed from outside: the mean of the adjacent
 // triangles' normals, weighted by area, then smoothed twice over the adjacent triangles.
 //
 // The normals come from the surface and not from the gradient of the field, because a trained field is noisier than its

@@ -11,7 +11,7 @@ constexpr float kTransparent = -12.0f;
 // Points are shifted by half a node, so that truncation rounds to the nearest node.
 constexpr float kToNearest = 0.5f;
 // More steps than any line through a grid has.
-constexpr float kMostSteps = 1e6f;
+constexpr float kMaxSteps = 1e6f;
 
 }  // namespace
 
@@ -99,7 +99,7 @@ int VisibilityTester::StepsWithinGrid(const Eigen::Vector3f& point, const Eigen:
     steps = std::min(steps, (end - point[axis]) / step[axis]);
   }
   // 0 for a view that is so far away that the step underflows.
-  return steps > 0 && steps < kMostSteps ? static_cast<int>(steps) : 0;
+  return steps > 0 && steps < kMaxSteps ? static_cast<int>(steps) : 0;
 }
 
 size_t VisibilityTester::NearestNode(const Eigen::Vector3f& shifted) const {

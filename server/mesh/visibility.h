@@ -18,7 +18,7 @@ struct VisibilityLimits {
 // Tests whether nodes or surface points of the grid are visible from the training views: whether the optical depth
 // along the straight line to some view is within the limit. Nodes above the surface's value are opaque. Rays are
 // sampled at steps of the smallest node spacing, each at the nearest node. The tester copies the values, so that the
-// grid may be edited afterwards.
+// grid may be edited later.
 class VisibilityTester {
  public:
   VisibilityTester(const FieldGrid& grid, const VisibilityLimits& limits);

@@ -12,8 +12,8 @@
 namespace romap::mesh {
 namespace {
 
-// A surface observed at a flatter angle counts as invisible, because the walls of unobserved matter are parallel to the
-// flattest rays.
+// A surface observed at a flatter angle counts as invisible, because the walls around unobserved space are parallel to
+// the flattest rays.
 constexpr float kMinCosine = 0.2f;
 // Share of the visible area that may lie below the base because of noise at the border of the hull.
 constexpr double kShareBelow = 0.02;
@@ -87,10 +87,10 @@ void CutBelow(FieldGrid& grid, float height) {
   const float cut = (height - grid.origin.z()) / grid.spacing.z();  // in node coordinates
   const Eigen::Vector3i last = grid.nodes.array() - 2;
   for (int z = 1; z <= last.z(); ++z) {
-    const float most = std::max(kCutSlope * (static_cast<float>(z) - cut), kEmpty);
+    const float max_value = std::max(kCutSlope * (static_cast<float>(z) - cut), kEmpty);
     for (int y = 1; y <= last.y(); ++y) {
       for (size_t node = grid.Index(1, y, z), end = node + static_cast<size_t>(last.x()); node < end; ++node) {
-        if (grid.value[node] > most) grid.Edit(node, most);
+        if (grid.value[node] > max_value) grid.Edit(node, max_value);
       }
     }
   }

@@ -18,7 +18,7 @@ namespace romap::mesh {
 // `visibility` may have been made before hidden space was filled, because invisible nodes do not hide visible ones.
 std::optional<float> FindVisibleBase(const FieldGrid& grid, VisibilityTester& visibility);
 
-// Ends all matter below `height` in a flat face at that height.
+// Empties all nodes below `height`, so that the surface is closed by a flat face at that height.
 void CutBelow(FieldGrid& grid, float height);
 
 }  // namespace romap::mesh

@@ -35,7 +35,7 @@ TEST(ExtractMesh, SphereIsAccurateToAFractionOfAVoxel) {
   EXPECT_LT(LargestDistance(mesh, sphere), 0.0012);  // a voxel is 0.032
 }
 
-TEST(ExtractMesh, NormalsAreUnitLengthAndPointOutwards) {
+TEST(ExtractMesh, NormalsHaveUnitLengthAndPointOutward) {
   const Mesh mesh = Extract(SnapshotOf(Sphere(0.6f)));
   ASSERT_EQ(mesh.normals.size(), mesh.vertices.size());
   double worst_cosine = 1;
@@ -85,13 +85,13 @@ TEST(ExtractMesh, ScalingTheMapScalesTheMesh) {
   }
 }
 
-TEST(ExtractMesh, ObjectsThatLeaveTheBoxAreClosedAtTheBox) {
+TEST(ExtractMesh, ObjectsThatExtendBeyondTheBoxAreClosedAtTheBox) {
   const Mesh mesh = Extract(SnapshotOf([](const Eigen::Vector3f& p) { return 0.2f - p.z(); }));
   EXPECT_TRUE(CheckTopology(mesh).IsClosedManifold());
   EXPECT_NEAR(Volume(mesh), 4 * 1.2, 0.02 * 4.8);
 }
 
-TEST(ExtractMesh, MatterOutsideTheHullIsRemoved) {
+TEST(ExtractMesh, SolidNodesOutsideTheHullAreRemoved) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.8f));
   snapshot.hull.resolution = 8;
   for (int cell = 0; cell < 512; ++cell) snapshot.hull.bits.push_back(cell % 8 < 4);  // x < 0 only
@@ -146,7 +146,7 @@ TEST(ExtractMesh, CavitiesAreFilled) {
   EXPECT_NEAR(Volume(mesh), 4.0 / 3.0 * kPi * 0.343, 0.01);
 }
 
-// An upside-down bowl: its inside opens downwards, and all cameras look from above.
+// An upside-down bowl: its cavity opens downward, and all cameras look from above.
 TEST(ExtractMesh, InvisibleSpaceIsFilled) {
   const InsideDistance bowl = [](const Eigen::Vector3f& p) {
     return std::min(0.1f - std::abs(p.norm() - 0.6f), p.z() + 0.05f);
@@ -172,7 +172,7 @@ TEST(ExtractMesh, InvisibleSpaceIsFilled) {
 }
 
 // A box on a table, seen from above from all sides, so that the masks do not show its lower end.
-TEST(ExtractMesh, EndsBelowWhereTheVisibleSurfaceEnds) {
+TEST(ExtractMesh, EndsAtTheLowestVisibleHeight) {
   const InsideDistance column = [](const Eigen::Vector3f& p) {  // the lower end is at z = -0.6
     return std::min({0.5f - p.head<2>().cwiseAbs().maxCoeff(), 0.5f - p.z(), p.z() + 0.6f});
   };
@@ -238,7 +238,7 @@ TEST(ExtractMesh, NanCountsAsEmpty) {
   for (const Eigen::Vector3f& p : mesh.vertices) ASSERT_TRUE(p.allFinite());
 }
 
-TEST(ExtractMesh, EmptyFieldsFailNamingTheObject) {
+TEST(ExtractMesh, ErrorsOfEmptyFieldsNameTheObject) {
   const InsideDistance nowhere = [](const Eigen::Vector3f&) { return -1.0f; };
   const InsideDistance nan = [](const Eigen::Vector3f&) { return std::numeric_limits<float>::quiet_NaN(); };
   for (const InsideDistance& field : {nowhere, nan}) {
@@ -248,7 +248,7 @@ TEST(ExtractMesh, EmptyFieldsFailNamingTheObject) {
   }
 }
 
-TEST(ExtractMesh, InvalidSnapshotsAreRejectedNamingTheObject) {
+TEST(ExtractMesh, ErrorsOfInvalidSnapshotsNameTheObject) {
   const auto error = [](const FieldSnapshot& snapshot) {
     const absl::Status status = ExtractMesh(snapshot, {}).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
@@ -265,7 +265,7 @@ TEST(ExtractMesh, InvalidSnapshotsAreRejectedNamingTheObject) {
   EXPECT_THAT(error(snapshot), HasSubstr("hull has 0 cells, must have 4^3"));
   snapshot = SnapshotOf(Sphere(0.5f));
   snapshot.surface_level = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(error(snapshot), HasSubstr("surface level nan"));
+  EXPECT_THAT(error(snapshot), HasSubstr("surface_level nan"));
 }
 
 TEST(MeshConfig, FieldsCanBeSet) {

@@ -45,7 +45,7 @@ class DistanceField : public FieldSampler {
 
 inline constexpr float kTestLevel = 3.0f;
 
-// A view of 400 x 400 px from `center` (Object frame) towards the origin, all pixels of which show the object.
+// A view of 400 x 400 px from `center` (Object frame) toward the origin, all pixels of which show the object.
 inline TrainingCamera ViewFrom(const Eigen::Vector3d& center) {
   TrainingCamera view;
   const Eigen::Quaterniond turn = ShortestRotation(-center, Eigen::Vector3d::UnitZ());

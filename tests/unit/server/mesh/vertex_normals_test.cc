@@ -34,7 +34,7 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-TEST(VertexNormals, PointOutwardsOnABall) {
+TEST(VertexNormals, PointOutwardOnABall) {
   Mesh ball = MakeBall({40, 30, 20});
   SetVertexNormals(ball);
   ASSERT_EQ(ball.normals.size(), ball.vertices.size());
