@@ -9,7 +9,7 @@
 namespace romap::nerf {
 namespace {
 
-// Limits of a transfer to another box. Beyond them, training from scratch costs no more.
+// Limits of a transfer to another box. Beyond them, a transfer is no cheaper than training from scratch.
 constexpr double kMaxUnknownShare = 0.8;  // of the new box, outside the old one
 constexpr double kMinFeatureScale = 0.25;
 constexpr double kMaxGrowth = 2.5;  // of the longest side since the hash grid was laid out
@@ -34,7 +34,7 @@ BoxedField::Fit BoxedField::FitTo(const Cuboid& cuboid) {
   return fit;
 }
 
-// Returns kRestarted, without any change, if the boxes have too little in common.
+// Returns kRestarted, without any change, if the boxes overlap too little.
 BoxedField::Fit BoxedField::TransferTo(const TrainingBox& box) {
   const double unknown_share = 1 - box_.ShareCovered(box);
   const double growth = box.LongestSide_mu() / box.unit_mu;

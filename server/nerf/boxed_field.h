@@ -5,8 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/nerf/cpu/ray_renderer.h"
+#include "server/nerf/model/field_model.h"
 #include "server/nerf/model/occupancy.h"
+#include "server/nerf/model/render_space.h"
 #include "server/nerf/model/step_source.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/train_stats.h"
@@ -15,7 +16,7 @@
 
 namespace romap::nerf {
 
-// The field itself: its training box, model, optimizer and occupancy grid. Nothing can be trained before the first box.
+// The field of one object with its training box, model, optimizer and occupancy grid. Training requires a box.
 class BoxedField {
  public:
   // The result of FitTo().
@@ -29,7 +30,7 @@ class BoxedField {
   BoxedField(const NerfConfig& config, uint64_t seed);
 
   // Makes the box fit the cuboid. If the cuboid still fits the box, nothing changes. Otherwise the learned field is
-  // transferred to a new box, or restarted if the two boxes have little in common. SetHull() must follow a change.
+  // transferred to a new box, or restarted if the two boxes overlap too little. SetHull() must follow a change.
   Fit FitTo(const Cuboid& cuboid);
 
   // Discards everything learned. The box and its hull stay.

@@ -79,7 +79,7 @@ Verdict Compare(const DepthView& other, const Eigen::Vector3d& p_world, double s
   return other.background.at<uint8_t>(at) != 0 || in_free_space ? Verdict::kContradicts : Verdict::kAgrees;
 }
 
-// True if any view other than `own` contradicts the point, or none of them sees it.
+// True if any view other than `own` contradicts the point, or if it is visible in none of them.
 bool IsMisplaced(const std::vector<DepthView>& views, size_t own, const Eigen::Vector3d& p_world, double scale) {
   bool agrees = false;
   for (size_t i = 0; i < views.size(); ++i) {

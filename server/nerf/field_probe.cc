@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/nerf/cpu/ray_renderer.h"
 #include "server/nerf/math/ray.h"
 
 namespace romap::nerf {
@@ -34,22 +35,22 @@ void FieldProbe::Build(const RaySet& rays, size_t views) {
   };
   for (size_t view = 0; view < views; ++view) {
     for (int tile = 0; tile < PixelSampler::kTiles; ++tile) {
-      const size_t most = tile == PixelSampler::kBorderTile ? kBorderProbes : kProbesPerTile;
-      add(rays.sampler().TilePixels(view, tile, most), view, /*is_object=*/true);
+      const size_t count = tile == PixelSampler::kBorderTile ? kBorderProbes : kProbesPerTile;
+      add(rays.sampler().TilePixels(view, tile, count), view, /*is_object=*/true);
     }
     add(rays.sampler().BackgroundPixels(view, kBackgroundProbes), view, /*is_object=*/false);
   }
 }
 
-double FieldProbe::ShareMeetingBox(const std::array<float, 3>& extent) const {
-  int object_rays = 0, meeting_rays = 0;
+double FieldProbe::ShareIntersectingBox(const std::array<float, 3>& extent) const {
+  int object_rays = 0, intersecting_rays = 0;
   for (const Ray& ray : rays_) {
     float entry = 0, exit = 0;
     if (!ray.target.is_object) continue;
     ++object_rays;
-    meeting_rays += plain::IntersectBox(ray.origin, ray.direction, extent.data(), entry, exit) ? 1 : 0;
+    intersecting_rays += plain::IntersectBox(ray.origin, ray.direction, extent.data(), entry, exit) ? 1 : 0;
   }
-  return object_rays > 0 ? static_cast<double>(meeting_rays) / object_rays : 1;
+  return object_rays > 0 ? static_cast<double>(intersecting_rays) / object_rays : 1;
 }
 
 ProbeReport FieldProbe::Measure(const FieldModel& model, const NerfConfig& config, const RenderSpace& space) const {

@@ -4,7 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "server/nerf/cpu/ray_renderer.h"
+#include "server/nerf/model/field_model.h"
+#include "server/nerf/model/render_space.h"
+#include "server/nerf/nerf_config.h"
 #include "server/nerf/ray_set.h"
 
 namespace romap::nerf {
@@ -32,8 +34,8 @@ class FieldProbe {
   // Chooses the pixels. Call it whenever `rays`, of `views` views, was rebuilt or its cameras moved. Keeps no reference
   // to `rays`.
   void Build(const RaySet& rays, size_t views);
-  // The share of the rays through object pixels that meet the box [0, extent] of Unit space, 0..1. 1 without rays.
-  double ShareMeetingBox(const std::array<float, 3>& extent) const;
+  // The share of the rays through object pixels that intersect the box [0, extent] of Unit space, 0..1. 1 without rays.
+  double ShareIntersectingBox(const std::array<float, 3>& extent) const;
   ProbeReport Measure(const FieldModel& model, const NerfConfig& config, const RenderSpace& space) const;
 
  private:

@@ -7,7 +7,7 @@
 namespace romap::nerf {
 namespace {
 
-constexpr double kMinShareMeetingBox = 0.5;
+constexpr double kMinShareIntersectingBox = 0.5;
 
 }  // namespace
 
@@ -23,16 +23,16 @@ std::string FieldWarnings::Text(int divergences, const std::vector<KeyframeId>& 
   if (divergences > 0) {
     warnings.push_back(fmt::format("training diverged {} times; paused until new data arrives", divergences));
   }
-  if (invalid_correction_) warnings.push_back("ignored a map correction that is not finite");
+  if (invalid_correction_) warnings.push_back("a map correction with values that are not finite was ignored");
   if (!box_error_.empty()) warnings.push_back(box_error_);
   if (rejected_views_ > 0) {
-    warnings.push_back(fmt::format("{} views rejected, the last one: {}", rejected_views_, view_error_));
+    warnings.push_back(fmt::format("{} views rejected; last error: {}", rejected_views_, view_error_));
   }
   if (checks_.black_views > 0) {
     warnings.push_back(fmt::format("the object is black in {} of {} views", checks_.black_views, checks_.views));
   }
-  if (!checks_.depth_consistent) warnings.push_back("depth images contradict the masks and are ignored");
-  if (checks_.share_meeting_box < kMinShareMeetingBox) {
+  if (!checks_.depth_consistent) warnings.push_back("depth images ignored because they contradict the masks");
+  if (checks_.share_intersecting_box < kMinShareIntersectingBox) {
     warnings.push_back("most rays through the masks miss the object's box");
   }
   if (!untrusted.empty()) {

@@ -9,15 +9,15 @@
 
 namespace romap::nerf {
 
-// Collects what is wrong with the input of one object, and describes it for people.
+// Collects problems with the input of one object and describes them in a human-readable text.
 class FieldWarnings {
  public:
   // The result of checks on all views of the object.
   struct ViewChecks {
     int views = 0;
-    int black_views = 0;           // those whose object pixels are black
-    bool depth_consistent = true;  // dense depth agrees with the masks, or there is none
-    double share_meeting_box = 1;  // of the rays through the masks
+    int black_views = 0;                // those whose object pixels are black
+    bool depth_consistent = true;       // dense depth agrees with the masks, or there is none
+    double share_intersecting_box = 1;  // share of the rays through the masks that intersect the box
   };
 
   // The result of setting the last box. An OK status clears the warning.
@@ -26,8 +26,8 @@ class FieldWarnings {
   void OnInvalidCorrection() { invalid_correction_ = true; }
   void OnViewChecks(const ViewChecks& checks) { checks_ = checks; }
 
-  // All warnings, separated by "; ". Empty if there are none. `divergences`: how often training diverged before it was
-  // paused, 0 if it is not paused. `untrusted`: the views that are excluded from training.
+  // All warnings, separated by "; ". Empty if there are none. `divergences`: number of times that training diverged
+  // before it was paused; 0 if it is not paused. `untrusted`: the views that are excluded from training.
   std::string Text(int divergences, const std::vector<KeyframeId>& untrusted) const;
 
  private:

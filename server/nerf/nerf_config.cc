@@ -11,9 +11,8 @@ void FieldFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("preset", &c.preset,
              {.choices = NerfPresetNames(),
               .audience = Audience::kOperator,
-              .help = "Base values of the nerf settings: the fast recipe, or the paper's; settings in the same file "
-                      "and later --set "
-                      "override them",
+              .help = "Base values of the nerf settings: fast, or as in the paper; settings in the same file and later "
+                      "--set options override them",
               .on_set = [&c](const std::string& name) { c = *NerfPreset(name); }});
   fields.Add("field", &c.field,
              {.choices = {"density", "sdf"}, .help = "Output of the field: density or signed distance (CPU only)"});
@@ -63,22 +62,27 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
       "hull_vote_share", &c.hull_vote_share,
       {.min = 0,
        .max = 1,
-       .help = "A hull cell is emptied if the masks of at least this share of the views that see it exclude it"});
-  fields.Add("hull_trim_share", &c.hull_trim_share,
-             {.min = 0,
-              .max = 0.2,
-              .help = "Outer layers of the hull where less than this share of all rays ends are removed; 0 = none"});
-  fields.Add("hull_show_share", &c.hull_show_share,
-             {.min = 0,
-              .max = 1,
-              .help = "Minimum share of the images that contain a hull cell that must show the object there"});
+       .help = "A hull cell is emptied if the masks of at least this share of the views that contain it exclude it"});
   fields.Add(
-      "occupancy_start_step", &c.occupancy_start_step,
-      {.unit = "steps", .min = 0, .max = 100000, .help = "First step after which cells without density are skipped"});
-  fields.Add("occupancy_interval_steps", &c.occupancy_interval_steps,
-             {.unit = "steps", .min = 1, .max = 100000, .help = "Steps between updates of the occupied cells"});
+      "hull_trim_share", &c.hull_trim_share,
+      {.min = 0,
+       .max = 0.2,
+       .help = "Outer layers of the hull are removed if less than this share of all rays ends in them; 0 = never"});
+  fields.Add(
+      "hull_show_share", &c.hull_show_share,
+      {.min = 0,
+       .max = 1,
+       .help = "A hull cell is emptied if fewer than this share of the images that contain it show the object there"});
+  fields.Add("occupancy_start_step", &c.occupancy_start_step,
+             {.unit = "steps",
+              .min = 0,
+              .max = 100000,
+              .help = "Number of steps after which cells without density are skipped"});
+  fields.Add(
+      "occupancy_interval_steps", &c.occupancy_interval_steps,
+      {.unit = "steps", .min = 1, .max = 100000, .help = "Number of steps between updates of the occupied cells"});
   fields.Add("occupancy_decay", &c.occupancy_decay,
-             {.min = 0, .max = 1, .help = "Factor on the stored weight of a cell at every visit"});
+             {.min = 0, .max = 1, .help = "Factor by which the stored weight of a cell decays at every visit"});
   fields.Add("occupancy_threshold", &c.occupancy_threshold,
              {.min = 0,
               .max = 1,
@@ -94,8 +98,8 @@ void RayFields(NerfConfig& c, ConfigFields& fields) {
              {.min = 0, .max = 0.5, .help = "Maximum share of the rays of a step through pixels with a map point"});
   fields.Add("sampling", &c.sampling,
              {.choices = {"occupied", "uniform"},
-              .help = "Samples on a ray: in occupied cells, or evenly between its entry into the box and its exit "
-                      "(paper)"});
+              .help = "Placement of samples on a ray: in occupied cells only, or evenly between entry and exit of the "
+                      "box (paper)"});
   fields.Add("max_samples_per_ray", &c.max_samples_per_ray,
              {.unit = "samples", .min = 1, .max = 64, .help = "Maximum number of samples on a ray (paper: 32)"});
   fields.Add("min_samples_per_ray", &c.min_samples_per_ray,
@@ -104,7 +108,7 @@ void RayFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "box sides",
               .min = 1e-4,
               .max = 1,
-              .help = "Minimum distance between samples, unless min_samples_per_ray needs a smaller one"});
+              .help = "Minimum distance between samples, unless min_samples_per_ray requires a smaller one"});
 }
 
 void LossFields(NerfConfig& c, ConfigFields& fields) {
@@ -117,7 +121,7 @@ void LossFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("contrast_weight", &c.contrast_weight,
              {.min = 0,
               .max = 100,
-              .help = "Weight of errors in the color difference of two near pixels in the loss; 0 = no pixel pairs"});
+              .help = "Weight of errors in the color difference of two nearby pixels in the loss; 0 = no pixel pairs"});
   fields.Add("depth_weight", &c.depth_weight,
              {.min = 0, .max = 100, .help = "Weight of depth errors, in box sides, in the loss (paper: 0.5)"});
   fields.Add("random_background", &c.random_background,
@@ -141,12 +145,12 @@ void OptimizerFields(NerfConfig& c, ConfigFields& fields) {
   fields.Add("adam_beta2", &c.adam_beta2,
              {.min = 0, .max = 0.9999, .help = "Decay of Adam's mean of squared gradients"});
   fields.Add("min_sample_gradient", &c.min_sample_gradient,
-             {.min = 0, .max = 1, .help = "Minimum gradient of a sample that takes part in the backward pass"});
+             {.min = 0, .max = 1, .help = "Minimum gradient of a sample that is included in the backward pass"});
   fields.Add("backend", &c.backend,
              {.choices = {"auto", "cpu", "cuda"},
               .audience = Audience::kOperator,
-              .help = "Where fields are trained; auto = on a CUDA device if there is one; the CPU replaces a missing "
-                      "device"});
+              .help = "Device that trains fields; auto = a CUDA device if available, otherwise the CPU; cuda = the "
+                      "same, with a warning if the CPU is used"});
 }
 
 void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
@@ -170,17 +174,25 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
               .max = 10000,
               .help = "Number of steps that each view adds after a complete training"});
   fields.Add("max_refine_steps", &c.max_refine_steps,
-             {.unit = "steps", .min = 0, .max = 100000, .help = "Maximum number of added steps that are pending"});
+             {.unit = "steps",
+              .min = 0,
+              .max = 100000,
+              .help = "Maximum number of steps by which new views can extend a complete training at a time"});
   fields.Add("slice_steps", &c.slice_steps,
-             {.unit = "steps", .min = 1, .max = 1000, .help = "Steps a thread trains an object before the next one"});
+             {.unit = "steps",
+              .min = 1,
+              .max = 1000,
+              .help = "Number of steps that a thread trains one object before it switches to another"});
   fields.Add(
       "snapshot_interval_steps", &c.snapshot_interval_steps,
       {.unit = "steps", .min = 1, .max = 100000, .help = "Maximum number of steps between two meshes of an object"});
   fields.Add("snapshot_interval_s", &c.snapshot_interval_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Maximum time between two meshes of an object in training"});
-  fields.Add(
-      "probe_interval_steps", &c.probe_interval_steps,
-      {.unit = "steps", .min = 10, .max = 10000, .help = "Steps between comparisons of the field with each view"});
+  fields.Add("probe_interval_steps", &c.probe_interval_steps,
+             {.unit = "steps",
+              .min = 10,
+              .max = 10000,
+              .help = "Number of steps between comparisons of the field with its views"});
   fields.Add("min_loss_decrease", &c.min_loss_decrease,
              {.min = 0,
               .max = 1,
@@ -200,11 +212,12 @@ void ScheduleFields(NerfConfig& c, ConfigFields& fields) {
              {.unit = "s", .min = 0, .max = 3600, .help = "Addition to max_training_time_s for each view"});
   fields.Add("completion_delay_s", &c.completion_delay_s,
              {.unit = "s", .min = 0, .max = 3600, .help = "Time without a new view after which training is completed"});
-  fields.Add("pose_prior_px", &c.pose_prior_px,
-             {.unit = "px",
-              .min = 0,
-              .max = 100,
-              .help = "Expected maximum error of the camera poses of views, which are refined; 0 = no refinement"});
+  fields.Add(
+      "pose_prior_px", &c.pose_prior_px,
+      {.unit = "px",
+       .min = 0,
+       .max = 100,
+       .help = "Expected maximum error of the camera poses, for their refinement during training; 0 = no refinement"});
 }
 
 // What the CUDA kernels support; see server/nerf/cuda/cuda_trainer.h.

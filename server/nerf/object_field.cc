@@ -121,7 +121,7 @@ void ObjectField::PrepareViews() {
   warnings_.OnViewChecks({.views = views(),
                           .black_views = static_cast<int>(std::ranges::count_if(views_.views(), IsBlack)),
                           .depth_consistent = views_.depth_consistent(),
-                          .share_meeting_box = probe_.ShareMeetingBox(field_.Space().extent)});
+                          .share_intersecting_box = probe_.ShareIntersectingBox(field_.Space().extent)});
   field_.SetHull(views_.CarveHull());
   views_changed_ = false;
   loss_trend_.Restart();

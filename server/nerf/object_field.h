@@ -30,7 +30,7 @@ class ObjectField {
 
   // Sets the object's cuboid, before enlargement. A cuboid that still fits the training box changes nothing. Otherwise
   // the learned field is transferred to a new box, and the training plan is extended in proportion to the unknown part
-  // of that box. If the boxes have little in common, training restarts. INVALID_ARGUMENT: see ValidateCuboid.
+  // of that box. If the boxes overlap too little, training restarts. INVALID_ARGUMENT: see ValidateCuboid.
   absl::Status SetBox(const Cuboid& cuboid);
 
   // Adds a view, or replaces the view of the same keyframe. FAILED_PRECONDITION: there is no box yet, or the view is of
@@ -52,7 +52,7 @@ class ObjectField {
   // A copy of the current field. The caller sets `converged`, because it knows whether more training is planned.
   FieldSnapshot Snapshot() const;
 
-  // What is wrong with the object's input, for people; empty if nothing is. See FieldWarnings.
+  // Human-readable problems with the object's input; empty if there are none. See FieldWarnings.
   std::string Warning() const;
 
   // Frees the memory that only Train() needs, until the next Train().

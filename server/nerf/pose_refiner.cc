@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "common/statistics.h"
+#include "server/nerf/cpu/ray_renderer.h"
 
 namespace romap::nerf {
 namespace {
 
-constexpr size_t kMinViews = 6;  // fewer views do not show which one is wrong
+constexpr size_t kMinViews = 6;  // with fewer views it is unknown which one is wrong
 constexpr size_t kPixels = 100;  // per view: on the object, and on the outline
 constexpr double kGain = 0.7;    // share of the noisy estimate that is applied; later refinements correct the rest
 constexpr double kMinMotion_px = 0.3;  // RMS motion of the views below which the refinement interval doubles
@@ -97,8 +98,8 @@ void PoseRefiner::Refine(std::span<ObjectView> views, std::span<const float> wei
   next_step_ = step + interval_steps_;
 }
 
-// A view with a much larger error than the others is wrong rather than inaccurate. It returns to its given pose, so
-// that ViewTrust can detect it instead of comparing a pose that was fitted to something else.
+// A view with a much larger error than the others is wrong rather than inaccurate. Its given pose is restored, so that
+// ViewTrust can detect it; a pose that was fitted to wrong data would hide the error.
 void PoseRefiner::ResetOutliers(std::span<ObjectView> views, std::span<const float> weights,
                                 const TrainingBox& box) const {
   constexpr double kPerTypicalError = 3, kOffset_px = 2;

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "common/stage_messages.h"
-#include "server/nerf/cpu/ray_renderer.h"
+#include "server/nerf/model/field_model.h"
+#include "server/nerf/model/render_space.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/ray_set.h"
 #include "server/nerf/training_box.h"

@@ -15,7 +15,7 @@ inline constexpr std::array<const char*, static_cast<int>(TrainPhase::kCount)> k
 // Statistics of one training run.
 struct TrainStats {
   int steps = 0;
-  uint64_t rays = 0;            // that met an occupied cell
+  uint64_t rays = 0;            // that intersected an occupied cell
   uint64_t samples = 0;         // evaluated
   uint64_t active_samples = 0;  // with a gradient large enough for the backward pass
   double color_loss = 0;        // mean squared color error per object ray

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMinMargin = 0.02;   // of the longest half extent; keeps the surface of flat objects inside
 constexpr double kMinFill = 0.4;      // of the volume; a smaller cuboid needs a finer grid
-constexpr double kMaxTilt_rad = 0.2;  // of the box against the upright cuboid
+constexpr double kMaxTilt_rad = 0.2;  // between the box and the upright cuboid
 
 }  // namespace
 

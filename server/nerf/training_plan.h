@@ -11,7 +11,7 @@ namespace romap::nerf {
 //
 // The learning rate decreases exponentially over the planned steps. It depends on the number of steps left: a view that
 // arrives after the end of the plan extends the plan, and thereby increases the rate slightly. Steps beyond the plan
-// are added while the loss still decreases: see OnFulfilled.
+// are added while the loss still decreases: see OnEvaluation.
 class TrainingPlan {
  public:
   explicit TrainingPlan(const NerfConfig& config) : config_(config) { Restart(); }
@@ -24,8 +24,8 @@ class TrainingPlan {
   // proportion to the shift, up to a full new training.
   void OnCorrectedView(uint64_t steps_done, double shift_share);
 
-  // The training box was replaced; `unknown_share`, 0..1, of the new one is outside the old one. The plan is extended
-  // in proportion, by between a fifth of a full training and all of it.
+  // The training box was replaced; the share `unknown_share`, 0..1, of the new one is outside the old one. The plan is
+  // extended in proportion, by between a fifth of a full training and all of it.
   void OnNewBox(uint64_t steps_done, double unknown_share);
 
   // Called after every evaluation with the relative decrease of the loss per 100 steps. If all planned steps are done

@@ -18,9 +18,9 @@ class TrainingPolicy {
 
   // Whether no more views are expected: the session is finished, or no view has arrived for a while.
   bool IsComplete(const TrainingJob& job, bool session_finished, Time now) const;
-  // Whether a slice of the job would do anything.
+  // Whether the job has steps left or updates to apply.
   bool IsRunnable(const TrainingJob& job, bool session_finished, Time now) const;
-  // When the job becomes complete if no view arrives until then. Nothing if it is leased or would have no steps left.
+  // When the job becomes complete if no view arrives until then. nullopt if it is leased or would have no steps left.
   std::optional<Time> CompletionTime(const TrainingJob& job) const;
   // Whether the object cannot be trained further unless new input arrives.
   bool IsIdle(const TrainingJob& job, bool session_finished) const;

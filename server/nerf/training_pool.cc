@@ -17,7 +17,7 @@ using Clock = TrainingJob::Clock;
 
 TrainingPool::TrainingPool(const NerfConfig& config, int workers)
     : config_(config), queue_(config, std::max(0, workers)) {
-  for (int i = 0; i < workers; ++i) workers_.emplace_back([this] { Work(); });
+  for (int i = 0; i < workers; ++i) workers_.emplace_back([this] { RunWorker(); });
 }
 
 TrainingPool::~TrainingPool() {
@@ -76,7 +76,7 @@ bool TrainingPool::IsIdle(SessionId session) const {
   return queue_.IsIdle(session);
 }
 
-void TrainingPool::Work() {
+void TrainingPool::RunWorker() {
   LowerThreadPriority();
   std::unique_lock lock(mutex_);
   while (!stopping_) {
@@ -89,7 +89,7 @@ void TrainingPool::Work() {
       }
       continue;
     }
-    Serve(*lease, lock);
+    RunLease(*lease, lock);
   }
 }
 
@@ -98,17 +98,17 @@ void TrainingPool::TrainSlices(SessionId session, int count) {
   for (int i = 0; i < count; ++i) {
     std::optional<TrainingQueue::Lease> lease = queue_.Next(Clock::now(), session);
     if (!lease) return;
-    Serve(*lease, lock);
+    RunLease(*lease, lock);
   }
 }
 
 // Runs the slice of a lease without the lock, then returns the lease.
-void TrainingPool::Serve(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock) {
+void TrainingPool::RunLease(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   std::string failure;
   try {
     RunSlice(lease);
-  } catch (const std::exception& e) {  // from a library, or out of memory: costs this object, not the server
+  } catch (const std::exception& e) {  // from a library, or out of memory: only this object is lost
     failure = e.what();
   }
   lock.lock();

@@ -49,8 +49,7 @@ class TrainingPool {
   // No more views will arrive: trains every object to the end of its plan.
   void Finish(SessionId session);
 
-  // For a pool without workers: trains the session's objects for at most `count` slices, fewer if there is nothing more
-  // to do.
+  // For a pool without workers: trains the session's objects for at most `count` slices, fewer if no steps are left.
   void TrainSlices(SessionId session, int count);
 
   Progress GetProgress(SessionId session) const;
@@ -58,8 +57,8 @@ class TrainingPool {
   bool IsIdle(SessionId session) const;
 
  private:
-  void Work();
-  void Serve(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock);
+  void RunWorker();
+  void RunLease(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock);
   void RunSlice(TrainingQueue::Lease& lease);
   static void ApplyUpdate(ObjectField& field, ObjectViews update);
   TrainStats TrainField(ObjectField& field, const TrainingQueue::Lease& lease) const;

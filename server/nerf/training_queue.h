@@ -16,7 +16,7 @@
 
 namespace romap::nerf {
 
-// Names a session in the training queue. 0: none.
+// Id of a session in the training queue. 0: none.
 using TrainingSessionId = uint64_t;
 
 struct TrainingProgress {
@@ -26,7 +26,7 @@ struct TrainingProgress {
   double progress = 0;       // 0..1, mean over the objects of steps done / steps planned; 1 without objects
 };
 
-// The training jobs of all sessions. Hands out leases: the right to train one object for a slice. Sessions take turns;
+// The training jobs of all sessions. Grants leases: the right to train one object for a slice. Sessions take turns;
 // within a session, TrainingPolicy decides. Not thread-safe. Calls with an unknown session have no effect.
 class TrainingQueue {
  public:
@@ -74,8 +74,8 @@ class TrainingQueue {
   std::optional<Time> NextCompletionTime() const;
 
   TrainingProgress Progress(TrainingSessionId session) const;
-  // True if nothing is being trained, waits to be trained, or would be trained later without new input. Objects with
-  // too few views do not count.
+  // True if no object is being trained, is waiting to be trained, or would be trained later without new input. Objects
+  // with too few views do not count.
   bool IsIdle(TrainingSessionId session) const;
 
   const TrainingPolicy& policy() const { return policy_; }

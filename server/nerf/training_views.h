@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "common/stage_messages.h"
-#include "server/nerf/cpu/ray_renderer.h"
 #include "server/nerf/field_probe.h"
+#include "server/nerf/model/field_model.h"
+#include "server/nerf/model/render_space.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/pose_refiner.h"
 #include "server/nerf/ray_set.h"
@@ -43,7 +44,7 @@ class TrainingViews {
 
   // Sets the corrected pose of the view of a keyframe. After a small correction the view keeps its trust, and its
   // refinement relative to the given pose; after a larger one both are reset. Returns how far the view moved, in sides
-  // of the box, or nothing if there is no such view. INVALID_ARGUMENT: see ValidateView; the view is unchanged.
+  // of the box; nullopt if there is no such view. INVALID_ARGUMENT: see ValidateView; the view is unchanged.
   absl::StatusOr<std::optional<double>> Correct(const ViewPose& pose, const TrainingBox& box, uint64_t step);
 
   // Checks again whether dense depth is consistent with the masks. True if the result changed; then the hull must be

@@ -186,8 +186,8 @@ void ViewAlignment::AddColor(const RenderedPixel& pixel, const Projection& proje
   const double limit = 1.345 * scales.color;  // Huber's
   for (int c = 0; c < 3; ++c) {
     const double before = smooth_bgr_.at<cv::Vec3b>(projection.before)[c] / 255.0;
-    const double seen = bgr_.at<cv::Vec3b>(projection.before)[c] / 255.0;
-    const double residual = now[c] - before + seen - pixel.bgr[static_cast<size_t>(c)];
+    const double observed = bgr_.at<cv::Vec3b>(projection.before)[c] / 255.0;
+    const double residual = now[c] - before + observed - pixel.bgr[static_cast<size_t>(c)];
     const double size = std::abs(residual), square = scales.color * scales.color;
     const double weight = (size <= limit ? 1 : limit / size) / square;
     const ObjectMotion row = gradient.row(c).transpose();
@@ -227,7 +227,7 @@ ViewAlignment::Equations ViewAlignment::Linearize(std::span<const RenderedPixel>
 }
 
 ObjectMotion ViewAlignment::Align(std::span<const RenderedPixel> rendered, const SE3<Camera, Object>& T_camera_object,
-                                  const ObjectMotion& so_far, double prior_px) const {
+                                  const ObjectMotion& applied, double prior_px) const {
   const Eigen::Vector3d center = T_camera_object.translation();
   ObjectMotion best = ObjectMotion::Zero();
   Equations equations = Linearize(rendered, center, best, {});
@@ -239,19 +239,19 @@ ObjectMotion ViewAlignment::Align(std::span<const RenderedPixel> rendered, const
   per_deviation.tail<3>() /= center.z();
   const ObjectMotion prior = per_deviation.cwiseAbs2();
   const auto cost = [&](const ObjectMotion& motion) {
-    return kInformation * equations.cost + prior.dot((so_far + motion).cwiseAbs2());
+    return kInformation * equations.cost + prior.dot((applied + motion).cwiseAbs2());
   };
   equations = Linearize(rendered, center, best, scales);
-  double least = cost(best);
+  double lowest_cost = cost(best);
   for (int i = 0; i < kIterations; ++i) {
     Eigen::Matrix<double, 6, 6> A = kInformation * equations.A;
     A.diagonal() += prior;
-    const ObjectMotion step = A.ldlt().solve(-(kInformation * equations.b + prior.cwiseProduct(so_far + best)));
+    const ObjectMotion step = A.ldlt().solve(-(kInformation * equations.b + prior.cwiseProduct(applied + best)));
     if (!step.allFinite()) break;
     equations = Linearize(rendered, center, best + step, scales);
     const double now = cost(best + step);
-    if (!(now < least)) break;
-    least = now;
+    if (!(now < lowest_cost)) break;
+    lowest_cost = now;
     best += step;
   }
   return best;

@@ -41,10 +41,10 @@ class ViewAlignment {
   // The motion of the object that makes the view match the rendering: its colors, up to an offset per channel, and its
   // outline. Least squares by Gauss-Newton on the gradients of the view (B. Lucas, T. Kanade, "An Iterative Image
   // Registration Technique", 1981). The prior on the camera error is a shift of the object by `prior_px` (standard
-  // deviation) in each direction, and a rotation of the camera that causes the same shift. `so_far` is the motion
+  // deviation) in each direction, and a rotation of the camera that causes the same shift. `applied` is the motion
   // already applied. Zero if there is no improvement or there are too few pixels.
   ObjectMotion Align(std::span<const RenderedPixel> rendered, const SE3<Camera, Object>& T_camera_object,
-                     const ObjectMotion& so_far, double prior_px) const;
+                     const ObjectMotion& applied, double prior_px) const;
 
  private:
   struct Scales;

@@ -15,8 +15,8 @@ constexpr int kMinObjectPixels = 16;
 // Empty if `image` has the size of the crop and the right type.
 std::string ImageError(const char* name, const cv::Mat& image, cv::Size size, int type, const char* type_name) {
   if (image.size() != size) {
-    return fmt::format("{} is {}x{} px but the crop is {}x{} px", name, image.cols, image.rows, size.width,
-                       size.height);
+    return fmt::format("{} must be {}x{} px like the crop, is {}x{} px", name, size.width, size.height, image.cols,
+                       image.rows);
   }
   if (image.type() != type) return fmt::format("{} must be {}", name, type_name);
   return {};
@@ -30,7 +30,7 @@ std::string ViewError(const ObjectView& view, const TrainingBox& box) {
   if (!view.T_world_camera.IsFinite()) return "pose is not finite";
   const cv::Rect image(0, 0, view.camera.width_px, view.camera.height_px);
   if (view.roi_px.empty() || (view.roi_px & image) != view.roi_px) {
-    return fmt::format("the crop (x {}, y {}, {}x{} px) is not inside the image of {}x{} px", view.roi_px.x,
+    return fmt::format("the crop (x {}, y {}, {}x{} px) must be inside the image of {}x{} px", view.roi_px.x,
                        view.roi_px.y, view.roi_px.width, view.roi_px.height, image.width, image.height);
   }
   const cv::Size size = view.roi_px.size();
@@ -47,7 +47,7 @@ std::string ViewError(const ObjectView& view, const TrainingBox& box) {
   const int object_pixels = cv::countNonZero(view.ray_kind == static_cast<int>(RayKind::kObject));
   if (object_pixels == 0) return "mask is empty";
   if (object_pixels < kMinObjectPixels) {
-    return fmt::format("mask has {} px, at least {} px are needed", object_pixels, kMinObjectPixels);
+    return fmt::format("mask must have at least {} object pixels, has {}", kMinObjectPixels, object_pixels);
   }
   const Eigen::Vector3d center_camera = view.T_world_camera.Inverse() * box.T_world_object.translation();
   if (center_camera.z() <= 0) return "the object's box is behind the camera";

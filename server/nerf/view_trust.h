@@ -10,8 +10,8 @@ namespace romap::nerf {
 
 // Detects views that contradict the others, because of a wrong pose or the mask of another object: their residuals do
 // not decrease with those of the other views. Such views are not trusted, and are excluded from training until their
-// residuals are normal again. All views are trusted if there are few, or if too many contradict the others: then it is
-// unknown which ones are wrong.
+// residuals are normal again. All views are trusted if there are only a few, or if too many contradict the others,
+// because then it is unknown which ones are wrong.
 class ViewTrust {
  public:
   // The view at `index` is new or was replaced. It is trusted until it has been trained on for some steps.

@@ -13,8 +13,8 @@ namespace {
 using hull::CellEvidence;
 
 constexpr double kDepthNoise = 0.01;  // share of the depth by which a measurement may be too far
-constexpr int kMostReach_px = 30;     // larger footprints: the camera is too close for depth to carve
-constexpr int kLargestBlock = 16;     // cells per side of the blocks that are tested as a whole first
+constexpr int kMaxReach_px = 30;      // larger footprints: the camera is too close for depth to carve
+constexpr int kMaxBlock = 16;         // cells per side of the blocks that are tested as a whole first
 
 enum class Coverage { kUnknown, kNone, kFull, kPartial };
 
@@ -22,14 +22,14 @@ enum class Coverage { kUnknown, kNone, kFull, kPartial };
 
 // How a view's mask covers a footprint.
 struct VisualHull::Verdict {
-  Coverage matter = Coverage::kUnknown;  // pixels that are not background
-  Coverage object = Coverage::kUnknown;  // pixels that show the object
-  bool in_image = false;                 // the whole footprint, whether inside the crop or not
+  Coverage foreground = Coverage::kUnknown;  // pixels that are not background
+  Coverage object = Coverage::kUnknown;      // pixels that show the object
+  bool in_image = false;                     // the whole footprint, whether inside the crop or not
 
   // Whether every smaller footprint inside this one has the same evidence.
   bool IsUniform() const {
-    return matter == Coverage::kNone ||
-           (matter == Coverage::kFull && (object == Coverage::kNone || object == Coverage::kFull));
+    return foreground == Coverage::kNone ||
+           (foreground == Coverage::kFull && (object == Coverage::kNone || object == Coverage::kFull));
   }
 };
 
@@ -43,13 +43,13 @@ class VisualHull::Footprints {
     const SE3<Camera, Object> T_camera_object = view.T_world_camera.Inverse() * box.T_world_object;
     projection_ =
         hull::GridProjection::Of(view.camera, T_camera_object.RotationMatrix(), T_camera_object.translation());
-    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, matter_sum_, CV_32S);
+    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, foreground_sum_, CV_32S);
     cv::integral((view.ray_kind == static_cast<int>(RayKind::kObject)) / 255, object_sum_, CV_32S);
     if (!use_depth || view.depth_mu.empty()) return;
-    const double least_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
-    if (least_z_mu <= 0) return;  // the footprints of some cells are unbounded
-    const int reach_px = 1 + static_cast<int>(cell_radius_mu * focal_px_ / least_z_mu);
-    if (reach_px > kMostReach_px) return;
+    const double min_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
+    if (min_z_mu <= 0) return;  // the footprints of some cells are unbounded
+    const int reach_px = 1 + static_cast<int>(cell_radius_mu * focal_px_ / min_z_mu);
+    if (reach_px > kMaxReach_px) return;
     cv::Mat known;
     cv::compare(view.depth_mu, 0, known, cv::CMP_GT);  // false for NaN too
     cv::Mat depth_mu = cv::Mat::zeros(view.depth_mu.size(), CV_32FC1);
@@ -88,7 +88,7 @@ class VisualHull::Footprints {
       if (count == 0) return Coverage::kNone;
       return count == (x1 - x0) * (y1 - y0) ? Coverage::kFull : Coverage::kPartial;
     };
-    return {coverage(matter_sum_), coverage(object_sum_), in_image};
+    return {coverage(foreground_sum_), coverage(object_sum_), in_image};
   }
 
  private:
@@ -96,14 +96,14 @@ class VisualHull::Footprints {
   cv::Size image_px_;
   cv::Rect roi_px_;
   double focal_px_;
-  cv::Mat matter_sum_;  // integral image of "not background"
-  cv::Mat object_sum_;  // integral image of "object"
+  cv::Mat foreground_sum_;  // integral image of "not background"
+  cv::Mat object_sum_;      // integral image of "object"
   cv::Mat nearest_mu_;  // least depth under the footprint of a cell, 0 if part of it is unknown; empty without depth
 };
 
 CellEvidence VisualHull::EvidenceOf(const Verdict& verdict, bool in_front_of_depth) {
-  if (verdict.matter == Coverage::kUnknown) return verdict.in_image ? CellEvidence::kCropped : CellEvidence::kNone;
-  if (verdict.matter == Coverage::kNone || in_front_of_depth) return CellEvidence::kBackground;
+  if (verdict.foreground == Coverage::kUnknown) return verdict.in_image ? CellEvidence::kCropped : CellEvidence::kNone;
+  if (verdict.foreground == Coverage::kNone || in_front_of_depth) return CellEvidence::kBackground;
   return verdict.object == Coverage::kNone ? CellEvidence::kOccluded : CellEvidence::kObject;
 }
 
@@ -127,23 +127,24 @@ double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kOc
 void VisualHull::Count(const ObjectView& view, int sign) {
   views_ += sign;
   const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
-  for (int z = 0; z < kOccupancyResolution; z += kLargestBlock) {
-    for (int y = 0; y < kOccupancyResolution; y += kLargestBlock) {
-      for (int x = 0; x < kOccupancyResolution; x += kLargestBlock) {
-        CountBlock(footprints, {x, y, z}, kLargestBlock, sign);
+  for (int z = 0; z < kOccupancyResolution; z += kMaxBlock) {
+    for (int y = 0; y < kOccupancyResolution; y += kMaxBlock) {
+      for (int x = 0; x < kOccupancyResolution; x += kMaxBlock) {
+        CountBlock(footprints, {x, y, z}, kMaxBlock, sign);
       }
     }
   }
 }
 
-// Counts the cells from `first` on, `side` along each axis: as a whole if their evidence is the same, else in halves.
+// Counts the cells from `first` on, `side` along each axis: as a whole if their evidence is the same, otherwise by
+// octants.
 void VisualHull::CountBlock(const Footprints& footprints, const Eigen::Vector3i& first, int side, int sign) {
   const hull::VoxelGrid& grid = evidence_.grid();
   const Eigen::Vector3d center = grid.BlockCenter(first, side);
   const double radius_mu = side == 1 ? CellRadius_mu() : 0.5 * side * grid.CellSize().norm();
   const Verdict verdict = footprints.Under(center, radius_mu);
   const bool depth_may_carve =
-      footprints.HasDepth() && verdict.matter != Coverage::kNone && verdict.matter != Coverage::kUnknown;
+      footprints.HasDepth() && verdict.foreground != Coverage::kNone && verdict.foreground != Coverage::kUnknown;
   if (side > 1 && (!verdict.IsUniform() || depth_may_carve)) {
     const int half = side / 2;
     for (int octant = 0; octant < 8; ++octant) {

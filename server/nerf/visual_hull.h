@@ -10,9 +10,9 @@
 
 namespace romap::nerf {
 
-// The cells of the training box that the views leave possible. A view shows background if the whole footprint of the
-// cell is background, or if dense depth was measured behind it; it shows the object if some pixel of the footprint
-// does.
+// The cells of the training box that may be occupied according to the views. A view is evidence for background if the
+// whole footprint of the cell is background, or if dense depth was measured behind it; it is evidence for the object if
+// any pixel of the footprint shows the object.
 class VisualHull {
  public:
   explicit VisualHull(const NerfConfig& config);
@@ -22,7 +22,7 @@ class VisualHull {
   void Add(const ObjectView& view) { Count(view, 1); }
   // `view` must be the same as when it was added.
   void Remove(const ObjectView& view) { Count(view, -1); }
-  // 1 = may hold matter, index as in OccupancyBits, kOccupancyResolution^3. All 1 if `carve_hull` is off.
+  // 1 = may be occupied, index as in OccupancyBits, kOccupancyResolution^3. All 1 if `carve_hull` is off.
   std::vector<uint8_t> Carve() const;
 
  private:

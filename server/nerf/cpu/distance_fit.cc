@@ -12,7 +12,7 @@ namespace {
 constexpr int kSteps = 30;
 constexpr int kChunks = 4;     // per step
 constexpr int kPoints = 1024;  // per chunk
-constexpr float kNear = 0.1f;  // box sides; most points are this close to the surface
+constexpr float kNear = 0.1f;  // box sides; most points are closer than this to the surface
 constexpr int kTries = 4;      // random cells drawn at most to find one near the surface
 constexpr uint64_t kSeed = 99;
 

@@ -1,5 +1,5 @@
-// Kernels for the frequency encoding and for MLPs of several hidden layers, which the fast kernels do not support;
-// baselines and ablations use them. Included by plain_kernels.cc and simd_kernels.cc like kernels-inl.h.
+// Kernels for the frequency encoding and for MLPs of several hidden layers, which the fast kernels do not support.
+// Baselines and ablations use them. Included by plain_kernels.cc and simd_kernels.cc like kernels-inl.h.
 #include "server/nerf/cpu/kernels-inl.h"
 #include "server/nerf/math/frequency.h"
 

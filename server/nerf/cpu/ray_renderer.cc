@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/composite.h"
 #include "server/nerf/math/losses.h"
 #include "server/nerf/model/step_parameters.h"
@@ -39,18 +40,18 @@ std::vector<RayResult> RenderRays(const FieldModel& model, const NerfConfig& con
   std::vector<RayResult> results;
   results.reserve(rays.size());
   for (size_t first = 0; first < rays.size(); first += chunk_rays) {
-    const std::span<const Ray> some = rays.subspan(first, std::min(chunk_rays, rays.size() - first));
+    const std::span<const Ray> chunk_of_rays = rays.subspan(first, std::min(chunk_rays, rays.size() - first));
     chunk.size = 0;
-    kernels.place_samples(some.data(), static_cast<int>(some.size()), rule, chunk, spans.data());
+    kernels.place_samples(chunk_of_rays.data(), static_cast<int>(chunk_of_rays.size()), rule, chunk, spans.data());
     kernels.to_grid(space.grid, chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data());
     kernels.encode(model.layout, model.table.data(), chunk.size, chunk.x.data(), chunk.y.data(), chunk.z.data(),
                    chunk.features.data());
     kernels.mlp_forward(model.mlp, chunk.size, chunk.features.data(), chunk.hidden.data(), chunk.raw.data());
     kernels.activate(chunk, model.density_bias);
     if (model.IsDistance()) {
-      kernels.distance_opacity(spans.data(), static_cast<int>(some.size()), model.sharpness, chunk);
+      kernels.distance_opacity(spans.data(), static_cast<int>(chunk_of_rays.size()), model.sharpness, chunk);
     }
-    Composite(some, spans, chunk, results);
+    Composite(chunk_of_rays, spans, chunk, results);
   }
   return results;
 }

@@ -9,8 +9,8 @@ namespace romap::nerf {
 
 // Distributes the tasks of training steps to threads. A step has two phases; a phase starts when all tasks of the
 // previous one are finished. Tasks go in order to the next free thread, so a thread that wakes up late on a busy
-// machine does not delay the step: the other threads take its tasks. Results do not depend on the assignment as long as
-// each task has its own memory. Waiting threads sleep.
+// machine does not delay the step: other threads run its tasks. Results do not depend on the assignment as long as each
+// task has its own memory. Waiting threads sleep.
 class StepTasks {
  public:
   struct Task {
@@ -22,7 +22,7 @@ class StepTasks {
   // `tasks`: number of tasks of each phase, at least one.
   StepTasks(uint64_t steps, std::array<uint64_t, 2> tasks) : steps_(steps), tasks_(tasks) {}
 
-  // Waits for the next task; returns nothing when all tasks have been handed out. Finish() must follow each task.
+  // Waits for the next task; nullopt if all tasks have been assigned. Finish() must follow each task.
   std::optional<Task> Next() {
     for (;;) {
       const uint64_t phase = phase_.load(std::memory_order_acquire);

@@ -18,8 +18,8 @@
 
 ROMAP_MATH_BEGIN
 
-// The cells of a block of points on all levels. They are stored to memory on purpose: extracting indices from vector
-// registers one by one is slower than loading them, and table loads of many points can then overlap.
+// The cells of a block of points on all levels. They are stored to memory intentionally: extracting indices from vector
+// registers one by one is slower than loading them, and table loads of many points can overlap.
 struct CellBlock {
   static constexpr int kPoints = 16;
   alignas(64) uint32_t pair[kPoints][4][kMaxLevels];

@@ -23,7 +23,8 @@ class CudaTrainer : public Trainer {
       if (!absl::IsResourceExhausted(stats.status())) {
         MarkUnhealthy(stats.status());
       } else if (!std::exchange(memory_warning_logged_, true)) {
-        spdlog::warn("training one field on the CPU until the device has memory: {}", Message(stats.status()));
+        spdlog::warn("the CUDA device is out of memory; training the field on the CPU until memory is available: {}",
+                     Message(stats.status()));
       }
     }
     device_.reset();
@@ -72,7 +73,7 @@ class CudaTrainer : public Trainer {
 absl::Status Supports(const NerfConfig& config) {
   ROMAP_RETURN_IF_ERROR(DeviceStatus());
   if (config.hidden_width > kMaxHidden || config.hidden_width % 16 != 0) {
-    return InvalidArgument("CUDA supports only nerf.hidden_width = a multiple of 16 up to {}, got {}", kMaxHidden,
+    return InvalidArgument("CUDA supports only nerf.hidden_width=16..{} in multiples of 16, got {}", kMaxHidden,
                            config.hidden_width);
   }
   if (config.encoding != "hash") {

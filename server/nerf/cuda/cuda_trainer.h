@@ -15,7 +15,7 @@ absl::Status Supports(const NerfConfig& config);
 
 // Trains the field of `cpu` on the CUDA device, on the stream of the thread that calls Run(). Requires
 // Supports(config). If the device fails, it is marked unhealthy, and `cpu` continues from the end of the last Run();
-// while the device has too little memory, `cpu` trains instead.
+// if the device has too little memory, `cpu` trains instead.
 std::unique_ptr<Trainer> MakeCudaTrainer(const NerfConfig& config, std::unique_ptr<Trainer> cpu);
 
 }  // namespace romap::nerf::cuda

@@ -54,12 +54,12 @@ absl::Status DeviceStatus() {
   return *health.status;
 }
 
-void MarkUnhealthy(const absl::Status& why) {
+void MarkUnhealthy(const absl::Status& reason) {
   Health& health = TheHealth();
   std::lock_guard lock(health.mutex);
   if (health.status && !health.status->ok()) return;
-  health.status = why;
-  spdlog::error("the CUDA device failed, falling back to the CPU for all fields: {}", Message(why));
+  health.status = reason;
+  spdlog::error("the CUDA device failed; falling back to the CPU for all fields: {}", Message(reason));
 }
 
 }  // namespace romap::nerf::cuda

@@ -9,6 +9,6 @@ namespace romap::nerf::cuda {
 absl::Status DeviceStatus();
 
 // Reports that the device failed; it is not used again in this process. The first call is logged. Thread-safe.
-void MarkUnhealthy(const absl::Status& why);
+void MarkUnhealthy(const absl::Status& reason);
 
 }  // namespace romap::nerf::cuda

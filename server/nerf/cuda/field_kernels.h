@@ -127,7 +127,7 @@ struct StepLaunch {
 };
 
 // Number of blocks of the first launch; the same on every device, so that sums have the same order on every device.
-int StepBlocks(int rays_per_step, int most_samples);
+int StepBlocks(int rays_per_step, int max_samples);
 
 // Dynamic shared memory of a block.
 size_t StepSharedBytes(const DeviceField& field, const SampleBudget& budget, MlpPath path);

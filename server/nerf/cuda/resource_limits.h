@@ -25,7 +25,7 @@ inline constexpr ResourceLimit kResourceLimits[] = {
 // Dynamic shared memory of a block of StepKernel on tensor cores.
 inline constexpr size_t kFastStepSharedBytes = 40 * 1024;   // fast preset: four blocks on 164 KB, two on 100 KB
 inline constexpr size_t kPaperStepSharedBytes = 64 * 1024;  // the paper's field: two blocks on 164 KB, one on 100 KB
-inline constexpr size_t kMostStepSharedBytes = 99 * 1024;   // any field: the limit of a block on all devices since 8.0
+inline constexpr size_t kMaxStepSharedBytes = 99 * 1024;    // any field: the limit of a block on all devices since 8.0
 
 inline constexpr int kArchitectures[] = {80, 86, 89, 90, 100, 120};
 

@@ -217,7 +217,7 @@ template <class Mlp>
 __global__ void __launch_bounds__(kTileSamples, 4) StepKernel(StepParams p) {
   ROMAP_DYNAMIC_SHARED(unsigned char, memory);
   Tile<typename Mlp::Factor> tile;
-  LayOutTile(p.field, p.budget.most, memory, tile);
+  LayOutTile(p.field, p.budget.max_samples, memory, tile);
   const uint32_t step = p.slice->next;
   if (blockIdx.x == 0 && threadIdx.x == 0) p.slice->running = step;
   Mlp::Prepare(p.field, tile);
@@ -273,7 +273,7 @@ __global__ void __launch_bounds__(kTileSamples, 4) EvaluateKernel(EvaluateParams
 template <class T>
 size_t StepBytes(const DeviceField& field, const SampleBudget& budget) {
   Tile<T> tile;
-  return LayOutTile<T>(field, budget.most, nullptr, tile);
+  return LayOutTile<T>(field, budget.max_samples, nullptr, tile);
 }
 
 template <class T>
@@ -313,8 +313,8 @@ cudaError_t LaunchEvaluate(const EvaluateParams& params, MlpPath path, cudaStrea
   return cudaGetLastError();
 }
 
-int StepBlocks(int rays_per_step, int most_samples) {
-  const int rays_per_tile = RaysThatFit(kTileSamples, most_samples);
+int StepBlocks(int rays_per_step, int max_samples) {
+  const int rays_per_tile = RaysThatFit(kTileSamples, max_samples);
   const int tiles = (rays_per_step + rays_per_tile - 1) / rays_per_tile;
   return tiles < kMaxStepBlocks ? tiles : kMaxStepBlocks;
 }
@@ -331,7 +331,8 @@ cudaError_t PrepareStep(const StepParams& params, MlpPath path) {
 }
 
 cudaError_t LaunchGradients(const StepParams& params, MlpPath path, cudaStream_t stream) {
-  const dim3 grid(static_cast<unsigned>(StepBlocks(params.rays_per_step, params.budget.most))), block(kTileSamples);
+  const dim3 grid(static_cast<unsigned>(StepBlocks(params.rays_per_step, params.budget.max_samples))),
+      block(kTileSamples);
   const size_t bytes = StepSharedBytes(params.field, params.budget, path);
   if (path == MlpPath::kTensorCores) {
     ROMAP_LAUNCH(StepKernel<TensorMlp>, grid, block, bytes, stream, params);

@@ -27,7 +27,7 @@ __device__ inline __half Rounded<__half>(float x) {
 struct RaySegment {
   float entry, piece;  // t at the entry, length of a piece
   float length;        // of the step of each sample
-  int count;           // samples; 0 if the ray meets no occupied cell
+  int count;           // samples; 0 if the ray intersects no occupied cell
   uint64_t occupied;   // bit k: piece k is occupied
 };
 

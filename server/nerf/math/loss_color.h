@@ -16,7 +16,7 @@ ROMAP_MATH_BEGIN
 //
 // The contrast term penalizes errors in the difference between two nearby pixels. Light that changes slowly over a
 // surface, as reflections do when the view changes, appears in both colors and cancels, so a field that does not depend
-// on the view direction is less likely to explain it by dents in the surface.
+// on the view direction is less likely to represent it by dents in the surface.
 
 // Color over which the ray is blended.
 ROMAP_HD float BackgroundColor(const RayTarget& target, const LossWeights& weights, int channel) {

@@ -11,8 +11,8 @@
 //   4. server/nerf/model/step_parameters.cc   MakeLossWeights fills the weight from the configuration
 //   5. server/nerf/nerf_config.h              the configuration field and its default
 //   6. server/nerf/nerf_config.cc             its range and help
-//   7. deploy/server.yaml                     its documentation (a test compares the file with the field list)
-//   8. tests/unit/server/nerf/math/losses_test.cc   a case of the finite-difference test
+//   7. tests/unit/server/nerf/math/losses_test.cc   a case of the finite-difference test
+//   8. deploy/server.yaml                     only if operators set it (a test compares the file with the field list)
 // The gradient tests of the kernels and the comparison of CUDA with the CPU then cover the term without changes.
 #include "server/nerf/math/lane.h"
 #include "server/nerf/math/loss_color.h"

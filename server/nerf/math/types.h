@@ -40,7 +40,7 @@ struct GridPose {
 // Range of a ray's samples in the sample arrays.
 struct RaySpan {
   int first = 0;  // sample
-  int count = 0;  // 0: the ray meets no occupied cell
+  int count = 0;  // 0: the ray intersects no occupied cell
 };
 
 // Training target of a ray.

@@ -115,12 +115,12 @@ std::vector<uint8_t> Occupancy::TrimmedHull(double share) const {
   const LayerWeights weights = AllWeights();
   for (size_t axis = 0; axis < 3; ++axis) {
     const auto& weight = weights[axis];
-    const double most_cut = share * std::accumulate(weight.begin(), weight.end(), 0.0);
+    const double max_cut = share * std::accumulate(weight.begin(), weight.end(), 0.0);
     first[axis] = 0;
     last[axis] = kSide - 1;
     double below = weight.front(), above = weight.back();
-    while (first[axis] < kSide - 1 && below < most_cut) below += weight[static_cast<size_t>(++first[axis])];
-    while (last[axis] > 0 && above < most_cut) above += weight[static_cast<size_t>(--last[axis])];
+    while (first[axis] < kSide - 1 && below < max_cut) below += weight[static_cast<size_t>(++first[axis])];
+    while (last[axis] > 0 && above < max_cut) above += weight[static_cast<size_t>(--last[axis])];
     // One layer of margin, because the surface may lie anywhere within its cell.
     first[axis] -= 1;
     last[axis] += 1;

@@ -41,7 +41,7 @@ class Occupancy {
   void Update();
 
   // Returns the hull without the outermost layers along each axis that received less than `share` of the weight of all
-  // samples. In directions that no view observes, such as towards the table below an object, the hull extends to the
+  // samples. In directions that no view observes, such as toward the table below an object, the hull extends to the
   // border of the box, but the object does not.
   std::vector<uint8_t> TrimmedHull(double share) const;
 

@@ -23,8 +23,8 @@ ShapeWeights MakeShapeWeights(const NerfConfig& config) {
 
 SampleBudget MakeSampleBudget(const NerfConfig& config) {
   return {.finest_step = static_cast<float>(config.min_sample_spacing),
-          .least = config.min_samples_per_ray,
-          .most = config.max_samples_per_ray,
+          .min_samples = config.min_samples_per_ray,
+          .max_samples = config.max_samples_per_ray,
           .skip_empty = config.sampling == "occupied"};
 }
 

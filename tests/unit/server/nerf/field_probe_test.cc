@@ -25,10 +25,10 @@ TEST(FieldProbeTest, MeasuresRaysThatMissTheBoxAndTheResidualOfAnEmptyField) {
   RaySet rays(config, 1);
   rays.Build(views, box);
   FieldProbe probe;
-  EXPECT_EQ(probe.ShareMeetingBox({1, 1, 1}), 1) << "without rays";
+  EXPECT_EQ(probe.ShareIntersectingBox({1, 1, 1}), 1) << "without rays";
   probe.Build(rays, views.size());
-  EXPECT_EQ(probe.ShareMeetingBox({1, 1, 1}), 1);
-  EXPECT_LT(probe.ShareMeetingBox({0.1f, 0.1f, 0.1f}), 0.2);
+  EXPECT_EQ(probe.ShareIntersectingBox({1, 1, 1}), 1);
+  EXPECT_LT(probe.ShareIntersectingBox({0.1f, 0.1f, 0.1f}), 0.2);
 
   Occupancy occupancy(config);
   occupancy.SetHull(std::vector<uint8_t>(occupancy.hull().size(), 0));

@@ -18,14 +18,14 @@ TEST(FieldWarningsTest, ListsAllProblems) {
   warnings.OnBox(absl::InvalidArgumentError("cuboid: pose is not finite"));
   warnings.OnRejectedView(absl::InvalidArgumentError("first"));
   warnings.OnRejectedView(absl::InvalidArgumentError("second"));
-  warnings.OnViewChecks({.views = 9, .black_views = 2, .depth_consistent = false, .share_meeting_box = 0.4});
+  warnings.OnViewChecks({.views = 9, .black_views = 2, .depth_consistent = false, .share_intersecting_box = 0.4});
   EXPECT_EQ(warnings.Text(3, {KeyframeId{4}, KeyframeId{7}}),
             "training diverged 3 times; paused until new data arrives; "
-            "ignored a map correction that is not finite; "
+            "a map correction with values that are not finite was ignored; "
             "cuboid: pose is not finite; "
-            "2 views rejected, the last one: second; "
+            "2 views rejected; last error: second; "
             "the object is black in 2 of 9 views; "
-            "depth images contradict the masks and are ignored; "
+            "depth images ignored because they contradict the masks; "
             "most rays through the masks miss the object's box; "
             "views excluded because they contradict the others: keyframe/4, keyframe/7");
 }

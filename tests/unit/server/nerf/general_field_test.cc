@@ -33,7 +33,7 @@ TEST(GeneralFieldTest, LearnsTheShapeOfABall) {
   EXPECT_LT(testing::BallSurfaceError(scene, TrainedBall(scene, deep, 1).Snapshot()), 0.1);
 }
 
-TEST(GeneralFieldTest, TrainsTheSameTwiceOnTwoThreads) {
+TEST(GeneralFieldTest, IsDeterministicOnTwoThreads) {
   const testing::BallScene scene;
   NerfConfig config;
   config.encoding = "frequency";

@@ -49,7 +49,7 @@ struct Change {
 
 class ObjectFieldBoxChangeTest : public ::testing::TestWithParam<Change> {};
 
-TEST_P(ObjectFieldBoxChangeTest, TransferredFieldBecomesAsGoodAsOneOfTheRightBox) {
+TEST_P(ObjectFieldBoxChangeTest, TransferredFieldReachesTheAccuracyOfAFieldTrainedInTheNewBox) {
   const BallScene scene;
   const auto whole = static_cast<int>(ShortConfig().full_budget_steps);
   ObjectField right = MakeField(scene, scene.Box());

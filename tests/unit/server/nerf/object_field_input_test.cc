@@ -37,7 +37,7 @@ NerfConfig ShapeConfig() {
   return config;
 }
 
-void TrainToTheEnd(ObjectField& field) {
+void TrainToCompletion(ObjectField& field) {
   while (field.AllowedSteps(true) > field.steps()) {
     field.Train(static_cast<int>(std::min<uint64_t>(20, field.AllowedSteps(true) - field.steps())), 1);
   }
@@ -48,7 +48,7 @@ ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& vie
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : views) EXPECT_TRUE(field.AddView(view).ok());
-  TrainToTheEnd(field);
+  TrainToCompletion(field);
   return field;
 }
 
@@ -74,7 +74,7 @@ TEST(ObjectFieldInputTest, ExcludesAViewWithAWrongPose) {
   // After a correction of its pose, the view is trusted again.
   ASSERT_TRUE(field.CorrectView({views[6].keyframe, scene.View(6).T_world_camera}).ok());
   EXPECT_EQ(field.Warning(), "");
-  TrainToTheEnd(field);
+  TrainToCompletion(field);
   EXPECT_EQ(field.Warning(), "");
   EXPECT_EQ(field.Snapshot().cameras.size(), 16u);
 }
@@ -129,7 +129,7 @@ TEST(ObjectFieldInputTest, NewMasksOfTheSameKeyframesChangeTheField) {
     ASSERT_TRUE(field.AddView(view).ok());
   }
   EXPECT_EQ(field.views(), scene.views) << "they replace the views of the same keyframes";
-  TrainToTheEnd(field);
+  TrainToCompletion(field);
   EXPECT_LT(raw_below(), level);
 }
 
@@ -142,7 +142,7 @@ TEST(ObjectFieldInputTest, LearnsTheShapeFromBlackImages) {
   EXPECT_LT(BallSurfaceError(scene, snapshot), 0.12);
 }
 
-TEST(ObjectFieldInputTest, WarnsOfABoxThatMissesTheObject) {
+TEST(ObjectFieldInputTest, WarnsAboutABoxThatMissesTheObject) {
   const BallScene scene;
   ObjectField field(ShapeConfig(), scene.object, 1);
   Cuboid box = scene.Box();
@@ -150,17 +150,17 @@ TEST(ObjectFieldInputTest, WarnsOfABoxThatMissesTheObject) {
                         box.T_world_object.translation() + Eigen::Vector3d(0, 0, 2.6 * scene.radius_mu)};
   ASSERT_TRUE(field.SetBox(box).ok());
   for (const ObjectView& view : scene.Views()) ASSERT_TRUE(field.AddView(view).ok());
-  TrainToTheEnd(field);
+  TrainToCompletion(field);
   const FieldSnapshot snapshot = field.Snapshot();
   EXPECT_THAT(snapshot.warning, HasSubstr("miss the object's box"));
   for (float raw : RawOnGrid(snapshot)) EXPECT_TRUE(std::isfinite(raw));
   ASSERT_TRUE(field.SetBox(scene.Box()).ok());
-  TrainToTheEnd(field);
+  TrainToCompletion(field);
   EXPECT_THAT(field.Warning(), Not(HasSubstr("miss the object's box")));
   EXPECT_LT(BallSurfaceError(scene, field.Snapshot()), 0.06);
 }
 
-TEST(ObjectFieldInputTest, WarnsOfRejectedInput) {
+TEST(ObjectFieldInputTest, WarnsAboutRejectedInput) {
   const BallScene scene;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   ObjectField field(SmallConfig(), scene.object, 1);
@@ -174,16 +174,16 @@ TEST(ObjectFieldInputTest, WarnsOfRejectedInput) {
   ObjectView view = scene.View(0);
   view.ray_kind = cv::Mat::zeros(view.roi_px.size(), CV_8UC1);
   EXPECT_FALSE(field.AddView(view).ok());
-  EXPECT_EQ(field.Warning(), "2 views rejected, the last one: view of object/7 in keyframe/1: mask is empty");
+  EXPECT_EQ(field.Warning(), "2 views rejected; last error: view of object/7 in keyframe/1: mask is empty");
   view.ray_kind.at<uint8_t>(30, 30) = static_cast<uint8_t>(RayKind::kObject);
   EXPECT_FALSE(field.AddView(view).ok());
-  EXPECT_THAT(field.Warning(), HasSubstr("mask has 1 px, at least 16 px are needed"));
+  EXPECT_THAT(field.Warning(), HasSubstr("mask must have at least 16 object pixels, has 1"));
   view = scene.View(0);
   view.camera.cx_px = nan;
   EXPECT_FALSE(field.AddView(view).ok());
   EXPECT_EQ(field.views(), 0);
   field.Move({nan, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()});
-  EXPECT_THAT(field.Warning(), HasSubstr("ignored a map correction that is not finite"));
+  EXPECT_THAT(field.Warning(), HasSubstr("a map correction with values that are not finite was ignored"));
   ASSERT_TRUE(field.AddView(scene.View(0)).ok());
   EXPECT_TRUE(field.Snapshot().T_world_object.IsFinite());
 }
@@ -213,7 +213,7 @@ TEST(ObjectFieldInputTest, IgnoresDepthOfAWrongScale) {
   std::vector<ObjectView> views = scene.Views();
   for (ObjectView& view : views) view.depth_mu = view.depth_mu * 1.1;
   const FieldSnapshot snapshot = TrainedOn(scene, views).Snapshot();
-  EXPECT_THAT(snapshot.warning, HasSubstr("depth images contradict the masks"));
+  EXPECT_THAT(snapshot.warning, HasSubstr("depth images ignored"));
   EXPECT_LT(BallSurfaceError(scene, snapshot), 0.06);
 }
 

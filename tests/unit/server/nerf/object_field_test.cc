@@ -52,7 +52,7 @@ TEST(ObjectFieldTest, LearnsTheShapeAndColorOfABall) {
   }
 }
 
-TEST(ObjectFieldTest, LearnsWithThePapersSamplingAndLosses) {
+TEST(ObjectFieldTest, LearnsWithTheSamplingAndLossesOfThePaper) {
   BallScene scene;
   scene.with_depth = true;
   NerfConfig config;
@@ -154,7 +154,7 @@ TEST(ObjectFieldTest, RejectsInvalidBoxes) {
   EXPECT_EQ(field.Train(5, 1).steps, 0);
 }
 
-TEST(ObjectFieldTest, RestartsOnlyForABoxWithLittleInCommon) {
+TEST(ObjectFieldTest, RestartsOnlyIfTheBoxesBarelyOverlap) {
   const BallScene scene;
   ObjectField field = MakeField(scene, SmallFieldConfig());
   field.Train(10, 1);

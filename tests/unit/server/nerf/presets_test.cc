@@ -22,7 +22,7 @@ TEST(PresetsTest, FastIsTheDefault) {
   EXPECT_FALSE(NerfPreset("slow").has_value());
 }
 
-TEST(PresetsTest, EveryPresetKeepsItsRangesAndItsName) {
+TEST(PresetsTest, EveryPresetIsInRangeAndHasItsName) {
   for (const std::string& name : NerfPresetNames()) {
     const NerfConfig preset = *NerfPreset(name);
     EXPECT_EQ(preset.preset, name);
@@ -34,7 +34,7 @@ TEST(PresetsTest, EveryPresetKeepsItsRangesAndItsName) {
 }
 
 // The numbers of the paper's section "Implementation Details".
-TEST(PresetsTest, PaperIsThePapersConfiguration) {
+TEST(PresetsTest, PaperPresetHasTheValuesOfThePaper) {
   const NerfConfig c = *NerfPreset("paper");
   EXPECT_EQ(c.encoding, "hash");
   EXPECT_EQ(c.log2_table_entries, 16);
@@ -66,7 +66,7 @@ TEST(PresetsTest, ExplicitKeysOverrideThePresetInAnyOrder) {
   }
 }
 
-TEST(PresetsTest, AssignmentsHoldInTheirOrder) {
+TEST(PresetsTest, AssignmentsAreAppliedInOrder) {
   NerfConfig config;
   const std::vector<std::string> after = {"nerf.preset=paper", "nerf.rays_per_step=512"};
   ASSERT_TRUE(FieldsOf(config).Set(after).ok());

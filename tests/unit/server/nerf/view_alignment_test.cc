@@ -136,11 +136,11 @@ TEST(ViewAlignmentTest, WithoutEvidenceReturnsToTheGivenPose) {
   for (const cv::Point& at : ViewAlignment(view).Pixels(100, 1)) {
     rendered.push_back({at.x, at.y, kDistance_mu * view.camera.Unproject(at.x, at.y), {0.5f, 0.5f, 0.5f}, 1.0f});
   }
-  ObjectMotion so_far = ObjectMotion::Zero();
-  so_far[3] = 0.01;
-  const ObjectMotion motion = ViewAlignment(view).Align(rendered, image.Pose(view), so_far, 2);
-  EXPECT_TRUE(motion.isApprox(-so_far, 1e-6)) << motion.transpose();
-  EXPECT_TRUE(ViewAlignment(view).Align({}, image.Pose(view), so_far, 2).isZero()) << "no rendering";
+  ObjectMotion applied = ObjectMotion::Zero();
+  applied[3] = 0.01;
+  const ObjectMotion motion = ViewAlignment(view).Align(rendered, image.Pose(view), applied, 2);
+  EXPECT_TRUE(motion.isApprox(-applied, 1e-6)) << motion.transpose();
+  EXPECT_TRUE(ViewAlignment(view).Align({}, image.Pose(view), applied, 2).isZero()) << "no rendering";
 }
 
 }  // namespace

@@ -58,15 +58,15 @@ TEST(ViewCheckTest, RejectsInvalidPosesAndCameras) {
 
 TEST(ViewCheckTest, RejectsInvalidImages) {
   EXPECT_THAT(ErrorOf([](ObjectView& v) { v.color_bgr = cv::Mat::zeros(10, 12, CV_8UC3); }),
-              HasSubstr("color_bgr is 12x10 px but the crop is 72x72 px"));
+              HasSubstr("color_bgr must be 72x72 px like the crop, is 12x10 px"));
   EXPECT_THAT(ErrorOf([](ObjectView& v) { v.depth_mu = cv::Mat::zeros(v.roi_px.size(), CV_16UC1); }),
               HasSubstr("depth_mu must be CV_32FC1"));
-  EXPECT_THAT(ErrorOf([](ObjectView& v) { v.roi_px.x = 5; }), HasSubstr("is not inside the image"));
+  EXPECT_THAT(ErrorOf([](ObjectView& v) { v.roi_px.x = 5; }), HasSubstr("must be inside the image"));
   EXPECT_THAT(ErrorOf([](ObjectView& v) {
                 v.ray_kind.setTo(static_cast<int>(RayKind::kBackground));
                 v.ray_kind.at<uint8_t>(30, 30) = static_cast<uint8_t>(RayKind::kObject);
               }),
-              HasSubstr("mask has 1 px, at least 16 px are needed"));
+              HasSubstr("mask must have at least 16 object pixels, has 1"));
 }
 
 }  // namespace

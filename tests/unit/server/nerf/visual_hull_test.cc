@@ -90,7 +90,7 @@ TEST(VisualHullTest, WithoutViewsAllCellsAreKept) {
 }
 
 // A dent that is invisible in every outline: the depth of all views is behind the ball's surface.
-TEST(VisualHullTest, DepthCarvesWhatMasksCannot) {
+TEST(VisualHullTest, DepthCarvesConcavities) {
   BallScene scene;
   scene.with_depth = true;
   const TrainingBox box = TrainingBox::Around(scene.Box(), 0.1);
@@ -133,7 +133,7 @@ ObjectView ViewFrom(const Eigen::Vector3d& center, RayKind kind) {
   return view;
 }
 
-// Marks the pixels whose rays meet a shape.
+// Marks the pixels whose rays intersect a shape.
 void Paint(ObjectView& view, const InsideDistance& shape, RayKind kind) {
   for (int v = 0; v < view.ray_kind.rows; ++v) {
     for (int u = 0; u < view.ray_kind.cols; ++u) {

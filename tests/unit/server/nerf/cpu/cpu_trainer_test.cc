@@ -24,7 +24,8 @@ void* Allocate(size_t bytes, size_t alignment) {
 
 }  // namespace
 
-// Counts the allocations of the whole program. Not inlined: GCC would take std::free() for a mismatch with `new`.
+// Counts the allocations of the whole program. Not inlined, because GCC would report std::free() as a mismatch with
+// `new`.
 void* operator new(size_t bytes) { return Allocate(bytes, alignof(std::max_align_t)); }
 void* operator new[](size_t bytes) { return Allocate(bytes, alignof(std::max_align_t)); }
 void* operator new(size_t bytes, std::align_val_t alignment) { return Allocate(bytes, static_cast<size_t>(alignment)); }
@@ -97,7 +98,7 @@ TEST(CpuTrainerTest, StepsAllocateNothing) {
   }
 }
 
-TEST(CpuTrainerTest, SameInputAndThreadsGiveTheSameBits) {
+TEST(CpuTrainerTest, SameInputAndThreadCountGiveIdenticalResults) {
   for (const int threads : {1, 2, 3}) {
     const std::vector<float> once = Trained(threads, {12});
     EXPECT_EQ(once, Trained(threads, {12})) << "threads " << threads;
@@ -105,7 +106,7 @@ TEST(CpuTrainerTest, SameInputAndThreadsGiveTheSameBits) {
   }
 }
 
-TEST(CpuTrainerTest, TwoThreadsDoTheWorkOfOne) {
+TEST(CpuTrainerTest, TwoThreadsGiveTheResultOfOneUpToRounding) {
   const std::vector<float> one = Trained(1, {8}), two = Trained(2, {8});
   const std::vector<float> untrained = Trained(1, {});
   double moved = 0, apart = 0;

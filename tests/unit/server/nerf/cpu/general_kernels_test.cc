@@ -184,7 +184,7 @@ TEST(DeepMlpTest, NewWeightsKeepTheScaleOfSignals) {
   EXPECT_LT(spread(6), 3 * spread(1));
 }
 
-TEST(NeedsGeneralKernelsTest, OnlyForWhatTheFastKernelsDoNotSupport) {
+TEST(NeedsGeneralKernelsTest, IsTrueOnlyForModelsThatTheFastKernelsDoNotSupport) {
   EXPECT_FALSE(FieldModel(NerfConfig(), 1).NeedsGeneralKernels());
   EXPECT_TRUE(FrequencyModel(4, 16, 1).NeedsGeneralKernels());
   NerfConfig deep;

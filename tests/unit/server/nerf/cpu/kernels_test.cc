@@ -196,7 +196,7 @@ TEST_P(KernelsTest, Compositing) {
   for (size_t i = 0; i < static_cast<size_t>(want.size * kOutputs); ++i) {
     EXPECT_NEAR(want.d_raw[i], got.d_raw[i], 1e-6f) << i;
   }
-  // Rays without a visible partner have no contrast loss.
+  // Rays whose partner has no samples have no contrast loss.
   weights.contrast = 0;
   run(plain_, want, want_results);
   EXPECT_LT(want_results[0].loss, got_results[0].loss);
@@ -204,7 +204,7 @@ TEST_P(KernelsTest, Compositing) {
   EXPECT_EQ(want_results[4].loss, got_results[4].loss);
 }
 
-TEST_P(KernelsTest, AdamLeavesEntriesWithoutGradientAlone) {
+TEST_P(KernelsTest, AdamDoesNotChangeEntriesWithoutGradient) {
   constexpr size_t kCount = 64;
   const AdamRates rates{0.01f, 0.8f, 0.95f};
   const auto run = [&](const KernelTable& kernels, AlignedBuffer<float>& first) {
@@ -245,7 +245,7 @@ TEST_P(KernelsTest, SamplesLieInOccupiedCellsAndInOrder) {
   plain_.place_samples(rays.data(), static_cast<int>(rays.size()), rule, want, want_spans.data());
   SimdKernels().place_samples(rays.data(), static_cast<int>(rays.size()), rule, got, got_spans.data());
   ASSERT_EQ(want.size, got.size);
-  ASSERT_GT(got.size, 40 * rule.budget.least / 2);
+  ASSERT_GT(got.size, 40 * rule.budget.min_samples / 2);
   const size_t size = static_cast<size_t>(got.size);
   ExpectNear(want.x, got.x, size, 1e-5f);
   ExpectNear(want.z, got.z, size, 1e-5f);
@@ -268,8 +268,9 @@ TEST_P(KernelsTest, SamplesSpreadEvenlyOverTheOccupiedPieces) {
   for (const uint32_t x : {3u, 4u, 31u, 32u, 63u}) occupy(x);
   // Along x through the center of row (y 10, z 20): 64 pieces, each one cell long.
   const Ray ray{{-1, 10.5f / 64, 20.5f / 64}, {1, 0, 0}, 0.5f, {}};
-  const SamplingRule rule{
-      .occupied_bits = bits.data(), .extent = {1, 1, 1}, .budget = {.finest_step = 0.5f / 64, .least = 1, .most = 16}};
+  const SamplingRule rule{.occupied_bits = bits.data(),
+                          .extent = {1, 1, 1},
+                          .budget = {.finest_step = 0.5f / 64, .min_samples = 1, .max_samples = 16}};
   for (const KernelTable* kernels : {&plain_, &SimdKernels()}) {
     SampleChunk chunk(64, 16, 16);
     RaySpan span;
@@ -293,7 +294,8 @@ TEST_P(KernelsTest, SamplesSpreadEvenlyOverTheOccupiedPieces) {
 
 TEST_P(KernelsTest, UniformSamplingSpansTheBox) {
   std::vector<uint32_t> nothing(kOccupancyResolution * kOccupancyResolution * kOccupancyResolution / 32);
-  SamplingRule rule{.occupied_bits = nothing.data(), .extent = {1, 1, 1}, .budget = {.most = 32, .skip_empty = false}};
+  SamplingRule rule{
+      .occupied_bits = nothing.data(), .extent = {1, 1, 1}, .budget = {.max_samples = 32, .skip_empty = false}};
   const Ray ray{{-1, 0.5f, 0.5f}, {1, 0, 0}, 0.5f, {}};
   SampleChunk chunk(64, 16, 16);
   RaySpan span;

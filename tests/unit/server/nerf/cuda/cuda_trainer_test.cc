@@ -74,7 +74,7 @@ double Deviation(const Trainer& a, const Trainer& b, const NerfConfig& config) {
   return apart / moved;
 }
 
-TEST_F(CudaTrainerTest, LearnsLikeTheCpu) {
+TEST_F(CudaTrainerTest, TrainsAsOnTheCpu) {
   NerfConfig config = SmallConfig();
   const StepSource source = BallSource(config);
   CpuTrainer cpu(config, 3, PlainKernels());
@@ -207,7 +207,7 @@ TEST_F(CudaTrainerTest, TheCpuContinuesAfterADeviceFailure) {
   EXPECT_EQ(AllParameters(*unused), AllParameters(cpu));
 }
 
-TEST_F(CudaTrainerTest, TheCpuTrainsWhileTheDeviceIsOutOfMemory) {
+TEST_F(CudaTrainerTest, TheCpuTrainsIfTheDeviceIsOutOfMemory) {
   const NerfConfig config = SmallConfig();
   const std::unique_ptr<Trainer> trainer = OnDevice(config);
   cuda_on_host::SetDeviceTraits({.memory_bytes = 1 << 20});

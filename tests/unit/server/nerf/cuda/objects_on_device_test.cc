@@ -59,7 +59,7 @@ void WaitUntilIdle(TrainingPool& pool, TrainingPool::SessionId session) {
   }
 }
 
-TEST_F(ObjectsOnDeviceTest, AnObjectLearnsLikeOnTheCpu) {
+TEST_F(ObjectsOnDeviceTest, AnObjectIsTrainedAsOnTheCpu) {
   NerfConfig config = TinyConfig();
   const std::vector<float> on_device = Train(config, 8);
   config.backend = "cpu";
@@ -83,7 +83,7 @@ TEST_F(ObjectsOnDeviceTest, TrainingTimeIsLimited) {
   pool.Offer(session, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   pool.Finish(session);
   WaitUntilIdle(pool, session);
-  EXPECT_EQ(pool.GetProgress(session).steps, 4u) << "one slice takes more than that";
+  EXPECT_EQ(pool.GetProgress(session).steps, 4u) << "one slice takes longer than the limit";
   pool.RemoveSession(session);
 }
 

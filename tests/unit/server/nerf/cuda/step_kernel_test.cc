@@ -83,11 +83,11 @@ struct Shape {
 
 // Partly filled tiles, tiles of many and of two rays, rays that span warps, fields that need padding.
 const Shape kShapes[] = {
-    {5, 32, 23, {.finest_step = 0.02f, .least = 3, .most = 12}, false},
-    {8, 32, 17, {.finest_step = 0.01f, .least = 4, .most = 16}, true},
-    {16, 64, 5, {.finest_step = 0.02f, .least = 4, .most = 32, .skip_empty = false}, false},
-    {9, 48, 3, {.finest_step = 0.004f, .least = 4, .most = 64}, false},
-    {2, 16, 131, {.finest_step = 0.01f, .least = 1, .most = 1}, true},
+    {5, 32, 23, {.finest_step = 0.02f, .min_samples = 3, .max_samples = 12}, false},
+    {8, 32, 17, {.finest_step = 0.01f, .min_samples = 4, .max_samples = 16}, true},
+    {16, 64, 5, {.finest_step = 0.02f, .min_samples = 4, .max_samples = 32, .skip_empty = false}, false},
+    {9, 48, 3, {.finest_step = 0.004f, .min_samples = 4, .max_samples = 64}, false},
+    {2, 16, 131, {.finest_step = 0.01f, .min_samples = 1, .max_samples = 1}, true},
 };
 
 TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
@@ -101,7 +101,7 @@ TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
       StepOnCpu cpu(field, input);
       plain ? cpu.Run(PlainKernels(), field, input) : cpu.RunRounded(field, input);
       ASSERT_GT(cpu.active_samples, cpu.chunk.size / 10);
-      ASSERT_TRUE(cpu.active_samples < cpu.chunk.size || shape.budget.most == 1);
+      ASSERT_TRUE(cpu.active_samples < cpu.chunk.size || shape.budget.max_samples == 1);
       const std::span<const float> table_gradient = cpu.table_gradient.span().first(field.table.size());
       StepOnDevice device(field, input);
       device.ComputeGradients(path);
@@ -121,7 +121,7 @@ TEST_P(CudaKernelsTest, StepHasTheGradientsOfTheCpu) {
 
 TEST_P(CudaKernelsTest, StepRecordsTheWeightsOfItsSamples) {
   const FieldModel field = NoisyField(5, 16);
-  const StepInput input = TestStep(60, {.finest_step = 0.02f, .least = 4, .most = 14}, false);
+  const StepInput input = TestStep(60, {.finest_step = 0.02f, .min_samples = 4, .max_samples = 14}, false);
   StepOnCpu cpu(field, input);
   cpu.Run(PlainKernels(), field, input);
   std::vector<uint32_t> visits(kCells);
@@ -152,8 +152,9 @@ TEST_P(CudaKernelsTest, StepRecordsTheWeightsOfItsSamples) {
 // With more tiles than blocks, a block processes a second tile.
 TEST_P(CudaKernelsTest, BlocksProcessSeveralTiles) {
   const FieldModel field = NoisyField(2, 16);
-  const StepInput input = TestStep(2 * kMaxStepBlocks + 7, {.finest_step = 0.9f, .least = 1, .most = 64}, false);
-  ASSERT_EQ(StepBlocks(static_cast<int>(input.rays.size()), input.budget.most), kMaxStepBlocks);
+  const StepInput input =
+      TestStep(2 * kMaxStepBlocks + 7, {.finest_step = 0.9f, .min_samples = 1, .max_samples = 64}, false);
+  ASSERT_EQ(StepBlocks(static_cast<int>(input.rays.size()), input.budget.max_samples), kMaxStepBlocks);
   StepOnCpu cpu(field, input);
   cpu.Run(PlainKernels(), field, input);
   StepOnDevice device(field, input);
@@ -203,7 +204,7 @@ TEST_P(CudaKernelsTest, TheLargestFieldFitsIntoABlock) {
   StepOnDevice device(field, TestStep(8, {}, false));
   for (const int most : {1, 16, 64}) {
     StepParams params = device.Params();
-    params.budget.most = most;
+    params.budget.max_samples = most;
     EXPECT_EQ(PrepareStep(params, MlpPath::kTensorCores), cudaSuccess) << most;
   }
 }

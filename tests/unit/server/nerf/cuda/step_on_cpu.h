@@ -107,7 +107,7 @@ struct StepOnCpu {
   int active_samples = 0;
 
   StepOnCpu(const FieldModel& field, const StepInput& input)
-      : chunk(static_cast<int>(input.rays.size()) * input.budget.most, field.layout.features, field.mlp.hidden),
+      : chunk(static_cast<int>(input.rays.size()) * input.budget.max_samples, field.layout.features, field.mlp.hidden),
         spans(input.rays.size()),
         results(input.rays.size(), RayResult{}),
         table_gradient(field.table.size() + kMaxLanes),

@@ -50,7 +50,7 @@ class StepOnDevice {
     table_ = ToDevice<float>(field.table.span());
     mlp_ = ToDevice<float>(field.mlp.parameters.span());
     table_gradient = Zeros(table_.size());
-    step_blocks_ = StepBlocks(static_cast<int>(input.rays.size()), input.budget.most);
+    step_blocks_ = StepBlocks(static_cast<int>(input.rays.size()), input.budget.max_samples);
     mlp_partial_ = DeviceArray<float>::Allocate(mlp_.size() * static_cast<size_t>(step_blocks_)).value();
   }
 

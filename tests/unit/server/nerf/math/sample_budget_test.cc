@@ -6,7 +6,7 @@ namespace romap::nerf {
 namespace {
 
 TEST(SampleCountTest, FollowsTheFinestStepWithinTheLimits) {
-  const SampleBudget budget{.finest_step = 0.1f, .least = 4, .most = 16};
+  const SampleBudget budget{.finest_step = 0.1f, .min_samples = 4, .max_samples = 16};
   EXPECT_EQ(SampleCount(budget, 0), 0);
   EXPECT_EQ(SampleCount(budget, 0.05f), 4);
   EXPECT_EQ(SampleCount(budget, 0.75f), 8);
@@ -14,7 +14,7 @@ TEST(SampleCountTest, FollowsTheFinestStepWithinTheLimits) {
 }
 
 TEST(SampleCountTest, UniformSamplingUsesTheLargestNumber) {
-  const SampleBudget budget{.finest_step = 0.1f, .least = 4, .most = 16, .skip_empty = false};
+  const SampleBudget budget{.finest_step = 0.1f, .min_samples = 4, .max_samples = 16, .skip_empty = false};
   EXPECT_EQ(SampleCount(budget, 0.05f), 16);
   EXPECT_EQ(SampleCount(budget, 0), 0);
 }

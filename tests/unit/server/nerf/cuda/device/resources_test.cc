@@ -87,23 +87,23 @@ TEST_P(CudaResourceTest, KernelsStayWithinTheirLimits) {
   EXPECT_EQ(kernels, 6u);
 }
 
-size_t StepBytes(int levels, int hidden, int most_samples) {
+size_t StepBytes(int levels, int hidden, int max_samples) {
   DeviceField field{};
   NerfConfig config;
   config.levels = levels;
   field.grid = MakeGridLayout(config);
   field.hidden = hidden;
-  const size_t bytes = StepSharedBytes(field, {.most = most_samples}, MlpPath::kTensorCores);
+  const size_t bytes = StepSharedBytes(field, {.max_samples = max_samples}, MlpPath::kTensorCores);
   fmt::print("StepKernel<TensorMlp>, {} levels, {} neurons, {} samples a ray: {} bytes of dynamic shared memory\n",
-             levels, hidden, most_samples, bytes);
+             levels, hidden, max_samples, bytes);
   return bytes;
 }
 
 TEST(CudaResources, SharedMemoryStaysWithinItsLimits) {
   EXPECT_LE(StepBytes(8, 32, 16), kFastStepSharedBytes);
   EXPECT_LE(StepBytes(16, 64, 32), kPaperStepSharedBytes);
-  for (const int most_samples : {1, 16, kMaxSamplesPerRay}) {
-    EXPECT_LE(StepBytes(kMaxLevels, kMaxHidden, most_samples), kMostStepSharedBytes);
+  for (const int max_samples : {1, 16, kMaxSamplesPerRay}) {
+    EXPECT_LE(StepBytes(kMaxLevels, kMaxHidden, max_samples), kMaxStepSharedBytes);
   }
 }
 
