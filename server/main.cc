@@ -55,23 +55,24 @@ struct Config {
 
 void PrintError(const std::string& message) { fmt::print(stderr, "romap-server: {}\n", message); }
 
-// The flags, or the exit status if the program must end (--help, --version, invalid flags).
+// The flags, or the exit status if the program must exit (--help, --version, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
   std::optional<std::string> listen_address, log_level;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
-  app.add_option("--listen", listen_address,
-                 "HOST:PORT of the gRPC service; port 0 = any free port. Same as --set transport.listen_address=..");
-  app.add_option("--config", flags.config_file, "YAML file with settings");
-  app.add_option("--set", flags.assignments, "Setting section.field=value, overrides the file; may be repeated")
+  app.add_option(
+      "--listen", listen_address,
+      "HOST:PORT of the gRPC service; port 0 = any free port. Same as --set transport.listen_address=HOST:PORT");
+  app.add_option("--config", flags.config_file, "YAML file with settings; see deploy/server.yaml");
+  app.add_option("--set", flags.assignments, "SECTION.FIELD=VALUE; overrides the file; may be repeated")
       ->allow_extra_args(false);
   auto* dump = app.add_flag("--dump-config", flags.dump_config,
                             "Print the settings for operators and those that were set, with unit, range and meaning, "
                             "and exit");
   app.add_flag("--expert", flags.expert, "With --dump-config: print all settings")->needs(dump);
-  app.add_option("--log-level", log_level, "Minimum severity of logged messages. Same as --set log.level=..");
-  app.add_option("--threads", threads, "Number of training threads. Same as --set nerf.training_threads=..");
+  app.add_option("--log-level", log_level, "Minimum severity of logged messages. Same as --set log.level=LEVEL");
+  app.add_option("--threads", threads, "Number of training threads. Same as --set nerf.training_threads=N");
   app.set_version_flag("--version", fmt::format("romap-server {}", Version()));
   try {
     app.parse(argc, argv);

@@ -41,31 +41,31 @@ void FrameLedger::AcknowledgeMasks(const FrameMasks& masks) {
   map_->Acknowledge(MasksAck{.frame_id = masks.frame_id, .accepted = true, .error = ""});
 }
 
-void FrameLedger::Reject(const Arrival& arrival, const absl::Status& why) {
+void FrameLedger::Reject(const Arrival& arrival, const absl::Status& reason) {
   if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
     ++frames_rejected_;
-    spdlog::info("session {}: frame {} rejected: {}", session_id_, frame->frame_id, Message(why));
+    spdlog::info("session {}: frame {} rejected: {}", session_id_, frame->frame_id, Message(reason));
   } else {
     const uint64_t frame_id = std::get<MasksInput>(arrival.input).frame_id;
-    spdlog::info("session {}: masks of frame {} rejected: {}", session_id_, frame_id, Message(why));
+    spdlog::info("session {}: masks of frame {} rejected: {}", session_id_, frame_id, Message(reason));
   }
-  Refuse(arrival, Message(why), TrackingState::kLost);
+  SendRejection(arrival, Message(reason), TrackingState::kLost);
 }
 
 void FrameLedger::Drop(const Arrival& arrival) {
   if (std::holds_alternative<FrameInput>(arrival.input)) ++frames_dropped_;
-  Refuse(arrival, "dropped: the server cannot keep up with the live stream", TrackingState::kTracking);
+  SendRejection(arrival, "dropped: the server cannot keep up with the live stream", TrackingState::kTracking);
 }
 
-void FrameLedger::Refuse(const Arrival& arrival, std::string why, TrackingState state) {
+void FrameLedger::SendRejection(const Arrival& arrival, std::string reason, TrackingState state) {
   if (const auto* masks = std::get_if<MasksInput>(&arrival.input)) {
-    map_->Acknowledge(MasksAck{.frame_id = masks->frame_id, .accepted = false, .error = std::move(why)});
+    map_->Acknowledge(MasksAck{.frame_id = masks->frame_id, .accepted = false, .error = std::move(reason)});
   } else {
     const FrameInput& frame = std::get<FrameInput>(arrival.input);
     FrameAck ack;
     ack.frame_id = frame.frame_id;
     ack.accepted = false;
-    ack.error = std::move(why);
+    ack.error = std::move(reason);
     ack.state = state;
     ack.latency_s = SecondsSince(arrival.time);
     map_->Acknowledge(std::move(ack), frame.timestamp_ns);

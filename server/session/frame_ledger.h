@@ -31,8 +31,8 @@ class FrameLedger {
   void AcknowledgeMasks(const FrameMasks& masks);
 
   // Each of these settles one input. Reject: malformed. Drop: the live queue was full. SkipMapping: acknowledged, but
-  // not mapped, because mapping is behind a live stream.
-  void Reject(const Arrival& arrival, const absl::Status& why);
+  // not mapped, because mapping cannot keep up with a live stream.
+  void Reject(const Arrival& arrival, const absl::Status& reason);
   void Drop(const Arrival& arrival);
   void SkipMapping() { Settle(); }
   void CountMappedFrame(bool is_keyframe, size_t map_points);
@@ -48,7 +48,7 @@ class FrameLedger {
   void FillIn(Statistics* statistics) const;
 
  private:
-  void Refuse(const Arrival& arrival, std::string why, TrackingState state);
+  void SendRejection(const Arrival& arrival, std::string reason, TrackingState state);
   void Settle();
 
   const std::string session_id_;

@@ -54,7 +54,7 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
 }
 
 // Adds an entry for every label of the mask that has none, so that later stages find one for each label.
-void ListAllLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
+void AddUnlistedLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
   std::vector<bool> listed(65536, false);
   listed[0] = true;
   for (const Instance& instance : instances) listed[instance.label] = true;
@@ -104,12 +104,12 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
   frame->has_masks = !frame->labels.empty();
   if (camera_.HasDistortion()) Undistort(*frame);
-  if (frame->has_masks) ListAllLabels(frame->labels, frame->instances);
-  Remember(*frame);
+  if (frame->has_masks) AddUnlistedLabels(frame->labels, frame->instances);
+  AddAccepted(*frame);
   return std::shared_ptr<const Frame>(std::move(frame));
 }
 
-void Ingest::Remember(const Frame& frame) {
+void Ingest::AddAccepted(const Frame& frame) {
   accepted_.push_back({frame.frame_id, frame.timestamp_ns, frame.has_masks});
   const auto is_too_old = [&](const AcceptedFrame& old) {
     // Unsigned, because timestamps have an arbitrary epoch and the signed difference could overflow.
@@ -129,7 +129,7 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   FrameMasks masks{.frame_id = input.frame_id, .labels = {}, .instances = input.instances};
   ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_));
   if (camera_.HasDistortion()) UndistortNearest(masks.labels);
-  ListAllLabels(masks.labels, masks.instances);
+  AddUnlistedLabels(masks.labels, masks.instances);
   frame->has_masks = true;
   return masks;
 }
@@ -139,13 +139,13 @@ absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindFrameWithoutMasks(uint64_t fr
                                       [](const AcceptedFrame& frame, uint64_t id) { return frame.frame_id < id; });
   if (found == accepted_.begin() && any_expired_ && found->frame_id != frame_id) {
     return InvalidArgument(
-        "too late: the frame is more than {} s (objects.max_mask_delay_s) older than the newest frame",
+        "masks: too late: frame {} is more than {} s (objects.max_mask_delay_s) older than the newest frame", frame_id,
         max_mask_delay_s_);
   }
   if (found == accepted_.end() || found->frame_id != frame_id) {
     return InvalidArgument("frame_id: no accepted frame has id {}", frame_id);
   }
-  if (found->has_masks) return InvalidArgument("frame {} already has masks", frame_id);
+  if (found->has_masks) return InvalidArgument("masks: frame {} already has masks", frame_id);
   return &*found;
 }
 

@@ -13,7 +13,7 @@
 namespace romap::session {
 
 // The first stage: decodes, validates and undistorts the inputs of one session. Checks that frame ids and timestamps
-// increase, and keeps a list of the frames that may still get late masks. Not thread-safe.
+// increase, and keeps a list of the frames for which late masks are still accepted. Not thread-safe.
 class Ingest {
  public:
   // Late masks are accepted for frames whose timestamp is at most `max_mask_delay_s` older than the newest one.
@@ -36,7 +36,7 @@ class Ingest {
 
   absl::Status CheckOrder(const FrameInput& input) const;
   absl::StatusOr<AcceptedFrame*> FindFrameWithoutMasks(uint64_t frame_id);
-  void Remember(const Frame& frame);
+  void AddAccepted(const Frame& frame);
   void Undistort(Frame& frame) const;
   void UndistortNearest(cv::Mat& image) const;
 

@@ -50,7 +50,7 @@ void MapState::ApplyMerge(ObjectMerged merged) {
   ObjectUpdate& object = into->second.object;
   merged.revision = ++object.revision;
   Send(merged);
-  // A slow reader may not get the merge, but must get the revision.
+  // A slow reader may miss the merge but must get the revision.
   ++object.revision;
   Send(object);
 }
@@ -101,7 +101,7 @@ void MapState::Correct(const MapCorrection& correction) {
   }
 }
 
-SE3<World, Camera> MapState::PoseNow(const TrajectoryEntry& entry) const {
+SE3<World, Camera> MapState::CurrentPose(const TrajectoryEntry& entry) const {
   if (!entry.reference) return *entry.ack.T_world_camera;
   return references_.at(entry.reference).Compose(entry.T_reference_camera);
 }
@@ -154,7 +154,7 @@ MapSnapshot MapState::Snapshot() const {
   }
   for (const TrajectoryEntry& entry : trajectory_) {
     snapshot.trajectory.push_back(entry.ack);
-    snapshot.trajectory.back().T_world_camera = PoseNow(entry);
+    snapshot.trajectory.back().T_world_camera = CurrentPose(entry);
     snapshot.timestamps_ns.push_back(entry.timestamp_ns);
   }
   return snapshot;

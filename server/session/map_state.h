@@ -18,18 +18,20 @@
 
 namespace romap::session {
 
-// The map that clients see: the newest cuboid and mesh of every object, the trajectory, and the subscribers. Every
-// change of an object gets its revision here, and here only, and is sent to all outboxes. A correction moves existing
-// meshes by their pose; their vertices are not sent again. The id of a removed object is never used again. Thread-safe.
+// The map that clients see: the newest cuboid and mesh of every object, the trajectory, and the subscribers. Only this
+// class assigns revisions: every change of an object gets the next one and is sent to all outboxes. A correction moves
+// existing meshes by their pose; their vertices are not sent again. The id of a removed object is never used again.
+// Thread-safe.
 class MapState {
  public:
   // Applies an ObjectUpdate, ObjectRemoved or ObjectMerged; its revision is overwritten. Ignored if the object was
-  // removed or, for removals and merges, never announced. A merge into an unknown object becomes a removal.
+  // removed or, for removals and merges, if no update of it came before. A merge into an unknown object becomes a
+  // removal.
   void Apply(MapEvent event);
   // Moves the mesh of an object with the space around it: p_new = S_new_old * p_old. Later meshes of older snapshots
   // are moved too. Clients get the new pose with the object's next update, so call this before Apply() of the
   // updates of the same correction. Also call it before the correction is passed to the field: snapshots must not
-  // include corrections that are unknown here.
+  // include corrections that were not applied here.
   void MoveObject(ObjectId object, const Sim3<World, World>& S_new_old);
   // Ignored if the object was removed.
   void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
@@ -69,7 +71,7 @@ class MapState {
   void ApplyUpdate(ObjectUpdate update);
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
-  SE3<World, Camera> PoseNow(const TrajectoryEntry& entry) const;
+  SE3<World, Camera> CurrentPose(const TrajectoryEntry& entry) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;

@@ -129,31 +129,31 @@ std::optional<MapEvent> Outbox::Next(std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
   ready_.wait_for(lock, timeout, [&] { return closed_ || !events_.empty(); });
   if (events_.empty()) return std::nullopt;
-  ForgetFront();
+  ClearIteratorsToFront();
   MapEvent event = std::move(events_.front());
   events_.pop_front();
   return event;
 }
 
-// The first event is about to be returned: a newer one can no longer replace it.
-void Outbox::ForgetFront() {
+// The first event is about to be returned, so a newer one can no longer replace it.
+void Outbox::ClearIteratorsToFront() {
   const EventIterator front = events_.begin();
-  const auto forget = [&](std::optional<EventIterator>& event) {
+  const auto clear = [&](std::optional<EventIterator>& event) {
     if (event == front) event.reset();
   };
   if (const auto* update = std::get_if<ObjectUpdate>(&*front)) {
     AnnouncedObject& object = objects_.at(update->id);
-    forget(object.announcement);
-    forget(object.update);
+    clear(object.announcement);
+    clear(object.update);
   } else if (const auto* mesh = std::get_if<MeshUpdate>(&*front)) {
-    forget(objects_.at(mesh->id).mesh);
+    clear(objects_.at(mesh->id).mesh);
   } else if (const auto* merged = std::get_if<ObjectMerged>(&*front)) {
     merges_.erase(merged->from);
   } else if (IsAck(*front)) {
-    forget(newest_ack_);
+    clear(newest_ack_);
     if (acks_ == Acks::kAll) --waiting_acks_;
   } else {
-    forget(statistics_);
+    clear(statistics_);
   }
 }
 

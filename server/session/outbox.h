@@ -15,18 +15,18 @@
 
 namespace romap::session {
 
-// The event queue of one subscriber. Never blocks the sender: events that a slow reader has not read yet are coalesced,
-// so that only the newest cuboid and the newest mesh of each object wait. The order is kept, with these rules:
+// The event queue of one subscriber. It never blocks the sender: events that a slow reader has not read yet are
+// coalesced, so that only the newest cuboid and the newest mesh of each object wait. The order is kept, with these
+// rules:
 //   - The first update of an object, which announces it, keeps its position: no other event of the object precedes it.
 //   - No event of an object follows its removal or merge.
 //   - An object that is created and removed before its announcement is read produces no event at all. Objects whose
-//     waiting merge names it are redirected to the object it was merged into, or removed if it was removed.
+//     waiting merge refers to it are merged into the object that it was merged into, or removed if it was removed.
 // A reader that applies all events has the same map as the sender. The number of waiting events is bounded by the
 // number of current objects and of objects whose announcement was read.
 //
 // Required of the sender: the first event of an object is an ObjectUpdate; object ids are never reused; a merge is
-// followed by an update of `into`, which carries the revision to readers for which the merge was left out.
-// Thread-safe.
+// followed by an update of `into`, which gives the new revision to readers that do not receive the merge. Thread-safe.
 class Outbox {
  public:
   enum class Acks {
@@ -70,7 +70,7 @@ class Outbox {
   EventIterator Append(MapEvent event);
   void Replace(std::optional<EventIterator>& old_event, MapEvent event);
   void Drop(std::optional<EventIterator>& event);
-  void ForgetFront();
+  void ClearIteratorsToFront();
   void TrimAcks();
 
   const Acks acks_;

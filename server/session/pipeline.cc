@@ -70,8 +70,8 @@ void Pipeline::Correct(const MapCorrection& correction) {
 
 // Objects -> clients and fields.
 void Pipeline::Publish(objects::ObjectOutput output) {
-  // First, because the object updates below publish the corrected mesh poses, and because a field must not make meshes
-  // in the corrected world before the map is corrected.
+  // This comes first, because the object updates below publish the corrected mesh poses, and because a field must not
+  // produce meshes in the corrected world before the map is corrected.
   for (const ObjectViews& views : output.views) {
     if (views.S_new_old) map_->MoveObject(views.object, *views.S_new_old);
   }
@@ -127,7 +127,7 @@ Pipeline::~Pipeline() {
   mesher_->RemoveSession(mesher_session_);
 }
 
-// A disk that fails ends the recording, but not the session.
+// A write error ends the recording, but not the session.
 void Pipeline::Record(const SessionInput& input) {
   if (!recorder_) return;
   const absl::Status status = recorder_->Append(input);

@@ -23,11 +23,11 @@
 
 namespace romap::session {
 
-// The second half of an input's processing, as a task for the thread that maps.
+// The second half of the processing of an input, as a task for the mapping thread.
 struct MappingStep {
   std::function<void()> run;
   bool is_keyframe = false;
-  bool may_be_skipped = false;     // under load; the map only lacks the object masks of this frame
+  bool may_be_skipped = false;     // under load; then only the object masks of this frame are lost
   bool changes_local_map = false;  // later frames are tracked against the result
 };
 
@@ -36,17 +36,17 @@ struct MappingStep {
 //   Ingest -> Tracker -> SparseMapper -> ObjectMapper -> TrainingPool -> Mesher -> MapState -> clients
 //
 // Process() reads in that order. The pipeline has no thread: the caller runs Process() on one thread and the
-// MappingSteps, in their order, on the same or on a second one. The sparse map goes back to the tracker as a value
+// MappingSteps, in their order, on the same or on a second one. The sparse map is returned to the tracker by value
 // (LocalMapSlot). The training pool and the mesher belong to the server; they call MeshField() and PublishMesh().
 class Pipeline {
  public:
-  // Runs the step, or queues it for the thread that maps.
+  // Runs the step, or queues it for the mapping thread.
   using MappingExecutor = std::function<void(MappingStep)>;
 
   // `pool`, `mesher`, `map` and `ledger` outlive the pipeline. `recorder` gets every accepted input; may be null.
   Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
            Mesher* mesher, MapState* map, FrameLedger* ledger, std::unique_ptr<wire::RecordingWriter> recorder);
-  ~Pipeline();  // neither the pool nor the mesher calls back afterwards
+  ~Pipeline();  // the pool and the mesher make no more calls
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
@@ -54,14 +54,14 @@ class Pipeline {
   // input that is rejected.
   void Process(const Arrival& arrival, const MappingExecutor& execute);
 
-  // On the thread that maps, after the last step: the last corrections and cuboids. Fields then train to the end of
-  // their plans.
+  // Call on the mapping thread after the last step. Publishes the last corrections and cuboids, and lets the fields
+  // train to completion.
   void FinishMapping();
   bool IsTrainingDone() const;  // and all meshes are published; meaningful after FinishMapping()
   // For a training pool without threads: trains for at most `count` slices.
   void TrainSlices(int count);
 
-  // Makes bundle adjustment end early while keyframes wait. Thread-safe.
+  // Makes bundle adjustment stop early while keyframes are waiting. Thread-safe.
   void RequestEarlyStop(bool keyframes_wait) { sparse_mapper_.RequestEarlyStop(keyframes_wait); }
 
   nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_session_); }

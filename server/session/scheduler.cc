@@ -8,7 +8,7 @@
 namespace romap::session {
 namespace {
 
-// Single thread: slices of training after each keyframe, about what two cores train between two keyframes.
+// Single thread: number of training slices after each keyframe, about as many as two cores train between two keyframes.
 constexpr int kSlicesPerKeyframe = 4;
 
 constexpr std::chrono::milliseconds kTrainingPollPeriod{20};
@@ -77,7 +77,7 @@ void Scheduler::RunMapping() {
       callbacks_.tick();
     }
     EndMapping();
-    TrainToTheEnd();
+    TrainToCompletion();
   } catch (const std::exception& e) {
     Fail("mapping", e.what());
     EndMapping();
@@ -85,21 +85,21 @@ void Scheduler::RunMapping() {
 }
 
 void Scheduler::RunSingleThread() {
-  const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteAtOnce(step); };
+  const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteImmediately(step); };
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
       if (!stopping_) pipeline_->Process(*arrival, execute);
       callbacks_.tick();
     }
     EndMapping();
-    TrainToTheEnd();
+    TrainToCompletion();
   } catch (const std::exception& e) {
     Fail("mapping", e.what());
     EndMapping();
   }
 }
 
-void Scheduler::ExecuteAtOnce(const MappingStep& step) {
+void Scheduler::ExecuteImmediately(const MappingStep& step) {
   step.run();
   if (step.is_keyframe) pipeline_->TrainSlices(kSlicesPerKeyframe);
 }
@@ -141,7 +141,7 @@ void Scheduler::EndMapping() {
   ledger_->SettleAll();
 }
 
-void Scheduler::TrainToTheEnd() {
+void Scheduler::TrainToCompletion() {
   if (failed_ || stopping_) return;
   pipeline_->FinishMapping();
   while (!stopping_ && !pipeline_->IsTrainingDone()) {

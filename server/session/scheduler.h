@@ -21,10 +21,10 @@ namespace romap::session {
 //
 //   client threads -> inputs -> [tracking thread: Pipeline::Process()] -> steps -> [mapping thread: MappingStep::run()]
 //
-// Replay: a full queue blocks, and what changes the local map is mapped before the next frame is tracked.
-// Live: a full input queue drops its oldest input; tracking never waits for the mapping of an ordinary frame.
-// Single thread (session.single_thread): the tracking thread maps and trains too, in a fixed order, so that equal input
-// gives an identical map. The training pool and the mesher must have no threads then.
+// Replay: a full queue blocks, and steps that change the local map are executed before the next frame is tracked. Live:
+// a full input queue drops its oldest input; tracking never waits for the mapping of an ordinary frame. Single thread
+// (session.single_thread): the tracking thread maps and trains too, in a fixed order, so that equal input gives an
+// identical map. In this mode the training pool and the mesher must have no threads.
 class Scheduler {
  public:
   // Called on the scheduler's threads.
@@ -42,22 +42,22 @@ class Scheduler {
   bool Offer(SessionInput input);
   // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
-  // Ends the threads without processing the waiting inputs or training to the end, and joins them. Must not be called
-  // by a callback.
+  // Ends and joins the threads without processing the waiting inputs or completing the training. Must not be called by
+  // a callback.
   void Stop();
 
  private:
   void RunTracking();      // the tracking thread
   void RunMapping();       // the mapping thread
-  void RunSingleThread();  // both
+  void RunSingleThread();  // tracking and mapping on one thread
 
   // How a mapping step is executed in each mode; called by the pipeline on the tracking thread.
-  void ExecuteAtOnce(const MappingStep& step);
+  void ExecuteImmediately(const MappingStep& step);
   void ExecuteReplay(MappingStep step);
   void ExecuteLive(MappingStep step);
   void RunStep(const MappingStep& step);
 
-  void TrainToTheEnd();
+  void TrainToCompletion();
   void Fail(const char* stage, const std::string& what);
   void EndMapping();
 

@@ -9,7 +9,7 @@
 
 namespace romap::session {
 
-// The configuration of a mapping service, one struct per stage. It does not change after the service is made.
+// The configuration of a mapping service, one struct per stage. It does not change after the service is created.
 struct ServerConfig {
   slam::SlamConfig slam;
   objects::ObjectsConfig objects;

@@ -70,7 +70,7 @@ void Session::OnFinished() {
 }
 
 void Session::OnFailed(const char* stage, const std::string& what) {
-  spdlog::error("session {}: {} failed, the session ends: {}", id_, stage, what);
+  spdlog::error("session {}: {} failed; session ended: {}", id_, stage, what);
   state_ = SessionState::kFailed;
   map_.Close(Internal("session '{}' failed in {}: {}", id_, stage, what));
 }

@@ -42,7 +42,7 @@ class Session {
   absl::Status Offer(SessionInput input);
   // No more inputs. Returns immediately; the state becomes kFinished after everything is mapped and trained.
   void Finish();
-  // Ends the threads without training to the end, and every stream with `status`. Called before deletion.
+  // Ends the threads without completing the training, and ends every stream with `status`. Called before deletion.
   void Stop(const absl::Status& status);
 
   // Claims the right to send inputs; false if another stream holds it.

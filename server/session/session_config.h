@@ -26,8 +26,8 @@ struct SessionConfig {
                {.unit = "frames",
                 .min = 1,
                 .max = 1024,
-                .help = "Maximum number of frames waiting for tracking; above it, replay sessions wait and live "
-                        "sessions drop the oldest frame"});
+                .help = "Maximum number of frames waiting for tracking; when it is reached, replay sessions wait and "
+                        "live sessions drop the oldest frame"});
     fields.Add(
         "mapping_queue", &mapping_queue,
         {.unit = "frames", .min = 1, .max = 1024, .help = "Maximum number of tracked frames waiting for mapping"});
@@ -35,8 +35,8 @@ struct SessionConfig {
                {.unit = "acknowledgements",
                 .min = 16,
                 .max = 1 << 20,
-                .help = "Maximum number of acknowledgements waiting for a client that does not read; the oldest ones "
-                        "above it are dropped"});
+                .help = "Maximum number of acknowledgements waiting for a client that does not read; beyond it, the "
+                        "oldest ones are dropped"});
     fields.Add("statistics_period_s", &statistics_period_s,
                {.unit = "s", .min = 0.05, .max = 60, .help = "Time between two statistics messages"});
     fields.Add("record_dir", &record_dir,

@@ -37,15 +37,15 @@ absl::Status CallHost::Launch(StoppableCall* call, std::function<void()> body) {
   return absl::OkStatus();
 }
 
-void CallHost::Forget(StoppableCall* call) {
+void CallHost::Unregister(StoppableCall* call) {
   std::lock_guard lock(mutex_);
   calls_.erase(call);
 }
 
-void CallHost::StopAll(const absl::Status& why) {
+void CallHost::StopAll(const absl::Status& reason) {
   std::lock_guard lock(mutex_);
-  stopped_ = why;
-  for (StoppableCall* call : calls_) call->RequestStop(why);
+  stopped_ = reason;
+  for (StoppableCall* call : calls_) call->RequestStop(reason);
 }
 
 void CallHost::JoinAll() {

@@ -17,8 +17,9 @@ namespace romap::transport {
 class StoppableCall {
  public:
   virtual ~StoppableCall() = default;
-  // Ends the call soon, with `why` (which may be OK) as its status. Does not wait. Only the first call has an effect.
-  virtual void RequestStop(const absl::Status& why) = 0;
+  // Ends the call soon, with `reason` (which may be OK) as its status. Does not wait. Only the first call has an
+  // effect.
+  virtual void RequestStop(const absl::Status& reason) = 0;
 };
 
 // Runs the calls of one server. Every call has its own thread, because the methods of MappingService may block and
@@ -30,13 +31,13 @@ class CallHost {
 
   MappingService& service() const { return *service_; }
 
-  // Runs `body` on a new thread. StopAll() stops `call`, which may be null, until Forget(call). RESOURCE_EXHAUSTED: too
-  // many calls. After StopAll(): the status given there.
+  // Runs `body` on a new thread. StopAll() stops `call`, which may be null, until Unregister(call). RESOURCE_EXHAUSTED:
+  // too many calls. After StopAll(): the status given there.
   absl::Status Launch(StoppableCall* call, std::function<void()> body);
-  void Forget(StoppableCall* call);
+  void Unregister(StoppableCall* call);
 
   // Stops all registered calls and rejects new ones.
-  void StopAll(const absl::Status& why);
+  void StopAll(const absl::Status& reason);
   // Waits for every body to return.
   void JoinAll();
 

@@ -9,8 +9,8 @@
 namespace romap::transport {
 
 // One Map call: passes frames and late masks from the client to the MapStream, and events from MapStream::Next() to the
-// client. A request is read only after the stream has accepted the previous one; this is the back pressure on the
-// client.
+// client. A request is read only after the stream has accepted the previous one; this slows the client down if the
+// session cannot keep up.
 class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
  public:
   using StreamReactor::StreamReactor;

@@ -65,21 +65,21 @@ class StreamReactor : public Reactor, public StoppableCall {
   void OnWriteDone(bool ok) final { write_.Complete(ok); }
   void OnCancel() final { RequestStop(absl::CancelledError("the client disconnected")); }
   void OnDone() final {
-    host_->Forget(this);
+    host_->Unregister(this);
     delete this;
   }
 
-  void RequestStop(const absl::Status& why) final {
+  void RequestStop(const absl::Status& reason) final {
     std::lock_guard lock(mutex_);
     if (stop_reason_) return;
-    stop_reason_ = why;
+    stop_reason_ = reason;
     if (events_ != nullptr) events_->Cancel();
     OnStop();
   }
 
  protected:
-  // The whole call, from the first request to the last response; returns its status. May block, but must return soon
-  // after RequestStop().
+  // Processes the whole call, from the first request to the last response, and returns its status. May block, but must
+  // return soon after RequestStop().
   virtual absl::Status Run() = 0;
   // Ends waits that EventStream::Cancel() does not end. Must not block.
   virtual void OnStop() {}

@@ -27,13 +27,13 @@ struct TransportConfig {
                 .min = 1,
                 .max = 4096,
                 .audience = Audience::kOperator,
-                .help = "Maximum number of simultaneous calls and streams; each one has a thread"});
+                .help = "Maximum number of simultaneous calls and streams; each one uses a thread"});
     fields.Add("keepalive_s", &keepalive_s,
                {.unit = "s",
                 .min = 1,
                 .max = 3600,
-                .help = "Time without traffic after which a client is pinged, and then disconnected if it is silent "
-                        "for the same time"});
+                .help = "Time without traffic after which the server pings a client; a client that does not respond "
+                        "within the same time is disconnected"});
     fields.Add("shutdown_grace_s", &shutdown_grace_s,
                {.unit = "s", .min = 0, .max = 60, .help = "Time for clients to read pending messages at shutdown"});
   }

@@ -83,7 +83,7 @@ class Stages {
     return correction;
   }
 
-  void TrainToTheEnd() {
+  void TrainToCompletion() {
     pool_.Finish(pool_session_);
     WaitUntilIdle();
   }
@@ -148,7 +148,7 @@ TEST(CorrectedMapTest, LoopClosureMovesMeshesWithoutSendingThemAgain) {
   Stages stages;
   stages.MapFrames(world);
   stages.Publish(stages.mapper.Finish());
-  stages.TrainToTheEnd();
+  stages.TrainToCompletion();
   Client client;
   client.Read(*stages.outbox);
   ASSERT_THAT(client.objects, SizeIs(2));
@@ -186,7 +186,7 @@ TEST(CorrectedMapTest, MeshesMadeDuringCorrectionsAreInsideTheirCuboids) {
     stages.WaitForTraining();
   }
   stages.Publish(stages.mapper.Finish());
-  stages.TrainToTheEnd();
+  stages.TrainToCompletion();
   Client client;
   client.Read(*stages.outbox);
   ASSERT_THAT(client.meshes, SizeIs(2));

@@ -129,7 +129,7 @@ TEST(OutboxTest, OnlyTheSenderGetsMasksAcks) {
   EXPECT_EQ(viewer.Next(kNoWait), std::nullopt);
 }
 
-TEST(OutboxTest, SlowReaderLosesTheOldestAcks) {
+TEST(OutboxTest, TheOldestAcksOfASlowReaderAreDropped) {
   Outbox outbox(Outbox::Acks::kAll, 4);
   outbox.Put(Update(1, 1));
   for (uint64_t i = 1; i <= 100; ++i) outbox.Put(Ack(i));
@@ -150,7 +150,7 @@ TEST(OutboxTest, ClosedOutboxKeepsWaitingEventsAndItsStatus) {
   EXPECT_EQ(outbox.status().code(), absl::StatusCode::kNotFound);
 }
 
-TEST(OutboxTest, CloseEndsAWaitingNext) {
+TEST(OutboxTest, CloseEndsABlockedNext) {
   Outbox outbox(Outbox::Acks::kAll, 4);
   std::thread reader([&] { EXPECT_EQ(outbox.Next(std::chrono::minutes(1)), std::nullopt); });
   outbox.Close();
