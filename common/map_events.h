@@ -78,7 +78,7 @@ struct ObjectMerged {
 struct Statistics {
   uint64_t frames_received = 0;
   uint64_t frames_processed = 0;
-  uint64_t frames_dropped = 0;   // live mode under load
+  uint64_t frames_dropped = 0;   // dropped in live mode because the server was too busy
   uint64_t frames_rejected = 0;  // malformed frames
   uint64_t keyframes = 0;
   uint64_t map_points = 0;
