@@ -129,7 +129,8 @@ absl::StatusOr<Evaluation> MethodRunner::Evaluate(const MethodRun& run, const st
     const std::string path = fmt::format("{}/objects/{}_{}.ply", dir, one.object->id, one.object->name);
     ROMAP_RETURN_IF_ERROR(WriteWorldMesh(one.snapshot, *std::move(mesh), path));
   }
-  const eval::RunReport report = eval::EvaluateRun(dir, sequence_->dir(), /*poses_given=*/true);
+  const eval::RunReport report = eval::EvaluateRun(
+      dir, sequence_->dir(), {.alignment = eval::Alignment::kNone, .reason = "training used the given camera poses"});
   if (report.objects) {
     evaluation.quality = QualityOf(*report.objects);
     evaluation.matched = report.objects->matched;

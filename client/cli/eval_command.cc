@@ -1,11 +1,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "client/cli/command.h"
 #include "client/eval/eval.h"
+#include "client/eval/run_record.h"
+#include "client/files/sequence.h"
 #include "client/files/text_file.h"
 #include "common/status.h"
 
@@ -33,18 +37,30 @@ CLI::App* AddSubcommand(CLI::App& app, const char* name, const char* help, std::
 void AddMapSubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     std::string out, sequence, json;
-    bool poses_estimated = false;
+    std::optional<eval::Alignment> alignment;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = AddSubcommand(app, "map", "Compare the output of romap run with the ground truth of its sequence",
                                     &options->json);
   command->add_option("map", options->out, "Output folder of romap run")->required();
   command->add_option("sequence", options->sequence, "Folder of the sequence")->required();
-  command->add_flag("--poses-estimated", options->poses_estimated,
-                    "Camera poses were estimated: align the trajectories, then each mesh by ICP");
+  command
+      ->add_option("--align", options->alignment,
+                   "Alignment of the map with the ground truth: none (same world), se3 or sim3 (by the trajectories, "
+                   "then each mesh by ICP). Default: none if the run used the given camera poses, otherwise sim3")
+      ->transform(CLI::CheckedTransformer(kAlignments))
+      ->option_text("none|se3|sim3");
   command->callback([options, chosen] {
     *chosen = [options] {
-      const eval::RunReport report = eval::EvaluateRun(options->out, options->sequence, !options->poses_estimated);
+      const eval::RunRecord record = eval::ReadRunRecord(options->out);
+      const eval::MapAlignment alignment = options->alignment
+                                               ? eval::MapAlignment{*options->alignment, "--align"}
+                                               : eval::DetermineAlignment(record, options->out, options->sequence);
+      const absl::StatusOr<files::Sequence> sequence =
+          files::Sequence::Open(options->sequence, {.masks = "", .detections = "", .poses = ""});
+      const eval::RunReport report =
+          eval::EvaluateRun(options->out, options->sequence, alignment,
+                            sequence.ok() ? eval::FramesOf(record, *sequence) : std::vector<int64_t>());
       if (!report.objects && !report.boxes && !report.trajectory) {
         return FailedPrecondition("nothing to compare: {}", fmt::join(report.notes, "; "));
       }
@@ -72,7 +88,8 @@ void AddObjectsSubcommand(CLI::App& app, Command* chosen) {
   command->add_option("--gt-traj", eval.true_trajectory, "Ground-truth trajectory");
   command->add_option("--dataset", eval.dataset_dir,
                       "Sequence with masks and depth that determines which predicted points were visible");
-  command->add_flag("--no-cap", eval.no_cap, "Ignore ground-truth points that were inferred instead of measured");
+  command->add_flag("--ignore-inferred,--no-cap", eval.ignore_inferred,
+                    "Ignore ground-truth points that were inferred instead of measured");
   command->add_option("--samples", eval.samples, "Number of samples per mesh")->capture_default_str();
   command->callback(
       [options, chosen] { *chosen = [options] { return Show(eval::EvaluateObjects(options->eval), options->json); }; });
@@ -97,16 +114,28 @@ void AddBoxesSubcommand(CLI::App& app, Command* chosen) {
 void AddTrajectorySubcommand(CLI::App& app, Command* chosen) {
   struct Options {
     eval::TrajectoryEvalOptions eval;
-    std::string json;
+    std::string frames_of, json;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = AddSubcommand(app, "trajectory", "Measure the absolute trajectory error", &options->json);
+  CLI::App* command = AddSubcommand(
+      app, "trajectory", "Measure trajectory errors and print a verdict (GOOD, DEGRADED or WRONG)", &options->json);
   command->add_option("--est", options->eval.estimated, "Estimated trajectory, TUM format")->required();
   command->add_option("--gt", options->eval.ground_truth, "Ground-truth trajectory, TUM format")->required();
   command->add_option("--align", options->eval.alignment, "Alignment of the trajectories: none, se3 or sim3 (default)")
       ->transform(CLI::CheckedTransformer(kAlignments));
+  command->add_option("--sequence", options->frames_of,
+                      "Folder of the sequence, to count its frames without a pose. Default: the number of frames is "
+                      "inferred from the poses");
   command->callback([options, chosen] {
-    *chosen = [options] { return Show(eval::EvaluateTrajectory(options->eval), options->json); };
+    *chosen = [options]() -> absl::Status {
+      eval::TrajectoryEvalOptions evaluation = options->eval;
+      if (!options->frames_of.empty()) {
+        ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
+                               files::Sequence::Open(options->frames_of, {.masks = "", .detections = "", .poses = ""}));
+        evaluation.frames_ns = eval::FramesOf({.first_frame = 0, .frames_sent = sequence.size()}, sequence);
+      }
+      return Show(eval::EvaluateTrajectory(evaluation), options->json);
+    };
   });
 }
 

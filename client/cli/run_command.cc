@@ -13,6 +13,7 @@
 #include "client/cli/run_summary.h"
 #include "client/cli/service_options.h"
 #include "client/eval/eval.h"
+#include "client/eval/run_record.h"
 #include "client/files/text_file.h"
 #include "common/status.h"
 
@@ -53,12 +54,31 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
   return snapshots;
 }
 
-// Compares the map with the ground truth of the sequence, if any, prints the results and adds them to the summary.
-void Evaluate(const RunOptions& options, bool poses_given, nlohmann::json& summary) {
-  const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence_dir, poses_given);
+// What the run used; `romap eval map` reads it from summary.json.
+eval::RunRecord RecordOf(const RunOptions& options, const files::Sequence& sequence, const MapCollector& collector) {
+  eval::RunRecord record{.first_frame = options.stream.first_frame, .frames_sent = collector.sent()};
+  record.poses = "none";  // also if the sequence has no poses to use
+  if (sequence.has_poses() && options.poses != PoseUse::kIgnore) {
+    record.poses = options.poses == PoseUse::kGiven ? "given" : "prior";
+  }
+  return record;
+}
+
+// Compares the map with the ground truth of the sequence, if any, prints the results and adds them to the summary. A
+// run that estimated the poses gets a verdict on its trajectory even if it mapped no object.
+void Evaluate(const RunOptions& options, const eval::RunRecord& record, const files::Sequence& sequence,
+              nlohmann::json& summary) {
+  const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence_dir,
+                                                   eval::DetermineAlignment(record, options.out, options.sequence_dir),
+                                                   eval::FramesOf(record, sequence));
+  summary["poses"] = *record.poses;
+  summary["frames"]["first"] = *record.first_frame;
   summary["evaluation"] = ToJson(report);
-  if (!report.objects && !report.boxes) return;  // the sequence has no ground truth
-  fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence_dir, eval::FormatTable(report));
+  const bool has_true_objects = report.objects || report.boxes;
+  const std::string text = has_true_objects           ? eval::FormatTable(report)
+                           : *record.poses == "given" ? ""
+                                                      : eval::FormatTrajectory(report);
+  if (!text.empty()) fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence_dir, text);
 }
 
 absl::Status RunSequence(const RunOptions& options) {
@@ -82,8 +102,7 @@ absl::Status RunSequence(const RunOptions& options) {
   fmt::print("{}", FormatSummary(summary));
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
-  const bool poses_given = options.poses == PoseUse::kGiven && sequence.has_poses();
-  if (!objects.empty()) Evaluate(options, poses_given, json);
+  Evaluate(options, RecordOf(options, sequence, collector), sequence, json);
   ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
   if (options.stream.keep_session) fmt::print("session {} remains on the server\n", result.session_id);

@@ -1,6 +1,7 @@
 #include "client/eval/alignment.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 
@@ -8,6 +9,8 @@
 
 namespace romap::eval {
 namespace {
+
+constexpr double kMinScale = 1e-9;  // division by a smaller scale would amplify rounding errors
 
 using PointMatrix = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>;
 
@@ -51,22 +54,42 @@ std::optional<Sim3<World, World>> FitSimilarity(const Points& x, const Points& y
   if ((from.colwise() - mean).squaredNorm() / static_cast<double>(x.size()) < 1e-18) return std::nullopt;
   const Eigen::Matrix4d matrix = Eigen::umeyama(from, AsMatrix(y), with_scale);
   const double scale = with_scale ? matrix.topLeftCorner<3, 1>().norm() : 1.0;
+  if (!(scale > kMinScale)) return std::nullopt;
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>() / scale;
   return Sim3<World, World>(scale, Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>());
+}
+
+Eigen::Quaterniond MeanRotation(std::span<const Eigen::Matrix3d> rotations) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Eigen::Matrix3d& rotation : rotations) sum += rotation;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::Matrix3d mean = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  return Eigen::Quaterniond(mean);
+}
+
+Sim3<World, World> AlignMeans(const Points& x, const Points& y, const Eigen::Quaterniond& rotation) {
+  const Eigen::Vector3d mean_x = AsMatrix(x).rowwise().mean();
+  const Eigen::Vector3d mean_y = AsMatrix(y).rowwise().mean();
+  return {1, rotation, mean_y - rotation * mean_x};
+}
+
+absl::StatusOr<PoseAssociation> AssociatePoses(std::span<const files::StampedPose> estimated,
+                                               std::span<const files::StampedPose> ground_truth, double max_dt_s,
+                                               size_t needed) {
+  PoseAssociation pairs =
+      files::AssociateTimestamps(TimestampsOf(estimated), TimestampsOf(ground_truth), std::llround(max_dt_s * 1e9));
+  if (pairs.size() >= needed) return pairs;
+  return InvalidArgument("only {} of {} estimated poses have a ground-truth pose within {:.3f} s; at least {} required",
+                         pairs.size(), estimated.size(), max_dt_s, needed);
 }
 
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
                                                 std::span<const files::StampedPose> ground_truth, Alignment alignment,
                                                 double max_dt_s) {
   TrajectoryFit fit;
-  fit.pairs =
-      files::AssociateTimestamps(TimestampsOf(estimated), TimestampsOf(ground_truth), std::llround(max_dt_s * 1e9));
-  const size_t needed = alignment == Alignment::kNone ? 1 : 3;
-  if (fit.pairs.size() < needed) {
-    return InvalidArgument(
-        "only {} of {} estimated poses have a ground-truth pose within {:.3f} s; at least {} required",
-        fit.pairs.size(), estimated.size(), max_dt_s, needed);
-  }
+  ROMAP_ASSIGN_OR_RETURN(fit.pairs,
+                         AssociatePoses(estimated, ground_truth, max_dt_s, alignment == Alignment::kNone ? 1 : 3));
   if (alignment == Alignment::kNone) return fit;
   Points x, y;
   for (const auto& [i, j] : fit.pairs) {
@@ -74,7 +97,9 @@ absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPo
     y.push_back(ground_truth[j].T_world_camera.translation());
   }
   const std::optional<Sim3<World, World>> similarity = FitSimilarity(x, y, alignment == Alignment::kSim3);
-  if (!similarity) return InvalidArgument("cannot align the trajectories: all estimated positions coincide");
+  if (!similarity) {
+    return InvalidArgument("cannot align the trajectories: all estimated or all true positions coincide");
+  }
   fit.S_gt_est = *similarity;
   return fit;
 }

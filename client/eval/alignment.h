@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,17 +24,32 @@ std::string ToString(Alignment alignment);
 Points Transform(const Sim3<World, World>& similarity, const Points& points);
 
 // Least-squares similarity (rigid transform without `with_scale`) that maps x[i] to y[i] (Umeyama, PAMI 1991). `x` and
-// `y` have the same length. nullopt if there are no points or all points of `x` coincide.
+// `y` have the same length. nullopt if there are no points, if all points of `x` coincide, or if the best scale is 0,
+// e.g. because all points of `y` coincide.
 std::optional<Sim3<World, World>> FitSimilarity(const Points& x, const Points& y, bool with_scale);
+
+// The mean of rotation matrices with the least squared (chordal) distance to them. `rotations` must not be empty.
+Eigen::Quaterniond MeanRotation(std::span<const Eigen::Matrix3d> rotations);
+
+// The rigid transform with the given rotation that maps the mean of `x` to the mean of `y`. Neither may be empty.
+Sim3<World, World> AlignMeans(const Points& x, const Points& y, const Eigen::Quaterniond& rotation);
+
+using PoseAssociation = std::vector<std::pair<size_t, size_t>>;  // indices (estimated, true), in order of time
+
+// Associates the poses of two trajectories (sorted by time) one to one within max_dt_s. INVALID_ARGUMENT: fewer than
+// `needed` pairs.
+absl::StatusOr<PoseAssociation> AssociatePoses(std::span<const files::StampedPose> estimated,
+                                               std::span<const files::StampedPose> ground_truth, double max_dt_s,
+                                               size_t needed);
 
 // The alignment of two trajectories.
 struct TrajectoryFit {
-  Sim3<World, World> S_gt_est;                   // maps the estimated world to the ground-truth world
-  std::vector<std::pair<size_t, size_t>> pairs;  // indices (estimated, true) of associated poses, in order of time
+  Sim3<World, World> S_gt_est;  // maps the estimated world to the ground-truth world
+  PoseAssociation pairs;
 };
 
-// Associates the poses of two trajectories (sorted by time) one to one within max_dt_s and aligns the positions of the
-// pairs. INVALID_ARGUMENT: fewer than three pairs (one pair for kNone), or all estimated positions coincide.
+// Associates the poses of two trajectories and aligns the positions of the pairs. INVALID_ARGUMENT: fewer than three
+// pairs (one pair for kNone), or the positions determine no alignment (FitSimilarity).
 absl::StatusOr<TrajectoryFit> AlignTrajectories(std::span<const files::StampedPose> estimated,
                                                 std::span<const files::StampedPose> ground_truth, Alignment alignment,
                                                 double max_dt_s);

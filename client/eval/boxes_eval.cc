@@ -18,10 +18,9 @@ using Polygon = std::vector<Eigen::Vector2d>;
 // Corners of the footprint in the xy plane, counter-clockwise.
 Polygon Footprint(const YawBox& box) {
   Polygon corners;
-  const Eigen::Rotation2Dd turn(box.yaw_rad);
+  const Eigen::Rotation2Dd yaw(box.yaw_rad);
   for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
-    corners.push_back(turn * Eigen::Vector2d(x * box.half_extents.x(), y * box.half_extents.y()) +
-                      box.center.head<2>());
+    corners.push_back(yaw * Eigen::Vector2d(x * box.half_extents.x(), y * box.half_extents.y()) + box.center.head<2>());
   }
   return corners;
 }
@@ -65,9 +64,9 @@ BoxFigures Compare(const YawBox& predicted, const YawBox& truth, double iou) {
   BoxFigures figures;
   figures.iou = iou;
   figures.center_cm = 100 * (predicted.center - truth.center).norm();
-  const double turn_deg = (predicted.yaw_rad - truth.yaw_rad) * kDegPerRad;
-  const double quarter_turns = std::floor((turn_deg + 45) / 90);
-  figures.yaw_deg = std::abs(turn_deg - 90 * quarter_turns);
+  const double difference_deg = (predicted.yaw_rad - truth.yaw_rad) * kDegPerRad;
+  const double quarter_turns = std::floor((difference_deg + 45) / 90);
+  figures.yaw_deg = std::abs(difference_deg - 90 * quarter_turns);
   figures.tilt_deg = predicted.tilt_deg;
   Eigen::Vector3d half_extents = predicted.half_extents;
   if (static_cast<int>(quarter_turns) % 2 != 0) std::swap(half_extents.x(), half_extents.y());

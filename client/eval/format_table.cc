@@ -119,22 +119,14 @@ std::string FormatTable(const BoxesReport& report) {
       report.extra.empty() ? "none" : fmt::format("{}", fmt::join(report.extra, ", ")));
 }
 
-std::string FormatTable(const TrajectoryReport& report) {
-  return fmt::format(
-      "trajectory, alignment {}: {} of {} poses matched ({} true poses), path length {:.3f} m, scale {:.6f}\n"
-      "ATE rmse {:.6f} m  mean {:.6f}  median {:.6f}  max {:.6f}\n"
-      "rotation rmse {:.4f} deg  max {:.4f}\n",
-      ToString(report.alignment), report.matched, report.estimated_poses, report.ground_truth_poses,
-      report.path_length_m, report.scale, report.ate_rmse_m, report.ate_mean_m, report.ate_median_m, report.ate_max_m,
-      report.rotation_rmse_deg, report.rotation_max_deg);
-}
-
 std::string FormatTable(const RunReport& report) {
   std::vector<std::string> parts;
+  parts.push_back(fmt::format("alignment with the ground truth: {} ({})\n", ToString(report.alignment.alignment),
+                              report.alignment.reason));
   if (report.objects) parts.push_back(FormatTable(*report.objects));
   if (report.boxes) parts.push_back(FormatTable(*report.boxes));
-  if (report.trajectory) parts.push_back(FormatTable(*report.trajectory));
   for (const std::string& note : report.notes) parts.push_back(note + "\n");
+  if (const std::string trajectory = FormatTrajectory(report); !trajectory.empty()) parts.push_back(trajectory);
   return fmt::format("{}", fmt::join(parts, "\n"));
 }
 

@@ -71,7 +71,7 @@ void RemoveInferredPoints(const std::vector<double>& source, Surface* surface) {
 }
 
 absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const ObjectsEvalOptions& options,
-                                                  uint32_t seed, bool no_cap) {
+                                                  uint32_t seed, bool ignore_inferred) {
   ROMAP_ASSIGN_OR_RETURN(const auto files, files::ReadMeshFolder(dir));
   std::vector<Surface> surfaces;
   for (const auto& [name, file] : files) {
@@ -83,7 +83,8 @@ absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const 
     if (surface.faces == 0 && seen != file.scalars.end()) {
       std::transform(seen->second.begin(), seen->second.end(), surface.seen.begin(), [](double s) { return s > 0; });
     }
-    if (surface.faces == 0 && no_cap && source != file.scalars.end()) RemoveInferredPoints(source->second, &surface);
+    if (surface.faces == 0 && ignore_inferred && source != file.scalars.end())
+      RemoveInferredPoints(source->second, &surface);
     if (surface.points.empty()) return InvalidArgument("{}/{}: all points are inferred", dir, name);
     surfaces.push_back(std::move(surface));
   }
@@ -279,9 +280,9 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
   ROMAP_RETURN_IF_ERROR(ValidateOptions(options));
   // Different seeds: with the same samples a mesh compared with itself would have zero error.
   ROMAP_ASSIGN_OR_RETURN(const std::vector<Surface> truth,
-                         LoadSurfaces(options.ground_truth_dir, options, options.seed + 1, options.no_cap));
+                         LoadSurfaces(options.ground_truth_dir, options, options.seed + 1, options.ignore_inferred));
   ROMAP_ASSIGN_OR_RETURN(std::vector<Surface> predicted,
-                         LoadSurfaces(options.predicted_dir, options, options.seed, /*no_cap=*/false));
+                         LoadSurfaces(options.predicted_dir, options, options.seed, /*ignore_inferred=*/false));
   ObjectsReport report;
   report.options = options;
   ROMAP_ASSIGN_OR_RETURN(report.trajectory_scale, AlignByTrajectories(options, &predicted));

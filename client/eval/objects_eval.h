@@ -31,7 +31,7 @@ struct ObjectsEvalOptions {
   uint32_t seed = 0;
   double match_distance = 0.5;  // maximal center distance of a pair without overlap, in diagonals of the true box
   size_t icp_points = 20'000;
-  bool no_cap = false;  // ignore true points with source = 2
+  bool ignore_inferred = false;  // ignore true points with source = 2
 };
 
 struct Ratio {

@@ -57,40 +57,62 @@ void Add(const std::string& what, const std::vector<std::string>& needed, Evalua
   }
 }
 
+// The verdict on the trajectory. If the true poses are readable, a missing or unusable estimate is WRONG.
+std::optional<Verdict> VerdictOf(const absl::StatusOr<TrajectoryReport>& trajectory,
+                                 const std::string& true_trajectory) {
+  if (trajectory.ok()) return trajectory->verdict;
+  if (!files::ReadTum(true_trajectory).ok()) return std::nullopt;
+  return Verdict{VerdictLevel::kWrong, {Message(trajectory.status())}};
+}
+
+void AddTrajectory(const TrajectoryEvalOptions& options, RunReport* report) {
+  if (!Exists(options.ground_truth)) {
+    report->notes.push_back(fmt::format("trajectory not measured: {} does not exist", options.ground_truth));
+    return;
+  }
+  absl::StatusOr<TrajectoryReport> trajectory = EvaluateTrajectory(options);
+  report->verdict = VerdictOf(trajectory, options.ground_truth);
+  if (trajectory.ok()) {
+    report->trajectory = *std::move(trajectory);
+  } else {
+    report->notes.push_back(fmt::format("trajectory not measured: {}", Message(trajectory.status())));
+  }
+}
+
 }  // namespace
 
-RunReport EvaluateRun(const std::string& out_dir, const std::string& sequence_dir, bool poses_given) {
-  const std::string trajectory = out_dir + "/trajectory.txt";
-  const std::string true_trajectory = sequence_dir + "/groundtruth.txt";
+RunReport EvaluateRun(const std::string& out_dir, const std::string& sequence_dir, const MapAlignment& alignment,
+                      const std::vector<int64_t>& frames_ns) {
+  const bool same_world = alignment.alignment == Alignment::kNone;
+  const TrajectoryEvalOptions trajectory{.estimated = out_dir + "/trajectory.txt",
+                                         .ground_truth = sequence_dir + "/groundtruth.txt",
+                                         .alignment = alignment.alignment,
+                                         .frames_ns = frames_ns};
   ObjectsEvalOptions objects;
   objects.predicted_dir = out_dir + "/objects";
   objects.ground_truth_dir = sequence_dir + "/gt";
-  objects.alignment = poses_given ? Alignment::kNone : Alignment::kSe3;
+  objects.alignment = same_world ? Alignment::kNone : Alignment::kSe3;
   objects.dataset_dir = CanDetermineVisibility(sequence_dir) ? sequence_dir : "";
-  objects.no_cap = true;
+  objects.ignore_inferred = true;
   BoxesEvalOptions boxes;
   boxes.predicted = out_dir + "/cuboids.json";
   boxes.ground_truth = sequence_dir + "/objects.yaml";
   std::vector<std::string> objects_need{objects.predicted_dir, objects.ground_truth_dir};
   std::vector<std::string> boxes_need{boxes.predicted, boxes.ground_truth};
-  if (!poses_given) {
-    objects.estimated_trajectory = boxes.estimated_trajectory = trajectory;
-    objects.true_trajectory = boxes.true_trajectory = true_trajectory;
-    for (auto* need : {&objects_need, &boxes_need}) need->insert(need->end(), {trajectory, true_trajectory});
+  if (!same_world) {
+    objects.trajectory_alignment = boxes.trajectory_alignment = alignment.alignment;
+    objects.estimated_trajectory = boxes.estimated_trajectory = trajectory.estimated;
+    objects.true_trajectory = boxes.true_trajectory = trajectory.ground_truth;
+    for (auto* need : {&objects_need, &boxes_need}) {
+      need->insert(need->end(), {trajectory.estimated, trajectory.ground_truth});
+    }
   }
-  RunReport report;
+  RunReport report{.alignment = alignment};
   Add(
       "meshes", objects_need, [&] { return EvaluateObjects(objects); }, &report.objects, &report.notes);
   Add(
       "cuboids", boxes_need, [&] { return EvaluateBoxes(boxes); }, &report.boxes, &report.notes);
-  Add(
-      "trajectory", {trajectory, true_trajectory},
-      [&] {
-        return EvaluateTrajectory({.estimated = trajectory,
-                                   .ground_truth = true_trajectory,
-                                   .alignment = poses_given ? Alignment::kNone : Alignment::kSim3});
-      },
-      &report.trajectory, &report.notes);
+  AddTrajectory(trajectory, &report);
   return report;
 }
 

@@ -9,6 +9,10 @@ using Json = nlohmann::ordered_json;
 
 Json OrNull(std::optional<double> value) { return value ? Json(*value) : Json(nullptr); }
 
+Json VerdictToJson(const Verdict& verdict) {
+  return {{"level", ToString(verdict.level)}, {"reasons", verdict.reasons}};
+}
+
 // The figures that a row and the mean have in common.
 template <class Figures>
 void AddSurface(const Figures& figures, Json* json) {
@@ -63,7 +67,7 @@ Json ToJson(const ObjectsReport& report) {
                       {"samples", options.samples},
                       {"seed", options.seed},
                       {"thresholds_cm", options.thresholds_cm},
-                      {"no_cap", options.no_cap},
+                      {"ignore_inferred", options.ignore_inferred},
                       {"seen_by_masks", !options.dataset_dir.empty()}};
   return json;
 }
@@ -93,25 +97,54 @@ Json ToJson(const BoxesReport& report) {
 }
 
 Json ToJson(const TrajectoryReport& report) {
-  return {{"align", ToString(report.alignment)},
-          {"est_poses", report.estimated_poses},
-          {"gt_poses", report.ground_truth_poses},
-          {"matched", report.matched},
-          {"scale", report.scale},
-          {"gt_path_length_m", report.path_length_m},
-          {"ate_rmse_m", report.ate_rmse_m},
-          {"ate_mean_m", report.ate_mean_m},
-          {"ate_median_m", report.ate_median_m},
-          {"ate_max_m", report.ate_max_m},
-          {"rot_rmse_deg", report.rotation_rmse_deg},
-          {"rot_max_deg", report.rotation_max_deg}};
+  const MotionFigures& motion = report.motion;
+  const FrameCoverage& coverage = report.coverage;
+  Json json = {{"align", ToString(report.alignment)},
+               {"est_poses", report.estimated_poses},
+               {"gt_poses", report.ground_truth_poses},
+               {"matched", report.matched},
+               {"scale", report.scale},
+               {"gt_path_length_m", report.path_length_m},
+               {"gt_extent_m", report.extent_m},
+               {"ate_rmse_m", report.ate_rmse_m},
+               {"ate_mean_m", report.ate_mean_m},
+               {"ate_median_m", report.ate_median_m},
+               {"ate_max_m", report.ate_max_m},
+               {"rot_rmse_deg", report.rotation_rmse_deg},
+               {"rot_max_deg", report.rotation_max_deg}};
+  json["motion"] = {{"window_s", motion.window_s},
+                    {"frame_correlation", OrNull(motion.frame_correlation)},
+                    {"window_correlation", OrNull(motion.window_correlation)},
+                    {"rot_median_deg", motion.rotation_median_deg},
+                    {"rot_95_deg", motion.rotation_95_deg},
+                    {"scale", OrNull(motion.scale)},
+                    {"scale_note", motion.scale_note},
+                    {"local_scales", motion.local_scales},
+                    {"max_jump_m", motion.jumps.position_m},
+                    {"max_jump_m_at_s", motion.jumps.position_s},
+                    {"max_jump_deg", motion.jumps.rotation_deg},
+                    {"max_jump_deg_at_s", motion.jumps.rotation_s}};
+  json["frames"] = {{"all", coverage.frames},
+                    {"tracked", coverage.tracked},
+                    {"before_first", coverage.before_first},
+                    {"lost", coverage.lost},
+                    {"inferred", coverage.inferred}};
+  json["calibration"] = nullptr;
+  if (report.calibration) {
+    json["calibration"] = {{"position_95", report.calibration->position_coverage},
+                           {"rotation_95", report.calibration->rotation_coverage}};
+  }
+  json["verdict"] = VerdictToJson(report.verdict);
+  return json;
 }
 
 Json ToJson(const RunReport& report) {
   Json json;
+  json["alignment"] = {{"align", ToString(report.alignment.alignment)}, {"reason", report.alignment.reason}};
   json["objects"] = report.objects ? ToJson(*report.objects) : Json(nullptr);
   json["boxes"] = report.boxes ? ToJson(*report.boxes) : Json(nullptr);
   json["trajectory"] = report.trajectory ? ToJson(*report.trajectory) : Json(nullptr);
+  json["verdict"] = report.verdict ? VerdictToJson(*report.verdict) : Json(nullptr);
   json["notes"] = report.notes;
   return json;
 }

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "client/files/tum.h"
 #include "common/statistics.h"
 
 namespace romap::eval {
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
+constexpr size_t kMinPairs = 3;
 
 double Mean(const std::vector<double>& values) {
   double sum = 0;
@@ -23,35 +23,101 @@ double RootMeanSquare(std::vector<double> values) {
   return std::sqrt(Mean(values));
 }
 
+std::vector<int64_t> TimestampsOf(const std::vector<files::StampedPose>& poses) {
+  std::vector<int64_t> timestamps_ns;
+  for (const files::StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns);
+  return timestamps_ns;
+}
+
+// Root mean square distance of the true positions from their mean.
+double ExtentOf(const std::vector<PosePair>& pairs) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const PosePair& pair : pairs) mean += pair.truth.translation() / static_cast<double>(pairs.size());
+  std::vector<double> distances_m;
+  for (const PosePair& pair : pairs) distances_m.push_back((pair.truth.translation() - mean).norm());
+  return RootMeanSquare(std::move(distances_m));
+}
+
+Sim3<World, World> Fit(const std::vector<PosePair>& pairs, Alignment alignment) {
+  if (alignment == Alignment::kNone) return {};
+  Points estimated, truth;
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const PosePair& pair : pairs) {
+    estimated.push_back(pair.estimated.translation());
+    truth.push_back(pair.truth.translation());
+    rotations.push_back((pair.truth.rotation() * pair.estimated.rotation().conjugate()).toRotationMatrix());
+  }
+  const auto similarity = FitSimilarity(estimated, truth, alignment == Alignment::kSim3);
+  return similarity ? *similarity : AlignMeans(estimated, truth, MeanRotation(rotations));
+}
+
+// Absolute errors of the aligned poses.
+std::vector<PoseError> ErrorsOf(const std::vector<PosePair>& pairs, const Sim3<World, World>& S_gt_est) {
+  std::vector<PoseError> errors;
+  for (const PosePair& pair : pairs) {
+    const SE3<World, Camera> aligned = S_gt_est.Moved(pair.estimated);
+    errors.push_back({(aligned.translation() - pair.truth.translation()).norm(),
+                      pair.truth.rotation().angularDistance(aligned.rotation()) * kDegPerRad});
+  }
+  return errors;
+}
+
+void AddAbsoluteErrors(const std::vector<PoseError>& errors, TrajectoryReport* report) {
+  std::vector<double> errors_m, angles_deg;
+  for (const PoseError& error : errors) {
+    errors_m.push_back(error.position_m);
+    angles_deg.push_back(error.rotation_deg);
+  }
+  report->ate_rmse_m = RootMeanSquare(errors_m);
+  report->ate_mean_m = Mean(errors_m);
+  report->ate_median_m = Quantile(errors_m, 0.5);
+  report->ate_max_m = *std::max_element(errors_m.begin(), errors_m.end());
+  report->rotation_rmse_deg = RootMeanSquare(angles_deg);
+  report->rotation_max_deg = *std::max_element(angles_deg.begin(), angles_deg.end());
+}
+
 }  // namespace
 
-absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> estimated, files::ReadTum(options.estimated));
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.ground_truth));
-  ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
-                         AlignTrajectories(estimated, truth, options.alignment, options.max_dt_s));
-  TrajectoryReport report{.alignment = options.alignment,
-                          .estimated_poses = estimated.size(),
-                          .ground_truth_poses = truth.size(),
-                          .matched = fit.pairs.size(),
-                          .scale = fit.S_gt_est.scale()};
-  std::vector<double> errors_m, angles_deg;
-  for (size_t k = 0; k < fit.pairs.size(); ++k) {
-    const SE3<World, Camera> T_gt_camera = fit.S_gt_est.Moved(estimated[fit.pairs[k].first].T_world_camera);
-    const SE3<World, Camera>& T_gt_true = truth[fit.pairs[k].second].T_world_camera;
-    errors_m.push_back((T_gt_camera.translation() - T_gt_true.translation()).norm());
-    angles_deg.push_back(T_gt_true.rotation().angularDistance(T_gt_camera.rotation()) * kDegPerRad);
-    if (k == 0) continue;
-    const SE3<World, Camera>& T_gt_previous = truth[fit.pairs[k - 1].second].T_world_camera;
-    report.path_length_m += (T_gt_true.translation() - T_gt_previous.translation()).norm();
+absl::StatusOr<TrajectoryReport> CompareTrajectories(const TrajectoryInput& input, Alignment alignment,
+                                                     double max_dt_s) {
+  ROMAP_ASSIGN_OR_RETURN(const PoseAssociation associated,
+                         AssociatePoses(input.estimated, input.ground_truth, max_dt_s, kMinPairs));
+  std::vector<PosePair> pairs;
+  for (const auto& [i, j] : associated) {
+    const files::StampedPose& truth = input.ground_truth[j];
+    pairs.push_back({truth.timestamp_ns, input.estimated[i].T_world_camera, truth.T_world_camera});
   }
-  report.ate_rmse_m = RootMeanSquare(errors_m);
-  report.ate_mean_m = Mean(errors_m);
-  report.ate_median_m = Quantile(errors_m, 0.5);
-  report.ate_max_m = *std::max_element(errors_m.begin(), errors_m.end());
-  report.rotation_rmse_deg = RootMeanSquare(angles_deg);
-  report.rotation_max_deg = *std::max_element(angles_deg.begin(), angles_deg.end());
+  const Sim3<World, World> S_gt_est = Fit(pairs, alignment);
+  TrajectoryReport report{.alignment = alignment,
+                          .estimated_poses = input.estimated.size(),
+                          .ground_truth_poses = input.ground_truth.size(),
+                          .matched = pairs.size(),
+                          .scale = S_gt_est.scale(),
+                          .extent_m = ExtentOf(pairs)};
+  for (size_t k = 1; k < pairs.size(); ++k) {
+    report.path_length_m += (pairs[k].truth.translation() - pairs[k - 1].truth.translation()).norm();
+  }
+  const std::vector<PoseError> errors = ErrorsOf(pairs, S_gt_est);
+  AddAbsoluteErrors(errors, &report);
+  report.motion = MeasureMotion(pairs, report.extent_m, report.scale);
+  const std::vector<int64_t> poses_ns = TimestampsOf(input.estimated);
+  report.coverage = input.frames_ns.empty() ? InferCoverage(poses_ns, input.ground_truth.front().timestamp_ns,
+                                                            input.ground_truth.back().timestamp_ns)
+                                            : CoverageOf(input.frames_ns, poses_ns);
+  if (input.sigmas) {
+    std::vector<PoseSigma> sigmas;
+    for (const auto& [i, j] : associated) sigmas.push_back((*input.sigmas)[i]);
+    report.calibration = MeasureCalibration(errors, sigmas, report.scale);
+  }
+  report.verdict = Judge(report);
   return report;
+}
+
+absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options) {
+  TrajectoryInput input{.frames_ns = options.frames_ns};
+  ROMAP_ASSIGN_OR_RETURN(input.estimated, files::ReadTum(options.estimated));
+  ROMAP_ASSIGN_OR_RETURN(input.ground_truth, files::ReadTum(options.ground_truth));
+  return CompareTrajectories(input, options.alignment, options.max_dt_s);
 }
 
 }  // namespace romap::eval

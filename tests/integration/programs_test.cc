@@ -102,7 +102,9 @@ TEST(ProgramsTest, TracksTheCameraFromImagesAndWritesTheCorrectedTrajectory) {
   const testing_support::ProcessResult run =
       Romap({"run", folder / "sequence", "--local", "--poses", "none", "--out", folder / "map", "--no-pictures"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("ATE rmse"), HasSubstr("trajectory verdict: ")));
   const nlohmann::json summary = ReadJson(folder / "map/summary.json");
+  EXPECT_EQ(summary["poses"], "none");
   const int initializing = summary["tracking"]["initializing"];
   EXPECT_GT(initializing, 0);  // no pose was sent
   EXPECT_LT(initializing, 40);

@@ -110,8 +110,8 @@ TEST(IntersectionOverUnionTest, AgreesWithMonteCarlo) {
   const YawBox a{{0, 0, 0}, -0.5, {0.15, 0.1, 0.2}, 0};
   const YawBox b{{0.04, -0.03, 0.05}, 0.2, {0.12, 0.13, 0.15}, 0};
   const auto inside = [](const YawBox& box, const Eigen::Vector3d& p) {
-    const Eigen::AngleAxisd turn(-box.yaw_rad, Eigen::Vector3d::UnitZ());
-    return ((turn * (p - box.center)).cwiseAbs().array() < box.half_extents.array()).all();
+    const Eigen::AngleAxisd yaw(-box.yaw_rad, Eigen::Vector3d::UnitZ());
+    return ((yaw * (p - box.center)).cwiseAbs().array() < box.half_extents.array()).all();
   };
   std::mt19937 random(2);
   std::uniform_real_distribution<double> uniform(-0.3, 0.3);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -105,6 +106,30 @@ inline std::vector<files::StampedPose> Orbit(int count = 200) {
 inline std::vector<files::StampedPose> Moved(std::vector<files::StampedPose> poses,
                                              const Sim3<World, World>& similarity) {
   for (files::StampedPose& pose : poses) pose.T_world_camera = similarity.Moved(pose.T_world_camera);
+  return poses;
+}
+
+// The poses with positions scaled about the first one by a factor that may depend on the index.
+template <class Factor>
+std::vector<files::StampedPose> WithLocalScale(const std::vector<files::StampedPose>& poses, Factor factor) {
+  std::vector<files::StampedPose> scaled = poses;
+  Eigen::Vector3d position = poses.front().T_world_camera.translation();
+  for (size_t k = 1; k < poses.size(); ++k) {
+    position += factor(k) * (poses[k].T_world_camera.translation() - poses[k - 1].T_world_camera.translation());
+    scaled[k].T_world_camera = {poses[k].T_world_camera.rotation(), position};
+  }
+  return scaled;
+}
+
+// Deterministic noise: the poses with normal errors of position (standard deviation per axis).
+inline std::vector<files::StampedPose> WithNoise(std::vector<files::StampedPose> poses, double sigma_m, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, sigma_m);
+  for (files::StampedPose& pose : poses) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    pose.T_world_camera = {pose.T_world_camera.rotation(),
+                           Eigen::Vector3d(pose.T_world_camera.translation() + Eigen::Vector3d(x, y, z))};
+  }
   return poses;
 }
 

@@ -88,9 +88,9 @@ TEST_F(ObjectsEvalTest, MeasuresASphereThatIsFiveMillimetersTooLarge) {
 
 TEST_F(ObjectsEvalTest, IcpRecoversScaleRotationAndTranslation) {
   const double angle_rad = 0.054;
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d(0.02, -0.03, 0.04).normalized()));
+  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d(0.02, -0.03, 0.04).normalized()));
   const Sim3<World, World> about_center(
-      1.06, turn, kBoxCenter - 1.06 * (turn * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005));
+      1.06, rotation, kBoxCenter - 1.06 * (rotation * kBoxCenter) + Eigen::Vector3d(0.008, -0.006, 0.005));
   Put("gt/box", eval_world::Box(kBoxHalf, kBoxCenter));
   Put("pred/a", eval_world::Moved(eval_world::Box(kBoxHalf, kBoxCenter), about_center));
   options_.alignment = Alignment::kSim3;
@@ -117,7 +117,7 @@ TEST_F(ObjectsEvalTest, HalfASphereIsHalfComplete) {
   EXPECT_NEAR(match.figures.accuracy_cm, eval_world::SamplingFloor_cm(kSphereArea_cm2, kSamples), 0.02);
 }
 
-TEST_F(ObjectsEvalTest, SeenFiguresIgnoreUnseenPointsAndNoCapIgnoresInferredPoints) {
+TEST_F(ObjectsEvalTest, SeenFiguresIgnoreUnseenPointsAndInferredPointsCanBeExcluded) {
   Mesh cloud = eval_world::Sphere(0.1, {0, 0, 0}, 300);
   cloud.triangles.clear();
   std::vector<double> seen, source;
@@ -134,7 +134,7 @@ TEST_F(ObjectsEvalTest, SeenFiguresIgnoreUnseenPointsAndNoCapIgnoresInferredPoin
   EXPECT_NEAR(match.figures.accuracy_cm, 2 * 1.44 / 2.44, 0.06)
       << "the lower half is 2 cm too large and has 1.44 times the area";
   EXPECT_NEAR(match.true_seen_share, 0.5, 0.01);
-  options_.no_cap = true;
+  options_.ignore_inferred = true;
   EXPECT_GT(EvaluateOne().true_seen_share, 0.6) << "of the measured points";
 }
 

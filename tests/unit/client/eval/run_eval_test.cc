@@ -18,6 +18,9 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
+const MapAlignment kGiven{Alignment::kNone, "test"};
+const MapAlignment kEstimated{Alignment::kSim3, "test"};
+
 class RunEvalTest : public testing::Test {
  protected:
   // Writes a sequence with one box, and a run that mapped it in the world of `S_run_true`.
@@ -42,7 +45,7 @@ class RunEvalTest : public testing::Test {
 
 TEST_F(RunEvalTest, DoesNotAlignWithGivenPoses) {
   Write({});
-  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/true);
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", kGiven);
   EXPECT_THAT(report.notes, SizeIs(0));
   ASSERT_TRUE(report.objects && report.boxes && report.trajectory);
   EXPECT_FALSE(report.objects->rows[0].match->icp.has_value());
@@ -53,7 +56,7 @@ TEST_F(RunEvalTest, DoesNotAlignWithGivenPoses) {
 
 TEST_F(RunEvalTest, AlignsByTrajectoriesWithEstimatedPoses) {
   Write(eval_world::OtherWorld());
-  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", /*poses_given=*/false);
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", kEstimated);
   EXPECT_THAT(report.notes, SizeIs(0));
   ASSERT_TRUE(report.objects && report.boxes && report.trajectory);
   EXPECT_NEAR(report.objects->trajectory_scale, 1 / 0.37, 1e-6);
@@ -63,28 +66,44 @@ TEST_F(RunEvalTest, AlignsByTrajectoriesWithEstimatedPoses) {
 }
 
 TEST_F(RunEvalTest, NotesFiguresThatCannotBeMeasured) {
-  const RunReport nothing = EvaluateRun(folder_ / "run/x", folder_ / "set/x", true);
+  const RunReport nothing = EvaluateRun(folder_ / "run/x", folder_ / "set/x", kGiven);
   EXPECT_THAT(nothing.notes, SizeIs(3));
   EXPECT_THAT(nothing.notes[0], AllOf(HasSubstr("meshes not measured"), HasSubstr("run/x/objects")));
   Write({});
   ASSERT_TRUE(files::WriteFile(folder_ / "run/cuboids.json", "{\"objects\": 5}").ok());
-  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", kGiven);
   ASSERT_THAT(report.notes, SizeIs(1));
   EXPECT_THAT(report.notes[0], AllOf(HasSubstr("cuboids not measured"), HasSubstr("the list 'objects:' is missing")));
   EXPECT_TRUE(report.objects && report.trajectory);
 }
 
+TEST_F(RunEvalTest, AnUnusableTrajectoryIsWrong) {
+  Write({});
+  ASSERT_TRUE(files::WriteTum(folder_ / "run/trajectory.txt", {}).ok());
+  const RunReport empty = EvaluateRun(folder_ / "run", folder_ / "set", kEstimated);
+  ASSERT_TRUE(empty.verdict.has_value());
+  EXPECT_EQ(empty.verdict->level, VerdictLevel::kWrong);
+  EXPECT_THAT(FormatTrajectory(empty), AllOf(HasSubstr("trajectory verdict: WRONG"), HasSubstr("contains no poses")));
+  std::filesystem::remove(folder_ / "set/groundtruth.txt");
+  const RunReport unknown = EvaluateRun(folder_ / "run", folder_ / "set", kEstimated);
+  EXPECT_FALSE(unknown.verdict.has_value());
+  EXPECT_EQ(FormatTrajectory(unknown), "");
+}
+
 TEST_F(RunEvalTest, TablesAndJsonContainTheFigures) {
   Write({});
-  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", true);
+  const RunReport report = EvaluateRun(folder_ / "run", folder_ / "set", kGiven);
   const std::string table = FormatTable(report);
   EXPECT_THAT(table, AllOf(HasSubstr("acc.seen"), HasSubstr("5_box"), HasSubstr("1 of 1"), HasSubstr("IoU3D"),
-                           HasSubstr("ATE rmse 0.000000 m")));
+                           HasSubstr("ATE rmse 0.000000 m"), HasSubstr("alignment with the ground truth: none (test)"),
+                           HasSubstr("trajectory verdict: GOOD")));
   const nlohmann::ordered_json json = ToJson(report);
   EXPECT_EQ(json["objects"]["objects"][0]["predicted"], "5_box");
   EXPECT_EQ(json["objects"]["mean"]["ratio_1"], 100.0);
   EXPECT_NEAR(json["boxes"]["mean"]["iou_all_gt"].get<double>(), 1, 1e-7);
   EXPECT_EQ(json["trajectory"]["matched"], 200);
+  EXPECT_EQ(json["verdict"]["level"], "GOOD");
+  EXPECT_EQ(json["trajectory"]["frames"]["lost"], 0);
 }
 
 }  // namespace
