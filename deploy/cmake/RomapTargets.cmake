@@ -58,7 +58,7 @@ target_link_libraries(romap_opencv INTERFACE opencv_core opencv_imgproc opencv_i
 # Eigen, OpenCV's matrices and Abseil would take five seconds of every compilation, so they are parsed only once. All
 # targets share the one precompiled header, so the compile definitions of these libraries must be the same in all
 # targets.
-file(WRITE ${CMAKE_BINARY_DIR}/precompiled.cc "")
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled.cc CONTENT "")  # keeps its time, unlike file(WRITE)
 add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
 target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
 target_compile_options(romap_precompiled PRIVATE -fpch-preprocess)
@@ -68,9 +68,13 @@ target_precompile_headers(romap_precompiled PRIVATE
 
 # Tests also share GoogleTest. The speed of test code does not matter, so it is compiled with little optimization.
 set(ROMAP_TEST_OPTIMIZATION -O1)
+set(ROMAP_TEST_TIMEOUT_s 300)
+if(ROMAP_SANITIZER)
+  set(ROMAP_TEST_TIMEOUT_s 1200)
+endif()
 if(ROMAP_BUILD_TESTS)
   find_package(GTest CONFIG REQUIRED)
-  file(WRITE ${CMAKE_BINARY_DIR}/precompiled_tests.cc "")
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled_tests.cc CONTENT "")
   add_library(romap_precompiled_tests OBJECT ${CMAKE_BINARY_DIR}/precompiled_tests.cc)
   target_link_libraries(romap_precompiled_tests PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor
                                                         fmt::fmt GTest::gmock)
@@ -119,5 +123,5 @@ function(romap_tests name)
   target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main fmt::fmt)
   target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
   target_compile_options(${name}_test PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
-  gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+  gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s})
 endfunction()

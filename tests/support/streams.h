@@ -11,12 +11,14 @@
 #include <vector>
 
 #include "common/mapping_service.h"
+#include "tests/support/sanitizer.h"
 
 // Helpers for tests of a MappingService. All waits end with a test failure after kTimeout.
 
 namespace romap::testing {
 
-inline constexpr std::chrono::seconds kTimeout{60};
+// Long under a sanitizer, where a busy machine trains a small field in minutes.
+inline constexpr std::chrono::seconds kTimeout{testing_support::kUnderSanitizer ? 240 : 60};
 
 inline CameraModel SmallCamera() {
   CameraModel camera;

@@ -19,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kPollPeriod{10};
+constexpr std::chrono::seconds kLineTimeout{kUnderSanitizer ? 120 : 30};
 
 std::string ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -59,7 +60,7 @@ BackgroundProcess::~BackgroundProcess() {
 }
 
 std::string BackgroundProcess::WaitForLine(const std::string& prefix) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  const auto deadline = std::chrono::steady_clock::now() + kLineTimeout;
   while (std::chrono::steady_clock::now() < deadline) {
     std::istringstream lines(ReadFile(out_path_));
     for (std::string line; std::getline(lines, line) && !lines.eof();) {
@@ -72,7 +73,8 @@ std::string BackgroundProcess::WaitForLine(const std::string& prefix) {
     }
     std::this_thread::sleep_for(kPollPeriod);
   }
-  ADD_FAILURE() << "no line that begins with '" << prefix << "' within 30 s; stderr: " << ReadFile(err_path_);
+  ADD_FAILURE() << "no line that begins with '" << prefix << "' within " << kLineTimeout.count()
+                << " s; stderr: " << ReadFile(err_path_);
   return "";
 }
 

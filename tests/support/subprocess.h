@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/sanitizer.h"
+
 namespace romap::testing_support {
 
-inline constexpr std::chrono::seconds kProcessTimeout{240};
+inline constexpr std::chrono::seconds kProcessTimeout{kUnderSanitizer ? 900 : 240};
 
 struct ProcessResult {
   int exit_code = -1;  // 128 + signal number if a signal ended it

@@ -11,6 +11,7 @@
 #include "server/objects/object_mapper.h"
 #include "server/session/map_state.h"
 #include "server/session/mesher.h"
+#include "tests/support/sanitizer.h"
 #include "tests/support/streams.h"
 #include "tests/support/synthetic_world.h"
 
@@ -37,7 +38,7 @@ nerf::NerfConfig FastNerf() {
   config.levels = 5;
   config.log2_table_entries = 12;
   config.finest_resolution = 128;
-  config.rays_per_step = 512;
+  config.rays_per_step = testing_support::kUnderSanitizer ? 256 : 512;
   config.full_budget_steps = 120;
   config.first_budget_steps = 60;
   return config;
