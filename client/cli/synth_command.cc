@@ -142,7 +142,7 @@ void AddPathOptions(SynthCommandOptions& options, CLI::App* command) {
                                    {"tworounds", synth::PathKind::kTwoRounds},
                                    {"rotation", synth::PathKind::kRotation}},
                                   "Camera path: orbit (level circle), handheld (arc with hand motion), tworounds (two "
-                                  "laps through a larger room), or rotation (fast rotation of a hand in place)");
+                                  "laps through a larger room), or rotation (fast hand-held rotation in place)");
   path.Add("--rounds", synth.rounds,
            "Number of circles (orbit), passes along the arc (handheld), or pairs of laps (tworounds)");
   path.Add("--arc", synth.arc_deg,

@@ -10,7 +10,7 @@
 namespace romap::synth {
 namespace {
 
-constexpr double kPointsPerSquareMetre = 1e6;
+constexpr double kPointsPerSquareMeter = 1e6;
 constexpr double kMaxPoints = 60000;
 constexpr float kUnderside_m = 3e-4F;
 
@@ -59,7 +59,7 @@ SurfacePoints::SurfacePoints(const SceneObject& object, uint64_t seed) : label_(
     for (const std::array<uint32_t, 3>& triangle : part.mesh.triangles) area += TriangleArea(part.mesh, triangle);
     insides.emplace_back(part.mesh.vertices, part.mesh.triangles);
   }
-  const double density = std::min(kPointsPerSquareMetre, kMaxPoints / area);
+  const double density = std::min(kPointsPerSquareMeter, kMaxPoints / area);
   const std::vector<std::vector<LocalPoint>> samples = SampleParts(object.solid, density, random);
   for (size_t part = 0; part < samples.size(); ++part) {
     for (const LocalPoint& point : samples[part]) {

@@ -27,8 +27,11 @@ Eigen::Quaterniond FromRotationVector(const Eigen::Vector3d& vector) {
 
 Eigen::Vector3d ShakeNoise(double time, uint32_t seed) { return SmoothNoise3(time, kShakePeriod, seed); }
 
-// The factor by which the noise has the given maximal step between consecutive frames.
+// The factor by which the noise has the given maximal step between consecutive frames. The noise of a short sequence
+// may be slower.
 double FactorForPeakStep(double peak_step, int frames, uint32_t seed) {
+  constexpr int kMinFrames = 100;
+  frames = std::max(frames, kMinFrames);
   double highest = 0;
   for (int i = 1; i < frames; ++i) highest = std::max(highest, (ShakeNoise(i, seed) - ShakeNoise(i - 1, seed)).norm());
   return highest > 0 ? peak_step / highest : 0;

@@ -41,14 +41,20 @@ Eigen::Vector3d ImagePoses::CameraPoint(const Eigen::Vector3d& p_world) const {
   if (!Rolling()) return inverses_[0].rotation * p_world + inverses_[0].translation;
   // The row depends on the pose, which depends on the row. The image moves by a fraction of a row per row, so this
   // fixed-point iteration converges.
-  constexpr int kIterations = 4;
+  constexpr int kMaxIterations = 20;
+  constexpr double kTolerance_px = 1e-3;
   constexpr double kNear_m = 1e-3;
-  Eigen::Vector3d p_camera = CameraPointInRow(0.5 * static_cast<double>(rows_.size() - 1), p_world);
-  for (int iteration = 0; iteration < kIterations && p_camera.z() > kNear_m; ++iteration) {
+  const auto last_row = static_cast<double>(rows_.size() - 1);
+  double row = 0.5 * last_row;
+  Eigen::Vector3d p_camera = CameraPointInRow(row, p_world);
+  for (int iteration = 0; iteration < kMaxIterations && p_camera.z() > kNear_m; ++iteration) {
     Eigen::Vector2d pixel_px = camera_.Project(p_camera);
     if (camera_.HasDistortion()) pixel_px = DistortPixel(camera_, pixel_px);
     if (!std::isfinite(pixel_px.y())) break;
-    p_camera = CameraPointInRow(pixel_px.y(), p_world);
+    const double next_row = std::clamp(pixel_px.y(), 0.0, last_row);
+    if (std::abs(next_row - row) < kTolerance_px) break;
+    row = next_row;
+    p_camera = CameraPointInRow(row, p_world);
   }
   return p_camera;
 }

@@ -20,9 +20,9 @@ std::optional<std::array<double, kCount>> ParseNumbers(const std::string& text) 
   const char* const end = text.data() + text.size();
   for (size_t i = 0; i < kCount; ++i) {
     if (i > 0 && (next == end || *next++ != ':')) return std::nullopt;
-    const auto [rest, error] = std::from_chars(next, end, numbers[i]);
+    const auto [stop, error] = std::from_chars(next, end, numbers[i]);
     if (error != std::errc()) return std::nullopt;
-    next = rest;
+    next = stop;
   }
   if (next != end) return std::nullopt;
   return numbers;
@@ -35,8 +35,8 @@ absl::StatusOr<FrameRange> ParseFrameRange(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto [colon, error] = std::from_chars(text.data(), end, range.first);
   if (error == std::errc() && colon != end && *colon == ':') {
-    const auto [rest, last_error] = std::from_chars(colon + 1, end, range.last);
-    if (last_error == std::errc() && rest == end) return range;
+    const auto [stop, last_error] = std::from_chars(colon + 1, end, range.last);
+    if (last_error == std::errc() && stop == end) return range;
   }
   return InvalidArgument("'{}': expected FIRST:LAST, two frame numbers from 1, e.g. 100:130", text);
 }
@@ -66,8 +66,8 @@ absl::StatusOr<TableTexture> ParseTableTexture(const std::string& text) {
   if (text.starts_with(kRepeat)) {
     TableTexture table{.kind = TableTexture::Kind::kRepeated};
     const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data() + kRepeat.size(), end, table.repeats);
-    if (error == std::errc() && rest == end) return table;
+    const auto [stop, error] = std::from_chars(text.data() + kRepeat.size(), end, table.repeats);
+    if (error == std::errc() && stop == end) return table;
   }
   return InvalidArgument("'{}': expected distinct, repeat:N, plain or faint, e.g. repeat:2", text);
 }

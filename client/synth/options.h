@@ -15,7 +15,7 @@ enum class PathKind {
   // round and the walls in between, including an almost textureless wall. 600 frames per round correspond to a brisk
   // walk.
   kTwoRounds,
-  kRotation,  // the rotation of a hand at the first viewpoint of the orbit, without other motion
+  kRotation,  // hand-held rotation at the first viewpoint of the orbit, see RotationOptions
 };
 
 // An inclusive range of frame numbers, counted from 1 as in the file names.

@@ -195,7 +195,7 @@ TEST(CameraPathTest, RotatesFirstThenFollowsThePath) {
   for (size_t i = 0; i < 120; ++i) {
     EXPECT_LT((poses[i].translation() - poses[120].translation()).norm(), 0.012) << i;
   }
-  // The rest is the same path with fewer frames.
+  // The remaining frames follow the path of a sequence without rotation in place.
   const auto only_path = Poses({.seed = 1, .frames = 180, .path = PathKind::kHandheld}, scene);
   for (size_t i = 0; i < only_path.size(); ++i) {
     EXPECT_LT((poses[120 + i].translation() - only_path[i].translation()).norm(), 1e-9);

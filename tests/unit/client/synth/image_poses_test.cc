@@ -11,7 +11,7 @@
 namespace romap::synth {
 namespace {
 
-// A camera at (0, 0, -1 m) that looks along z; rotates by `pitch_rad` and `yaw_rad` and moves by `move_m` during the
+// A camera at (0, 0, -1 m) that faces along z; rotates by `pitch_rad` and `yaw_rad` and moves by `move_m` during the
 // readout.
 std::vector<SE3<World, Camera>> Rows(const CameraModel& camera, double pitch_rad, double yaw_rad, double move_m) {
   std::vector<SE3<World, Camera>> rows;
