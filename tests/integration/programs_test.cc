@@ -48,6 +48,12 @@ synth::SynthOptions SmallScene() {
 
 void MakeSmallSequence(const std::string& dir) { ASSERT_TRUE(synth::MakeSequence(SmallScene(), dir).ok()); }
 
+// For tests that end before anything is mapped.
+void MakeTinySequence(const std::string& dir) {
+  const synth::SynthOptions options{.seed = 3, .objects = 1, .frames = 15, .width_px = 80, .height_px = 60};
+  ASSERT_TRUE(synth::MakeSequence(options, dir).ok());
+}
+
 size_t CountFiles(const std::string& folder, const std::string& extension) {
   return std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
                        [&](const auto& entry) { return entry.path().extension() == extension; });
@@ -185,7 +191,7 @@ TEST(InvalidInputTest, IncompleteSequenceFolder) {
 
 TEST(InvalidInputTest, OutputFolderThatCannotBeCreated) {
   const testing_support::TemporaryFolder folder;
-  MakeSmallSequence(folder / "sequence");
+  MakeTinySequence(folder / "sequence");
   std::ofstream(folder / "file") << "not a folder";
   ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "file/map"}), 3, "file/map");
   ExpectOneLine(
@@ -208,7 +214,7 @@ TEST(ProgramsTest, BothProgramsReportTheSameVersion) {
 
 TEST(InvalidInputTest, UnreadableImage) {
   const testing_support::TemporaryFolder folder;
-  MakeSmallSequence(folder / "sequence");
+  MakeTinySequence(folder / "sequence");
   for (const auto& entry : fs::directory_iterator(folder / "sequence/rgb")) {
     if (entry.path().filename().string().find("12") != std::string::npos) fs::remove(entry.path());
   }
@@ -219,7 +225,7 @@ TEST(InvalidInputTest, UnknownFlagCommandAndConfigKey) {
   const testing_support::TemporaryFolder folder;
   ExpectOneLine(Romap({"run", "x", "--frobnicate"}), 2, "frobnicate");
   ExpectOneLine(Romap({"frobnicate"}), 2, "frobnicate");
-  MakeSmallSequence(folder / "sequence");
+  MakeTinySequence(folder / "sequence");
   ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--set", "nerf.rays=1", "--out", folder / "map"}), 2,
                 "unknown key 'nerf.rays', did you mean 'nerf.");
   std::ofstream(folder / "bad.yaml") << "mesh:\n  resolutoin: 64\n";
@@ -235,7 +241,7 @@ TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
   std::ofstream(folder / "conflict.yaml") << "nerf:\n  backend: cuda\n  field: sdf\n";
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--config", folder / "conflict.yaml"}), 2,
                 "conflict.yaml:2: nerf.backend = cuda does not support nerf.field = sdf");
-  MakeSmallSequence(folder / "sequence");
+  MakeTinySequence(folder / "sequence");
   // A local run ignores the sections of the configuration that only romap-server uses.
   const testing_support::ProcessResult run =
       Romap({"run", folder / "sequence", "--local", "--config", ROMAP_SOURCE_DIR "/deploy/server.yaml", "--set",
@@ -247,7 +253,7 @@ TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
 
 TEST(InvalidInputTest, NoServerAndPortInUse) {
   const testing_support::TemporaryFolder folder;
-  MakeSmallSequence(folder / "sequence");
+  MakeTinySequence(folder / "sequence");
   testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");

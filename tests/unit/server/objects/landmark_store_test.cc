@@ -32,7 +32,10 @@ class LandmarkStoreTest : public ::testing::Test {
   static FrameDetections FrameOf(const std::vector<LandmarkKey>& keys) {
     FrameDetections frame{.usable = true, .frame_id = 1, .detections = {}, .keys = keys, .unambiguous = {}};
     for (size_t i = 0; i < keys.size(); ++i) {
-      frame.detections.push_back({.label = static_cast<uint16_t>(kLabel + i), .class_name = "cup", .track_id = {}});
+      Detection detection;
+      detection.label = static_cast<uint16_t>(kLabel + i);
+      detection.class_name = "cup";
+      frame.detections.push_back(detection);
       frame.unambiguous.push_back(true);
     }
     return frame;
