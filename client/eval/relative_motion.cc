@@ -24,7 +24,7 @@ std::vector<double> PathLengths(std::span<const PosePair> pairs) {
   return path_m;
 }
 
-Motion Between(const PosePair& from, const PosePair& to, double path_m) {
+RelativeMotion Between(const PosePair& from, const PosePair& to, double path_m) {
   const SE3<Camera, Camera> estimated = from.estimated.Inverse() * to.estimated;
   const SE3<Camera, Camera> truth = from.truth.Inverse() * to.truth;
   return {.start_ns = from.timestamp_ns,
@@ -39,16 +39,16 @@ double Seconds(int64_t timestamp_ns) { return static_cast<double>(timestamp_ns) 
 
 }  // namespace
 
-std::vector<Motion> FrameMotions(std::span<const PosePair> pairs) {
+std::vector<RelativeMotion> FrameMotions(std::span<const PosePair> pairs) {
   const std::vector<double> path_m = PathLengths(pairs);
-  std::vector<Motion> motions;
+  std::vector<RelativeMotion> motions;
   for (size_t k = 1; k < pairs.size(); ++k) motions.push_back(Between(pairs[k - 1], pairs[k], path_m[k - 1]));
   return motions;
 }
 
-std::vector<Motion> WindowMotions(std::span<const PosePair> pairs, double window_s) {
+std::vector<RelativeMotion> WindowMotions(std::span<const PosePair> pairs, double window_s) {
   const std::vector<double> path_m = PathLengths(pairs);
-  std::vector<Motion> motions;
+  std::vector<RelativeMotion> motions;
   size_t end = 0;
   for (size_t start = 0; start < pairs.size(); ++start) {
     const auto elapsed_s = [&] { return Seconds(pairs[end].timestamp_ns - pairs[start].timestamp_ns); };
@@ -60,9 +60,9 @@ std::vector<Motion> WindowMotions(std::span<const PosePair> pairs, double window
   return motions;
 }
 
-std::optional<double> DirectionCorrelation(std::span<const Motion> motions) {
+std::optional<double> DirectionCorrelation(std::span<const RelativeMotion> motions) {
   double weighted = 0, total_m = 0;
-  for (const Motion& motion : motions) {
+  for (const RelativeMotion& motion : motions) {
     total_m += motion.truth.norm();
     const double length = motion.estimated.norm();
     if (length > 0) weighted += motion.truth.dot(motion.estimated) / length;
@@ -70,9 +70,9 @@ std::optional<double> DirectionCorrelation(std::span<const Motion> motions) {
   return total_m > 0 ? std::optional(weighted / total_m) : std::nullopt;
 }
 
-std::optional<double> SignedScale(std::span<const Motion> motions) {
+std::optional<double> SignedScale(std::span<const RelativeMotion> motions) {
   std::vector<double> lengths_m;
-  for (const Motion& motion : motions) lengths_m.push_back(motion.truth.norm());
+  for (const RelativeMotion& motion : motions) lengths_m.push_back(motion.truth.norm());
   if (lengths_m.empty()) return std::nullopt;
   const double shortest_m = kMinLengthShare * Median(lengths_m);
   // Estimated to true length, because an estimated length may be 0.
@@ -87,7 +87,7 @@ std::optional<double> SignedScale(std::span<const Motion> motions) {
   return ratio == 0 ? std::nullopt : std::optional(1 / ratio);
 }
 
-std::vector<double> LocalScales(std::span<const Motion> motions, int sections) {
+std::vector<double> LocalScales(std::span<const RelativeMotion> motions, int sections) {
   std::vector<double> scales;
   if (motions.empty()) return scales;
   const double path_m = motions.back().path_m;
@@ -102,9 +102,9 @@ std::vector<double> LocalScales(std::span<const Motion> motions, int sections) {
   return scales;
 }
 
-Jumps LargestJumps(std::span<const Motion> frame_motions, double scale) {
+Jumps LargestJumps(std::span<const RelativeMotion> frame_motions, double scale) {
   Jumps jumps;
-  for (const Motion& motion : frame_motions) {
+  for (const RelativeMotion& motion : frame_motions) {
     const double error_m = (scale * motion.estimated - motion.truth).norm();
     if (error_m > jumps.position_m) {
       jumps.position_m = error_m;
@@ -119,12 +119,12 @@ Jumps LargestJumps(std::span<const Motion> frame_motions, double scale) {
 }
 
 MotionFigures MeasureMotion(std::span<const PosePair> pairs, double extent_m, double fit_scale) {
-  const std::vector<Motion> frames = FrameMotions(pairs);
-  std::vector<Motion> windows = WindowMotions(pairs, kWindow_s);
+  const std::vector<RelativeMotion> frames = FrameMotions(pairs);
+  std::vector<RelativeMotion> windows = WindowMotions(pairs, kWindow_s);
   const bool has_windows = windows.size() >= kMinMotions;
   if (!has_windows) windows = frames;
   std::vector<double> angles_deg;
-  for (const Motion& motion : windows) angles_deg.push_back(motion.rotation_error_deg);
+  for (const RelativeMotion& motion : windows) angles_deg.push_back(motion.rotation_error_deg);
 
   MotionFigures figures{.window_s = has_windows ? kWindow_s : 0,
                         .rotation_median_deg = Quantile(angles_deg, 0.5),

@@ -20,7 +20,7 @@ struct PosePair {
 
 // The motion from one pair to a later one. The translations are in the camera frame at the start. Therefore they need
 // no alignment of the worlds, and no alignment can hide a translation in the wrong direction.
-struct Motion {
+struct RelativeMotion {
   int64_t start_ns = 0;
   int64_t end_ns = 0;
   double path_m = 0;                                    // length of the true path up to the start
@@ -30,23 +30,23 @@ struct Motion {
 };
 
 // The motions between consecutive pairs (sorted by time), also across gaps.
-std::vector<Motion> FrameMotions(std::span<const PosePair> pairs);
+std::vector<RelativeMotion> FrameMotions(std::span<const PosePair> pairs);
 
 // For each pair, the motion to the first pair at least `window_s` later; none if that pair is more than 1.5 windows
 // later.
-std::vector<Motion> WindowMotions(std::span<const PosePair> pairs, double window_s);
+std::vector<RelativeMotion> WindowMotions(std::span<const PosePair> pairs, double window_s);
 
 // Correlation of the directions of estimated and true translation: the mean cosine of the angle between them, weighted
 // by the true length. 1 = same direction, 0 = unrelated, -1 = opposite. Independent of the scale, and one jump changes
 // it no more than any other motion. nullopt without true translation.
-std::optional<double> DirectionCorrelation(std::span<const Motion> motions);
+std::optional<double> DirectionCorrelation(std::span<const RelativeMotion> motions);
 
 // Median ratio of true to estimated length, negative if the direction of most translations is opposite. Ignores motions
 // much shorter than usual. nullopt if fewer than three remain or their median estimated length is 0.
-std::optional<double> SignedScale(std::span<const Motion> motions);
+std::optional<double> SignedScale(std::span<const RelativeMotion> motions);
 
 // SignedScale of each of `sections` parts of the true path with the same length; sections without a scale are omitted.
-std::vector<double> LocalScales(std::span<const Motion> motions, int sections);
+std::vector<double> LocalScales(std::span<const RelativeMotion> motions, int sections);
 
 // The largest errors of a motion between consecutive frames.
 struct Jumps {
@@ -57,7 +57,7 @@ struct Jumps {
 };
 
 // `scale` converts estimated lengths to m.
-Jumps LargestJumps(std::span<const Motion> frame_motions, double scale);
+Jumps LargestJumps(std::span<const RelativeMotion> frame_motions, double scale);
 
 // Motion over about a second, or between frames if the trajectory is too short or its frames too rare.
 struct MotionFigures {

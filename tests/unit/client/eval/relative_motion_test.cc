@@ -10,8 +10,8 @@ namespace {
 using eval_world::Orbit;
 
 // Motions with the given true and estimated translation along x.
-std::vector<Motion> AlongX(const std::vector<std::pair<double, double>>& true_and_estimated) {
-  std::vector<Motion> motions;
+std::vector<RelativeMotion> AlongX(const std::vector<std::pair<double, double>>& true_and_estimated) {
+  std::vector<RelativeMotion> motions;
   for (const auto& [truth, estimated] : true_and_estimated) {
     motions.push_back(
         {.path_m = static_cast<double>(motions.size()), .estimated = {estimated, 0, 0}, .truth = {truth, 0, 0}});
@@ -54,12 +54,12 @@ TEST(RelativeMotionTest, LocalScalesDivideThePath) {
 
 TEST(RelativeMotionTest, WindowsEndOneSecondLaterAndSkipGaps) {
   std::vector<files::StampedPose> poses = Orbit();  // 25 Hz
-  const std::vector<Motion> windows = WindowMotions(Pairs(poses), 1);
+  const std::vector<RelativeMotion> windows = WindowMotions(Pairs(poses), 1);
   ASSERT_EQ(windows.size(), 175u);
   EXPECT_EQ(windows[3].end_ns - windows[3].start_ns, 1'000'000'000);
   EXPECT_NEAR(windows[0].rotation_error_deg, 0, 1e-6);
   poses.erase(poses.begin() + 60, poses.begin() + 140);
-  for (const Motion& window : WindowMotions(Pairs(poses), 1)) {
+  for (const RelativeMotion& window : WindowMotions(Pairs(poses), 1)) {
     EXPECT_LE(window.end_ns - window.start_ns, 1'500'000'000);
   }
   EXPECT_TRUE(WindowMotions(Pairs(Orbit(20)), 1).empty());
