@@ -21,8 +21,9 @@ struct CudaStreamOnHost {
   std::unique_ptr<CudaGraphOnHost> capture;
 };
 struct CudaEventOnHost {
-  std::chrono::steady_clock::time_point at;
-  cudaStream_t stream = nullptr;  // where it was recorded
+  using Time = std::chrono::steady_clock::time_point;
+  std::shared_ptr<Time> at = std::make_shared<Time>();  // shared with waiting records, which may outlive the event
+  cudaStream_t stream = nullptr;                        // where it was recorded
 };
 
 namespace romap::cuda_on_host {
@@ -169,8 +170,8 @@ cudaError_t cudaEventDestroy(cudaEvent_t event) {
 
 cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
   event->stream = stream;
-  return Enqueue(stream, [=] {
-    event->at = std::chrono::steady_clock::now();
+  return Enqueue(stream, [at = event->at] {
+    *at = std::chrono::steady_clock::now();
     return cudaSuccess;
   });
 }
@@ -178,6 +179,6 @@ cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
 cudaError_t cudaEventSynchronize(cudaEvent_t event) { return Finish(event->stream); }
 
 cudaError_t cudaEventElapsedTime(float* milliseconds, cudaEvent_t start, cudaEvent_t end) {
-  *milliseconds = std::chrono::duration<float, std::milli>(end->at - start->at).count();
+  *milliseconds = std::chrono::duration<float, std::milli>(*end->at - *start->at).count();
   return DeviceFault();
 }
