@@ -41,9 +41,9 @@ MapAlignment DetermineAlignment(const RunRecord& record, const std::string& out_
     return {Alignment::kSim3, "the trajectories cannot be compared, so the camera poses may be estimated"};
   }
   if (HaveSameWorld(*estimated, *truth, kMaxDt_s)) {
-    return {Alignment::kNone, "trajectory.txt agrees with groundtruth.txt, so the camera poses were given"};
+    return {Alignment::kNone, "trajectory.txt agrees with groundtruth.txt without alignment"};
   }
-  return {Alignment::kSim3, "trajectory.txt differs from groundtruth.txt, so the camera poses were estimated"};
+  return {Alignment::kSim3, "trajectory.txt agrees with groundtruth.txt only after alignment, if at all"};
 }
 
 }  // namespace romap::eval

@@ -114,7 +114,7 @@ void DescriptorTree::FindLeaves(const Descriptor& descriptor, int max_leaves, Se
       for (uint32_t child = node.first_child; child < node.first_child + node.children; ++child) {
         Search::Branch branch{HammingDistance(centers_[child], descriptor), child};
         if (branch.distance < nearest.distance) std::swap(branch, nearest);
-        if (branch.distance > 256) continue;  // the placeholder, replaced by the first child
+        if (branch.distance > 256) continue;  // the initial distance, greater than any other
         search.open.push_back(branch);
         std::ranges::push_heap(search.open, farther);
       }
