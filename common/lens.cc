@@ -68,6 +68,11 @@ Eigen::Vector2d DistortPixel(const CameraModel& camera, const Eigen::Vector2d& p
   return camera.Project({distorted.x(), distorted.y(), 1});
 }
 
+Eigen::Vector2d ProjectDistorted(const CameraModel& camera, const Eigen::Vector3d& p_camera) {
+  const Eigen::Vector2d pinhole_px = camera.Project(p_camera);
+  return camera.HasDistortion() ? DistortPixel(camera, pinhole_px) : pinhole_px;
+}
+
 UndistortionMaps MakeUndistortionMaps(const CameraModel& camera) {
   UndistortionMaps maps;
   const cv::Matx33d K = IntrinsicMatrix(camera);

@@ -17,6 +17,9 @@ std::vector<Eigen::Vector2f> UndistortPixels(const CameraModel& camera, std::spa
 // The inverse for one pixel: from the pinhole image to the image of `camera`.
 Eigen::Vector2d DistortPixel(const CameraModel& camera, const Eigen::Vector2d& pinhole_px);
 
+// The pixel of a point in the camera frame (z > 0) in the image of `camera`, with its distortion.
+Eigen::Vector2d ProjectDistorted(const CameraModel& camera, const Eigen::Vector3d& p_camera);
+
 // Maps for cv::remap that convert an image of `camera` to an image of camera.Pinhole() of the same size.
 struct UndistortionMaps {
   cv::Mat xy;        // CV_16SC2

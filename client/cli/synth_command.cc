@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 #include <memory>
+#include <type_traits>
 
 #include "client/cli/command.h"
 #include "client/cli/progress.h"
@@ -25,41 +26,44 @@ struct SynthCommandOptions {
   std::vector<std::string> blurred;
 };
 
+template <class Value>
+using Parser = absl::StatusOr<Value> (*)(const std::string& text);
+
+template <class Value>
+absl::Status ReadText(const char* option, const std::string& text, std::type_identity_t<Parser<Value>> parse,
+                      Value* value) {
+  const absl::StatusOr<Value> parsed = parse(text);
+  if (!parsed.ok()) return InvalidArgument("{}: {}", option, Message(parsed.status()));
+  *value = *parsed;
+  return absl::OkStatus();
+}
+
+// An empty text leaves `value` unchanged.
+template <class Value>
+absl::Status ReadOptional(const char* option, const std::string& text, std::type_identity_t<Parser<Value>> parse,
+                          Value* value) {
+  return text.empty() ? absl::OkStatus() : ReadText(option, text, parse, value);
+}
+
 absl::Status ReadRanges(const char* option, const std::vector<std::string>& texts,
                         std::vector<synth::FrameRange>* ranges) {
   for (const std::string& text : texts) {
-    const absl::StatusOr<synth::FrameRange> range = synth::ParseFrameRange(text);
-    if (!range.ok()) return InvalidArgument("{}: {}", option, Message(range.status()));
-    ranges->push_back(*range);
+    ROMAP_RETURN_IF_ERROR(ReadText(option, text, synth::ParseFrameRange, &ranges->emplace_back()));
   }
   return absl::OkStatus();
 }
 
 // Parses the options that the command line holds as text.
 absl::Status ReadTexts(SynthCommandOptions& options) {
-  if (!options.table_texture.empty()) {
-    const absl::StatusOr<synth::TableTexture> table = synth::ParseTableTexture(options.table_texture);
-    if (!table.ok()) return InvalidArgument("--table-texture: {}", Message(table.status()));
-    options.synth.surroundings.table = *table;
-  }
-  if (!options.jump.empty()) {
-    const absl::StatusOr<synth::CameraJump> jump = synth::ParseCameraJump(options.jump);
-    if (!jump.ok()) return InvalidArgument("--jump: {}", Message(jump.status()));
-    options.synth.jump = *jump;
-  }
-  if (!options.crop.empty()) {
-    const absl::StatusOr<synth::ImageCrop> crop = synth::ParseImageCrop(options.crop);
-    if (!crop.ok()) return InvalidArgument("--crop: {}", Message(crop.status()));
-    options.synth.crop = *crop;
-  }
-  if (!options.gain_steps.empty()) {
-    const absl::StatusOr<synth::GainRange> gain = synth::ParseGainRange(options.gain_steps);
-    if (!gain.ok()) return InvalidArgument("--gain-steps: {}", Message(gain.status()));
-    options.synth.gain_steps = *gain;
-  }
-  ROMAP_RETURN_IF_ERROR(ReadRanges("--cut", options.cuts, &options.synth.cuts));
-  ROMAP_RETURN_IF_ERROR(ReadRanges("--black", options.black, &options.synth.black));
-  return ReadRanges("--blur", options.blurred, &options.synth.blurred);
+  synth::SynthOptions& synth = options.synth;
+  ROMAP_RETURN_IF_ERROR(
+      ReadOptional("--table-texture", options.table_texture, synth::ParseTableTexture, &synth.surroundings.table));
+  ROMAP_RETURN_IF_ERROR(ReadOptional("--jump", options.jump, synth::ParseCameraJump, &synth.jump));
+  ROMAP_RETURN_IF_ERROR(ReadOptional("--crop", options.crop, synth::ParseImageCrop, &synth.crop));
+  ROMAP_RETURN_IF_ERROR(ReadOptional("--gain-steps", options.gain_steps, synth::ParseGainRange, &synth.gain_steps));
+  ROMAP_RETURN_IF_ERROR(ReadRanges("--cut", options.cuts, &synth.cuts));
+  ROMAP_RETURN_IF_ERROR(ReadRanges("--black", options.black, &synth.black));
+  return ReadRanges("--blur", options.blurred, &synth.blurred);
 }
 
 absl::Status RunSynth(SynthCommandOptions options) {

@@ -19,8 +19,7 @@ std::optional<Rgb> ColorAt(const SharpImage& sharp, const Scene& scene, const Ca
   constexpr double kDepthTolerance = 0.02;  // relative
   const Eigen::Vector3d p_camera = sharp.poses.CameraPoint(p_world);
   if (p_camera.z() <= 0) return std::nullopt;
-  Eigen::Vector2d pixel_px = camera.Project(p_camera);
-  if (camera.HasDistortion()) pixel_px = DistortPixel(camera, pixel_px);
+  const Eigen::Vector2d pixel_px = ProjectDistorted(camera, p_camera);
   if (!(pixel_px.x() >= 0 && pixel_px.y() >= 0 && pixel_px.x() < camera.width_px - 1 &&
         pixel_px.y() < camera.height_px - 1)) {
     return std::nullopt;

@@ -86,8 +86,7 @@ void SurfacePoints::MarkSeen(const TrueFrame& frame, const CameraModel& camera, 
     const Eigen::Vector3d p_world = positions_world_[i].cast<double>();
     const Eigen::Vector3d p = poses.CameraPoint(p_world);
     if (p.z() <= 0) continue;
-    Eigen::Vector2d pixel = camera.Project(p);
-    if (camera.HasDistortion()) pixel = DistortPixel(camera, pixel);
+    const Eigen::Vector2d pixel = ProjectDistorted(camera, p);
     if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < camera.width_px - 0.5 &&
           pixel.y() < camera.height_px - 0.5)) {
       continue;

@@ -48,8 +48,7 @@ Eigen::Vector3d ImagePoses::CameraPoint(const Eigen::Vector3d& p_world) const {
   double row = 0.5 * last_row;
   Eigen::Vector3d p_camera = CameraPointInRow(row, p_world);
   for (int iteration = 0; iteration < kMaxIterations && p_camera.z() > kNear_m; ++iteration) {
-    Eigen::Vector2d pixel_px = camera_.Project(p_camera);
-    if (camera_.HasDistortion()) pixel_px = DistortPixel(camera_, pixel_px);
+    const Eigen::Vector2d pixel_px = ProjectDistorted(camera_, p_camera);
     if (!std::isfinite(pixel_px.y())) break;
     const double next_row = std::clamp(pixel_px.y(), 0.0, last_row);
     if (std::abs(next_row - row) < kTolerance_px) break;

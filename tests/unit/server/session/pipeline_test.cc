@@ -5,25 +5,22 @@
 #include <optional>
 #include <vector>
 
-#include "tests/support/streams.h"
+#include "tests/unit/server/session/pipeline_fixture.h"
 
 namespace romap::session {
 namespace {
 
 constexpr std::chrono::milliseconds kNoWait{0};
 
-// A pipeline with a training pool and a mesher without threads: everything runs on the thread of the test.
-class PipelineTest : public ::testing::Test {
+// Everything runs on the thread of the test.
+class PipelineTest : public PipelineFixture {
  protected:
+  PipelineTest() : PipelineFixture(SingleThread()) {}
+
   static ServerConfig SingleThread() {
     ServerConfig config;
     config.session.single_thread = true;
     return config;
-  }
-  static SessionOptions Options() {
-    SessionOptions options;
-    options.camera = testing::SmallCamera();
-    return options;
   }
 
   void Process(SessionInput input) {
@@ -36,19 +33,7 @@ class PipelineTest : public ::testing::Test {
     }
     return std::nullopt;
   }
-  Statistics Counters() const {
-    Statistics statistics;
-    ledger_.FillIn(&statistics);
-    return statistics;
-  }
 
-  const ServerConfig config_ = SingleThread();
-  nerf::TrainingPool pool_{config_.nerf, /*workers=*/0};
-  Mesher mesher_{config_.mesh, Mesher::Threading::kCaller};
-  MapState map_;
-  std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);
-  FrameLedger ledger_{"session", &map_};
-  Pipeline pipeline_{"session", Options(), config_, &pool_, &mesher_, &map_, &ledger_, /*recorder=*/nullptr};
   std::vector<MappingStep> steps_;
 };
 

@@ -10,22 +10,14 @@
 #include <utility>
 #include <vector>
 
-#include "tests/support/streams.h"
+#include "tests/unit/server/session/pipeline_fixture.h"
 
 namespace romap::session {
 namespace {
 
-constexpr std::chrono::milliseconds kNoWait{0};
-
 // Runs a pipeline without objects, so that there is nothing to train.
-class SchedulerTest : public ::testing::Test {
+class SchedulerTest : public PipelineFixture {
  protected:
-  static SessionOptions Options() {
-    SessionOptions options;
-    options.camera = testing::SmallCamera();
-    return options;
-  }
-
   void Start(
       FrameMode mode, bool single_thread, std::function<void()> tick = [] {}) {
     SessionConfig config;
@@ -37,19 +29,6 @@ class SchedulerTest : public ::testing::Test {
         .failed = [this](const char* stage,
                          const std::string& what) { failure_.set_value(std::string(stage) + ": " + what); }};
     scheduler_ = std::make_unique<Scheduler>(config, mode, &pipeline_, &ledger_, std::move(callbacks));
-  }
-
-  std::vector<FrameAck> ReadAcks() {
-    std::vector<FrameAck> acks;
-    while (const auto event = outbox_->Next(kNoWait)) {
-      if (const auto* ack = std::get_if<FrameAck>(&*event)) acks.push_back(*ack);
-    }
-    return acks;
-  }
-  Statistics Counters() const {
-    Statistics statistics;
-    ledger_.FillIn(&statistics);
-    return statistics;
   }
 
   void ExpectAllFramesProcessed(bool single_thread) {
@@ -67,13 +46,6 @@ class SchedulerTest : public ::testing::Test {
     EXPECT_FALSE(scheduler_->Offer(testing::MakeFrame(6))) << "the inputs are closed";
   }
 
-  const ServerConfig config_;
-  nerf::TrainingPool pool_{config_.nerf, /*workers=*/0};
-  Mesher mesher_{config_.mesh, Mesher::Threading::kCaller};
-  MapState map_;
-  std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);
-  FrameLedger ledger_{"session", &map_};
-  Pipeline pipeline_{"session", Options(), config_, &pool_, &mesher_, &map_, &ledger_, /*recorder=*/nullptr};
   std::atomic<bool> finished_ = false;
   std::promise<std::string> failure_;
   std::unique_ptr<Scheduler> scheduler_;  // last: its threads use all of the above

@@ -2,23 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <random>
 #include <vector>
 
+#include "tests/unit/server/slam/random_descriptor.h"
+
 namespace romap::slam {
 namespace {
-
-Descriptor RandomDescriptor(std::mt19937_64& random) {
-  Descriptor descriptor;
-  for (uint64_t& word : descriptor) word = random();
-  return descriptor;
-}
-
-Descriptor Flip(Descriptor descriptor, int bits) {
-  for (int i = 0; i < bits; ++i) descriptor[static_cast<size_t>(i) % 4] ^= uint64_t{1} << (i / 4);
-  return descriptor;
-}
 
 TEST(MatchDescriptors, FindsMutualBestMatchesWithinTheLimits) {
   std::mt19937_64 random(3);

@@ -4,21 +4,11 @@
 
 #include <random>
 
+#include "tests/unit/server/slam/random_descriptor.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap::slam {
 namespace {
-
-Descriptor RandomDescriptor(std::mt19937_64& random) {
-  Descriptor descriptor;
-  for (uint64_t& word : descriptor) word = random();
-  return descriptor;
-}
-
-Descriptor Flip(Descriptor descriptor, int bits) {
-  for (int i = 0; i < bits; ++i) descriptor[static_cast<size_t>(i) % 4] ^= uint64_t{1} << (i / 4);
-  return descriptor;
-}
 
 class ProjectionSearchTest : public ::testing::Test {
  protected:
