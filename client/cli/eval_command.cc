@@ -81,7 +81,8 @@ void AddObjectsSubcommand(CLI::App& app, Command* chosen) {
   command->add_option("--pred", eval.predicted_dir, "Folder of predicted meshes")->required();
   command->add_option("--gt", eval.ground_truth_dir, "Folder of ground-truth surfaces")->required();
   command->add_option("--align", eval.alignment, "Alignment of each object by ICP: none, se3 or sim3 (default)")
-      ->transform(CLI::CheckedTransformer(kAlignments));
+      ->transform(CLI::CheckedTransformer(kAlignments))
+      ->option_text("none|se3|sim3");
   command->add_option("--threshold-cm", eval.thresholds_cm, "Thresholds of the completion ratio [cm]");
   command->add_option("--est-traj", eval.estimated_trajectory,
                       "Estimated trajectory in the coordinate frame of the meshes");
@@ -122,7 +123,8 @@ void AddTrajectorySubcommand(CLI::App& app, Command* chosen) {
   command->add_option("--est", options->eval.estimated, "Estimated trajectory, TUM format")->required();
   command->add_option("--gt", options->eval.ground_truth, "Ground-truth trajectory, TUM format")->required();
   command->add_option("--align", options->eval.alignment, "Alignment of the trajectories: none, se3 or sim3 (default)")
-      ->transform(CLI::CheckedTransformer(kAlignments));
+      ->transform(CLI::CheckedTransformer(kAlignments))
+      ->option_text("none|se3|sim3");
   command->add_option("--sequence", options->frames_of,
                       "Folder of the sequence, to count its frames without a pose. Default: the number of frames is "
                       "inferred from the poses");
