@@ -29,7 +29,7 @@ std::string CoverageLine(const FrameCoverage& coverage) {
 
 std::string FormatTable(const TrajectoryReport& report) {
   const MotionFigures& motion = report.motion;
-  const std::string window = motion.window_s > 0 ? fmt::format("over {:g} s", motion.window_s) : "between frames";
+  const std::string window = motion.WindowText();
   std::string text = fmt::format(
       "trajectory, alignment {}: {} of {} poses matched ({} true poses), path length {:.3f} m, scale {:.6f}\n"
       "ATE rmse {:.6f} m  mean {:.6f}  median {:.6f}  max {:.6f}; rmse is {:.1f} % of the extent {:.3f} m (rms)\n"

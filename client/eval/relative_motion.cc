@@ -118,6 +118,10 @@ Jumps LargestJumps(std::span<const RelativeMotion> frame_motions, double scale) 
   return jumps;
 }
 
+std::string MotionFigures::WindowText() const {
+  return window_s > 0 ? fmt::format("over {:g} s", window_s) : "between frames";
+}
+
 MotionFigures MeasureMotion(std::span<const PosePair> pairs, double extent_m, double fit_scale) {
   const std::vector<RelativeMotion> frames = FrameMotions(pairs);
   std::vector<RelativeMotion> windows = WindowMotions(pairs, kWindow_s);

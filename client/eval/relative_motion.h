@@ -62,8 +62,8 @@ Jumps LargestJumps(std::span<const RelativeMotion> frame_motions, double scale);
 // Motion over about a second, or between frames if the trajectory is too short or its frames too rare.
 struct MotionFigures {
   double window_s = 0;  // length of the windows; 0 = between consecutive frames
-  std::optional<double> frame_correlation =
-      std::nullopt;  // DirectionCorrelation; nullopt if the true camera hardly moves
+  // DirectionCorrelation; nullopt if the true camera hardly moves.
+  std::optional<double> frame_correlation = std::nullopt;
   std::optional<double> window_correlation = std::nullopt;
   double rotation_median_deg = 0;  // error of the relative rotation over a window
   double rotation_95_deg = 0;
@@ -73,6 +73,8 @@ struct MotionFigures {
   std::string scale_note = {};
   std::vector<double> local_scales = {};  // along the path; empty if the scale is not observable
   Jumps jumps = {};
+
+  std::string WindowText() const;  // "over 1 s" or "between frames"
 };
 
 constexpr double kWindow_s = 1;  // long enough that the translation exceeds the noise of a handheld camera's pose

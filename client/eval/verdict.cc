@@ -54,10 +54,6 @@ class Reasons {
   Verdict verdict_;
 };
 
-std::string WindowText(const MotionFigures& motion) {
-  return motion.window_s > 0 ? fmt::format("over {:g} s", motion.window_s) : "between frames";
-}
-
 void JudgeScale(const MotionFigures& motion, Reasons* reasons) {
   const std::vector<double>& scales = motion.local_scales;
   const auto reversed = std::count_if(scales.begin(), scales.end(), [](double scale) { return scale < 0; });
@@ -75,7 +71,7 @@ void JudgeScale(const MotionFigures& motion, Reasons* reasons) {
 void JudgeTranslation(const TrajectoryReport& report, Reasons* reasons) {
   const double correlation = report.motion.window_correlation.value_or(0);
   reasons->Add(LevelOf(1 - correlation, kCorrelationDeficit),
-               fmt::format("translation correlation {} is {:.2f} (at least {} required)", WindowText(report.motion),
+               fmt::format("translation correlation {} is {:.2f} (at least {} required)", report.motion.WindowText(),
                            correlation, 1 - kCorrelationDeficit.good));
   reasons->Add(LevelOf(report.AteShare(), kAteShare),
                fmt::format("ATE is {:.1f} % of the extent of the true positions (limit {} %)", 100 * report.AteShare(),
@@ -106,7 +102,7 @@ Verdict Judge(const TrajectoryReport& report) {
   if (judges_translation) JudgeTranslation(report, &reasons);
   const MotionFigures& motion = report.motion;
   reasons.Add(LevelOf(motion.rotation_95_deg, kRotation95_deg),
-              fmt::format("rotation error {} is {:.1f} deg (95 % quantile; limit {} deg)", WindowText(motion),
+              fmt::format("rotation error {} is {:.1f} deg (95 % quantile; limit {} deg)", motion.WindowText(),
                           motion.rotation_95_deg, kRotation95_deg.good));
   reasons.Add(
       LevelOf(motion.jumps.rotation_deg, kJumpRotation_deg),
