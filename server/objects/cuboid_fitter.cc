@@ -8,6 +8,8 @@
 #include "common/statistics.h"
 #include "server/objects/box_search.h"
 #include "server/objects/footprint.h"
+#include "server/objects/mask_base.h"
+#include "server/objects/support_height.h"
 
 namespace romap::objects {
 namespace {
@@ -216,15 +218,21 @@ Cuboid InWorld(const UprightBox& box, const HullRegion& region) {
   return cuboid;
 }
 
+void ExtendDown(double length_mu, Cuboid* cuboid) {
+  cuboid->half_extents.z() += length_mu / 2;
+  const SE3<World, Object>& T = cuboid->T_world_object;
+  cuboid->T_world_object = {T.rotation(), T * Eigen::Vector3d(0, 0, -length_mu / 2)};
+}
+
 bool HasEnoughPoints(const CuboidEvidence& evidence) {
   return evidence.points.size() >= static_cast<size_t>(evidence.min_points);
 }
 
 // The initial box: the footprint of the hull between heights from the support, the points and the outlines.
 std::optional<UprightBox> FindOuterBox(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
-                                       std::optional<double> support, const std::optional<Cuboid>& previous) {
+                                       const std::optional<Eigen::Vector3d>& unbounded, std::optional<double> support,
+                                       const std::optional<Cuboid>& previous) {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  const std::optional<Eigen::Vector3d> unbounded = UnboundedDirection(evidence, silhouettes);
   const Interval hull = Bounds(evidence.hull_cells, up);
   const Interval broad = BroadHeights(evidence.hull_cells, evidence.cell_size.z());
   const bool enough_points = HasEnoughPoints(evidence);
@@ -254,55 +262,15 @@ std::optional<UprightBox> FindOuterBox(const CuboidEvidence& evidence, const std
 
 }  // namespace
 
-std::optional<double> FindSupportHeight(const CuboidEvidence& evidence) {
-  if (evidence.hull_cells.empty()) return std::nullopt;
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  const Interval hull = Bounds(evidence.hull_cells, up);
-  // A surface above the lowest fifth of the object's own points cannot support the object.
-  constexpr double kLowPoints = 0.2;       // quantile
-  constexpr double kMaxAboveCenter = 0.1;  // without points; this and the following in terms of the object's size
-  constexpr double kMaxBelowHull = 0.3;
-  constexpr double kLayer = 0.05;       // thickness of the layer of points of a surface
-  constexpr double kMaxDistance = 1.3;  // horizontal, of such a point from the center
-  const double ceiling = HasEnoughPoints(evidence) ? NearestQuantile(Along(evidence.points, up), kLowPoints)
-                                                   : evidence.center.z() + kMaxAboveCenter * evidence.object_size_mu;
-  const double floor = std::min(hull.low, ceiling) - kMaxBelowHull * evidence.object_size_mu;
-  const double layer_mu = kLayer * evidence.object_size_mu;
-  // An object below this one occludes the surface around it, and the points of that object are not background.
-  std::optional<double> supporting_top;
-  for (double top : evidence.supporting_tops) {
-    if (top >= floor && top <= ceiling + layer_mu) supporting_top = std::max(top, supporting_top.value_or(top));
-  }
-  if (supporting_top) return supporting_top;
-  std::vector<double> heights;
-  for (const Eigen::Vector3d& p : evidence.background) {
-    if ((p - evidence.center).head<2>().norm() > kMaxDistance * evidence.object_size_mu) continue;
-    if (p.z() >= floor && p.z() <= ceiling + layer_mu) heights.push_back(p.z());
-  }
-  std::sort(heights.begin(), heights.end());
-  size_t best_count = 0;
-  double best_height = 0;
-  for (size_t first = 0, last = 0; first < heights.size(); ++first) {
-    while (last < heights.size() && heights[last] <= heights[first] + layer_mu) ++last;
-    if (last - first <= best_count) continue;
-    best_count = last - first;
-    best_height = heights[first + best_count / 2];
-  }
-  constexpr size_t kMinSupportPoints = 6;
-  if (best_count >= kMinSupportPoints) return best_height;
-  std::vector<double> bottoms;
-  for (double bottom : evidence.neighbor_bottoms) {
-    if (bottom >= floor && bottom <= ceiling + layer_mu) bottoms.push_back(bottom);
-  }
-  if (bottoms.empty()) return std::nullopt;
-  return NearestQuantile(bottoms, 0.5);
-}
-
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous) {
   if (evidence.hull_cells.empty()) return std::nullopt;
-  const std::optional<double> support = FindSupportHeight(evidence);
-  const auto outer = FindOuterBox(evidence, silhouettes, support, previous);
+  const std::optional<Eigen::Vector3d> unbounded = UnboundedDirection(evidence, silhouettes);
+  const auto mask_base = FindMaskBase(evidence.region, evidence.center, evidence.object_size_mu, silhouettes);
+  const std::optional<double> seen_support = FindSupportHeight(evidence, mask_base);
+  // Without a support, the masks of cameras all around the object still show its lower end.
+  const std::optional<double> support = seen_support || unbounded ? seen_support : mask_base;
+  const auto outer = FindOuterBox(evidence, silhouettes, unbounded, support, previous);
   if (!outer) return std::nullopt;
   const BoxSearch search({.region = evidence.region,
                           .center = evidence.center,
@@ -317,6 +285,9 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
   CuboidFit fit{.cuboid = InWorld(box, evidence.region), .training_box = InWorld(United(box, *outer), evidence.region)};
   constexpr double kTrainingMargin = 0.02;  // of the object's size: about the error of mask borders and of cells
   fit.training_box.half_extents.array() += kTrainingMargin * evidence.object_size_mu;
+  // A bulging object may extend below its mask base.
+  constexpr double kUnseenBottom = 0.08;  // of the object's size
+  if (!seen_support) ExtendDown(kUnseenBottom * evidence.object_size_mu, &fit.training_box);
   fit.cuboid.confidence = search.Agreement(box);
   const bool usable = fit.training_box.half_extents.allFinite() && fit.training_box.T_world_object.IsFinite();
   return usable ? std::optional(fit) : std::nullopt;

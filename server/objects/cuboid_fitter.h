@@ -41,9 +41,4 @@ struct CuboidFit {
 std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::vector<Silhouette>& silhouettes,
                                    const std::optional<Cuboid>& previous);
 
-// Height of the horizontal surface that the object stands on: the top of another object below it, otherwise the densest
-// thin layer of background points around its footprint, otherwise the median bottom of its neighbors. nullopt without
-// any of these.
-std::optional<double> FindSupportHeight(const CuboidEvidence& evidence);
-
 }  // namespace romap::objects

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "common/map_motion.h"
@@ -28,6 +29,14 @@ void AddEvidence(const LandmarkEvidence& from, LandmarkKey into_key, LandmarkEvi
   into->observations += from.observations;
   into->expected += from.observations;
   into->keyframe_observations += from.keyframe_observations;
+}
+
+// Whether a corner of the object's outline may be detected at this pixel. Corners of the coarsest octave are displaced
+// by up to the radius of their neighborhood.
+bool IsNearMask(const cv::Mat& labels, int u, int v) {
+  constexpr int kReach_px = 12;
+  const cv::Rect around(u - kReach_px, v - kReach_px, 2 * kReach_px + 1, 2 * kReach_px + 1);
+  return cv::countNonZero(labels(around & cv::Rect({}, labels.size()))) > 0;
 }
 
 // The point at which MeanMotion() averages.
@@ -78,6 +87,10 @@ void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetecti
       const int u = std::clamp(static_cast<int>(std::lround(observation.pixel_px.x())), 0, camera.width_px - 1);
       const int v = std::clamp(static_cast<int>(std::lround(observation.pixel_px.y())), 0, camera.height_px - 1);
       if (labels.at<uint16_t>(v, u) != 0) continue;
+      if (IsNearMask(labels, u, v)) {
+        points_.Vote(observation.point, kOutlineKey);
+        continue;
+      }
     }
     const auto key = key_of_label.find(observation.label);
     if (key != key_of_label.end()) points_.Vote(observation.point, key->second);

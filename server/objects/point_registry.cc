@@ -46,16 +46,32 @@ void PointRegistry::MovePoints(const std::vector<MapPoint>& points) {
   }
 }
 
+// The owner has a clear majority of the votes; those for the background and for the outline count together. A point of
+// the background is near masks in some views and clear of them in others, whereas a point on the outline of an object
+// is near its mask in nearly all views.
 void PointRegistry::UpdateOwner(Entry* entry) {
   constexpr double kClearMajority = 0.6;  // share of the votes
+  int background = 0;
+  int outline = 0;
   int total = 0;
   std::pair<LandmarkKey, int> best{kBackgroundKey, 0};
   for (const auto& vote : entry->votes) {
     total += vote.second;
-    if (vote.second > best.second) best = vote;
+    if (vote.first == kBackgroundKey) {
+      background = vote.second;
+    } else if (vote.first == kOutlineKey) {
+      outline = vote.second;
+    } else if (vote.second > best.second) {
+      best = vote;
+    }
   }
   entry->owner.reset();
-  if (total > 0 && best.second >= kClearMajority * total) entry->owner = best.first;
+  if (total == 0) return;
+  if (best.second >= kClearMajority * total) {
+    entry->owner = best.first;
+  } else if (background + outline >= kClearMajority * total) {
+    entry->owner = background >= outline ? kBackgroundKey : kOutlineKey;
+  }
 }
 
 void PointRegistry::Vote(MapPointId point, LandmarkKey key) {

@@ -92,40 +92,25 @@ TEST(CuboidFitterTest, KeepsTheEquivalentYawNearestToThePrevious) {
   EXPECT_NEAR(cuboid->half_extents.y(), kHalf.x(), observed.pixel_mu);
 }
 
+// Corners of the outline halfway up pass for a surface: the cuboid must not end there.
+TEST(CuboidFitterTest, ReachesTheLowerEndOfTheMasksWithoutASupport) {
+  for (const double false_surface_mu : {0.03, 0.05, 0.08}) {
+    SCOPED_TRACE(false_surface_mu);
+    ObservedObject observed = ObserveBox();
+    observed.evidence.edge_yaw_rad = kYaw_rad;
+    for (Eigen::Vector3d& p : observed.evidence.background) p.z() += false_surface_mu;
+    std::erase_if(observed.evidence.points,
+                  [&](const Eigen::Vector3d& p) { return observed.evidence.region.ToWorld(p).z() < false_surface_mu; });
+    const auto cuboid = Fitted(observed.evidence, observed.silhouettes, {});
+    ASSERT_TRUE(cuboid.has_value());
+    EXPECT_LT(LargestFaceError(*cuboid, observed.truth), 2 * observed.pixel_mu);
+  }
+}
+
 TEST(CuboidFitterTest, ReturnsNothingWithoutAHull) {
   ObservedObject observed = ObserveBox();
   observed.evidence.hull_cells.clear();
   EXPECT_FALSE(Fitted(observed.evidence, observed.silhouettes, {}).has_value());
-  EXPECT_FALSE(FindSupportHeight(observed.evidence).has_value());
-}
-
-TEST(FindSupportHeightTest, IsTheTableAroundTheObject) {
-  const ObservedObject observed = ObserveBox();
-  const auto height = FindSupportHeight(observed.evidence);
-  ASSERT_TRUE(height.has_value());
-  EXPECT_NEAR(observed.evidence.region.ToWorld({0, 0, *height}).z(), 0, 1e-9);
-}
-
-// A cup on a book: background points show the table around it, but only the book's cuboid shows the book.
-TEST(FindSupportHeightTest, IsTheTopOfTheObjectBelow) {
-  constexpr double kBook_mu = 0.02;
-  ObservedObject observed = ObserveBox();
-  for (Eigen::Vector3d& p : observed.evidence.background) p.z() -= kBook_mu;
-  const double own_bottom = observed.evidence.region.ToGrid(Eigen::Vector3d::Zero()).z();
-  observed.evidence.supporting_tops = {own_bottom + 0.002};
-  EXPECT_NEAR(FindSupportHeight(observed.evidence).value_or(9), own_bottom + 0.002, 1e-9);
-  // An object whose top is higher is behind it, or a duplicate of it.
-  observed.evidence.supporting_tops = {own_bottom + 0.07};
-  EXPECT_NEAR(FindSupportHeight(observed.evidence).value_or(9), own_bottom - kBook_mu, 1e-9);
-}
-
-TEST(FindSupportHeightTest, IsTheBottomOfTheNeighborsWithoutBackgroundPoints) {
-  ObservedObject observed = ObserveBox();
-  observed.evidence.background.clear();
-  EXPECT_FALSE(FindSupportHeight(observed.evidence).has_value());
-  const double own_bottom = observed.evidence.region.ToGrid(Eigen::Vector3d::Zero()).z();
-  observed.evidence.neighbor_bottoms = {own_bottom - 0.001, own_bottom + 0.5, own_bottom + 0.001, own_bottom};
-  EXPECT_NEAR(FindSupportHeight(observed.evidence).value_or(9), own_bottom, 1e-9);
 }
 
 }  // namespace

@@ -70,24 +70,49 @@ TEST_F(LandmarkStoreTest, ClearRemovesLandmarksAndPoints) {
 TEST_F(LandmarkStoreTest, PointsBelongToTheLandmarkOfTheirMaskOrToTheBackground) {
   const LandmarkKey key = AddLandmark().key;
   auto image = std::make_shared<Frame>();
-  image->camera = {.width_px = 20, .height_px = 10};
-  image->labels = cv::Mat::zeros(10, 20, CV_16UC1);
+  image->camera = {.width_px = 40, .height_px = 10};
+  image->labels = cv::Mat::zeros(10, 40, CV_16UC1);
   image->labels(cv::Rect(0, 0, 10, 10)) = kLabel;
   KeyframeView view;
   view.frame = image;
-  for (uint64_t id = 1; id <= 4; ++id) view.points.push_back({.id = MapPointId{id}, .position_world = {0, 0, 1}});
+  for (uint64_t id = 1; id <= 5; ++id) view.points.push_back({.id = MapPointId{id}, .position_world = {0, 0, 1}});
   view.observations = {{.point = MapPointId{1}, .pixel_px = {4, 4}, .label = kLabel},
-                       {.point = MapPointId{2}, .pixel_px = {15, 4}, .label = 0},
+                       {.point = MapPointId{2}, .pixel_px = {35, 4}, .label = 0},
                        {.point = MapPointId{3}, .pixel_px = {9, 4}, .label = 0},  // at the border of the mask
-                       {.point = MapPointId{4}, .pixel_px = {4, 4}, .label = 99}};
+                       {.point = MapPointId{4}, .pixel_px = {4, 4}, .label = 99},
+                       {.point = MapPointId{5}, .pixel_px = {15, 4}, .label = 0}};  // a corner of its outline
   store_.UpdatePoints(view);
   store_.CountPointVotes(view, FrameOf({key}));
   const auto groups = store_.points().GroupByOwner();
-  ASSERT_EQ(groups.size(), 2u) << "points 3 and 4 have no owner";
+  ASSERT_EQ(groups.size(), 3u) << "points 3 and 4 have no owner";
   ASSERT_EQ(groups.at(key).size(), 1u);
   EXPECT_EQ(groups.at(key)[0].id, MapPointId{1});
   ASSERT_EQ(groups.at(kBackgroundKey).size(), 1u);
   EXPECT_EQ(groups.at(kBackgroundKey)[0].id, MapPointId{2});
+  ASSERT_EQ(groups.at(kOutlineKey).size(), 1u);
+  EXPECT_EQ(groups.at(kOutlineKey)[0].id, MapPointId{5});
+}
+
+TEST(PointRegistryTest, APointThatIsOftenClearOfMasksBelongsToTheBackground) {
+  constexpr LandmarkKey kObject = 7;
+  PointRegistry registry;
+  KeyframeView view;
+  for (uint64_t id = 1; id <= 4; ++id) view.points.push_back({.id = MapPointId{id}, .position_world = {0, 0, 1}});
+  registry.UpdatePositions(view);
+  const auto vote = [&](uint64_t id, int inside, int outline, int background) {
+    for (int i = 0; i < inside; ++i) registry.Vote(MapPointId{id}, kObject);
+    for (int i = 0; i < outline; ++i) registry.Vote(MapPointId{id}, kOutlineKey);
+    for (int i = 0; i < background; ++i) registry.Vote(MapPointId{id}, kBackgroundKey);
+  };
+  vote(1, 0, 3, 4);
+  vote(2, 0, 4, 3);
+  vote(3, 4, 2, 0);
+  vote(4, 3, 3, 0);
+  const auto groups = registry.GroupByOwner();
+  ASSERT_EQ(groups.size(), 3u) << "point 4 has no owner";
+  EXPECT_EQ(groups.at(kBackgroundKey)[0].id, MapPointId{1});
+  EXPECT_EQ(groups.at(kOutlineKey)[0].id, MapPointId{2});
+  EXPECT_EQ(groups.at(kObject)[0].id, MapPointId{3});
 }
 
 TEST_F(LandmarkStoreTest, CountsLandmarksThatAreDetectedTogetherOrCovered) {
