@@ -269,7 +269,7 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
   const auto mask_base = FindMaskBase(evidence.region, evidence.center, evidence.object_size_mu, silhouettes);
   const std::optional<double> seen_support = FindSupportHeight(evidence, mask_base);
   // Without a support, the masks of cameras all around the object still show its lower end.
-  const std::optional<double> support = seen_support || unbounded ? seen_support : mask_base;
+  const std::optional<double> support = seen_support || unbounded || !mask_base ? seen_support : mask_base->bottom;
   const auto outer = FindOuterBox(evidence, silhouettes, unbounded, support, previous);
   if (!outer) return std::nullopt;
   const BoxSearch search({.region = evidence.region,

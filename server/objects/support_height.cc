@@ -33,7 +33,7 @@ double LowestCell(const CuboidEvidence& evidence) {
 }
 
 // A surface above the lowest fifth of the object's own points, or above the lower end of its masks, cannot support it.
-HeightRange PossibleHeights(const CuboidEvidence& evidence, std::optional<double> mask_base) {
+HeightRange PossibleHeights(const CuboidEvidence& evidence, const std::optional<MaskBase>& mask_base) {
   constexpr double kLowPoints = 0.2;  // quantile
   double ceiling = evidence.center.z() + kMaxAboveCenter * evidence.object_size_mu;
   if (evidence.points.size() >= static_cast<size_t>(evidence.min_points)) {
@@ -43,7 +43,7 @@ HeightRange PossibleHeights(const CuboidEvidence& evidence, std::optional<double
   }
   const double floor = std::min(LowestCell(evidence), ceiling) - kMaxBelowHull * evidence.object_size_mu;
   ceiling += kLayer * evidence.object_size_mu;
-  if (mask_base) ceiling = std::min(ceiling, *mask_base + kMaxMaskError * evidence.object_size_mu);
+  if (mask_base) ceiling = std::min(ceiling, mask_base->bound + kMaxMaskError * evidence.object_size_mu);
   return {floor, ceiling};
 }
 
@@ -62,7 +62,7 @@ std::optional<double> DensestLayer(std::vector<double> heights, double thickness
 
 }  // namespace
 
-std::optional<double> FindSupportHeight(const CuboidEvidence& evidence, std::optional<double> mask_base) {
+std::optional<double> FindSupportHeight(const CuboidEvidence& evidence, const std::optional<MaskBase>& mask_base) {
   if (evidence.hull_cells.empty()) return std::nullopt;
   const HeightRange possible = PossibleHeights(evidence, mask_base);
   // An object below this one occludes the surface around it, and the points of that object are not background.
@@ -81,7 +81,8 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence, std::opt
 
   std::vector<double> bottoms;
   for (double bottom : evidence.neighbor_bottoms) {
-    const bool is_near_base = !mask_base || std::abs(bottom - *mask_base) < kMaxMaskError * evidence.object_size_mu;
+    const bool is_near_base =
+        !mask_base || std::abs(bottom - mask_base->bottom) < kMaxMaskError * evidence.object_size_mu;
     if (possible.Contains(bottom) && is_near_base) bottoms.push_back(bottom);
   }
   if (bottoms.empty()) return std::nullopt;

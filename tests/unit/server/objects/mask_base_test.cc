@@ -39,12 +39,14 @@ class MaskBaseTest : public ::testing::Test {
   }
 
   // In the world, where the table is at 0.
-  std::optional<double> Base(double size_mu) const {
+  std::optional<MaskBase> Base(double size_mu) const {
     const HullRegion region{.R_world_grid = Eigen::Matrix3d::Identity(),
                             .center_world = {0.01, -0.02, 0.05},
                             .half_extents = Eigen::Vector3d::Constant(size_mu)};
-    const auto height = FindMaskBase(region, {0.01, 0.01, 0.02}, size_mu, silhouettes_);
-    return height ? std::optional(*height + region.center_world.z()) : std::nullopt;
+    auto base = FindMaskBase(region, {0.01, 0.01, 0.02}, size_mu, silhouettes_);
+    if (base) base->bound += region.center_world.z();
+    if (base) base->bottom += region.center_world.z();
+    return base;
   }
 
   int frames_ = 20;
@@ -58,21 +60,30 @@ SyntheticObject Box() { return {"box", SyntheticShape::kBox, {0, 0, 0.05}, {0.10
 
 TEST_F(MaskBaseTest, IsTheBottomOfABoxSeenFromAllSides) {
   Observe({Box()});
-  EXPECT_NEAR(Base(0.27).value_or(9), 0, 2 * pixel_mu_);
+  const auto base = Base(0.27);
+  ASSERT_TRUE(base.has_value());
+  EXPECT_NEAR(base->bound, 0, 2 * pixel_mu_);
+  EXPECT_NEAR(base->bottom, base->bound, 0.5 * pixel_mu_);
 }
 
 // The leaves are wider than the pot, so a box around the object ends above the bottom of the pot in every image.
 TEST_F(MaskBaseTest, IsTheBottomOfAPotUnderWideLeaves) {
   Observe({{"pot", SyntheticShape::kBox, {0, 0, 0.05}, {0.04, 0.04, 0.05}, 0},
            {"leaves", SyntheticShape::kEllipsoid, {0, 0, 0.18}, {0.12, 0.12, 0.07}, 0}});
-  EXPECT_NEAR(Base(0.35).value_or(9), 0, 2 * pixel_mu_);
+  const auto base = Base(0.35);
+  ASSERT_TRUE(base.has_value());
+  EXPECT_NEAR(base->bound, 0, 2 * pixel_mu_);
+  EXPECT_NEAR(base->bottom, base->bound, 0.5 * pixel_mu_);
 }
 
-TEST_F(MaskBaseTest, IsSlightlyAboveTheBottomOfABall) {
-  Observe({{"ball", SyntheticShape::kEllipsoid, {0, 0, 0.08}, {0.08, 0.08, 0.08}, 0}});
-  const double base = Base(0.28).value_or(9);
-  EXPECT_GT(base, -2 * pixel_mu_);
-  EXPECT_LT(base, 0.35 * 0.08);
+TEST_F(MaskBaseTest, ABallContinuesBelowTheBound) {
+  constexpr double kRadius_mu = 0.08;
+  Observe({{"ball", SyntheticShape::kEllipsoid, {0, 0, kRadius_mu}, {kRadius_mu, kRadius_mu, kRadius_mu}, 0}});
+  const auto base = Base(0.23);
+  ASSERT_TRUE(base.has_value());
+  EXPECT_GT(base->bound, 0.05 * kRadius_mu);
+  EXPECT_LT(base->bound, 0.35 * kRadius_mu);
+  EXPECT_NEAR(base->bottom, 0, 0.1 * kRadius_mu);
 }
 
 // A bound is also true for few directions, only less tight.
@@ -80,15 +91,19 @@ TEST_F(MaskBaseTest, IsNotBelowTheBottomSeenFromOneSide) {
   SyntheticWorldOptions options;
   options.sweep_deg = 40;
   Observe({Box()}, options);
-  const double base = Base(0.27).value_or(-9);
-  EXPECT_GT(base, -2 * pixel_mu_);
-  EXPECT_LT(base, 0.1);
+  const auto base = Base(0.27);
+  ASSERT_TRUE(base.has_value());
+  EXPECT_GT(base->bound, -2 * pixel_mu_);
+  EXPECT_LT(base->bound, 0.1);
 }
 
 TEST_F(MaskBaseTest, ToleratesSomeWrongMasks) {
   wrong_masks_ = 4;
   Observe({Box()});
-  EXPECT_NEAR(Base(0.27).value_or(9), 0, 3 * pixel_mu_);
+  const auto base = Base(0.27);
+  ASSERT_TRUE(base.has_value());
+  EXPECT_NEAR(base->bound, 0, 3 * pixel_mu_);
+  EXPECT_NEAR(base->bottom, base->bound, 0.5 * pixel_mu_);
 }
 
 TEST_F(MaskBaseTest, IsUnknownIfAnotherObjectHidesTheLowerEnd) {
