@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "common/cuboid.h"
 #include "common/geometry.h"
@@ -74,7 +75,13 @@ struct ObjectMerged {
   uint64_t revision = 0;  // new revision of `into`
 };
 
-// Counters of one session since it was created.
+// A condition that makes the map of a session less accurate while it lasts.
+struct SessionWarning {
+  std::string name;  // stable identifier for programs, e.g. "up_unknown"
+  std::string text;  // human-readable
+};
+
+// Counters of one session since it was created, and its present warnings.
 struct Statistics {
   uint64_t frames_received = 0;
   uint64_t frames_processed = 0;
@@ -87,6 +94,7 @@ struct Statistics {
   uint64_t training_steps = 0;
   double training_progress = 0;  // 0..1 over all objects
   uint64_t resident_bytes = 0;   // of the server process
+  std::vector<SessionWarning> warnings = {};
 };
 
 using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck>;

@@ -46,6 +46,7 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   if (collector.statistics()) {
     summary.frames_dropped = collector.statistics()->frames_dropped;
     summary.map_points = collector.statistics()->map_points;
+    summary.warnings = collector.statistics()->warnings;
   }
   summary.faults = collector.faults();
 
@@ -87,6 +88,10 @@ nlohmann::json ToJson(const RunSummary& summary) {
                        {"first_cuboid_s", object.first_cuboid_s},
                        {"first_mesh_s", object.first_mesh_s}});
   }
+  nlohmann::json warnings = nlohmann::json::array();
+  for (const SessionWarning& warning : summary.warnings) {
+    warnings.push_back({{"name", warning.name}, {"text", warning.text}});
+  }
   return {{"sequence", summary.sequence},
           {"frames",
            {{"sent", summary.frames_sent},
@@ -113,6 +118,7 @@ nlohmann::json ToJson(const RunSummary& summary) {
           {"server_peak_bytes", summary.server_peak_bytes},
           {"client_peak_bytes", summary.client_peak_bytes},
           {"objects", objects},
+          {"warnings", warnings},
           {"faults", summary.faults}};
 }
 
@@ -149,6 +155,9 @@ std::string FormatSummary(const RunSummary& summary) {
                         SecondsText(object.first_mesh_s));
   }
   if (summary.objects.empty()) text += "(no objects mapped)\n";
+  for (const SessionWarning& warning : summary.warnings) {
+    text += fmt::format("warning: {}: {}\n", warning.name, warning.text);
+  }
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;
 }

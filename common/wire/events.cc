@@ -230,11 +230,20 @@ v1::Statistics ToProto(const Statistics& statistics) {
   proto.set_training_steps(statistics.training_steps);
   proto.set_training_progress(statistics.training_progress);
   proto.set_resident_bytes(statistics.resident_bytes);
+  for (const SessionWarning& warning : statistics.warnings) {
+    v1::SessionWarning& added = *proto.add_warnings();
+    added.set_name(warning.name);
+    added.set_text(warning.text);
+  }
   return proto;
 }
 
 absl::StatusOr<Statistics> FromProto(const v1::Statistics& proto, const std::string& where) {
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.training_progress(), where + ".training_progress"));
+  std::vector<SessionWarning> warnings;
+  for (const v1::SessionWarning& warning : proto.warnings()) {
+    warnings.push_back({.name = warning.name(), .text = warning.text()});
+  }
   return Statistics{.frames_received = proto.frames_received(),
                     .frames_processed = proto.frames_processed(),
                     .frames_dropped = proto.frames_dropped(),
@@ -245,7 +254,8 @@ absl::StatusOr<Statistics> FromProto(const v1::Statistics& proto, const std::str
                     .objects_training = proto.objects_training(),
                     .training_steps = proto.training_steps(),
                     .training_progress = proto.training_progress(),
-                    .resident_bytes = proto.resident_bytes()};
+                    .resident_bytes = proto.resident_bytes(),
+                    .warnings = std::move(warnings)};
 }
 
 }  // namespace romap::wire

@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "common/map_events.h"
 #include "common/stage_messages.h"
@@ -44,7 +45,10 @@ class FrameLedger {
   // settles the last of them.
   void WhenSettled(std::function<void()> done);
 
-  // Sets the counters of frames, keyframes and map points.
+  // Replaces the warnings of the session.
+  void SetWarnings(std::vector<SessionWarning> warnings);
+
+  // Sets the counters of frames, keyframes and map points, and the warnings.
   void FillIn(Statistics* statistics) const;
 
  private:
@@ -58,7 +62,8 @@ class FrameLedger {
   std::atomic<uint64_t> frames_received_ = 0, frames_processed_ = 0, frames_dropped_ = 0, frames_rejected_ = 0;
   std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  std::vector<SessionWarning> warnings_;
   uint64_t inputs_settled_ = 0;
   bool all_settled_ = false;
   std::multimap<uint64_t, std::function<void()>> waiters_;  // by the number of inputs that must be settled

@@ -42,6 +42,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execu
     // Objects. Publish() sends them to the clients, and their new views to the fields.
     Publish(object_mapper_.ObserveFrame(mapped.tracked));
     if (mapped.view) Publish(object_mapper_.ObserveKeyframe(*mapped.view));
+    ledger_->SetWarnings(sparse_mapper_.Warnings());
     ledger_->CountMappedFrame(mapped.view.has_value(), sparse_mapper_.points());
   };
   execute(std::move(step));
@@ -98,6 +99,7 @@ void Pipeline::PublishMesh(MeshUpdate mesh, const MeshPose& pose) { map_->Publis
 
 void Pipeline::FinishMapping() {
   Correct(sparse_mapper_.Finish());
+  ledger_->SetWarnings(sparse_mapper_.Warnings());
   Publish(object_mapper_.Finish());
   pool_->Finish(pool_session_);
 }

@@ -93,6 +93,11 @@ MapCorrection SparseMapper::Finish() {
   return current_->corrections.TakeCorrection(current_->map);
 }
 
+std::vector<SessionWarning> SparseMapper::Warnings() const {
+  if (current_->world_is_given || current_->map.keyframes().empty()) return {};
+  return current_->up.Warnings();
+}
+
 // ------------------------------------------------------------------------------------------------ steps of Process
 
 void SparseMapper::ResetMap() {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/stage_messages.h"
 #include "server/slam/correction_log.h"
@@ -50,6 +51,8 @@ class SparseMapper {
   void RequestEarlyStop(bool stop) { local_adjuster_.RequestEarlyStop(stop); }
 
   size_t points() const { return current_->map.points().size(); }
+  // What the client should know about the accuracy of the map. Empty while there is no map.
+  std::vector<SessionWarning> Warnings() const;
 
  private:
   friend class SparseMapperInspector;  // tests/support

@@ -1,37 +1,60 @@
 #include "server/slam/world_up.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
+#include "server/slam/geometry/level_cameras.h"
+#include "server/slam/geometry/scene_planes.h"
 #include "server/slam/geometry/support_plane.h"
+#include "server/slam/geometry/up_fusion.h"
 
 namespace romap::slam {
 namespace {
 
 constexpr double kMinRotation_rad = 0.3 * std::numbers::pi / 180;
-constexpr double kMinConfidence = 0.3;
+constexpr double kGravitySigma_rad = 0.5 * std::numbers::pi / 180;
+// Prior probability that a person holds the camera. A camera on a mount may have any constant roll.
+constexpr double kLevelReliability = 0.8;
+// Prior probabilities that a large plane of a scene is horizontal or vertical.
+constexpr double kHorizontalReliability = 0.4;
+constexpr double kVerticalReliability = 0.4;
+constexpr double kSamePlane_rad = 20 * std::numbers::pi / 180;
+constexpr double kMinConfidence = 0.3;  // to turn the world
+// An estimate may be less confident than the one before by this factor if it is about the same direction.
+constexpr double kMaxLoss = 0.7;
+constexpr double kSmallTurn_rad = 5 * std::numbers::pi / 180;
+// Up is known if it is right with this probability and within this standard deviation.
+constexpr double kKnownConfidence = 0.7;
+constexpr double kKnownSigma_rad = 0.7 * std::numbers::pi / 180;  // per axis: about 1 degree in total
 constexpr uint64_t kPeriod_keyframes = 5;
 constexpr uint64_t kLongPeriod_keyframes = 20;  // once the confidence is high
 constexpr double kHighConfidence = 0.8;
 constexpr size_t kMaxCameras = 200;
 constexpr double kMaxInsideShare = 0.1;  // of a background point's observations; not 0 because masks have errors
-constexpr double kMaxBorderShare = 0.5;
+constexpr double kMaxMaskShare = 0.3;    // the same, including observations at the border of a mask
 
 struct Evidence {
   std::vector<SupportPoint> points;
   std::vector<Eigen::Vector3d> object_points;
   std::vector<Eigen::Vector3d> centers;
   std::vector<Eigen::Vector3d> ups;
+  std::vector<Eigen::Vector3d> rights;
 };
 
-// Points near mask borders in most frames are edges of the objects, slightly above the support plane.
+// Points of an object, including those of its outline: corners of the outline are detected beside the mask, and on a
+// plain table there are no other points near the object.
+bool IsObject(const MaskVotes& votes) { return 2 * (votes.inside + votes.border) > votes.total(); }
+
 bool IsBackground(const MaskVotes& votes) {
-  return votes.inside <= kMaxInsideShare * votes.total() && votes.border <= kMaxBorderShare * votes.total();
+  return votes.inside <= kMaxInsideShare * votes.total() &&
+         votes.inside + votes.border <= kMaxMaskShare * votes.total();
 }
 
 Evidence GatherEvidence(const SlamMap& map) {
@@ -42,7 +65,7 @@ Evidence GatherEvidence(const SlamMap& map) {
       votes.Add(map.FindKeyframe(observation.keyframe)->frame->mask_zones[static_cast<size_t>(observation.feature)]);
     }
     if (votes.total() == 0) continue;  // not observed with masks yet
-    if (2 * votes.inside > votes.total()) {
+    if (IsObject(votes)) {
       evidence.object_points.push_back(track.point.position_world);
     } else if (IsBackground(votes) && track.observations.size() >= 2) {
       // One pixel across the ray; along the ray, the error grows with 1 / parallax.
@@ -58,8 +81,26 @@ Evidence GatherEvidence(const SlamMap& map) {
     if (i++ % step != 0) continue;
     evidence.centers.push_back(keyframe.center_world());
     evidence.ups.push_back(keyframe.T_world_camera().rotation() * -Eigen::Vector3d::UnitY());
+    evidence.rights.push_back(keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitX());
   }
   return evidence;
+}
+
+// Large planes of a scene are mostly walls or floors. The support itself is not counted twice.
+void AddScenePlanes(const Evidence& evidence, const std::optional<SupportPlane>& support, const Eigen::Vector3d& guess,
+                    uint64_t seed, std::vector<UpClue>& clues) {
+  const double max_same_cosine = std::cos(kSamePlane_rad);
+  for (const PlaneFit& found : FindScenePlanes(evidence.points, seed)) {
+    const Eigen::Vector3d normal = found.plane.normal.dot(guess) < 0 ? -found.plane.normal : found.plane.normal;
+    if (support && normal.dot(support->normal_world) > max_same_cosine) continue;
+    clues.push_back({.vector_world = normal,
+                     .sigma_rad = found.sigma_rad / std::numbers::sqrt2,
+                     .reliability = kHorizontalReliability});
+    clues.push_back({.kind = UpClue::Kind::kPerpendicular,
+                     .vector_world = normal,
+                     .sigma_rad = found.sigma_rad / std::numbers::sqrt2,
+                     .reliability = kVerticalReliability});
+  }
 }
 
 }  // namespace
@@ -70,33 +111,88 @@ void WorldUp::ObserveGravity(const Frame& frame, const SE3<World, Camera>& T_wor
   has_gravity_ = true;
 }
 
+// Returns whether the map shows an up direction.
+bool WorldUp::UpdateFromMap(const SlamMap& map, bool is_last) {
+  const Evidence evidence = GatherEvidence(map);
+  Eigen::Vector3d guess = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& up : evidence.ups) guess += up;
+  if (!(guess.norm() > 0)) return false;
+  guess.normalize();
+  std::vector<UpClue> clues;
+  const auto plane = FindSupportPlane({.points = evidence.points,
+                                       .object_points_world = evidence.object_points,
+                                       .camera_centers_world = evidence.centers,
+                                       .camera_ups_world = evidence.ups,
+                                       .seed = map.keyframe_count()});
+  if (plane) {
+    clues.push_back({.vector_world = plane->normal_world,
+                     .sigma_rad = plane->sigma_rad / std::numbers::sqrt2,
+                     .reliability = plane->confidence});
+  }
+  AddScenePlanes(evidence, plane, guess, map.keyframe_count(), clues);
+  const auto level = UpFromLevelCameras(evidence.rights, evidence.ups);
+  if (level) {
+    clues.push_back({.vector_world = level->up_world, .sigma_rad = level->sigma_rad, .reliability = kLevelReliability});
+  }
+  if (clues.empty()) return false;
+  const FusedUp fused = FuseUp(clues, guess);
+  constexpr double kDegree = std::numbers::pi / 180;
+  spdlog::debug(
+      "slam: up with confidence {:.2f}, sigma {:.2f} deg, {:.2f} deg from z; support plane: {} points, confidence "
+      "{:.2f}, sigma {:.2f} deg, {:.2f} deg from z; cameras: sigma {:.2f} deg, roll {:.2f} deg, {:.2f} deg from z",
+      fused.confidence, fused.sigma_rad / kDegree, std::acos(fused.direction_world.z()) / kDegree,
+      plane ? plane->inliers : 0, plane ? plane->confidence : 0, plane ? plane->sigma_rad / kDegree : 0,
+      plane ? std::acos(plane->normal_world.z()) / kDegree : 0, level ? level->sigma_rad / kDegree : 0,
+      level ? level->roll_rad / kDegree : 0, level ? std::acos(level->up_world.z()) / kDegree : 0);
+  // A clearly worse estimate than before is probably due to another surface of the scene. At the end, all evidence is
+  // available.
+  const double turn_rad = std::acos(std::clamp(fused.direction_world.dot(up_world_), -1.0, 1.0));
+  const double required = (turn_rad < kSmallTurn_rad ? kMaxLoss : 1) * confidence_;
+  if (!is_last && fused.confidence < required) return false;
+  if (fused.confidence < kMinConfidence) {
+    confidence_ = fused.confidence;
+    return false;
+  }
+  up_world_ = fused.direction_world;
+  confidence_ = fused.confidence;
+  sigma_rad_ = fused.sigma_rad;
+  return true;
+}
+
 std::optional<Eigen::Quaterniond> WorldUp::ProposeRotation(const SlamMap& map, bool is_last) {
-  Eigen::Vector3d up_world;
   if (has_gravity_) {
-    up_world = gravity_.up_world();
+    up_world_ = gravity_.up_world();
     confidence_ = 1;
+    sigma_rad_ = kGravitySigma_rad;
   } else {
     if (!is_last && map.keyframe_count() < next_fit_) return std::nullopt;
     next_fit_ = map.keyframe_count() + (confidence_ >= kHighConfidence ? kLongPeriod_keyframes : kPeriod_keyframes);
-    const Evidence evidence = GatherEvidence(map);
-    const auto plane = FindSupportPlane({.points = evidence.points,
-                                         .object_points_world = evidence.object_points,
-                                         .camera_centers_world = evidence.centers,
-                                         .camera_ups_world = evidence.ups,
-                                         .seed = map.keyframe_count()});
-    if (!plane || plane->confidence < kMinConfidence) return std::nullopt;
-    // A clearly worse plane than before is probably another surface of the scene.
-    if (plane->confidence < 0.7 * confidence_) return std::nullopt;
-    confidence_ = plane->confidence;
-    up_world = plane->normal_world;
-    spdlog::debug("slam: support plane of {} points, confidence {:.2f}, sigma {:.2f} deg", plane->inliers,
-                  plane->confidence, plane->sigma_rad * 180 / std::numbers::pi);
+    if (!UpdateFromMap(map, is_last)) return std::nullopt;
   }
-  const double angle_rad = std::acos(std::clamp(up_world.z(), -1.0, 1.0));
-  if (!is_last && angle_rad < kMinRotation_rad) return std::nullopt;
-  return RotationFromZTo(up_world).conjugate();
+  const double angle_rad = std::acos(std::clamp(up_world_.z(), -1.0, 1.0));
+  // A turn within the uncertainty is not worth the correction of the whole map.
+  if (!is_last && angle_rad < std::max(kMinRotation_rad, sigma_rad_ / 2)) return std::nullopt;
+  return RotationFromZTo(up_world_).conjugate();
 }
 
-void WorldUp::Rotate(const Eigen::Quaterniond& R_new_old) { gravity_.Rotate(R_new_old); }
+void WorldUp::Rotate(const Eigen::Quaterniond& R_new_old) {
+  gravity_.Rotate(R_new_old);
+  up_world_ = R_new_old * up_world_;
+}
+
+bool WorldUp::is_known() const { return confidence_ >= kKnownConfidence && sigma_rad_ <= kKnownSigma_rad; }
+
+std::vector<SessionWarning> WorldUp::Warnings() const {
+  if (is_known()) return {};
+  const std::string guess =
+      confidence_ > 0
+          ? fmt::format("the best guess is right with a probability of {:.0f} % and a standard deviation of {:.1f} deg",
+                        100 * confidence_, sigma_rad_ * 180 / std::numbers::pi)
+          : "the first camera is assumed to be level";
+  return {{.name = "up_unknown",
+           .text = fmt::format("the images do not show clearly where up is, so cuboids may be tilted: {}; send "
+                               "gravity_camera with the frames, or show the surface around the objects",
+                               guess)}};
+}
 
 }  // namespace romap::slam

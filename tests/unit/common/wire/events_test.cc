@@ -132,7 +132,8 @@ TEST(WireEvents, StatisticsRoundTrip) {
                               .objects_training = 8,
                               .training_steps = 9,
                               .training_progress = 0.5,
-                              .resident_bytes = 1ull << 40};
+                              .resident_bytes = 1ull << 40,
+                              .warnings = {{.name = "up_unknown", .text = "no evidence"}}};
   const Statistics got = RoundTrip(statistics);
   EXPECT_EQ(got.frames_received, 1u);
   EXPECT_EQ(got.frames_processed, 2u);
@@ -145,6 +146,9 @@ TEST(WireEvents, StatisticsRoundTrip) {
   EXPECT_EQ(got.training_steps, 9u);
   EXPECT_EQ(got.training_progress, 0.5);
   EXPECT_EQ(got.resident_bytes, 1ull << 40);
+  ASSERT_EQ(got.warnings.size(), 1u);
+  EXPECT_EQ(got.warnings[0].name, "up_unknown");
+  EXPECT_EQ(got.warnings[0].text, "no evidence");
 }
 
 void ExpectError(const v1::MapEvent& proto, const char* message) {

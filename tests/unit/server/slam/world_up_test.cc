@@ -52,6 +52,15 @@ class WorldUpTest : public ::testing::Test {
     map_.AddKeyframe(MakeFrameFeatures(frame, features), T_world_camera);
   }
 
+  // Rolls the cameras about their optical axes.
+  void RollCameras() {
+    for (auto& [id, keyframe] : map_.keyframes()) {
+      const SE3<World, Camera>& T = keyframe.T_world_camera();
+      const Eigen::Quaterniond roll(Eigen::AngleAxisd(roll_rad_, Eigen::Vector3d::UnitZ()));
+      keyframe.SetPose({T.rotation() * roll, T.translation()});
+    }
+  }
+
   void AddPoints() {
     for (size_t k = 0; k < points_.size(); ++k) {
       PointTrack& track = map_.AddPoint(points_[k]);
@@ -66,6 +75,7 @@ class WorldUpTest : public ::testing::Test {
     }
   }
 
+  double roll_rad_ = 0;
   const CameraModel camera_ = TexturedWorld(640, 480).camera();
   std::mt19937_64 random_{3};
   std::vector<Eigen::Vector3d> points_;
@@ -83,11 +93,48 @@ TEST_F(WorldUpTest, EdgesOfFlatObjectsDoNotTiltTheWorld) {
   ASSERT_TRUE(R_new_old);
   const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
   EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.2 * kDegree);
+  EXPECT_TRUE(up.is_known());
+  EXPECT_TRUE(up.Warnings().empty());
 }
 
-TEST_F(WorldUpTest, WithoutMasksThereIsNoSupportPlane) {
+// Points without masks may lie on the objects, so only the cameras show up: all of them are level in this world.
+TEST_F(WorldUpTest, LevelCamerasShowUpWithoutMasks) {
   AddPoints();
-  EXPECT_FALSE(WorldUp().ProposeRotation(map_, /*is_last=*/true));
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(10 * kDegree, Eigen::Vector3d(1, 1, 0).normalized()));
+  map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
+  WorldUp up;
+  const auto R_new_old = up.ProposeRotation(map_);
+  ASSERT_TRUE(R_new_old);
+  const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
+  EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.5 * kDegree);
+  EXPECT_LT(up.confidence(), 0.9);
+}
+
+// Cameras on a mount roll, and nothing but the objects is visible.
+TEST_F(WorldUpTest, UpIsUnknownWithoutEvidence) {
+  roll_rad_ = 20 * kDegree;
+  RollCameras();
+  AddPoints();
+  WorldUp up;
+  EXPECT_FALSE(up.ProposeRotation(map_, /*is_last=*/true));
+  EXPECT_FALSE(up.is_known());
+  ASSERT_EQ(up.Warnings().size(), 1u);
+  EXPECT_EQ(up.Warnings()[0].name, "up_unknown");
+}
+
+TEST_F(WorldUpTest, GravityShowsUpWithoutOtherEvidence) {
+  roll_rad_ = 20 * kDegree;
+  RollCameras();
+  Frame frame;
+  const SE3<World, Camera> T_world_camera = TexturedWorld::OrbitPose(0);
+  frame.gravity_camera = T_world_camera.rotation().conjugate() * -Eigen::Vector3d::UnitZ();
+  WorldUp up;
+  up.ObserveGravity(frame, T_world_camera);
+  const auto R_new_old = up.ProposeRotation(map_, /*is_last=*/true);
+  ASSERT_TRUE(R_new_old);
+  EXPECT_NEAR((*R_new_old * Eigen::Vector3d::UnitZ()).z(), 1, 1e-6);
+  EXPECT_TRUE(up.is_known());
+  EXPECT_TRUE(up.Warnings().empty());
 }
 
 TEST_F(WorldUpTest, SmallRotationsAreProposedOnlyAtTheEnd) {
