@@ -118,6 +118,7 @@ double BoxSearch::PriorCost(const UprightBox& box) const {
   }
   if (outside > 0) cost += kPointsWeight * outside / static_cast<double>(criteria_.points.size());
   if (criteria_.support_height) cost += kSupportWeight * std::abs(box.low.z() - *criteria_.support_height);
+  if (criteria_.bottom_bound) cost += kSupportWeight * std::max(0.0, box.low.z() - *criteria_.bottom_bound);
   if (const auto& previous = criteria_.previous) {
     cost += kPreviousWeight * ((box.low - previous->low).lpNorm<1>() + (box.high - previous->high).lpNorm<1>());
   }

@@ -25,6 +25,7 @@ struct BoxCriteria {
   double object_size_mu = 0;                         // largest diagonal of a mask's box, at the object's distance
   std::vector<Eigen::Vector3d> points;               // map points on the object
   std::optional<double> support_height;              // of the surface it stands on
+  std::optional<double> bottom_bound = {};           // the bottom is not above it
   std::optional<UprightBox> previous;                // keeps faces stable where the other evidence is weak
 };
 

@@ -218,12 +218,6 @@ Cuboid InWorld(const UprightBox& box, const HullRegion& region) {
   return cuboid;
 }
 
-void ExtendDown(double length_mu, Cuboid* cuboid) {
-  cuboid->half_extents.z() += length_mu / 2;
-  const SE3<World, Object>& T = cuboid->T_world_object;
-  cuboid->T_world_object = {T.rotation(), T * Eigen::Vector3d(0, 0, -length_mu / 2)};
-}
-
 bool HasEnoughPoints(const CuboidEvidence& evidence) {
   return evidence.points.size() >= static_cast<size_t>(evidence.min_points);
 }
@@ -267,9 +261,10 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
   if (evidence.hull_cells.empty()) return std::nullopt;
   const std::optional<Eigen::Vector3d> unbounded = UnboundedDirection(evidence, silhouettes);
   const auto mask_base = FindMaskBase(evidence.region, evidence.center, evidence.object_size_mu, silhouettes);
-  const std::optional<double> seen_support = FindSupportHeight(evidence, mask_base);
+  const std::optional<double> support = FindSupportHeight(evidence, mask_base);
   // Without a support, the masks of cameras all around the object still show its lower end.
-  const std::optional<double> support = seen_support || unbounded || !mask_base ? seen_support : mask_base->bottom;
+  std::optional<double> bottom_bound;
+  if (mask_base && !support) bottom_bound = unbounded ? mask_base->bound : mask_base->bottom;
   const auto outer = FindOuterBox(evidence, silhouettes, unbounded, support, previous);
   if (!outer) return std::nullopt;
   const BoxSearch search({.region = evidence.region,
@@ -277,6 +272,7 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
                           .object_size_mu = evidence.object_size_mu,
                           .points = HasEnoughPoints(evidence) ? evidence.points : std::vector<Eigen::Vector3d>{},
                           .support_height = support,
+                          .bottom_bound = bottom_bound,
                           .previous = AtYaw(previous, evidence.region, outer->yaw_rad)},
                          silhouettes, outer->yaw_rad);
   constexpr double kFirstStep = 0.1;  // of the object's size
@@ -285,9 +281,6 @@ std::optional<CuboidFit> FitCuboid(const CuboidEvidence& evidence, const std::ve
   CuboidFit fit{.cuboid = InWorld(box, evidence.region), .training_box = InWorld(United(box, *outer), evidence.region)};
   constexpr double kTrainingMargin = 0.02;  // of the object's size: about the error of mask borders and of cells
   fit.training_box.half_extents.array() += kTrainingMargin * evidence.object_size_mu;
-  // A bulging object may extend below its mask base.
-  constexpr double kUnseenBottom = 0.08;  // of the object's size
-  if (!seen_support) ExtendDown(kUnseenBottom * evidence.object_size_mu, &fit.training_box);
   fit.cuboid.confidence = search.Agreement(box);
   const bool usable = fit.training_box.half_extents.allFinite() && fit.training_box.T_world_object.IsFinite();
   return usable ? std::optional(fit) : std::nullopt;

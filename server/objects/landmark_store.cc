@@ -32,10 +32,12 @@ void AddEvidence(const LandmarkEvidence& from, LandmarkKey into_key, LandmarkEvi
 }
 
 // Whether a corner of the object's outline may be detected at this pixel. Corners of the coarsest octave are displaced
-// by up to the radius of their neighborhood.
+// by up to the radius of their neighborhood. In small images, less must do, or no background would remain.
 bool IsNearMask(const cv::Mat& labels, int u, int v) {
   constexpr int kReach_px = 12;
-  const cv::Rect around(u - kReach_px, v - kReach_px, 2 * kReach_px + 1, 2 * kReach_px + 1);
+  constexpr int kMinReaches = 50;  // across the image
+  const int reach_px = std::min(kReach_px, labels.cols / kMinReaches);
+  const cv::Rect around(u - reach_px, v - reach_px, 2 * reach_px + 1, 2 * reach_px + 1);
   return cv::countNonZero(labels(around & cv::Rect({}, labels.size()))) > 0;
 }
 

@@ -166,7 +166,8 @@ std::optional<MaskBase> FindMaskBase(const HullRegion& region, const Eigen::Vect
     drops.push_back(end.ball_drop * ends.up_world().cross(end.contact_world - axis).norm());
   }
   const double bound = NearestQuantile(std::move(heights), kShareOfBounds);
-  return MaskBase{.bound = bound, .bottom = bound - Bulge(Median(std::move(steepness))) * Median(std::move(drops))};
+  const double drop = Median(std::move(drops));
+  return MaskBase{.bound = bound, .bottom = bound - Bulge(Median(std::move(steepness))) * drop, .lowest = bound - drop};
 }
 
 }  // namespace romap::objects

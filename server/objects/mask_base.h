@@ -16,6 +16,8 @@ struct MaskBase {
   // The bottom itself, if the cameras surround the object. It is the bound unless the lower part of the object bulges
   // like a ball: then it is that of a ball that continues the surface at the bound.
   double bottom = 0;
+  // The bottom of such a ball, even if the masks show no bulge: small masks do not show it.
+  double lowest = 0;
 };
 
 // The ray through the lowest pixel of a mask must meet the object, and only where the other masks allow the object, so

@@ -79,11 +79,14 @@ std::optional<double> FindSupportHeight(const CuboidEvidence& evidence, const st
   }
   if (const auto layer = DensestLayer(std::move(heights), kLayer * evidence.object_size_mu)) return layer;
 
+  HeightRange near_base = possible;
+  if (mask_base) {
+    const double error_mu = kMaxMaskError * evidence.object_size_mu;
+    near_base = {mask_base->lowest - error_mu, mask_base->bottom + error_mu};
+  }
   std::vector<double> bottoms;
   for (double bottom : evidence.neighbor_bottoms) {
-    const bool is_near_base =
-        !mask_base || std::abs(bottom - mask_base->bottom) < kMaxMaskError * evidence.object_size_mu;
-    if (possible.Contains(bottom) && is_near_base) bottoms.push_back(bottom);
+    if (possible.Contains(bottom) && near_base.Contains(bottom)) bottoms.push_back(bottom);
   }
   if (bottoms.empty()) return std::nullopt;
   return NearestQuantile(std::move(bottoms), 0.5);

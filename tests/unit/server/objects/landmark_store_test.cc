@@ -70,8 +70,8 @@ TEST_F(LandmarkStoreTest, ClearRemovesLandmarksAndPoints) {
 TEST_F(LandmarkStoreTest, PointsBelongToTheLandmarkOfTheirMaskOrToTheBackground) {
   const LandmarkKey key = AddLandmark().key;
   auto image = std::make_shared<Frame>();
-  image->camera = {.width_px = 40, .height_px = 10};
-  image->labels = cv::Mat::zeros(10, 40, CV_16UC1);
+  image->camera = {.width_px = 600, .height_px = 10};
+  image->labels = cv::Mat::zeros(10, 600, CV_16UC1);
   image->labels(cv::Rect(0, 0, 10, 10)) = kLabel;
   KeyframeView view;
   view.frame = image;

@@ -53,10 +53,10 @@ TEST(FindSupportHeightTest, IsNotAboveTheLowerEndOfTheMasks) {
   for (Eigen::Vector3d& p : observed.evidence.background) p.z() += 0.05;
   std::erase_if(observed.evidence.points, [&](const Eigen::Vector3d& p) { return p.z() < bottom + 0.05; });
   EXPECT_NEAR(FindSupportHeight(observed.evidence, {}).value_or(9), bottom + 0.05, 1e-9);
-  EXPECT_FALSE(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom}).has_value());
+  EXPECT_FALSE(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom, bottom}).has_value());
   // Fewer points show the table.
   for (int i = 0; i < 8; ++i) observed.evidence.background.emplace_back(-0.05 * i, 0.1, bottom);
-  EXPECT_NEAR(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom}).value_or(9), bottom, 1e-9);
+  EXPECT_NEAR(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom, bottom}).value_or(9), bottom, 1e-9);
 }
 
 TEST(FindSupportHeightTest, NeighborsOnAnotherLevelDoNotCount) {
@@ -64,9 +64,19 @@ TEST(FindSupportHeightTest, NeighborsOnAnotherLevelDoNotCount) {
   observed.evidence.background.clear();
   const double bottom = BottomOf(observed);
   observed.evidence.neighbor_bottoms = {bottom - 0.04, bottom - 0.04, bottom + 0.002};
-  EXPECT_NEAR(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom}).value_or(9), bottom + 0.002, 1e-9);
+  EXPECT_NEAR(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom, bottom}).value_or(9), bottom + 0.002, 1e-9);
   observed.evidence.neighbor_bottoms = {bottom - 0.04};
-  EXPECT_FALSE(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom}).has_value());
+  EXPECT_FALSE(FindSupportHeight(observed.evidence, MaskBase{bottom, bottom, bottom}).has_value());
+}
+
+// Masks of a ball end above its bottom.
+TEST(FindSupportHeightTest, NeighborsMayBeLowerThanTheMasksShow) {
+  ObservedObject observed = ObserveBox();
+  observed.evidence.background.clear();
+  const double bottom = BottomOf(observed);
+  observed.evidence.neighbor_bottoms = {bottom};
+  const MaskBase ball{.bound = bottom + 0.04, .bottom = bottom + 0.04, .lowest = bottom + 0.01};
+  EXPECT_NEAR(FindSupportHeight(observed.evidence, ball).value_or(9), bottom, 1e-9);
 }
 
 TEST(FindSupportHeightTest, IsUnknownWithoutAHull) {
