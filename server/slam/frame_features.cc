@@ -27,6 +27,20 @@ double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
   return center_mu;
 }
 
+// Computes everything that depends on `image_px` and `lens`.
+void UpdatePositions(FrameFeatures& frame) {
+  const CameraModel& camera = frame.camera;
+  for (size_t i = 0; i < frame.size(); ++i) {
+    const Eigen::Vector2d pixel_px = frame.lens.Undistort(camera, frame.image_px[i].cast<double>());
+    const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
+    const double depth_mu = frame.ranges_mu[i] * frame.bearings_camera[i].z();
+    frame.features[i].pixel_px = pixel_px.cast<float>();
+    frame.bearings_camera[i] = ray.normalized();
+    frame.ranges_mu[i] = depth_mu * ray.norm();
+  }
+  frame.grid = FeatureGrid(camera.width_px, camera.height_px, frame.features);
+}
+
 }  // namespace
 
 FeatureGrid::FeatureGrid(int width_px, int height_px, const std::vector<Feature>& features)
@@ -93,17 +107,16 @@ std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeature
   if (frame->lens == lens) return frame;
   auto corrected = std::make_shared<FrameFeatures>(*frame);
   corrected->lens = lens;
-  const CameraModel& camera = frame->camera;
-  for (size_t i = 0; i < frame->size(); ++i) {
-    const Eigen::Vector2d pixel_px = lens.Undistort(camera, frame->image_px[i].cast<double>());
-    const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
-    corrected->features[i].pixel_px = pixel_px.cast<float>();
-    corrected->bearings_camera[i] = ray.normalized();
-    const double depth_mu = frame->ranges_mu[i] * frame->bearings_camera[i].z();
-    corrected->ranges_mu[i] = depth_mu * ray.norm();
-  }
-  corrected->grid = FeatureGrid(camera.width_px, camera.height_px, corrected->features);
+  UpdatePositions(*corrected);
   return corrected;
+}
+
+std::shared_ptr<const FrameFeatures> WithImagePixels(const FrameFeatures& frame,
+                                                     std::vector<Eigen::Vector2f> image_px) {
+  auto moved = std::make_shared<FrameFeatures>(frame);
+  moved->image_px = std::move(image_px);
+  UpdatePositions(*moved);
+  return moved;
 }
 
 std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& frame, const cv::Mat& labels, int mask_erosion_px) {

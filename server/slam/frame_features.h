@@ -38,7 +38,9 @@ struct FrameFeatures {
   std::vector<Feature> features = {};                 // pixels corrected by `lens`
   std::vector<Eigen::Vector2f> image_px = {};         // per feature: its pixel in the image, before the correction
   std::vector<Eigen::Vector3d> bearings_camera = {};  // per feature: unit length
-  std::vector<double> ranges_mu = {};     // per feature: distance along the bearing from the depth image, 0 = unknown
+  std::vector<double> ranges_mu = {};  // per feature: distance along the bearing from the depth image, 0 = unknown
+  std::vector<float> noise =
+      {};  // per feature: standard deviation of its pixel, in those of a detected feature of its octave
   std::vector<MaskZone> mask_zones = {};  // per feature
   FeatureGrid grid = {};
 
@@ -51,6 +53,8 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
                                                        const RadialCorrection& lens = {});
 // The same frame with its features corrected by another lens. Returns `frame` itself if it has this lens.
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame, const RadialCorrection& lens);
+// The same frame with its features at other pixels of the image, before the lens correction.
+std::shared_ptr<const FrameFeatures> WithImagePixels(const FrameFeatures& frame, std::vector<Eigen::Vector2f> image_px);
 // The same frame with its features labeled by masks that arrived after it, as FeatureExtractor does.
 // `labels`: CV_16UC1 of the frame's size.
 std::shared_ptr<const FrameFeatures> WithMasks(const FrameFeatures& frame, const cv::Mat& labels, int mask_erosion_px);

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -9,11 +10,29 @@
 #include "server/slam/map_adjustment.h"
 
 namespace romap::slam {
+namespace {
+
+constexpr double kMinNoise = 0.2;  // of the assumed one
+
+}  // namespace
 
 struct GlobalAdjuster::Run {
   void Solve() {
-    summary = AdjustBundle(problem.bundle, {.max_iterations = 20, .function_tolerance = 1e-6, .abort = &abort});
+    const BundleOptions options{.max_iterations = 20, .function_tolerance = 1e-6, .abort = &abort};
+    summary = AdjustBundle(problem.bundle, options);
+    if (summary.usable && !summary.aborted) AdjustWithMeasuredNoise(options);
     done = true;
+  }
+
+  // Adjusts again with the measured noise instead of the assumed one, so that errors that are large for this camera and
+  // scene lose their influence. The observations remain classified by the assumed noise.
+  void AdjustWithMeasuredNoise(const BundleOptions& options) {
+    const double noise = std::clamp(MeasureNoise(problem.bundle), kMinNoise, 1.0);
+    for (BundleObservation& observation : problem.bundle.observations) observation.sigma_px *= noise;
+    AdjustBundle(problem.bundle, options);
+    for (BundleObservation& observation : problem.bundle.observations) observation.sigma_px /= noise;
+    ClassifyOutliers(problem.bundle);
+    spdlog::debug("slam: noise of observations {:.2f} of the assumed one", noise);
   }
 
   MapProblem problem;
@@ -43,6 +62,14 @@ void GlobalAdjuster::Cancel() {
   run_->abort = true;
   if (run_->thread.joinable()) run_->thread.join();
   run_ = nullptr;
+}
+
+bool GlobalAdjuster::IsFinished() const { return run_ && run_->done; }
+
+std::optional<BundleFit> GlobalAdjuster::Fit(bool wait) const {
+  if (wait && run_->thread.joinable()) run_->thread.join();
+  if (!run_->done || !run_->summary.usable) return std::nullopt;
+  return MeasureFit(run_->problem.bundle);
 }
 
 bool GlobalAdjuster::Apply(bool wait, SlamMap& map) {

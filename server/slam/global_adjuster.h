@@ -1,7 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
+#include "server/slam/optimize/bundle_adjustment.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
@@ -21,6 +23,10 @@ class GlobalAdjuster {
   void Cancel();
   // True after Start() until the run is applied or canceled.
   bool IsPending() const { return run_ != nullptr; }
+  // The fit of the pending run's solution; nullopt while it is not finished, or if the solver failed. `wait`: blocks
+  // until it is finished. Requires IsPending().
+  std::optional<BundleFit> Fit(bool wait) const;
+  bool IsFinished() const;  // the pending run has a result
   // Writes the result of the pending run to the map it was started with. `wait`: blocks until the run is finished.
   // Returns whether the map changed: false without a pending or finished run, or if the solver failed.
   bool Apply(bool wait, SlamMap& map);

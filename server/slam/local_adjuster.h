@@ -15,6 +15,7 @@ class LocalAdjuster {
   void Adjust(const MapKeyframe& newest, SlamMap& map);
   // From any thread: `stop` ends the current and the following adjustments early, but never two in a row.
   void RequestEarlyStop(bool stop) { stop_ = stop; }
+  bool is_stop_requested() const { return stop_; }
 
   struct Times {
     int runs = 0;

@@ -82,7 +82,7 @@ bool CorrectDrift(const LoopMatch& loop, bool fix_scale, const std::vector<MapKe
     if (!node.fixed) node.S_world_camera = S_new_old * before.at(keyframe->id);
   }
   const PoseGraphSummary summary = OptimizePoseGraph(nodes, edges, {.fix_scale = fix_scale});
-  spdlog::info(
+  spdlog::debug(
       "slam: loop from {} to {}: drift {:.0f} px, scale {:.3f}; pose graph of {} keyframes and {} edges, cost {:.3g} "
       "-> {:.3g}",
       loop.newest.ToString(), loop.old.ToString(), loop.drift_px, S_new_old.scale(), nodes.size(), edges.size(),

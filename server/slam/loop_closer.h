@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/slam/place_recognizer.h"
+#include "server/slam/loop_detector.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 

@@ -3,12 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
+#include <numbers>
 #include <set>
 #include <utility>
 
 #include "common/statistics.h"
-#include "server/slam/geometry/similarity.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/projection_search.h"
 
@@ -16,7 +15,6 @@ namespace romap::slam {
 namespace {
 
 constexpr int kCandidates = 5;
-constexpr int kLoopCandidates = 3;
 constexpr int kMaxDistance = 60;  // Hamming, bits
 constexpr double kRatio = 0.85;
 constexpr int kMinFirstInliers = 12;  // of matches by descriptors
@@ -26,8 +24,11 @@ constexpr double kWideRadius_px = 10;
 constexpr double kNarrowRadius_px = 4;
 constexpr size_t kFewNeighbors = 3;
 constexpr size_t kNeighbors = 8;
-constexpr int kMinCommonPoints = 15;
-constexpr uint64_t kMinLoopKeyframes = 10;  // between the old and the newest keyframe
+constexpr double kRivalRotation_rad = 10 * std::numbers::pi / 180;
+constexpr double kRivalDistanceShare = 0.2;  // of the scene depth
+// A second place with this share of the best place's points fits the frame as well: descriptors and visibility
+// alone change the number of points of the true place by a third from one keyframe to the next.
+constexpr double kRivalPointShare = 0.7;
 
 std::vector<LocalPoint> MakeLocalPoints(const SlamMap& map, const std::vector<MapPointId>& ids) {
   std::vector<LocalPoint> points;
@@ -44,6 +45,12 @@ PoseObservation MakeObservation(const FrameFeatures& frame, int feature, const E
 
 }  // namespace
 
+bool AreRivals(const LocatedFrame& a, const LocatedFrame& b) {
+  const double rotation_rad = a.T_world_camera.rotation().angularDistance(b.T_world_camera.rotation());
+  const double distance_mu = (a.T_world_camera.translation() - b.T_world_camera.translation()).norm();
+  return rotation_rad > kRivalRotation_rad || distance_mu > kRivalDistanceShare * a.median_depth_mu;
+}
+
 std::vector<MapPointId> PlaceRecognizer::PointsAround(const MapKeyframe& keyframe, size_t neighbors) const {
   std::set<MapPointId> points;
   const auto take = [&](const MapKeyframe& from) {
@@ -59,21 +66,23 @@ std::vector<MapPointId> PlaceRecognizer::PointsAround(const MapKeyframe& keyfram
   return {points.begin(), points.end()};
 }
 
-std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatures& frame,
-                                                                const MapKeyframe& around_keyframe,
-                                                                uint64_t call) const {
-  const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(around_keyframe, kFewNeighbors));
+std::optional<LocatedFrame> PlaceRecognizer::Locate(const FrameFeatures& frame, const MapKeyframe& around,
+                                                    uint64_t call) const {
+  const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(around, kFewNeighbors));
   std::vector<PoseObservation> observations;
   for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxDistance, kRatio)) {
     observations.push_back(
         MakeObservation(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
   }
   const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinFirstInliers, .seed = config_.Seed(call)});
-  if (!pose) return std::nullopt;
+  return pose ? LocateNear(frame, around, pose->T_world_camera) : std::nullopt;
+}
 
+std::optional<LocatedFrame> PlaceRecognizer::LocateNear(const FrameFeatures& frame, const MapKeyframe& around_keyframe,
+                                                        const SE3<World, Camera>& T_world_camera) const {
   const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(around_keyframe, kNeighbors));
-  Located located;
-  located.T_world_camera = pose->T_world_camera;
+  LocatedFrame located{.keyframe = around_keyframe.id, .T_world_camera = T_world_camera};
+  std::vector<PoseObservation> observations;
   PoseEstimate refined;
   for (const double radius_px : {kWideRadius_px, kNarrowRadius_px}) {
     ProjectionMatcher matcher(frame, located.T_world_camera);
@@ -96,76 +105,42 @@ std::optional<PlaceRecognizer::Located> PlaceRecognizer::Locate(const FrameFeatu
   if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
     return std::nullopt;
   }
+  const SE3<Camera, World> T_camera_world = located.T_world_camera.Inverse();
+  std::vector<double> depths_mu;
+  for (const auto& [id, feature] : located.points) {
+    depths_mu.push_back((T_camera_world * map_->FindPoint(id)->point.position_world).z());
+  }
+  located.median_depth_mu = Median(std::move(depths_mu));
   return located;
 }
 
-std::optional<PlaceRecognizer::Relocalized> PlaceRecognizer::Relocalize(const FrameFeatures& frame) const {
-  for (const PlaceMatch& candidate : index_.Query(frame.features, kCandidates)) {
-    const MapKeyframe* keyframe = map_->FindKeyframe(candidate.keyframe);
+std::vector<KeyframeId> PlaceRecognizer::SimilarKeyframes(const FrameFeatures& frame, int max_results) const {
+  std::vector<KeyframeId> keyframes;
+  for (const PlaceMatch& match : index_.Query(frame.features, max_results)) keyframes.push_back(match.keyframe);
+  return keyframes;
+}
+
+std::optional<LocatedFrame> PlaceRecognizer::Relocalize(const FrameFeatures& frame) const {
+  std::vector<LocatedFrame> places;
+  for (const KeyframeId id : SimilarKeyframes(frame, kCandidates)) {
+    const MapKeyframe* keyframe = map_->FindKeyframe(id);
     if (keyframe == nullptr) continue;
-    if (const auto located = Locate(frame, *keyframe, frame.frame_id)) {
-      return Relocalized{located->T_world_camera, keyframe->id};
-    }
+    if (auto located = Locate(frame, *keyframe, frame.frame_id)) places.push_back(*std::move(located));
   }
-  return std::nullopt;
-}
-
-std::optional<LoopMatch> PlaceRecognizer::FindLoop(const MapKeyframe& keyframe, bool fix_scale) const {
-  std::set<KeyframeId> connected = {keyframe.id};
-  for (const auto& [id, shared] : map_->Covisible(keyframe, kMinSharedPoints)) connected.insert(id);
-  int tried = 0;
-  for (const PlaceMatch& candidate :
-       index_.Query(keyframe.features(), kCandidates + static_cast<int>(connected.size()))) {
-    if (connected.contains(candidate.keyframe) || candidate.keyframe.value + kMinLoopKeyframes > keyframe.id.value) {
-      continue;
-    }
-    if (++tried > kLoopCandidates) break;
-    const MapKeyframe* old = map_->FindKeyframe(candidate.keyframe);
-    if (old == nullptr) continue;
-    const auto located = Locate(*keyframe.frame, *old, keyframe.id.value);
-    if (!located) continue;
-    if (auto loop = MakeLoop(keyframe, *old, *located, fix_scale)) return loop;
+  if (places.empty()) return std::nullopt;
+  const auto best = std::max_element(places.begin(), places.end(), [](const LocatedFrame& a, const LocatedFrame& b) {
+    return a.points.size() < b.points.size();
+  });
+  for (const LocatedFrame& place : places) {
+    const bool fits_as_well =
+        static_cast<double>(place.points.size()) > kRivalPointShare * static_cast<double>(best->points.size());
+    if (!fits_as_well || !AreRivals(*best, place)) continue;
+    spdlog::info("slam: frame {} fits the places of {} ({} points) and of {} ({} points): ambiguous, not relocalized",
+                 frame.frame_id, best->keyframe.ToString(), best->points.size(), place.keyframe.ToString(),
+                 place.points.size());
+    return std::nullopt;
   }
-  return std::nullopt;
-}
-
-std::optional<LoopMatch> PlaceRecognizer::MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& old,
-                                                   const Located& located, bool fix_scale) const {
-  LoopMatch loop{.newest = keyframe.id, .old = old.id};
-  const SE3<Camera, World>& T_old_world = old.T_camera_world();
-  std::vector<SimilarityMatch> common;
-  std::vector<double> drifts_px;
-  for (const auto& [id, feature_index] : located.points) {
-    const Eigen::Vector3d& old_world = map_->FindPoint(id)->point.position_world;
-    const Feature& feature = keyframe.features()[static_cast<size_t>(feature_index)];
-    const Eigen::Vector3d p_camera = keyframe.T_camera_world() * old_world;
-    drifts_px.push_back(p_camera.z() > 0
-                            ? (keyframe.camera().Project(p_camera) - feature.pixel_px.cast<double>()).norm()
-                            : keyframe.camera().width_px);
-    const MapPointId observed = keyframe.points[static_cast<size_t>(feature_index)];
-    if (!observed) continue;
-    if (observed != id) loop.same_points.emplace_back(observed, id);
-    const Eigen::Vector3d p_old = T_old_world * old_world;
-    const double sigma_px = config_.pixel_sigma_px * feature.octave_scale;
-    common.push_back({.p_first = p_old,
-                      .p_second = keyframe.T_camera_world() * map_->FindPoint(observed)->point.position_world,
-                      .first_px = keyframe.camera().Project(p_old),
-                      .second_px = feature.pixel_px.cast<double>(),
-                      .first_sigma_px = sigma_px,
-                      .second_sigma_px = sigma_px});
-  }
-  loop.drift_px = Median(std::move(drifts_px));
-
-  loop.S_old_newest = Sim3<Camera, Camera>(T_old_world * located.T_world_camera);
-  if (fix_scale || loop.drift_px < kNoDrift_px) return loop;
-  // Only points that exist on both sides determine the ratio of their scales.
-  const auto similarity = SolveSimilarity(keyframe.camera(), common,
-                                          {.min_inliers = kMinCommonPoints, .seed = config_.Seed(keyframe.id.value)});
-  spdlog::debug("slam: loop candidate {} to {}: drift {:.1f} px, {} of {} common points agree", keyframe.id.ToString(),
-                old.id.ToString(), loop.drift_px, similarity ? similarity->inliers : 0, common.size());
-  if (!similarity) return std::nullopt;
-  loop.S_old_newest = similarity->S_first_second;
-  return loop;
+  return *best;
 }
 
 }  // namespace romap::slam

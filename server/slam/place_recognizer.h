@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/slam/geometry/pnp.h"
@@ -10,19 +11,20 @@
 
 namespace romap::slam {
 
-// A loop with less drift than this in the newest keyframe's image needs no correction.
-inline constexpr double kNoDrift_px = 4;
-
-// A keyframe and an old keyframe that show the same place.
-struct LoopMatch {
-  KeyframeId newest;
-  KeyframeId old;
-  Sim3<Camera, Camera> S_old_newest = {};
-  std::vector<std::pair<MapPointId, MapPointId>> same_points = {};  // (point of the new side, point of the old side)
-  double drift_px = 0;  // median distance in the newest image between features and projections of the old points
+// The pose of a frame relative to the part of the map around a keyframe.
+struct LocatedFrame {
+  KeyframeId keyframe;                                  // shows the same place
+  SE3<World, Camera> T_world_camera = {};               // in the world of that part
+  std::vector<std::pair<MapPointId, int>> points = {};  // with the feature that observes each
+  double median_depth_mu = 0;                           // of the points
 };
 
-// Place recognition: finds keyframes by their descriptors and verifies them geometrically.
+// Whether two poses of the same frame exclude each other: they differ by more than drift inside one place could
+// explain, 10 degrees or a fifth of the scene depth.
+bool AreRivals(const LocatedFrame& a, const LocatedFrame& b);
+
+// Place recognition: finds keyframes by their descriptors and verifies them geometrically. Repeated texture makes
+// different places look alike, so a frame that fits two places is assigned to none of them.
 class PlaceRecognizer {
  public:
   PlaceRecognizer(const SlamConfig& config, const SlamMap* map) : config_(config), map_(map), index_(1) {}
@@ -30,28 +32,21 @@ class PlaceRecognizer {
   void Add(const MapKeyframe& keyframe) { index_.Add(keyframe.id, keyframe.features()); }
   void Remove(KeyframeId keyframe) { index_.Remove(keyframe); }
 
-  struct Relocalized {
-    SE3<World, Camera> T_world_camera;
-    KeyframeId keyframe;  // shows the same place
-  };
-  // Finds the pose of a frame without a prior.
-  std::optional<Relocalized> Relocalize(const FrameFeatures& frame) const;
+  // Finds the pose of a frame without a prior. nullopt: no place fits, or several do.
+  std::optional<LocatedFrame> Relocalize(const FrameFeatures& frame) const;
 
-  // Finds an old keyframe that shows the same place but shares few or no points with this one. `fix_scale`: the map's
-  // scale does not drift.
-  std::optional<LoopMatch> FindLoop(const MapKeyframe& keyframe, bool fix_scale) const;
+  // Keyframes with descriptors similar to the frame's, best first.
+  std::vector<KeyframeId> SimilarKeyframes(const FrameFeatures& frame, int max_results) const;
+
+  // The pose of a frame relative to the points around a keyframe, by descriptors and P3P. `call` seeds the samples.
+  std::optional<LocatedFrame> Locate(const FrameFeatures& frame, const MapKeyframe& around, uint64_t call) const;
+
+  // The same with a known approximate pose. The points are searched within 10 px of their projections.
+  std::optional<LocatedFrame> LocateNear(const FrameFeatures& frame, const MapKeyframe& around,
+                                         const SE3<World, Camera>& T_world_camera) const;
 
  private:
-  // The pose of a frame in the part of the map around a keyframe.
-  struct Located {
-    SE3<World, Camera> T_world_camera;
-    std::vector<std::pair<MapPointId, int>> points;  // with the feature that observes each
-  };
-
   std::vector<MapPointId> PointsAround(const MapKeyframe& keyframe, size_t neighbors) const;
-  std::optional<Located> Locate(const FrameFeatures& frame, const MapKeyframe& around, uint64_t call) const;
-  std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const MapKeyframe& old, const Located& located,
-                                    bool fix_scale) const;
 
   const SlamConfig config_;
   const SlamMap* const map_;

@@ -24,9 +24,10 @@ struct SlamConfig {
   int max_keyframes = 2000;
   bool close_loops = true;
   bool refine_lens = true;
+  bool refine_observations = true;
   int max_points = 20000;
   double min_parallax_deg = 2.0;
-  double pixel_sigma_px = 1.0;
+  double pixel_sigma_px = 0.7;
   double depth_sigma_ratio = 0.02;
   double prior_sigma_rad = 0.01;
   double prior_sigma_mu = 0.02;
@@ -110,6 +111,9 @@ struct SlamConfig {
                {.audience = Audience::kOperator, .help = "Correct the map when the camera returns to a known place"});
     fields.Add("refine_lens", &refine_lens,
                {.help = "Estimate the residual lens distortion, if the camera is tracked from images"});
+    fields.Add(
+        "refine_observations", &refine_observations,
+        {.help = "Align the observations of a map point to its image in one keyframe, to a fraction of a pixel"});
     fields.Add("max_points", &max_points,
                {.unit = "points",
                 .min = 100,

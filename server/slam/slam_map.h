@@ -10,6 +10,7 @@
 
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
+#include "server/slam/features/patch.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/optimize/bundle_adjustment.h"
 #include "server/slam/slam_config.h"
@@ -56,6 +57,13 @@ struct FeatureRef {
   int feature = 0;
 };
 
+// The appearance of a map point, to which its observations are aligned.
+struct ReferencePatch {
+  Patch patch;
+  KeyframeId keyframe;      // it was read there
+  double octave_scale = 1;  // pixels of that keyframe per grid unit of the patch
+};
+
 // A map point with the data for matching it and for refining its position.
 struct PointTrack {
   MapPoint point;
@@ -65,7 +73,8 @@ struct PointTrack {
   double size_mu = 0;             // width of one pixel of the feature's octave at the point; similar in all keyframes
   uint64_t created_keyframe = 0;  // number of the keyframe that created it
   uint64_t latest_keyframe = 0;   // number of the newest keyframe that observes it
-  MaskVotes votes = {};           // from frames with masks that are not keyframes
+  std::shared_ptr<const ReferencePatch> patch = {};  // null until ObservationRefiner sets it
+  MaskVotes votes = {};                              // from frames with masks that are not keyframes
 };
 
 // The keyframes and points of one session. Not thread-safe. Ids are never reused.

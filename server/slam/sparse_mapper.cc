@@ -47,6 +47,7 @@ KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe, 
 SparseMapper::CurrentMap::CurrentMap(const SlamConfig& config, uint64_t keyframes_used, uint64_t points_used)
     : map(config, keyframes_used, points_used),
       places(config, &map),
+      loops(config, &map, &places),
       up(keyframes_used),
       mask_voter(config),
       next_global_adjustment(keyframes_used + kFirstGlobalAdjustment_keyframes) {}
@@ -57,11 +58,13 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bo
       keyframe_builder_(config),
       local_adjuster_(config),
       global_adjuster_(config, inline_adjustment),
+      loop_trial_(config, inline_adjustment),
       current_(std::make_unique<CurrentMap>(config, 0, 0)) {}
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
-  const bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false);
+  const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
+  const bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed;
   const bool is_of_current_map = image.pose_given || image.generation == generation_;
   if (image.initial_views) {
     InitializeFrom(image, mapped);
@@ -83,6 +86,7 @@ void SparseMapper::ObserveMasks(const FrameMasks& masks) {
 }
 
 MapCorrection SparseMapper::Finish() {
+  ConcludeLoopTrial(/*wait=*/true);
   ApplyGlobalAdjustment(/*wait=*/true);
   if (!current_->world_is_given && current_->map.keyframes().size() > 2) {
     StartGlobalAdjustment();
@@ -102,6 +106,7 @@ std::vector<SessionWarning> SparseMapper::Warnings() const {
 
 void SparseMapper::ResetMap() {
   global_adjuster_.Cancel();
+  loop_trial_.Cancel();
   // Ids are never reused within a session.
   current_ = std::make_unique<CurrentMap>(config_, current_->map.keyframe_count(), current_->map.point_count());
 }
@@ -186,6 +191,11 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   MapKeyframe& keyframe =
       keyframe_builder_.Add(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
   current_->newest = keyframe.id;
+  if (!keyframe.pose_given && config_.refine_observations) {
+    // The search for more observations takes as long as all other steps, so it is omitted while keyframes wait.
+    current_->refiner.Refine(*image.tracked.frame, /*search_points=*/!local_adjuster_.is_stop_requested(), keyframe,
+                             map);
+  }
   CullPoints(config_, map);
   if (!keyframe.pose_given) {
     local_adjuster_.Adjust(keyframe, map);
@@ -206,16 +216,17 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
 void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
   CurrentMap& current = *current_;
   const bool scale_is_known = current.has_depth_scale || current.world_is_given;
+  if (loop_trial_.IsPending()) return;
   std::optional<LoopMatch> loop;
-  if (config_.close_loops) loop = current.places.FindLoop(keyframe, scale_is_known);
-  if (loop) {
+  if (config_.close_loops) loop = current.loops.Find(keyframe, scale_is_known);
+  if (loop && loop->drift_px > kNoDrift_px) {
     global_adjuster_.Cancel();  // its result would undo the loop closure
-    if (CloseLoop(*loop, scale_is_known, config_, current.map)) {
-      ++counts_.loops_corrected;
-      StartGlobalAdjustment();
-    } else {
-      ++counts_.loops_merged;
-    }
+    loop_trial_.Start(current.map, *loop, scale_is_known, CanEstimateLens());
+    return;
+  }
+  if (loop) {
+    CloseLoop(*loop, scale_is_known, config_, current.map);
+    ++counts_.loops_merged;
     return;
   }
   if (current.map.keyframe_count() < current.next_global_adjustment) return;
@@ -243,6 +254,24 @@ bool SparseMapper::ApplyGlobalAdjustment(bool wait) {
   return true;
 }
 
+// Closes the loop on trial if the map confirms it. Returns whether the map changed.
+bool SparseMapper::ConcludeLoopTrial(bool wait) {
+  if (!loop_trial_.IsPending()) return false;
+  const LoopTrial::Verdict verdict = loop_trial_.Conclude(wait, current_->map);
+  if (verdict == LoopTrial::Verdict::kPending) return false;
+  const bool closed = verdict == LoopTrial::Verdict::kClosed;
+  if (closed) {
+    ++counts_.loops_corrected;
+    current_->up.RequestUpdate();
+    if (current_->newest) PublishLocalMap(current_->newest);
+  } else {
+    ++counts_.loops_rejected;
+    current_->loops.Reject(loop_trial_.loop());
+  }
+  loop_trial_.Cancel();
+  return closed;
+}
+
 void SparseMapper::AlignWithUp(bool is_last) {
   if (current_->world_is_given) return;
   const std::optional<Eigen::Quaterniond> R_new_old = current_->up.ProposeRotation(current_->map, is_last);
@@ -252,6 +281,7 @@ void SparseMapper::AlignWithUp(bool is_last) {
   current_->map.Transform({1.0, *R_new_old, Eigen::Vector3d::Zero()});
   current_->up.Rotate(*R_new_old);
   if (was_pending) StartGlobalAdjustment();
+  if (loop_trial_.IsPending()) loop_trial_.Restart(current_->map);
 }
 
 void SparseMapper::UpdatePose(TrackedFrame& tracked) const {
@@ -266,9 +296,10 @@ void SparseMapper::PublishLocalMap(KeyframeId reference, std::optional<LocalMap:
 void SparseMapper::LogSummary() const {
   const LocalAdjuster::Times& times = local_adjuster_.times();
   spdlog::info(
-      "slam: {} keyframes, {} points; loops: {} corrected, {} merged without correction; {} relocalizations; {} map "
+      "slam: {} keyframes, {} points; loops: {} corrected, {} merged without correction, {} rejected; {} "
+      "relocalizations; {} map "
       "resets; up confidence {:.2f}; local bundle adjustment: mean {:.0f} ms, longest {:.0f} ms",
-      current_->map.keyframes().size(), points(), counts_.loops_corrected, counts_.loops_merged,
+      current_->map.keyframes().size(), points(), counts_.loops_corrected, counts_.loops_merged, counts_.loops_rejected,
       counts_.relocalizations, counts_.resets, current_->up.confidence(), 1e3 * times.total_s / std::max(1, times.runs),
       1e3 * times.longest_s);
 }

@@ -11,7 +11,10 @@
 #include "server/slam/keyframe_builder.h"
 #include "server/slam/local_adjuster.h"
 #include "server/slam/local_map.h"
+#include "server/slam/loop_detector.h"
+#include "server/slam/loop_trial.h"
 #include "server/slam/mask_voter.h"
+#include "server/slam/observation_refiner.h"
 #include "server/slam/place_recognizer.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
@@ -63,9 +66,11 @@ class SparseMapper {
 
     SlamMap map;
     PlaceRecognizer places;
+    LoopDetector loops;
     CorrectionLog corrections;
     WorldUp up;
     MaskVoter mask_voter;
+    ObservationRefiner refiner;
     KeyframeId newest;
     bool world_is_given = false;      // the client's poses, given or as priors, define the world
     bool has_depth_scale = false;     // depth images define the scale
@@ -76,7 +81,8 @@ class SparseMapper {
   // Counts over the whole session, logged at its end.
   struct Counts {
     int loops_corrected = 0;
-    int loops_merged = 0;  // closed without moving poses, because the map had not drifted
+    int loops_rejected = 0;  // contradicted by the rest of the map
+    int loops_merged = 0;    // closed without moving poses, because the map had not drifted
     int relocalizations = 0;
     int resets = 0;
   };
@@ -89,6 +95,7 @@ class SparseMapper {
 
   void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
+  bool ConcludeLoopTrial(bool wait);
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
@@ -102,6 +109,7 @@ class SparseMapper {
   KeyframeBuilder keyframe_builder_;
   LocalAdjuster local_adjuster_;
   GlobalAdjuster global_adjuster_;
+  LoopTrial loop_trial_;
   std::unique_ptr<CurrentMap> current_;
   int generation_ = 0;  // of the map; see LocalMap::generation
   Counts counts_;

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "common/statistics.h"
 #include "server/slam/optimize/bundle_solver.h"
 
 namespace romap::slam {
@@ -88,6 +90,34 @@ void MarkOutliers(BundleProblem& problem, BundleSummary& summary) {
 }
 
 }  // namespace
+
+BundleFit MeasureFit(const BundleProblem& problem) {
+  BundleFit fit;
+  std::vector<uint8_t> inliers(problem.observations.size(), 0);
+  for (size_t i = 0; i < inliers.size(); ++i) {
+    if (!IsValid(problem, problem.observations[i])) continue;
+    ++fit.observations;
+    inliers[i] = Measure(problem, problem.observations[i]).beyond_bound ? 0 : 1;
+    fit.outliers += inliers[i] == 0 ? 1 : 0;
+  }
+  fit.rms_px = RmsPx(problem, inliers);
+  return fit;
+}
+
+void ClassifyOutliers(BundleProblem& problem) {
+  BundleSummary ignored;
+  MarkOutliers(problem, ignored);
+}
+
+double MeasureNoise(const BundleProblem& problem) {
+  constexpr double kMedianOfRayleigh = 1.177;  // of the length of a 2D error with standard deviation 1 per axis
+  std::vector<double> errors;
+  for (const BundleObservation& observation : problem.observations) {
+    const double error_px2 = Measure(problem, observation).reprojection_px2;
+    if (std::isfinite(error_px2)) errors.push_back(std::sqrt(error_px2) / observation.sigma_px);
+  }
+  return errors.empty() ? 1 : Median(std::move(errors)) / kMedianOfRayleigh;
+}
 
 BundleSummary AdjustBundle(BundleProblem& problem, const BundleOptions& options) {
   BundleSummary summary;

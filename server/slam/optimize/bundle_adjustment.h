@@ -77,6 +77,24 @@ struct BundleSummary {
   bool usable = false;  // false: nothing was changed (numerical failure, or nothing to do)
 };
 
+// How well a problem's cameras and points fit its observations.
+struct BundleFit {
+  int observations = 0;  // valid ones
+  int outliers = 0;      // of those, beyond the 95 % bound
+  double rms_px = 0;     // of the others, weighted by 1 / sigma^2
+
+  double OutlierShare() const { return observations > 0 ? static_cast<double>(outliers) / observations : 0; }
+};
+
+BundleFit MeasureFit(const BundleProblem& problem);
+
+// Sets BundleObservation::outlier of all observations.
+void ClassifyOutliers(BundleProblem& problem);
+
+// The observations' standard deviation as a factor of the one they claim: from the median of their errors, so that
+// outliers hardly change it. 1 without valid observations.
+double MeasureNoise(const BundleProblem& problem);
+
 // Bundle adjustment (Triggs et al. 2000) with Ceres: reprojection errors (and inverse-depth errors where depth was
 // measured), Huber loss at the 95 % bound, analytic Jacobians, right-multiplied SE3 increments, points eliminated by
 // the Schur complement. With `lens`, the remaining distortion of the cameras' common lens is estimated too
