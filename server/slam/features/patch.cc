@@ -162,9 +162,6 @@ std::optional<PatchAlignment> AlignPatch(const Patch& patch, const HalvedImages&
   }
   alignment.pixel_px = start_px + image_from_patch * shift;
   alignment.correlation = 1 - 0.5 * squared_error / kCount;  // of two normalized signals
-  const Eigen::Matrix2d covariance =
-      squared_error / (kCount - 4) * image_from_patch * inverse_hessian * image_from_patch.transpose();
-  alignment.sigma_px = std::sqrt(0.5 * covariance.trace());
   return alignment;
 }
 

@@ -43,8 +43,6 @@ struct Patch {
 struct PatchAlignment {
   Eigen::Vector2d pixel_px = Eigen::Vector2d::Zero();  // of the patch's center in the image
   double correlation = 0;                              // zero-mean, normalized; -1..1
-  // Standard deviation of `pixel_px` for the remaining differences of the gray values, pixels.
-  double sigma_px = 0;
 };
 
 // Finds the position of a patch in another image to a fraction of a pixel: Gauss-Newton on the gray values, which may
