@@ -32,7 +32,8 @@ std::optional<PatchAlignment> Align(const cv::Mat& reference, const cv::Mat& ima
 }
 
 TEST(PatchTest, FindsTheDisplacementToAFractionOfAPixel) {
-  for (const Eigen::Vector2d& shift_px : {Eigen::Vector2d(0.37, -0.62), Eigen::Vector2d(-0.8, 0.25), Eigen::Vector2d(0, 0)}) {
+  for (const Eigen::Vector2d& shift_px :
+       {Eigen::Vector2d(0.37, -0.62), Eigen::Vector2d(-0.8, 0.25), Eigen::Vector2d(0, 0)}) {
     const auto aligned = Align(Draw(Blobs, 0, 0), Draw(Blobs, shift_px.x(), shift_px.y()), {kX_px, kY_px});
     ASSERT_TRUE(aligned);
     EXPECT_LT((aligned->pixel_px - Eigen::Vector2d(kX_px, kY_px) - shift_px).norm(), 0.08) << shift_px.transpose();
