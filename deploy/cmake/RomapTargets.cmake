@@ -18,14 +18,6 @@ if(ROMAP_CCACHE)
 endif()
 
 add_compile_options(-Wall -Wextra -pthread)
-# GCC spends about a tenth of a compilation collecting garbage, so machines with enough memory collect later.
-cmake_host_system_information(RESULT memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
-cmake_host_system_information(RESULT cores QUERY NUMBER_OF_LOGICAL_CORES)
-math(EXPR memory_per_core_mb "${memory_mb} / ${cores}")
-if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND memory_per_core_mb GREATER 3000)
-  add_compile_options($<$<COMPILE_LANGUAGE:CXX>:--param=ggc-min-heapsize=1500000>
-                      $<$<COMPILE_LANGUAGE:CXX>:--param=ggc-min-expand=200>)
-endif()
 if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
