@@ -20,16 +20,11 @@ constexpr size_t kStoredImages = 24;
 // different patches rarely by more than 0.5.
 constexpr double kMinCorrelation = 0.7;
 constexpr double kWrongCorrelation = 0.3;
-constexpr double kMinAddedCorrelation = 0.85;
-constexpr size_t kNeighbors = 10;
-constexpr size_t kMaxAdded = 600;
-constexpr double kMinViewCosine = 0.87;  // 30 degrees between the reference's ray and the new one
+constexpr double kMinAddedCorrelation = 0.85;  // of a point that no descriptor confirms
+constexpr size_t kNeighbors = 10;              // keyframes whose points are searched
+constexpr size_t kMaxAdded = 600;              // observations per keyframe, to limit the time of bundle adjustment
+constexpr double kMinViewCosine = 0.87;        // 30 degrees between the reference's ray and the new one
 constexpr double kMinOctaveScale = 0.7;
-
-bool IsObservedIn(const PointTrack& track, KeyframeId keyframe) {
-  return std::any_of(track.observations.begin(), track.observations.end(),
-                     [&](const FeatureRef& observation) { return observation.keyframe == keyframe; });
-}
 
 // Derivative of pixels in `keyframe` by pixels in `reference` for a surface through the point that faces the reference
 // camera; nullopt if the point is behind a camera.
@@ -90,21 +85,22 @@ void ObservationRefiner::AddObservations(const Frame& frame, MapKeyframe& keyfra
   std::vector<MapPointId> found;
   for (const MapPointId id : PointsOf(map, Neighborhood(map, keyframe, kNeighbors, 0))) {
     const PointTrack& track = *map.FindPoint(id);
-    if (!track.patch || IsObservedIn(track, keyframe.id)) continue;
+    if (!track.patch || track.IsObservedBy(keyframe.id)) continue;
     const std::optional<FoundPatch> patch = FindPatch(track, keyframe, image, map);
     if (!patch) continue;
     Feature feature{.pixel_px = patch->image_px.cast<float>(), .descriptor = track.descriptor};
     feature.octave = std::clamp(static_cast<int>(std::lround(std::log(patch->octave_scale) / std::log(kOctaveFactor))),
                                 0, kOctaves - 1);
     feature.octave_scale = std::pow(kOctaveFactor, feature.octave);
-    feature.label = LabelAt(frame.labels, feature.pixel_px, static_cast<int>(std::lround(2 * feature.octave_scale)));
+    feature.label =
+        LabelAt(frame.labels, feature.pixel_px, static_cast<int>(std::lround(mask_erosion_px_ * feature.octave_scale)));
     features.push_back(feature);
     found.push_back(id);
     if (found.size() == kMaxAdded) break;
   }
   counts_.added += static_cast<int>(found.size());
-  spdlog::debug("slam: refiner {} aligned, {} not, {} removed, {} added", counts_.aligned, counts_.not_aligned,
-                counts_.removed, counts_.added);
+  spdlog::debug("slam: observations so far: {} aligned, {} not aligned, {} removed, {} added", counts_.aligned,
+                counts_.not_aligned, counts_.removed, counts_.added);
   if (found.empty()) return;
   const auto first = static_cast<int>(keyframe.points.size());
   keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens);

@@ -7,6 +7,7 @@
 
 #include "common/stage_messages.h"
 #include "server/slam/features/patch.h"
+#include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
 namespace romap::slam {
@@ -17,6 +18,8 @@ namespace romap::slam {
 // removed. Stores the images of recent keyframes, because new points are also observed there. Not thread-safe.
 class ObservationRefiner {
  public:
+  explicit ObservationRefiner(const SlamConfig& config) : mask_erosion_px_(config.mask_erosion_px) {}
+
   // Call after the keyframe's points are known and new ones were made. `search_points`: also observes points that are
   // visible but were not matched, at the positions of their patches. Long tracks reduce the drift more than precise
   // ones.
@@ -36,17 +39,19 @@ class ObservationRefiner {
     Eigen::Vector2d image_px = Eigen::Vector2d::Zero();
   };
 
-  void Align(const PointTrack& track, const FeatureRef& observation, SlamMap& map);
-  void Apply(SlamMap& map);
   // A point found by its patch.
   struct FoundPatch {
     Eigen::Vector2d image_px = Eigen::Vector2d::Zero();  // before the lens correction
     double octave_scale = 1;
   };
+
+  void Align(const PointTrack& track, const FeatureRef& observation, SlamMap& map);
+  void Apply(SlamMap& map);
   void AddObservations(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
   std::optional<FoundPatch> FindPatch(const PointTrack& track, const MapKeyframe& keyframe, const HalvedImages& image,
                                       const SlamMap& map) const;
 
+  const int mask_erosion_px_;
   std::map<KeyframeId, HalvedImages> images_;  // of recent keyframes
   std::map<KeyframeId, std::vector<NewPixel>> moved_;
   std::vector<std::pair<MapPointId, KeyframeId>> wrong_;

@@ -170,10 +170,7 @@ void PointMaker::FuseInto(MapKeyframe& keyframe, const std::vector<MapPointId>& 
   for (const MapPointId id : points) {
     PointTrack* track = map_->FindPoint(id);
     if (track == nullptr) continue;
-    const bool is_observed_here =
-        std::any_of(track->observations.begin(), track->observations.end(),
-                    [&](const FeatureRef& observation) { return observation.keyframe == keyframe.id; });
-    if (is_observed_here) continue;
+    if (track->IsObservedBy(keyframe.id)) continue;
     const auto found = matcher.Find(MakeLocalPoint(*track), search, {});
     if (!found) continue;
     const MapPointId there = keyframe.points[static_cast<size_t>(found->feature)];

@@ -17,6 +17,10 @@ size_t ObservationIndex(const PointTrack& track, KeyframeId keyframe) {
 
 }  // namespace
 
+bool PointTrack::IsObservedBy(KeyframeId keyframe) const {
+  return ObservationIndex(*this, keyframe) < observations.size();
+}
+
 MapKeyframe& SlamMap::AddKeyframe(std::shared_ptr<const FrameFeatures> frame,
                                   const SE3<World, Camera>& T_world_camera) {
   const KeyframeId id{++keyframe_count_};
@@ -40,7 +44,7 @@ PointTrack& SlamMap::AddPoint(const Eigen::Vector3d& position_world) {
 
 bool SlamMap::AddObservation(PointTrack& track, MapKeyframe& keyframe, int feature) {
   MapPointId& observed = keyframe.points[static_cast<size_t>(feature)];
-  if (observed || ObservationIndex(track, keyframe.id) < track.observations.size()) return false;
+  if (observed || track.IsObservedBy(keyframe.id)) return false;
   observed = track.point.id;
   const auto after = std::find_if(track.observations.begin(), track.observations.end(),
                                   [&](const FeatureRef& observation) { return observation.keyframe > keyframe.id; });

@@ -75,6 +75,8 @@ struct PointTrack {
   uint64_t latest_keyframe = 0;   // number of the newest keyframe that observes it
   std::shared_ptr<const ReferencePatch> patch = {};  // null until ObservationRefiner sets it
   MaskVotes votes = {};                              // from frames with masks that are not keyframes
+
+  bool IsObservedBy(KeyframeId keyframe) const;
 };
 
 // The keyframes and points of one session. Not thread-safe. Ids are never reused.

@@ -50,6 +50,7 @@ SparseMapper::CurrentMap::CurrentMap(const SlamConfig& config, uint64_t keyframe
       loops(config, &map, &places),
       up(keyframes_used),
       mask_voter(config),
+      refiner(config),
       next_global_adjustment(keyframes_used + kFirstGlobalAdjustment_keyframes) {}
 
 SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment)

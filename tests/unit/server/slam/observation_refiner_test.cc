@@ -49,7 +49,7 @@ class ObservationRefinerTest : public ::testing::Test {
   TexturedWorld world_;
   std::vector<std::shared_ptr<Frame>> frames_;
   SlamMap map_{config_};
-  ObservationRefiner refiner_;
+  ObservationRefiner refiner_{config_};
 };
 
 TEST_F(ObservationRefinerTest, ObservationsBecomeMorePrecise) {

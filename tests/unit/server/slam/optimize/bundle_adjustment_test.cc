@@ -372,5 +372,28 @@ TEST(BundleAdjustment, IgnoresPointsBehindTheCamera) {
   EXPECT_LT(RmsPoseErrorMu(world), 0.008);
 }
 
+TEST(BundleFitTest, MeasuresTheNoiseInSpiteOfOutliers) {
+  BundleWorldOptions options;
+  options.pixel_noise_px = 0.5;
+  BundleWorld world = MakeBundleWorld(options);
+  const double claimed_px = world.problem.observations[0].sigma_px;
+  EXPECT_NEAR(MeasureNoise(world.problem) * claimed_px, 0.5, 0.05);
+  for (size_t i = 0; i < world.problem.observations.size(); i += 10) world.problem.observations[i].pixel_px.x() += 50;
+  EXPECT_NEAR(MeasureNoise(world.problem) * claimed_px, 0.5, 0.1);
+}
+
+TEST(BundleFitTest, CountsOutliers) {
+  BundleWorld world = MakeBundleWorld({});
+  EXPECT_EQ(MeasureFit(world.problem).outliers, 0);
+  for (size_t i = 0; i < 5; ++i) world.problem.observations[i].pixel_px.x() += 50;
+  const BundleFit fit = MeasureFit(world.problem);
+  EXPECT_EQ(fit.outliers, 5);
+  EXPECT_EQ(fit.observations, static_cast<int>(world.problem.observations.size()));
+  EXPECT_LT(fit.rms_px, 1);
+  ClassifyOutliers(world.problem);
+  EXPECT_TRUE(world.problem.observations[0].outlier);
+  EXPECT_FALSE(world.problem.observations[5].outlier);
+}
+
 }  // namespace
 }  // namespace romap::slam
