@@ -83,8 +83,8 @@ struct LowerEnd {
   // Rise of the surface from this ray to one slightly above it, relative to that of an upright wall. Of a ball, it is
   // about 2.
   double steepness = 1;
-  double ball_drop =
-      0;  // height of a ball's tangent point above the ball's bottom, in terms of its distance from the axis
+  // Height of a ball's tangent point above the ball's bottom, in terms of its distance from the axis.
+  double ball_drop = 0;
 };
 
 class LowerEnds {
