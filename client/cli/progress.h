@@ -8,6 +8,9 @@ namespace romap::cli {
 // A progress bar on stderr. Redraws the line in place on a terminal; otherwise prints a line every few seconds.
 class Progress {
  public:
+  // Share of the frames in the fraction, where training follows.
+  static constexpr double kFrameFraction = 0.6;
+
   explicit Progress(std::string title);
   ~Progress();
   Progress(const Progress&) = delete;

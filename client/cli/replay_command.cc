@@ -29,9 +29,6 @@ struct ReplayOptions {
   ServiceOptions service;
 };
 
-// Fraction of the progress bar for the frames; the remainder is for training.
-constexpr double kFrameFraction = 0.6;
-
 // Sends all records and waits until the map is finished. Discards the events, because the map is exported afterwards.
 absl::Status SendRecords(const wire::Recording& recording, MappingService& service, const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto stream, service.OpenMap(session_id));
@@ -45,7 +42,7 @@ absl::Status SendRecords(const wire::Recording& recording, MappingService& servi
     }
     while (stream->Next(std::chrono::milliseconds(0))) {
     }
-    progress.Show(kFrameFraction * static_cast<double>(i) / static_cast<double>(recording.size()),
+    progress.Show(Progress::kFrameFraction * static_cast<double>(i) / static_cast<double>(recording.size()),
                   fmt::format("record {}/{}", i + 1, recording.size()));
   }
   if (Interrupted()) return absl::CancelledError("interrupted; no files were written");
@@ -53,7 +50,7 @@ absl::Status SendRecords(const wire::Recording& recording, MappingService& servi
   while (!stream->Done() && !Interrupted()) {
     const std::optional<MapEvent> event = stream->Next(std::chrono::milliseconds(50));
     if (const auto* statistics = event ? std::get_if<Statistics>(&*event) : nullptr) {
-      progress.Show(kFrameFraction + (1 - kFrameFraction) * statistics->training_progress,
+      progress.Show(Progress::kFrameFraction + (1 - Progress::kFrameFraction) * statistics->training_progress,
                     fmt::format("{} objects in training", statistics->objects_training));
     }
   }

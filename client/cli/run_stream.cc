@@ -22,8 +22,6 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
 constexpr std::chrono::seconds kMaxAckWait{5};
 constexpr double kTrainingAfterInterrupt_s = 3;
-// Fraction of the progress bar for the frames; the remainder is for training.
-constexpr double kFrameFraction = 0.6;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -204,15 +202,16 @@ class Run {
   void ShowFrames() {
     std::lock_guard lock(collector_mutex_);
     const double fraction = static_cast<double>(collector_.acknowledged()) / std::max<size_t>(1, TotalFrames());
-    progress_.Show(kFrameFraction * fraction, fmt::format("frame {}/{}, {} objects", collector_.acknowledged(),
-                                                          TotalFrames(), collector_.ConfirmedObjects()));
+    progress_.Show(Progress::kFrameFraction * fraction,
+                   fmt::format("frame {}/{}, {} objects", collector_.acknowledged(), TotalFrames(),
+                               collector_.ConfirmedObjects()));
   }
 
   void ShowTraining() {
     std::lock_guard lock(collector_mutex_);
     const Statistics statistics = collector_.statistics().value_or(Statistics{});
     progress_.Show(
-        kFrameFraction + (1 - kFrameFraction) * statistics.training_progress,
+        Progress::kFrameFraction + (1 - Progress::kFrameFraction) * statistics.training_progress,
         fmt::format("{} objects, {} in training", collector_.ConfirmedObjects(), statistics.objects_training));
   }
 

@@ -3,15 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "client/files/objects_yaml.h"
+#include "common/angles.h"
 #include "common/assignment.h"
 
 namespace romap::eval {
 namespace {
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 using Polygon = std::vector<Eigen::Vector2d>;
 

@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 
 namespace romap::eval {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr double kMaxWindowStretch = 1.5;
 constexpr double kMinLengthShare = 0.25;  // motions shorter than this share of the median length have no stable ratio
 constexpr size_t kMinMotions = 3;

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 
 namespace romap::eval {
 namespace {
 
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr size_t kMinPairs = 3;
 
 double Mean(const std::vector<double>& values) {
@@ -23,7 +22,7 @@ double RootMeanSquare(std::vector<double> values) {
   return std::sqrt(Mean(values));
 }
 
-std::vector<int64_t> TimestampsOf(const std::vector<files::StampedPose>& poses) {
+std::vector<int64_t> PoseTimestamps(const std::vector<files::StampedPose>& poses) {
   std::vector<int64_t> timestamps_ns;
   for (const files::StampedPose& pose : poses) timestamps_ns.push_back(pose.timestamp_ns);
   return timestamps_ns;
@@ -100,7 +99,7 @@ absl::StatusOr<TrajectoryReport> CompareTrajectories(const TrajectoryInput& inpu
   const std::vector<PoseError> errors = ErrorsOf(pairs, S_gt_est);
   AddAbsoluteErrors(errors, &report);
   report.motion = MeasureMotion(pairs, report.extent_m, report.scale);
-  const std::vector<int64_t> poses_ns = TimestampsOf(input.estimated);
+  const std::vector<int64_t> poses_ns = PoseTimestamps(input.estimated);
   report.coverage = input.frames_ns.empty() ? InferCoverage(poses_ns, input.ground_truth.front().timestamp_ns,
                                                             input.ground_truth.back().timestamp_ns)
                                             : CoverageOf(input.frames_ns, poses_ns);

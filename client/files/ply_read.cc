@@ -28,7 +28,7 @@ struct Element {
   std::vector<Property> properties;
 };
 
-struct Header {
+struct PlyHeader {
   Layout layout = Layout::kAscii;
   std::vector<Element> elements;
   size_t body_offset = 0;
@@ -110,9 +110,9 @@ bool ParseProperty(const std::vector<std::string>& words, std::vector<Element>* 
   return true;
 }
 
-absl::StatusOr<Header> ParseHeader(std::string_view bytes, const std::string& name) {
+absl::StatusOr<PlyHeader> ParseHeader(std::string_view bytes, const std::string& name) {
   if (!bytes.starts_with("ply")) return InvalidArgument("{}: not a PLY file (missing 'ply' signature)", name);
-  Header header;
+  PlyHeader header;
   bool has_layout = false;
   std::string_view rest = bytes;
   while (const auto words = NextLine(&rest)) {
@@ -272,7 +272,7 @@ Rgb8 ToColor(double red, double green, double blue) {
 }  // namespace
 
 absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& name) {
-  ROMAP_ASSIGN_OR_RETURN(const Header header, ParseHeader(bytes, name));
+  ROMAP_ASSIGN_OR_RETURN(const PlyHeader header, ParseHeader(bytes, name));
   Body body(bytes.substr(header.body_offset), header.layout);
   MeshFile file;
   for (const Element& element : header.elements) {

@@ -26,7 +26,7 @@ struct Column {
   bool as_bytes;  // uchar, otherwise float
 };
 
-std::string Header(const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars) {
+std::string WriteHeader(const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars) {
   std::string header = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
       "property float x\nproperty float y\nproperty float z\n",
@@ -63,7 +63,7 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
   if (!mesh.confidence.empty() && scalars.contains("confidence")) {
     return InvalidArgument("{}: 'confidence' is given both by the mesh and by the scalars", path);
   }
-  std::string bytes = Header(mesh, scalars);
+  std::string bytes = WriteHeader(mesh, scalars);
   bytes.reserve(bytes.size() + 36 * count + 13 * mesh.triangles.size());
   for (size_t k = 0; k < count; ++k) {
     Append(mesh.vertices[k], &bytes);

@@ -5,12 +5,10 @@
 #include <numbers>
 
 #include "client/synth/noise.h"
+#include "common/angles.h"
 
 namespace romap::synth {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
 
 // A camera pose relative to its target.
 struct Viewpoint {
@@ -34,10 +32,10 @@ SE3<World, Camera> PoseOf(const Viewpoint& view) {
 }
 
 Viewpoint OrbitView(const SynthOptions& options, double share, double start_rad, double distance_m) {
-  const double circle_rad = options.arc_deg > 0 ? options.arc_deg * kDegree : 2 * kPi;
+  const double circle_rad = options.arc_deg > 0 ? options.arc_deg * kRadPerDeg : 2 * std::numbers::pi;
   Viewpoint view;
   view.azimuth_rad = start_rad + circle_rad * options.rounds * share;
-  view.elevation_rad = options.elevation_deg * kDegree;
+  view.elevation_rad = options.elevation_deg * kRadPerDeg;
   view.distance_m = distance_m;
   return view;
 }
@@ -47,11 +45,11 @@ Viewpoint HandheldView(const SynthOptions& options, double share, double time_s,
                        double distance_m) {
   const auto seed = static_cast<uint32_t>(Scramble(options.seed));
   Viewpoint view;
-  view.azimuth_rad = start_rad + 0.5 * sweep_rad * (1 - std::cos(kPi * options.rounds * share)) +
+  view.azimuth_rad = start_rad + 0.5 * sweep_rad * (1 - std::cos(std::numbers::pi * options.rounds * share)) +
                      0.05 * SmoothNoise(time_s, 3, seed + 10) + 0.002 * SmoothNoise(time_s, 0.4, seed + 20);
   const double motion = options.hand_motion;
   const double elevation_deg = options.elevation_deg + 13 * motion * SmoothNoise(time_s, 4.5, seed + 30);
-  view.elevation_rad = std::clamp(elevation_deg, 5.0, 80.0) * kDegree + 0.002 * SmoothNoise(time_s, 0.4, seed + 40);
+  view.elevation_rad = std::clamp(elevation_deg, 5.0, 80.0) * kRadPerDeg + 0.002 * SmoothNoise(time_s, 0.4, seed + 40);
   view.distance_m = distance_m * std::max(0.97 + 0.14 * motion * SmoothNoise(time_s, 5, seed + 50), 0.5);
   view.roll_rad = 0.05 * motion * SmoothNoise(time_s, 2.5, seed + 60) + 0.002 * SmoothNoise(time_s, 0.3, seed + 70);
   view.target_m = 0.07 * motion * distance_m *
@@ -64,11 +62,11 @@ Viewpoint HandheldView(const SynthOptions& options, double share, double time_s,
 // walls on the far side, where everything is visible only briefly. The plain wall is at +y.
 Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s, double room_half_m,
                         double table_height_m) {
-  constexpr double kStart_rad = -10 * kDegree;  // the camera faces the plain wall after about a third of the path
-  constexpr double kSwing_rad = 150 * kDegree;
+  constexpr double kStart_rad = -10 * kRadPerDeg;  // the camera faces the plain wall after about a third of the path
+  constexpr double kSwing_rad = 150 * kRadPerDeg;
   const auto seed = static_cast<uint32_t>(Scramble(options.seed));
   const double motion = options.hand_motion;
-  const double turn_rad = 2 * 2 * kPi * options.rounds * share;
+  const double turn_rad = 2 * 2 * std::numbers::pi * options.rounds * share;
   const double away = 0.5 * (1 - std::cos(turn_rad));  // 0 at the start of a round, 1 halfway
   const auto toward = [](double azimuth_rad) { return Eigen::Vector2d(std::cos(azimuth_rad), std::sin(azimuth_rad)); };
   const Eigen::Vector2d sway_m =
@@ -82,7 +80,7 @@ Viewpoint TwoRoundsView(const SynthOptions& options, double share, double time_s
   view.distance_m = 0;
   view.target_m = {position_m.x(), position_m.y(),
                    table_height_m + 0.55 + 0.1 * motion * SmoothNoise(time_s, 4, seed + 50)};
-  view.azimuth_rad = heading_rad + kPi;
+  view.azimuth_rad = heading_rad + std::numbers::pi;
   view.elevation_rad = std::lerp(0.45, 0.1, away) + 0.06 * motion * SmoothNoise(time_s, 3.5, seed + 60) +
                        0.002 * SmoothNoise(time_s, 0.4, seed + 70);
   view.roll_rad = 0.05 * motion * SmoothNoise(time_s, 2.5, seed + 80) + 0.002 * SmoothNoise(time_s, 0.3, seed + 90);
@@ -109,9 +107,9 @@ CameraPath::CameraPath(const SynthOptions& options, const Scene& scene, const Ca
   target_m_ = {0, 0, scene.table_height_m + 0.35 * tallest_m};
 
   Random random(options.seed, 3);
-  start_rad_ = random.Uniform(-kPi, kPi);
-  const double random_sweep_rad = random.Uniform(120, 200) * kDegree;
-  sweep_rad_ = (options.arc_deg > 0 ? options.arc_deg * kDegree : random_sweep_rad) * (random.Chance(0.5) ? 1 : -1);
+  start_rad_ = random.Uniform(-std::numbers::pi, std::numbers::pi);
+  const double random_sweep_rad = random.Uniform(120, 200) * kRadPerDeg;
+  sweep_rad_ = (options.arc_deg > 0 ? options.arc_deg * kRadPerDeg : random_sweep_rad) * (random.Chance(0.5) ? 1 : -1);
 }
 
 SE3<World, Camera> CameraPath::PoseOnPath(double time) const {
@@ -134,7 +132,7 @@ SE3<World, Camera> CameraPath::Pose(int frame, double offset_frames) const {
   const SE3<World, Camera> pose = PoseOnPath(std::max(time - rotating_frames_, 0.0));
   Eigen::Quaterniond rotation = pose.rotation() * bursts_.Rotation(time) * shake_.Rotation(time);
   if (options_.jump.frame > 0 && frame + 1 >= options_.jump.frame) {
-    rotation = Eigen::AngleAxisd(options_.jump.turn_deg * kDegree, Eigen::Vector3d::UnitZ()) * rotation;
+    rotation = Eigen::AngleAxisd(options_.jump.turn_deg * kRadPerDeg, Eigen::Vector3d::UnitZ()) * rotation;
   }
   return {rotation, pose.translation() + bursts_.Sway_m(time) + shake_.Displacement_m(time)};
 }

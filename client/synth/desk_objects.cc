@@ -9,16 +9,12 @@
 namespace romap::synth {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
-
 // Adds a closed book lying flat with its bottom at `bottom_m`: two covers, a spine, and pages that are inset on three
 // sides.
 void AddBook(Solid& solid, Random& random, float half_x_m, float half_y_m, float thickness_m, float bottom_m,
              float turn_rad) {
   constexpr float kCover_m = 0.0025F;
-  Material cover = RandomMaterial(Pattern::kPrint, In(random, 0.03, 0.045), random);
+  Material cover = RandomMaterial(Pattern::kPrint, random.UniformFloat(0.03, 0.045), random);
   cover.colors[0] = FromHsv(random.Uniform(), random.Uniform(0.2, 0.75), random.Uniform(0.35, 0.8));
   cover.colors[1] = FromHsv(random.Uniform(), 0.2, random.Chance(0.5) ? 0.95 : 0.12);
   Material pages;
@@ -48,33 +44,33 @@ Solid MakeBook(Random& random) {
   Solid solid{"book", {}};
   const int books = 1 + random.Below(3);
   float bottom_m = 0;
-  float half_x_m = In(random, 0.065, 0.085);
+  float half_x_m = random.UniformFloat(0.065, 0.085);
   for (int i = 0; i < books; ++i) {
-    const float thickness_m = In(random, 0.018, 0.036);
-    AddBook(solid, random, half_x_m, half_x_m * In(random, 1.3, 1.5), thickness_m, bottom_m,
-            i == 0 ? 0.0F : In(random, -0.25, 0.25));
+    const float thickness_m = random.UniformFloat(0.018, 0.036);
+    AddBook(solid, random, half_x_m, half_x_m * random.UniformFloat(1.3, 1.5), thickness_m, bottom_m,
+            i == 0 ? 0.0F : random.UniformFloat(-0.25, 0.25));
     bottom_m += thickness_m;
-    half_x_m *= In(random, 0.82, 0.97);
+    half_x_m *= random.UniformFloat(0.82, 0.97);
   }
   return solid;
 }
 
 Solid MakeBox(Random& random) {
-  const Point half(In(random, 0.03, 0.06), In(random, 0.045, 0.075), In(random, 0.04, 0.1));
-  Material print = RandomMaterial(Pattern::kPrint, In(random, 0.028, 0.04), random);
+  const Point half(random.UniformFloat(0.03, 0.06), random.UniformFloat(0.045, 0.075), random.UniformFloat(0.04, 0.1));
+  Material print = RandomMaterial(Pattern::kPrint, random.UniformFloat(0.028, 0.04), random);
   return {"box", {{RoundedBox(Point(0, 0, half.z()), half, 0.003F), print}}};
 }
 
 Solid MakeLaptop(Random& random) {
-  const Point half(In(random, 0.1, 0.125), In(random, 0.075, 0.088), 0.007F);
-  const float tilt_rad = In(random, 0.15, 0.45);
+  const Point half(random.UniformFloat(0.1, 0.125), random.UniformFloat(0.075, 0.088), 0.007F);
+  const float tilt_rad = random.UniformFloat(0.15, 0.45);
   Material shell = RandomMaterial(Pattern::kPlain, 0.02F, random);
   shell.colors[0] = FromHsv(random.Uniform(), 0.06, random.Uniform(0.45, 0.75));
   Material keys = RandomMaterial(Pattern::kTiles, 0.014F, random);
   keys.colors = {FromHsv(0.6, 0.05, 0.2), FromHsv(0.6, 0.05, 0.28), FromHsv(0.6, 0.03, 0.55)};
   const Material screen = RandomMaterial(Pattern::kPrint, 0.035F, random);
   // The lid rises from the back edge and leans backward (+y).
-  const Eigen::Quaternionf lean = Turn(0.5F * kPi - tilt_rad, Point::UnitX());
+  const Eigen::Quaternionf lean = Turn(0.5F * std::numbers::pi_v<float> - tilt_rad, Point::UnitX());
   const Point hinge(0, half.y() - 0.004F, 2 * half.z());
   return {
       "laptop",
@@ -88,9 +84,9 @@ Solid MakeLaptop(Random& random) {
 }
 
 Solid MakeLamp(Random& random) {
-  const float height_m = In(random, 0.22, 0.29);
-  const float reach_m = In(random, 0.05, 0.08);
-  const float shade_m = In(random, 0.045, 0.058);
+  const float height_m = random.UniformFloat(0.22, 0.29);
+  const float reach_m = random.UniformFloat(0.05, 0.08);
+  const float shade_m = random.UniformFloat(0.045, 0.058);
   const Profile base =
       Smooth(Profile{{0.055F, 0}, {0.056F, 0.006F}, {0.045F, 0.013F}, {0.012F, 0.018F}, {0.006F, 0.026F}});
   // A cone that is open at the bottom, with an inner and an outer side.
@@ -120,24 +116,25 @@ Solid MakeLamp(Random& random) {
 }
 
 Solid MakeClock(Random& random) {
-  const float radius_m = In(random, 0.045, 0.062);
-  const float half_depth_m = In(random, 0.014, 0.02);
+  const float radius_m = random.UniformFloat(0.045, 0.062);
+  const float half_depth_m = random.UniformFloat(0.014, 0.02);
   const Profile drum = {{0.9F * radius_m, -half_depth_m}, {radius_m, -0.8F * half_depth_m},
                         {radius_m, 0.85F * half_depth_m}, {0.97F * radius_m, half_depth_m},
                         {0.9F * radius_m, half_depth_m},  {0.88F * radius_m, 0.7F * half_depth_m}};
-  const Eigen::Quaternionf upright = Turn(0.5F * kPi, Point::UnitX());
+  const Eigen::Quaternionf upright = Turn(0.5F * std::numbers::pi_v<float>, Point::UnitX());
   const Point center(0, 0, radius_m + 0.012F);
   const float face_m = -0.7F * half_depth_m;  // the face points to -y after the rotation
   Solid solid{"clock", {{Moved(Revolve(drum), upright, center), RandomMaterial(Pattern::kSpeckle, 0.02F, random)}}};
   const Material marks = RandomMaterial(Pattern::kPlain, 0.01F, random);
   for (int hour = 0; hour < 12; ++hour) {
-    const float angle = 2 * kPi * static_cast<float>(hour) / 12;
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(hour) / 12;
     const Point p(0.72F * radius_m * std::sin(angle), face_m, 0.72F * radius_m * std::cos(angle));
     solid.parts.push_back({Moved(RoundedBox(Point::Zero(), Point(0.0022F, 0.0015F, 0.006F), 0.0008F),
                                  Turn(angle, Point::UnitY()), center + p),
                            marks});
   }
-  for (const auto& [angle, length] : {std::pair{In(random, 0, 6.28), 0.3F}, std::pair{In(random, 0, 6.28), 0.55F}}) {
+  for (const auto& [angle, length] :
+       {std::pair{random.UniformFloat(0, 6.28), 0.3F}, std::pair{random.UniformFloat(0, 6.28), 0.55F}}) {
     const Point along(std::sin(angle), 0, std::cos(angle));
     solid.parts.push_back(
         {Moved(RoundedBox(Point::Zero(), Point(0.0018F, 0.0018F, 0.5F * length * radius_m), 0.0008F),
@@ -153,25 +150,26 @@ Solid MakeClock(Random& random) {
 }
 
 Solid MakePenHolder(Random& random) {
-  const float radius_m = In(random, 0.034, 0.042);
-  const float height_m = In(random, 0.085, 0.105);
+  const float radius_m = random.UniformFloat(0.034, 0.042);
+  const float height_m = random.UniformFloat(0.085, 0.105);
   const Profile holder = {
       {radius_m, 0}, {radius_m, height_m}, {radius_m - 0.003F, height_m}, {radius_m - 0.003F, 0.004F}};
   Solid solid{"pen holder",
               {{Revolve(holder), RandomMaterial(random.Chance(0.5) ? Pattern::kChecks : Pattern::kWood,
-                                                In(random, 0.008, 0.014), random)}}};
+                                                random.UniformFloat(0.008, 0.014), random)}}};
   const int pens = 3 + random.Below(3);
   for (int i = 0; i < pens; ++i) {
-    const float angle = 2 * kPi * (static_cast<float>(i) + In(random, 0, 0.5)) / static_cast<float>(pens);
+    const float angle = 2 * std::numbers::pi_v<float> * (static_cast<float>(i) + random.UniformFloat(0, 0.5)) /
+                        static_cast<float>(pens);
     const Point across(std::cos(angle), std::sin(angle), 0);
-    const float length_m = In(random, 0.14, 0.18);
+    const float length_m = random.UniformFloat(0.14, 0.18);
     const Point foot = -0.45F * radius_m * across + Point(0, 0, 0.005F);
     const Point tip = 0.8F * radius_m * across + Point(0, 0, 0.005F + length_m);
     const Point along = tip - foot;
     const std::vector<Point> path = {foot, foot + 0.9F * along, foot + 0.92F * along, tip};
     const std::vector<float> radius = {0.004F, 0.004F, 0.0036F, 0.0012F};
     solid.parts.push_back(
-        {Sweep(path, radius, radius), RandomMaterial(Pattern::kStripes, In(random, 0.01, 0.03), random)});
+        {Sweep(path, radius, radius), RandomMaterial(Pattern::kStripes, random.UniformFloat(0.01, 0.03), random)});
   }
   return solid;
 }

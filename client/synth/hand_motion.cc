@@ -6,12 +6,11 @@
 
 #include "client/synth/noise.h"
 #include "client/synth/random.h"
+#include "common/angles.h"
 
 namespace romap::synth {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180;
 constexpr double kCycles = 2;  // oscillations per burst
 constexpr double kShakePeriod = 12;
 
@@ -54,9 +53,9 @@ RotationBursts::RotationBursts(const RotationOptions& options, int frames, uint6
     burst.start = start;
     burst.axis = kRollPitchYaw[axis++ % 3];
     // The angle a sin(2 pi n u) sin(pi u) at u = 0..1 has its steepest slope 2 pi n a at u = 1/2.
-    const double slope = 2 * kPi * kCycles;
-    const double speed_rad = options.speed_deg * kDegree * random.Uniform(0.7, 1);
-    const double amplitude_rad = options.range_deg * kDegree * random.Uniform(0.7, 1);
+    const double slope = 2 * std::numbers::pi * kCycles;
+    const double speed_rad = options.speed_deg * kRadPerDeg * random.Uniform(0.7, 1);
+    const double amplitude_rad = options.range_deg * kRadPerDeg * random.Uniform(0.7, 1);
     burst.duration = std::min(slope * amplitude_rad / speed_rad, frames_ - start);
     burst.amplitude_rad = speed_rad * burst.duration / slope * (random.Chance(0.5) ? 1 : -1);
     bursts_.push_back(burst);
@@ -68,11 +67,11 @@ Eigen::Quaterniond RotationBursts::Rotation(double time) const {
   for (const Burst& burst : bursts_) {
     const double share = (time - burst.start) / burst.duration;
     if (share < 0 || share >= 1) continue;
-    const double window = std::sin(kPi * share);
+    const double window = std::sin(std::numbers::pi * share);
     Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
-    rotation[burst.axis] = burst.amplitude_rad * window * std::sin(2 * kPi * kCycles * share);
+    rotation[burst.axis] = burst.amplitude_rad * window * std::sin(2 * std::numbers::pi * kCycles * share);
     // A hand does not rotate about one axis exactly.
-    rotation[(burst.axis + 1) % 3] = 0.15 * burst.amplitude_rad * window * std::sin(3 * kPi * share);
+    rotation[(burst.axis + 1) % 3] = 0.15 * burst.amplitude_rad * window * std::sin(3 * std::numbers::pi * share);
     return FromRotationVector(rotation);
   }
   return Eigen::Quaterniond::Identity();
@@ -85,7 +84,7 @@ Eigen::Vector3d RotationBursts::Sway_m(double time) const {
 }
 
 Shake::Shake(const SynthOptions& options) : seed_(static_cast<uint32_t>(Scramble(options.seed + 18))) {
-  if (options.shake_deg > 0) angle_rad_ = FactorForPeakStep(options.shake_deg * kDegree, options.frames, seed_);
+  if (options.shake_deg > 0) angle_rad_ = FactorForPeakStep(options.shake_deg * kRadPerDeg, options.frames, seed_);
   if (options.shake_mm > 0) distance_m_ = FactorForPeakStep(1e-3 * options.shake_mm, options.frames, seed_ + 1);
 }
 

@@ -13,7 +13,6 @@
 namespace romap::synth {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kGripperDepth_m = 0.15;
 constexpr double kOccluderDepth_m = 0.3;
 constexpr double kCrossing_s = 4;
@@ -68,12 +67,12 @@ Overlays::Overlays(const SynthOptions& options, const CameraModel& camera) {
     gripper_bgr_ = PaintSheet(size, size.width, gripper);
   }
   if (options.occluder_share <= 0) return;
-  occluder_radius_px_ = std::sqrt(options.occluder_share * size.area() / kPi);
+  occluder_radius_px_ = std::sqrt(options.occluder_share * size.area() / std::numbers::pi);
   half_length_px_ = 0.5 * std::hypot(size.width, size.height) + 1.4 * occluder_radius_px_;
   frames_per_crossing_ = kCrossing_s * options.fps;
   const auto outline_seed = static_cast<uint32_t>(random.Bits());
   for (int i = 0; i < 360; ++i) {
-    const auto angle = static_cast<float>(2 * kPi * i / 360);
+    const auto angle = static_cast<float>(2 * std::numbers::pi * i / 360);
     outline_.push_back(1 +
                        0.25 * FractalNoise({std::cos(angle), std::sin(angle), 0.3F}, 1, 3, 0.5F, 1e-6F, outline_seed));
   }
@@ -81,7 +80,7 @@ Overlays::Overlays(const SynthOptions& options, const CameraModel& camera) {
   occluder_bgr_ = PaintSheet({side_px, side_px}, size.width, occluder);
   const int crossings = static_cast<int>(options.frames / frames_per_crossing_) + 1;
   for (int i = 0; i < crossings; ++i) {
-    const double angle = random.Uniform(0, 2 * kPi);
+    const double angle = random.Uniform(0, 2 * std::numbers::pi);
     const cv::Point2d direction(std::cos(angle), std::sin(angle));
     const double beside_px = random.Uniform(-0.2, 0.2) * size.height;
     const cv::Point2d center_px(0.5 * size.width, 0.5 * size.height);
@@ -100,7 +99,7 @@ void Overlays::DrawOccluder(int frame, TrueFrame& image) const {
   for (int v = visible.y; v < visible.br().y; ++v) {
     for (int u = visible.x; u < visible.br().x; ++u) {
       const double angle = std::atan2(v - center_px.y, u - center_px.x);
-      const auto bin = static_cast<size_t>((angle / (2 * kPi) + 1) * 360) % 360;
+      const auto bin = static_cast<size_t>((angle / (2 * std::numbers::pi) + 1) * 360) % 360;
       if (std::hypot(u - center_px.x, v - center_px.y) > occluder_radius_px_ * outline_[bin]) continue;
       image.color_bgr.at<cv::Vec3b>(v, u) = occluder_bgr_.at<cv::Vec3b>(v - corner.y, u - corner.x);
       image.labels.at<uint8_t>(v, u) = 0;

@@ -9,10 +9,6 @@
 namespace romap::synth {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
-
 Material Greenery(Random& random, float scale_m) {
   Material leaf = RandomMaterial(Pattern::kLeaf, scale_m, random);
   const double hue = random.Uniform(0.24, 0.38);
@@ -29,24 +25,24 @@ Mesh LeafBlade(const Point& foot, float heading_rad, float length_m, float width
   std::vector<float> width(path.size()), thickness(path.size());
   for (size_t i = 0; i < path.size(); ++i) {
     const float t = static_cast<float>(i) / static_cast<float>(path.size() - 1);
-    width[i] = 0.0012F + width_m * std::sin(kPi * std::pow(t, 0.8F)) * (1 - 0.3F * t);
+    width[i] = 0.0012F + width_m * std::sin(std::numbers::pi_v<float> * std::pow(t, 0.8F)) * (1 - 0.3F * t);
     thickness[i] = 0.0012F;
   }
   return Sweep(path, width, thickness);
 }
 
 void AddFlower(Solid& solid, Random& random, const Point& root, const Material& green) {
-  const float lean = In(random, 0, 2 * kPi);
-  const float reach_m = In(random, 0.01, 0.035);
-  const float height_m = In(random, 0.1, 0.14);
+  const float lean = random.UniformFloat(0, 2 * std::numbers::pi_v<float>);
+  const float reach_m = random.UniformFloat(0.01, 0.035);
+  const float height_m = random.UniformFloat(0.1, 0.14);
   const Point head = root + Point(reach_m * std::cos(lean), reach_m * std::sin(lean), height_m);
   const Point middle = root + Point(0.2F * reach_m * std::cos(lean), 0.2F * reach_m * std::sin(lean), 0.5F * height_m);
   solid.parts.push_back({Tube(Smooth(std::vector<Point>{root - Point(0, 0, 0.05F), middle, head}), 0.0022F), green});
   Material petal = RandomMaterial(Pattern::kSpeckle, 0.012F, random);
   const int petals = 5 + random.Below(3);
-  const float radius_m = In(random, 0.014, 0.02);
+  const float radius_m = random.UniformFloat(0.014, 0.02);
   for (int i = 0; i < petals; ++i) {
-    const float angle = 2 * kPi * static_cast<float>(i) / static_cast<float>(petals);
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(petals);
     const Eigen::Quaternionf turn = Turn(angle, Point::UnitZ()) * Turn(-0.35F, Point::UnitY());
     const Mesh blade = Ellipsoid(Point(radius_m, 0, 0), Point(radius_m, 0.55F * radius_m, 0.0025F));
     solid.parts.push_back({Moved(blade, turn, head), petal});
@@ -60,8 +56,8 @@ void AddFlower(Solid& solid, Random& random, const Point& root, const Material& 
 }  // namespace
 
 Solid MakeVase(Random& random) {
-  const float radius_m = In(random, 0.034, 0.044);
-  const float height_m = In(random, 0.12, 0.16);
+  const float radius_m = random.UniformFloat(0.034, 0.044);
+  const float height_m = random.UniformFloat(0.12, 0.16);
   const float wall_m = 0.0035F;
   const Profile outside = Smooth(Profile{{0.6F * radius_m, 0},
                                          {0.66F * radius_m, 0.004F},
@@ -74,12 +70,13 @@ Solid MakeVase(Random& random) {
     if (outside[i].y() > 0.4F * height_m) profile.emplace_back(outside[i].x() - wall_m, outside[i].y());
   }
   constexpr Pattern kPatterns[] = {Pattern::kMarble, Pattern::kStripes, Pattern::kSpeckle, Pattern::kChecks};
-  Solid solid{"vase",
-              {{Revolve(profile), RandomMaterial(kPatterns[random.Below(4)], In(random, 0.012, 0.02), random)}}};
+  Solid solid{
+      "vase",
+      {{Revolve(profile), RandomMaterial(kPatterns[random.Below(4)], random.UniformFloat(0.012, 0.02), random)}}};
   const Material green = Greenery(random, 0.01F);
   const int flowers = 2 + random.Below(2);
   for (int i = 0; i < flowers; ++i) {
-    const float angle = 2 * kPi * static_cast<float>(i) / static_cast<float>(flowers);
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(flowers);
     const Point root(0.2F * radius_m * std::cos(angle), 0.2F * radius_m * std::sin(angle), 0.95F * height_m);
     AddFlower(solid, random, root, green);
   }
@@ -87,8 +84,8 @@ Solid MakeVase(Random& random) {
 }
 
 Solid MakePottedPlant(Random& random) {
-  const float radius_m = In(random, 0.042, 0.055);
-  const float height_m = radius_m * In(random, 1.4, 1.8);
+  const float radius_m = random.UniformFloat(0.042, 0.055);
+  const float height_m = radius_m * random.UniformFloat(1.4, 1.8);
   const Profile pot = {{0.68F * radius_m, 0},
                        {0.7F * radius_m, 0.002F},
                        {0.94F * radius_m, 0.78F * height_m},
@@ -107,18 +104,19 @@ Solid MakePottedPlant(Random& random) {
   const Material green = Greenery(random, 0.012F);
   const int leaves = 9 + random.Below(5);
   for (int i = 0; i < leaves; ++i) {
-    const float heading = 2.4F * static_cast<float>(i) + In(random, -0.2, 0.2);  // the golden angle, as in plants
+    const float heading =
+        2.4F * static_cast<float>(i) + random.UniformFloat(-0.2, 0.2);  // the golden angle, as in plants
     const float t = static_cast<float>(i) / static_cast<float>(leaves);
     const Point foot(0.2F * radius_m * std::cos(heading), 0.2F * radius_m * std::sin(heading), 0.87F * height_m);
-    solid.parts.push_back(
-        {LeafBlade(foot, heading, In(random, 0.07, 0.095) * (1 - 0.35F * t), In(random, 0.012, 0.017), 1.1F + 1.5F * t),
-         green});
+    solid.parts.push_back({LeafBlade(foot, heading, random.UniformFloat(0.07, 0.095) * (1 - 0.35F * t),
+                                     random.UniformFloat(0.012, 0.017), 1.1F + 1.5F * t),
+                           green});
   }
   return solid;
 }
 
 Solid MakeApple(Random& random) {
-  const float radius_m = In(random, 0.034, 0.042);
+  const float radius_m = random.UniformFloat(0.034, 0.042);
   const Profile body = Smooth(Profile{{0.05F * radius_m, 0.14F * radius_m},
                                       {0.3F * radius_m, 0.01F * radius_m},
                                       {0.72F * radius_m, 0.35F * radius_m},

@@ -24,6 +24,7 @@ class Random {
   // [0, 1)
   double Uniform() { return static_cast<double>(Bits() >> 11) * 0x1.0p-53; }
   double Uniform(double low, double high) { return low + (high - low) * Uniform(); }
+  float UniformFloat(double low, double high) { return static_cast<float>(Uniform(low, high)); }
   // 0 .. count - 1
   int Below(int count) { return static_cast<int>(Bits() % static_cast<uint64_t>(count)); }
   bool Chance(double probability) { return Uniform() < probability; }

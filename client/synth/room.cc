@@ -10,10 +10,7 @@
 namespace romap::synth {
 namespace {
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kRoomHeight_m = 2.6F;
-
-float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
 
 // A rectangle from `corner` along `u` and `v` with front side u x v, in squares of about `cell_m`.
 Mesh Sheet(const Point& corner, const Point& u, const Point& v, float cell_m) {
@@ -80,25 +77,25 @@ AddWallPart WallInOwnFrame(Scene& scene, float turn_rad) {
 void AddWall(const AddWallPart& add, Random& random, float half_m) {
   constexpr Pattern kPatterns[] = {Pattern::kSpeckle, Pattern::kTiles, Pattern::kMarble, Pattern::kStripes};
   add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F),
-      Backdrop(kPatterns[random.Below(4)], In(random, 0.12, 0.3), random));
+      Backdrop(kPatterns[random.Below(4)], random.UniformFloat(0.12, 0.3), random));
   // Posters above, chests and bookshelves below.
   float y_m = -half_m + 0.2F;
   while (y_m < half_m - 0.7F) {
-    const float half_width_m = In(random, 0.18, 0.34);
-    const float half_height_m = In(random, 0.2, 0.38);
-    add(RoundedBox(Point(half_m - 0.005F, y_m + half_width_m, In(random, 1.25, 1.8)),
+    const float half_width_m = random.UniformFloat(0.18, 0.34);
+    const float half_height_m = random.UniformFloat(0.2, 0.38);
+    add(RoundedBox(Point(half_m - 0.005F, y_m + half_width_m, random.UniformFloat(1.25, 1.8)),
                    Point(0.008F, half_width_m, half_height_m), 0.002F, 0.1F),
-        Backdrop(Pattern::kPrint, In(random, 0.06, 0.14), random));
-    y_m += 2 * half_width_m + In(random, 0.05, 0.25);
+        Backdrop(Pattern::kPrint, random.UniformFloat(0.06, 0.14), random));
+    y_m += 2 * half_width_m + random.UniformFloat(0.05, 0.25);
   }
   y_m = -half_m + 0.5F;
   while (y_m < half_m - 0.9F) {
-    const Point half(In(random, 0.12, 0.2), In(random, 0.2, 0.4), In(random, 0.2, 0.5));
+    const Point half(random.UniformFloat(0.12, 0.2), random.UniformFloat(0.2, 0.4), random.UniformFloat(0.2, 0.5));
     constexpr Pattern kFronts[] = {Pattern::kTiles, Pattern::kPrint, Pattern::kChecks, Pattern::kFabric};
     add(RoundedBox(Point(half_m - half.x(), y_m + half.y(), half.z()), half, 0.01F, 0.08F),
         random.Chance(0.4) ? WoodMaterial(random, 0.03F)
-                           : Backdrop(kFronts[random.Below(4)], In(random, 0.06, 0.12), random));
-    y_m += 2 * half.y() + In(random, 0.02, 0.5);
+                           : Backdrop(kFronts[random.Below(4)], random.UniformFloat(0.06, 0.12), random));
+    y_m += 2 * half.y() + random.UniformFloat(0.02, 0.5);
   }
 }
 
@@ -107,9 +104,9 @@ void AddPlainWall(const AddWallPart& add, Random& random, float half_m) {
   Material paint = Backdrop(Pattern::kPlain, 0.1F, random);
   paint.grain = 0.03F;
   add(Sheet(Point(half_m, half_m, 0), Point(0, -2 * half_m, 0), Point(0, 0, kRoomHeight_m), 0.1F), paint);
-  for (float y_m = -half_m + 0.3F; y_m < half_m - 0.3F; y_m += In(random, 0.5, 0.8)) {
-    const Point half(0.004F, In(random, 0.03, 0.06), In(random, 0.04, 0.08));
-    add(RoundedBox(Point(half_m - 0.004F, y_m, In(random, 0.9, 1.6)), half, 0.001F, 0.05F),
+  for (float y_m = -half_m + 0.3F; y_m < half_m - 0.3F; y_m += random.UniformFloat(0.5, 0.8)) {
+    const Point half(0.004F, random.UniformFloat(0.03, 0.06), random.UniformFloat(0.04, 0.08));
+    add(RoundedBox(Point(half_m - 0.004F, y_m, random.UniformFloat(0.9, 1.6)), half, 0.001F, 0.05F),
         Backdrop(Pattern::kPrint, 0.03F, random));
   }
 }
@@ -119,7 +116,7 @@ void AddWalls(Scene& scene, const SceneOptions& options, Random& random) {
   const bool identical = options.surroundings.walls == Walls::kIdentical;
   const Random at_first_wall = random;
   for (int side = 0; side < 4; ++side) {
-    const float turn_rad = 0.5F * kPi * static_cast<float>(side);
+    const float turn_rad = 0.5F * std::numbers::pi_v<float> * static_cast<float>(side);
     if (identical) random = at_first_wall;
     const AddWallPart add = identical ? WallInOwnFrame(scene, turn_rad) : WallInRoomFrame(scene, turn_rad);
     const bool plain = options.plain_wall && !identical && side == 1;
@@ -129,7 +126,7 @@ void AddWalls(Scene& scene, const SceneOptions& options, Random& random) {
 
 Material TableMaterial(const TableTexture& texture, const Eigen::Vector2f& half_m, Random& random) {
   constexpr Pattern kCloths[] = {Pattern::kFabric, Pattern::kMarble, Pattern::kTiles, Pattern::kSpeckle};
-  const auto cloth = [&] { return Backdrop(kCloths[random.Below(4)], In(random, 0.05, 0.1), random); };
+  const auto cloth = [&] { return Backdrop(kCloths[random.Below(4)], random.UniformFloat(0.05, 0.1), random); };
   Material top;
   switch (texture.kind) {
     case TableTexture::Kind::kDistinct:
@@ -152,8 +149,8 @@ Material TableMaterial(const TableTexture& texture, const Eigen::Vector2f& half_
 
 void AddTable(Scene& scene, const TableTexture& texture, Random& random) {
   const auto height_m = static_cast<float>(scene.table_height_m);
-  const auto half_x = static_cast<float>(scene.layout_radius_m) + In(random, 0.15, 0.3);
-  const auto half_y = static_cast<float>(scene.layout_radius_m) + In(random, 0.08, 0.18);
+  const auto half_x = static_cast<float>(scene.layout_radius_m) + random.UniformFloat(0.15, 0.3);
+  const auto half_y = static_cast<float>(scene.layout_radius_m) + random.UniformFloat(0.08, 0.18);
   const Material top = TableMaterial(texture, {half_x, half_y}, random);
   const Material frame = WoodMaterial(random, 0.02F);
   // Fine cells resolve the shadows around the objects.
@@ -176,8 +173,8 @@ void AddTable(Scene& scene, const TableTexture& texture, Random& random) {
 // Floor, ceiling, walls and table.
 void AddSurfaces(Scene& scene, const SceneOptions& options, Random& random) {
   const auto half_m = static_cast<float>(scene.room_half_m);
-  const Material floor = random.Chance(0.5) ? Backdrop(Pattern::kTiles, In(random, 0.2, 0.35), random)
-                                            : Backdrop(Pattern::kFabric, In(random, 0.12, 0.25), random);
+  const Material floor = random.Chance(0.5) ? Backdrop(Pattern::kTiles, random.UniformFloat(0.2, 0.35), random)
+                                            : Backdrop(Pattern::kFabric, random.UniformFloat(0.12, 0.25), random);
   AddPart(scene, Sheet(Point(-half_m, -half_m, 0), Point(2 * half_m, 0, 0), Point(0, 2 * half_m, 0), 0.05F), floor);
   if (options.surroundings.walls != Walls::kNone) {
     Material ceiling;
@@ -201,12 +198,12 @@ void AddRoom(Scene& scene, const SceneOptions& options, Random& random) {
 
   // A warm panel above the table and cool daylight from one side. Both are rotated relative to the table: the samples
   // of a light parallel to an edge would align and produce steps in its shadow.
-  const float daylight_rad = In(random, 0, 2 * kPi);
+  const float daylight_rad = random.UniformFloat(0, 2 * std::numbers::pi_v<float>);
   const Point to_window(std::cos(daylight_rad), std::sin(daylight_rad), 0);
   const Point along_window(-to_window.y(), to_window.x(), 0);
   const Point lean = (Point::UnitZ() + 0.15F * along_window).normalized();
-  scene.lights = {{Point(In(random, -0.5, 0.5), In(random, -0.5, 0.5), kRoomHeight_m - 0.15F), Point(0.33F, 0.14F, 0),
-                   Point(-0.14F, 0.33F, 0), 2.0F * Rgb(1.0F, 0.92F, 0.8F)},
+  scene.lights = {{Point(random.UniformFloat(-0.5, 0.5), random.UniformFloat(-0.5, 0.5), kRoomHeight_m - 0.15F),
+                   Point(0.33F, 0.14F, 0), Point(-0.14F, 0.33F, 0), 2.0F * Rgb(1.0F, 0.92F, 0.8F)},
                   {0.85F * half_m * to_window + Point(0, 0, 1.75F), 0.5F * along_window, 0.4F * lean,
                    0.75F * half_m * half_m * Rgb(0.8F, 0.9F, 1.0F)}};
 }

@@ -8,8 +8,6 @@
 namespace romap::synth {
 namespace {
 
-float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
-
 // The profile of a hollow vessel: the outside up to the rim, then the inside, offset by the wall thickness, down to
 // `floor_m` above the table.
 Profile Hollow(const Profile& outside, float wall_m, float floor_m) {
@@ -39,9 +37,9 @@ Mesh Handle(const Point& top, const Point& bottom, float reach_m, float thicknes
 }  // namespace
 
 Solid MakeMug(Random& random) {
-  const float radius_m = In(random, 0.036, 0.046);
-  const float height_m = In(random, 0.08, 0.115);
-  const float waist = In(random, -0.1, 0.06);
+  const float radius_m = random.UniformFloat(0.036, 0.046);
+  const float height_m = random.UniformFloat(0.08, 0.115);
+  const float waist = random.UniformFloat(-0.1, 0.06);
   const float wall_m = 0.004F;
   const Profile outside = Smooth(Profile{{0.8F * radius_m, 0},
                                          {0.93F * radius_m, 0.004F},
@@ -49,22 +47,23 @@ Solid MakeMug(Random& random) {
                                          {radius_m * (1 + waist), 0.55F * height_m},
                                          {radius_m, height_m}});
   constexpr Pattern kPatterns[] = {Pattern::kSpeckle, Pattern::kStripes, Pattern::kDots, Pattern::kPrint};
-  Material glaze = RandomMaterial(kPatterns[random.Below(4)], In(random, 0.014, 0.022), random);
+  Material glaze = RandomMaterial(kPatterns[random.Below(4)], random.UniformFloat(0.014, 0.022), random);
   glaze.wrapping = Wrapping::kCylinder;
   Material handle_glaze = glaze;
   handle_glaze.pattern = Pattern::kSpeckle;
   const float start_m = radius_m * (1 + std::min(waist, 0.0F)) - 0.5F * wall_m;
   return {"cup",
           {{Revolve(Hollow(outside, wall_m, 0.006F)), glaze},
-           {Handle({start_m, 0, 0.82F * height_m}, {start_m, 0, 0.25F * height_m}, In(random, 0.03, 0.036), 0.0055F),
+           {Handle({start_m, 0, 0.82F * height_m}, {start_m, 0, 0.25F * height_m}, random.UniformFloat(0.03, 0.036),
+                   0.0055F),
             handle_glaze}}};
 }
 
 Solid MakeBottle(Random& random) {
-  const float radius_m = In(random, 0.03, 0.04);
-  const float height_m = In(random, 0.2, 0.28);
-  const float shoulder = In(random, 0.55, 0.68);
-  const float neck_m = In(random, 0.011, 0.014);
+  const float radius_m = random.UniformFloat(0.03, 0.04);
+  const float height_m = random.UniformFloat(0.2, 0.28);
+  const float shoulder = random.UniformFloat(0.55, 0.68);
+  const float neck_m = random.UniformFloat(0.011, 0.014);
   const Profile body = Smooth(Profile{{0.85F * radius_m, 0},
                                       {radius_m, 0.006F},
                                       {radius_m, 0.3F * height_m},
@@ -80,7 +79,7 @@ Solid MakeBottle(Random& random) {
                        {neck_m + 0.0025F, 0.92F * height_m},
                        {neck_m + 0.0025F, 0.995F * height_m},
                        {neck_m + 0.001F, height_m}};
-  Material paper = RandomMaterial(Pattern::kPrint, In(random, 0.024, 0.032), random);
+  Material paper = RandomMaterial(Pattern::kPrint, random.UniformFloat(0.024, 0.032), random);
   paper.wrapping = Wrapping::kCylinder;
   paper.colors[0] = FromHsv(random.Uniform(), 0.12, 0.92);
   return {"bottle",
@@ -90,21 +89,21 @@ Solid MakeBottle(Random& random) {
 }
 
 Solid MakeBowl(Random& random) {
-  const float radius_m = In(random, 0.065, 0.095);
-  const float height_m = radius_m * In(random, 0.55, 0.8);
+  const float radius_m = random.UniformFloat(0.065, 0.095);
+  const float height_m = radius_m * random.UniformFloat(0.55, 0.8);
   const Profile outside = Smooth(Profile{{0.42F * radius_m, 0},
                                          {0.44F * radius_m, 0.006F},
                                          {0.72F * radius_m, 0.3F * height_m},
                                          {0.92F * radius_m, 0.65F * height_m},
                                          {radius_m, height_m}});
   constexpr Pattern kPatterns[] = {Pattern::kMarble, Pattern::kDots, Pattern::kWood, Pattern::kStripes};
-  Material glaze = RandomMaterial(kPatterns[random.Below(4)], In(random, 0.014, 0.024), random);
+  Material glaze = RandomMaterial(kPatterns[random.Below(4)], random.UniformFloat(0.014, 0.024), random);
   return {"bowl", {{Revolve(Hollow(outside, 0.005F, 0.009F)), glaze}}};
 }
 
 Solid MakeTeapot(Random& random) {
-  const float radius_m = In(random, 0.055, 0.07);
-  const float height_m = radius_m * In(random, 1.35, 1.7);
+  const float radius_m = random.UniformFloat(0.055, 0.07);
+  const float height_m = radius_m * random.UniformFloat(1.35, 1.7);
   const Profile body = Smooth(Profile{{0.6F * radius_m, 0},
                                       {0.68F * radius_m, 0.006F},
                                       {0.97F * radius_m, 0.3F * height_m},
@@ -126,8 +125,8 @@ Solid MakeTeapot(Random& random) {
     const float share = static_cast<float>(i) / static_cast<float>(spout.size() - 1);
     spout_radius_m[i] = radius_m * (0.28F - 0.17F * std::sqrt(share));
   }
-  Material glaze =
-      RandomMaterial(random.Chance(0.5) ? Pattern::kSpeckle : Pattern::kMarble, In(random, 0.02, 0.035), random);
+  Material glaze = RandomMaterial(random.Chance(0.5) ? Pattern::kSpeckle : Pattern::kMarble,
+                                  random.UniformFloat(0.02, 0.035), random);
   return {"teapot",
           {{Revolve(body), glaze},
            {Revolve(lid), glaze},
@@ -138,8 +137,8 @@ Solid MakeTeapot(Random& random) {
 }
 
 Solid MakeWineGlass(Random& random) {
-  const float radius_m = In(random, 0.033, 0.042);
-  const float height_m = In(random, 0.15, 0.19);
+  const float radius_m = random.UniformFloat(0.033, 0.042);
+  const float height_m = random.UniformFloat(0.15, 0.19);
   const float bowl_m = 0.52F * height_m;  // height at which the stem meets the bowl
   Profile outside = {{0.95F * radius_m, 0}, {0.95F * radius_m, 0.002F}, {0.5F * radius_m, 0.005F}};
   const Profile stem_and_bowl = Smooth(Profile{{0.0052F, 0.014F},
@@ -150,7 +149,7 @@ Solid MakeWineGlass(Random& random) {
                                                {0.82F * radius_m, height_m}});
   outside.insert(outside.end(), stem_and_bowl.begin(), stem_and_bowl.end());
   constexpr Pattern kPatterns[] = {Pattern::kStripes, Pattern::kSpeckle, Pattern::kDots};
-  Material glass = RandomMaterial(kPatterns[random.Below(3)], In(random, 0.01, 0.016), random);
+  Material glass = RandomMaterial(kPatterns[random.Below(3)], random.UniformFloat(0.01, 0.016), random);
   return {"wine glass", {{Revolve(Hollow(outside, 0.0025F, bowl_m + 0.01F)), glass}}};
 }
 

@@ -7,21 +7,15 @@
 #include "client/synth/solids.h"
 
 namespace romap::synth {
-namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
-
-float In(Random& random, double low, double high) { return static_cast<float>(random.Uniform(low, high)); }
-
-}  // namespace
+namespace {}  // namespace
 
 Solid MakeChair(Random& random) {
-  const float half_m = In(random, 0.045, 0.055);
-  const float seat_m = In(random, 0.09, 0.11);
-  const float back_m = seat_m + In(random, 0.1, 0.13);
-  const float leg_m = In(random, 0.005, 0.0065);
+  const float half_m = random.UniformFloat(0.045, 0.055);
+  const float seat_m = random.UniformFloat(0.09, 0.11);
+  const float back_m = seat_m + random.UniformFloat(0.1, 0.13);
+  const float leg_m = random.UniformFloat(0.005, 0.0065);
   const Material wood = RandomMaterial(Pattern::kWood, 0.009F, random);
-  const Material cushion = RandomMaterial(Pattern::kChecks, In(random, 0.01, 0.014), random);
+  const Material cushion = RandomMaterial(Pattern::kChecks, random.UniformFloat(0.01, 0.014), random);
   Solid solid{"chair", {}};
   const auto add = [&](const Point& low, const Point& high, const Material& material, float edge_m) {
     solid.parts.push_back({RoundedBox(0.5F * (low + high), 0.5F * (high - low), edge_m), material});
@@ -43,7 +37,7 @@ Solid MakeChair(Random& random) {
 }
 
 Solid MakeBear(Random& random) {
-  const float size_m = In(random, 0.055, 0.075);  // half height of the body
+  const float size_m = random.UniformFloat(0.055, 0.075);  // half height of the body
   Material fur = RandomMaterial(Pattern::kFabric, 0.02F, random);
   fur.grain = 0.5F;
   Material pads = fur;
@@ -71,7 +65,7 @@ Solid MakeBear(Random& random) {
 }
 
 Solid MakeDuck(Random& random) {
-  const float size_m = In(random, 0.04, 0.055);
+  const float size_m = random.UniformFloat(0.04, 0.055);
   Material body = RandomMaterial(Pattern::kPlain, 0.02F, random);
   body.colors[0] = FromHsv(random.Uniform(0.08, 0.17), 0.8, 0.95);
   body.grain = 0.05F;
@@ -101,7 +95,7 @@ Solid MakeDuck(Random& random) {
 }
 
 Solid MakeCar(Random& random) {
-  const float half_x = In(random, 0.07, 0.09);  // half length
+  const float half_x = random.UniformFloat(0.07, 0.09);  // half length
   const float half_y = 0.42F * half_x;
   const float wheel_m = 0.2F * half_x;
   Material paint = RandomMaterial(random.Chance(0.5) ? Pattern::kPlain : Pattern::kStripes, 0.02F, random);
@@ -124,7 +118,7 @@ Solid MakeCar(Random& random) {
     Ring ring;
     const int around = 48;
     for (int j = 0; j < around; ++j) {
-      const float angle = 2 * kPi * static_cast<float>(j) / around;
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(j) / around;
       // A superellipse: a rectangle with rounded corners.
       const float c = std::cos(angle), s = std::sin(angle);
       const float x = std::copysign(std::sqrt(std::abs(c)), c), y = std::copysign(std::sqrt(std::abs(s)), s);
@@ -143,8 +137,9 @@ Solid MakeCar(Random& random) {
   for (const float x : {-0.6F, 0.58F}) {
     for (const float side : {-1.0F, 1.0F}) {
       const Point center(x * half_x, side * (half_y - 0.05F * wheel_m), wheel_m);
-      solid.parts.push_back({Moved(Revolve(wheel), Turn(0.5F * kPi, Point::UnitX()), center), tire});
-      solid.parts.push_back({Moved(Revolve(cap), Turn(0.5F * kPi, Point::UnitX()), center), hub});
+      solid.parts.push_back(
+          {Moved(Revolve(wheel), Turn(0.5F * std::numbers::pi_v<float>, Point::UnitX()), center), tire});
+      solid.parts.push_back({Moved(Revolve(cap), Turn(0.5F * std::numbers::pi_v<float>, Point::UnitX()), center), hub});
     }
   }
   return solid;

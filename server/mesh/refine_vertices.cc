@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kSteps = 2;
 // Larger values are clamped, because far from the surface they do not indicate where it is.
-constexpr float kMaxValue = 6.0f;
+constexpr float kMaxVertexValue = 6.0f;
 
 // The interval of a vertex's edge that contains the crossing, as shares of the whole edge.
 struct Bracket {
@@ -30,7 +30,7 @@ struct Bracket {
   void Narrow(float estimate, float estimate_value) {
     const int moved = (estimate_value > 0) == (value[0] > 0) ? 0 : 1;
     at[moved] = estimate;
-    value[moved] = std::clamp(estimate_value, -kMaxValue, kMaxValue);
+    value[moved] = std::clamp(estimate_value, -kMaxVertexValue, kMaxVertexValue);
     // The Illinois rule: halve the value of an end that was kept twice; otherwise the interval stops shrinking on that
     // side.
     if (kept == 1 - moved) value[kept] *= 0.5f;
@@ -51,8 +51,8 @@ std::vector<Bracket> BracketsOf(const FieldGrid& grid, const GridSurface& surfac
     brackets.push_back({.vertex = static_cast<uint32_t>(vertex),
                         .axis = axis,
                         .node_at_mu = grid.Position(grid.NodeAt(low))[axis],
-                        .value = {std::clamp(grid.value[low], -kMaxValue, kMaxValue),
-                                  std::clamp(grid.value[high], -kMaxValue, kMaxValue)}});
+                        .value = {std::clamp(grid.value[low], -kMaxVertexValue, kMaxVertexValue),
+                                  std::clamp(grid.value[high], -kMaxVertexValue, kMaxVertexValue)}});
   }
   return brackets;
 }

@@ -10,10 +10,10 @@ namespace romap::nerf {
 namespace {
 
 constexpr int kPointsPerView = 60;
-constexpr size_t kMaxViews = 12;  // evenly spaced among all
-constexpr int kBorder_px = 3;     // accuracy of masks and poses
+constexpr size_t kMaxViews = 12;   // evenly spaced among all
+constexpr int kMaskBorder_px = 3;  // accuracy of masks and poses
 constexpr std::array<double, 10> kOtherScales = {0.5, 0.7, 0.83, 0.91, 0.95, 1.05, 1.1, 1.2, 1.4, 2.0};
-constexpr double kDepthNoise = 0.02;  // of the depth
+constexpr double kSensorDepthNoise = 0.02;  // of the depth
 constexpr double kMaxMisplacedShare = 0.4;
 constexpr double kShareNoise = 0.02;     // smaller misplaced shares are not significant
 constexpr double kClearReduction = 0.5;  // another scale fits if it leaves less than this share of the contradictions
@@ -26,7 +26,7 @@ struct DepthView {
 };
 
 DepthView MakeDepthView(const ObjectView& view) {
-  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * kBorder_px + 1, 2 * kBorder_px + 1});
+  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * kMaskBorder_px + 1, 2 * kMaskBorder_px + 1});
   DepthView result{&view, view.T_world_camera.Inverse(), {}, {}};
   cv::erode(view.ray_kind == static_cast<int>(RayKind::kBackground), result.background, square);
   cv::Mat depth_mu = cv::Mat::zeros(view.depth_mu.size(), CV_32FC1);
@@ -75,7 +75,7 @@ Verdict Compare(const DepthView& other, const Eigen::Vector3d& p_world, double s
   const cv::Point at(cvRound(pixel.x()) - view.roi_px.x, cvRound(pixel.y()) - view.roi_px.y);
   if (!cv::Rect({0, 0}, view.roi_px.size()).contains(at)) return Verdict::kContradicts;
   const double measured_mu = scale * other.min_depth_mu.at<float>(at);
-  const bool in_free_space = p.z() < (1 - kDepthNoise) * measured_mu;
+  const bool in_free_space = p.z() < (1 - kSensorDepthNoise) * measured_mu;
   return other.background.at<uint8_t>(at) != 0 || in_free_space ? Verdict::kContradicts : Verdict::kAgrees;
 }
 

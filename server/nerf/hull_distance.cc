@@ -9,7 +9,7 @@
 namespace romap::nerf {
 namespace {
 
-constexpr int kSide = kOccupancyResolution;
+constexpr int kHullSide = kOccupancyResolution;
 constexpr int kMaxDistance = 10;  // cells
 
 // The squared distance to the nearest cell whose state is `wanted`, axis by axis (Saito and Toriwaki, 1994); `max` if
@@ -19,14 +19,14 @@ std::vector<float> SquaredDistances(std::span<const uint8_t> inside, bool wanted
   std::vector<float> squared(inside.size());
   std::ranges::transform(inside, squared.begin(), [&](uint8_t in) { return (in != 0) == wanted ? 0.0f : max; });
   size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis, stride *= kSide) {
+  for (int axis = 0; axis < 3; ++axis, stride *= kHullSide) {
     for (size_t first = 0; first < squared.size(); ++first) {
-      if (first / stride % kSide != 0) continue;
-      std::array<float, kSide> line;
-      for (size_t i = 0; i < kSide; ++i) line[i] = squared[first + i * stride];
-      for (int i = 0; i < kSide; ++i) {
+      if (first / stride % kHullSide != 0) continue;
+      std::array<float, kHullSide> line;
+      for (size_t i = 0; i < kHullSide; ++i) line[i] = squared[first + i * stride];
+      for (int i = 0; i < kHullSide; ++i) {
         float nearest = max;
-        for (int j = std::max(0, i - kMaxDistance); j <= std::min(kSide - 1, i + kMaxDistance); ++j) {
+        for (int j = std::max(0, i - kMaxDistance); j <= std::min(kHullSide - 1, i + kMaxDistance); ++j) {
           const float along = cell[axis] * static_cast<float>(i - j);
           nearest = std::min(nearest, line[static_cast<size_t>(j)] + along * along);
         }
@@ -40,7 +40,7 @@ std::vector<float> SquaredDistances(std::span<const uint8_t> inside, bool wanted
 }  // namespace
 
 std::vector<float> DistanceToBorder(std::span<const uint8_t> inside, const Eigen::Vector3f& extent) {
-  const Eigen::Vector3f cell = extent / kSide;
+  const Eigen::Vector3f cell = extent / kHullSide;
   const float half_cell = 0.5f * cell.minCoeff(), max = kMaxDistance * cell.minCoeff();
   const std::vector<float> to_inside = SquaredDistances(inside, true, cell, max * max);
   const std::vector<float> to_outside = SquaredDistances(inside, false, cell, max * max);

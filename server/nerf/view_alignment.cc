@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kReach_px = 5;           // half width of the band around the outline that is compared
 constexpr double kSmoothing_px = 1.5;  // image gradients must extend as far as the pose errors
-constexpr int kBorder_px = 2;          // of the crop, where no gradients are computed
+constexpr int kCropBorder_px = 2;      // of the crop, where no gradients are computed
 constexpr int kIterations = 4;
 constexpr float kMinOpacity = 0.5f;  // of pixels whose color is compared
 constexpr size_t kMinOpaquePixels = 10;
@@ -211,8 +211,8 @@ ViewAlignment::Equations ViewAlignment::Linearize(std::span<const RenderedPixel>
     const Eigen::Vector3d arm = turn * (pixel.p_camera_mu - center);
     const Eigen::Vector3d p = center + arm + motion.tail<3>();
     const Eigen::Vector2d at = camera_.Project(p) - corner;
-    const bool inside = at.x() >= kBorder_px && at.x() < roi_px_.width - kBorder_px && at.y() >= kBorder_px &&
-                        at.y() < roi_px_.height - kBorder_px;
+    const bool inside = at.x() >= kCropBorder_px && at.x() < roi_px_.width - kCropBorder_px &&
+                        at.y() >= kCropBorder_px && at.y() < roi_px_.height - kCropBorder_px;
     if (p.z() <= 0 || !inside) continue;
     Eigen::Matrix<double, 3, 6> moved;
     moved << -Skew(arm), Eigen::Matrix3d::Identity();

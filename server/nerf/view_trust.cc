@@ -7,7 +7,7 @@
 namespace romap::nerf {
 namespace {
 
-constexpr size_t kMinViews = 6;              // with fewer views, an outlier may be the only correct view
+constexpr size_t kMinTrustViews = 6;         // with fewer views, an outlier may be the only correct view
 constexpr uint64_t kMinSteps = 40;           // of training on a view before it is compared with the others
 constexpr double kMaxUntrustedShare = 0.34;  // of all views
 
@@ -43,7 +43,7 @@ void ViewTrust::OnView(size_t index, uint64_t step) {
 }
 
 bool ViewTrust::Update(const ProbeReport& report, uint64_t step) {
-  if (report.views.size() < kMinViews) return false;
+  if (report.views.size() < kMinTrustViews) return false;
   const std::vector<double> residuals = RelativeResiduals(report);
   std::vector<bool> trusted(views_.size());
   size_t untrusted = 0;

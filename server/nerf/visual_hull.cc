@@ -16,9 +16,9 @@ constexpr double kDepthNoise = 0.01;  // share of the depth by which a measureme
 constexpr int kMaxReach_px = 30;      // larger footprints: the camera is too close for depth to carve
 constexpr int kMaxBlock = 16;         // cells per side of the blocks that are tested as a whole first
 
-enum class Coverage { kUnknown, kNone, kFull, kPartial };
-
 }  // namespace
+
+enum class Coverage { kUnknown, kNone, kFull, kPartial };
 
 // How a view's mask covers a footprint.
 struct VisualHull::Verdict {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "server/objects/angles.h"
+#include "common/angles.h"
 #include "server/objects/two_sample_test.h"
 
 namespace romap::objects {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/objects/angles.h"
+#include "common/angles.h"
 #include "server/objects/landmark_decisions.h"
 
 namespace romap::objects {

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "common/angles.h"
 #include "common/map_motion.h"
-#include "server/objects/angles.h"
 
 namespace romap::objects {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/angles.h"
 #include "common/statistics.h"
-#include "server/objects/angles.h"
 #include "server/objects/edge_yaw.h"
 #include "server/objects/point_cuboid.h"
 #include "server/objects/projection.h"

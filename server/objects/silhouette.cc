@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/objects/angles.h"
+#include "common/angles.h"
 
 namespace romap::objects {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "common/angles.h"
 #include "common/image_sharpness.h"
 #include "common/map_motion.h"
 #include "common/statistics.h"
-#include "server/objects/angles.h"
 #include "server/objects/projection.h"
 
 namespace romap::objects {

@@ -6,7 +6,7 @@
 namespace romap::slam {
 namespace {
 
-struct Best {
+struct BestMatch {
   int index = -1;
   int distance = std::numeric_limits<int>::max();
   int second_distance = std::numeric_limits<int>::max();
@@ -19,10 +19,11 @@ struct Best {
 
 // Inlined into both of its callers, so that it is compiled with and without the popcnt instruction.
 [[gnu::always_inline]] inline void FindBestImpl(std::span<const Descriptor> first, std::span<const Descriptor> second,
-                                                std::vector<Best>& best_of_first, std::vector<Best>& best_of_second) {
+                                                std::vector<BestMatch>& best_of_first,
+                                                std::vector<BestMatch>& best_of_second) {
   for (size_t i = 0; i < first.size(); ++i) {
     const Descriptor a = first[i];
-    Best best;
+    BestMatch best;
     for (size_t k = 0; k < second.size(); ++k) {
       const int distance = CountDifferingBits(a, second[k]);
       if (distance < best.distance) {
@@ -43,13 +44,14 @@ struct Best {
 
 #if defined(__x86_64__)
 [[gnu::target("popcnt")]] void FindBestWithPopcnt(std::span<const Descriptor> first, std::span<const Descriptor> second,
-                                                  std::vector<Best>& best_of_first, std::vector<Best>& best_of_second) {
+                                                  std::vector<BestMatch>& best_of_first,
+                                                  std::vector<BestMatch>& best_of_second) {
   FindBestImpl(first, second, best_of_first, best_of_second);
 }
 #endif
 
-void FindBest(std::span<const Descriptor> first, std::span<const Descriptor> second, std::vector<Best>& best_of_first,
-              std::vector<Best>& best_of_second) {
+void FindBest(std::span<const Descriptor> first, std::span<const Descriptor> second,
+              std::vector<BestMatch>& best_of_first, std::vector<BestMatch>& best_of_second) {
 #if defined(__x86_64__)
   static const bool has_popcnt = __builtin_cpu_supports("popcnt") != 0;
   if (has_popcnt) return FindBestWithPopcnt(first, second, best_of_first, best_of_second);
@@ -61,12 +63,12 @@ void FindBest(std::span<const Descriptor> first, std::span<const Descriptor> sec
 
 std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               int max_distance, double ratio) {
-  std::vector<Best> best_of_first(first.size());
-  std::vector<Best> best_of_second(second.size());
+  std::vector<BestMatch> best_of_first(first.size());
+  std::vector<BestMatch> best_of_second(second.size());
   FindBest(first, second, best_of_first, best_of_second);
   std::vector<DescriptorMatch> matches;
   for (size_t i = 0; i < first.size(); ++i) {
-    const Best& best = best_of_first[i];
+    const BestMatch& best = best_of_first[i];
     if (best.index < 0 || best.distance > max_distance) continue;
     if (best_of_second[static_cast<size_t>(best.index)].index != static_cast<int>(i)) continue;
     if (best.second_distance != std::numeric_limits<int>::max() && best.distance >= ratio * best.second_distance) {

@@ -9,7 +9,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kSigmas = 3;
+constexpr double kDriftSigmas = 3;
 // Standard deviations. The systematic part of the rotation is what a focal length that is wrong by 2 % causes.
 constexpr double kRotationPerKeyframe_rad = 0.1 * std::numbers::pi / 180;
 constexpr double kRotationPerTurn = 0.02;
@@ -57,14 +57,14 @@ DriftBound DriftBetween(const SlamMap& map, KeyframeId from, KeyframeId to, bool
   }
   bound.path_keyframes = static_cast<int>(path.size());
   const double random = std::sqrt(static_cast<double>(path.size()));
-  bound.rotation_rad = kSigmas * std::hypot(random * kRotationPerKeyframe_rad, kRotationPerTurn * bound.turn_rad);
+  bound.rotation_rad = kDriftSigmas * std::hypot(random * kRotationPerKeyframe_rad, kRotationPerTurn * bound.turn_rad);
   if (!scale_is_known) {
-    bound.log_scale = kSigmas * std::hypot(random * kLogScalePerKeyframe, kLogScalePerTurn_rad * bound.turn_rad);
+    bound.log_scale = kDriftSigmas * std::hypot(random * kLogScalePerKeyframe, kLogScalePerTurn_rad * bound.turn_rad);
   }
   // A rotation error grows along the path: on average, half of it acts over the path's extent.
   const double extent_mu = path.empty() ? 0 : extent_world.diagonal().norm();
-  bound.translation_mu = std::hypot(kSigmas * kTranslationPerPath * bound.path_mu, 0.5 * extent_mu * bound.rotation_rad,
-                                    0.5 * extent_mu * bound.log_scale);
+  bound.translation_mu = std::hypot(kDriftSigmas * kTranslationPerPath * bound.path_mu,
+                                    0.5 * extent_mu * bound.rotation_rad, 0.5 * extent_mu * bound.log_scale);
   return bound;
 }
 

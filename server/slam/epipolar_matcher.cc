@@ -14,7 +14,7 @@ constexpr double kSigmas = 2.5;           // maximum distance of a ray from the 
 constexpr double kMaxParallax_rad = 0.8;  // ORB descriptors differ too much at larger angles
 constexpr double kMinSineToBaseline = 0.05;  // rays closer to the baseline do not determine depth
 constexpr int kMaxOctaveDifference = 2;
-constexpr float kSameCorner_px = 4;  // per octave scale: a second candidate closer than this is the same corner
+constexpr float kSameEpipolarCorner_px = 4;  // per octave scale: a second candidate closer than this is the same corner
 
 // A ray in polar coordinates whose axis is the baseline of a pair of keyframes.
 struct EpipolarRay {
@@ -24,7 +24,7 @@ struct EpipolarRay {
   double azimuth_sigma_rad = 0;
 };
 
-struct Best {
+struct BestFeature {
   int feature = -1;
   int distance = std::numeric_limits<int>::max();
   int second_distance = std::numeric_limits<int>::max();
@@ -53,12 +53,12 @@ Eigen::Matrix3d BaselineAxes(const Eigen::Vector3d& baseline) {
   return axes;
 }
 
-void UpdateBest(const MapKeyframe& keyframe, int feature, int distance, Best& best) {
+void UpdateBest(const MapKeyframe& keyframe, int feature, int distance, BestFeature& best) {
   const auto is_same_corner = [&](int a, int b) {
     const Feature& fa = keyframe.features()[static_cast<size_t>(a)];
     const Feature& fb = keyframe.features()[static_cast<size_t>(b)];
     const auto scale = static_cast<float>(std::max(fa.octave_scale, fb.octave_scale));
-    return (fa.pixel_px - fb.pixel_px).norm() < kSameCorner_px * scale;
+    return (fa.pixel_px - fb.pixel_px).norm() < kSameEpipolarCorner_px * scale;
   };
   const bool is_other_corner = best.feature >= 0 && !is_same_corner(best.feature, feature);
   if (distance < best.distance) {
@@ -106,8 +106,8 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
     max_azimuth_sigma_rad = std::max(max_azimuth_sigma_rad, ray.azimuth_sigma_rad);
 
   const double min_parallax_rad = config.min_parallax_deg * std::numbers::pi / 180;
-  std::vector<Best> best_of_first(first.features().size());
-  std::vector<Best> best_of_second(second.features().size());
+  std::vector<BestFeature> best_of_first(first.features().size());
+  std::vector<BestFeature> best_of_second(second.features().size());
   for (const EpipolarRay& ray : first_rays) {
     const Feature& feature = first.features()[static_cast<size_t>(ray.feature)];
     VisitEpipolarPlane(ray, second_rays, max_azimuth_sigma_rad, [&](const EpipolarRay& candidate) {
@@ -123,9 +123,9 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
 
   std::vector<FeatureMatch> matches;
   for (size_t i = 0; i < best_of_first.size(); ++i) {
-    const Best& best = best_of_first[i];
+    const BestFeature& best = best_of_first[i];
     if (best.feature < 0 || best.distance > kMaxMatchDistance_bits) continue;
-    const Best& back = best_of_second[static_cast<size_t>(best.feature)];
+    const BestFeature& back = best_of_second[static_cast<size_t>(best.feature)];
     if (back.feature != static_cast<int>(i)) continue;
     if (best.distance >= kMaxMatchRatio * best.second_distance ||
         back.distance >= kMaxMatchRatio * back.second_distance)

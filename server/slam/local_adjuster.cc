@@ -8,7 +8,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kMaxIterations = 8;  // enough to converge
+constexpr int kMaxLocalIterations = 8;  // enough to converge
 
 }  // namespace
 
@@ -18,7 +18,7 @@ void LocalAdjuster::Adjust(const MapKeyframe& newest, SlamMap& map) {
   // At least every second adjustment runs to completion.
   const std::atomic<bool>* abort = last_was_stopped_ ? nullptr : &stop_;
   const BundleSummary summary =
-      AdjustBundle(problem.bundle, {.max_iterations = kMaxIterations, .dense = true, .abort = abort});
+      AdjustBundle(problem.bundle, {.max_iterations = kMaxLocalIterations, .dense = true, .abort = abort});
   last_was_stopped_ = summary.aborted;
   if (summary.usable) ApplyWindow(problem, map);
   const double time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

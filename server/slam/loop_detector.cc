@@ -14,12 +14,12 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kCandidates = 8;       // by descriptors, besides connected keyframes
-constexpr int kTriedCandidates = 3;  // of those, verified geometrically
+constexpr int kMaxLoopCandidates = 8;  // by descriptors, besides connected keyframes
+constexpr int kTriedCandidates = 3;    // of those, verified geometrically
 constexpr int kMinCommonPoints = 15;
 constexpr uint64_t kMinLoopKeyframes = 10;  // between the old and the newest keyframe
 // Another explanation with this share of the points makes a loop ambiguous.
-constexpr double kRivalPointShare = 0.6;
+constexpr double kLoopRivalShare = 0.6;
 constexpr size_t kEarlierKeyframes = 6;             // before the newest, asked whether they observe the old place too
 constexpr int kMinSupportingKeyframes = 2;          // of those
 constexpr double kMaxDisagreement_px = 8;           // between the old points in an earlier keyframe and the correction
@@ -56,7 +56,7 @@ std::optional<LoopMatch> LoopDetector::Find(const MapKeyframe& keyframe, bool sc
   std::vector<LocatedFrame> places;
   int tried = 0;
   for (const KeyframeId id :
-       places_->SimilarKeyframes(*keyframe.frame, kCandidates + static_cast<int>(connected.size()))) {
+       places_->SimilarKeyframes(*keyframe.frame, kMaxLoopCandidates + static_cast<int>(connected.size()))) {
     if (connected.contains(id) || id.value + kMinLoopKeyframes > keyframe.id.value) continue;
     const MapKeyframe* old = map_->FindKeyframe(id);
     if (old == nullptr || IsRejected(keyframe.id, id)) continue;
@@ -84,7 +84,7 @@ bool LoopDetector::IsVerified(const MapKeyframe& keyframe, const LocatedFrame& l
                               const std::vector<LocatedFrame>& places, bool scale_is_known) const {
   if (loop.drift_px < kNoDrift_px) return true;  // agrees with the map as it is
   const auto fits_as_well = [&](const LocatedFrame& other) {
-    return static_cast<double>(other.points.size()) > kRivalPointShare * static_cast<double>(located.points.size());
+    return static_cast<double>(other.points.size()) > kLoopRivalShare * static_cast<double>(located.points.size());
   };
   const std::string name = keyframe.id.ToString() + " to " + loop.old.ToString();
   for (const LocatedFrame& place : places) {
@@ -119,7 +119,7 @@ bool LoopDetector::IsExplainedByCurrentPose(const MapKeyframe& keyframe, const L
   const MapKeyframe& old = *map_->FindKeyframe(located.keyframe);
   const auto current = places_->LocateNear(*keyframe.frame, old, keyframe.T_world_camera());
   if (!current) return false;
-  if (static_cast<double>(current->points.size()) < kRivalPointShare * static_cast<double>(located.points.size())) {
+  if (static_cast<double>(current->points.size()) < kLoopRivalShare * static_cast<double>(located.points.size())) {
     return false;
   }
   // With little drift, the search near the current pose ends at the loop's pose.

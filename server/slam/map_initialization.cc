@@ -11,12 +11,12 @@
 namespace romap::slam {
 namespace {
 
-constexpr size_t kMinPoints = 40;
+constexpr size_t kMinFirstPoints = 40;
 constexpr double kMaxRms_px = 2;
 
 std::optional<KeyframeId> InitializeFromTwoViews(const InitialViews& views, const SE3<World, Camera>& T_world_first,
                                                  const SlamConfig& config, SlamMap& map) {
-  if (views.points.size() < kMinPoints) return std::nullopt;
+  if (views.points.size() < kMinFirstPoints) return std::nullopt;
   std::vector<double> depths;
   for (const InitialViews::Point& point : views.points) depths.push_back(point.p_first.z());
   const double unit = 1 / Median(std::move(depths));
@@ -33,7 +33,7 @@ std::optional<KeyframeId> InitializeFromTwoViews(const InitialViews& views, cons
   const BundleSummary summary = AdjustBundle(problem.bundle, {.max_iterations = 20, .dense = true});
   if (!summary.usable || summary.final_rms_px > kMaxRms_px) return std::nullopt;
   ApplyGlobal(problem, map);
-  if (map.points().size() < kMinPoints) return std::nullopt;
+  if (map.points().size() < kMinFirstPoints) return std::nullopt;
   return second.id;
 }
 

@@ -12,11 +12,11 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kMinFeatures = 100;
+constexpr int kMinStartFeatures = 100;
 constexpr int kMaxOctave = 3;          // coarser corners are too inaccurate
 constexpr double kSearchShare = 0.08;  // of the image's width, around the last pixel of a feature
-constexpr int kMaxDistance = 60;       // Hamming, bits
-constexpr double kRatio = 0.85;
+constexpr int kMaxStartDistance = 60;  // Hamming, bits
+constexpr double kStartRatio = 0.85;
 // Minimum median motion of the features for SolveTwoView, as a share of the image's width.
 constexpr double kMinMotionShare = 0.012;
 constexpr int kMaxWait_frames = 90;       // for a second view; then the view is dropped
@@ -57,7 +57,7 @@ void MonocularInitializer::Follow(const FrameFeatures& frame, FollowedView& view
         second_distance = std::min(second_distance, distance);
       }
     }
-    if (best < 0 || best_distance > kMaxDistance || best_distance > kRatio * second_distance) continue;
+    if (best < 0 || best_distance > kMaxStartDistance || best_distance > kStartRatio * second_distance) continue;
     const auto k = static_cast<size_t>(best);
     if (best_distance >= distance_of[k]) continue;
     distance_of[k] = best_distance;
@@ -78,8 +78,8 @@ void MonocularInitializer::Follow(const FrameFeatures& frame, FollowedView& view
 
 std::optional<InitialViews> MonocularInitializer::AddFrame(std::shared_ptr<const FrameFeatures> frame,
                                                            std::string* reason) {
-  if (frame->size() < kMinFeatures) {
-    *reason = fmt::format("too little texture: {} features, {} needed", frame->size(), kMinFeatures);
+  if (frame->size() < kMinStartFeatures) {
+    *reason = fmt::format("too little texture: {} features, {} needed", frame->size(), kMinStartFeatures);
     followed_.clear();
     return std::nullopt;
   }

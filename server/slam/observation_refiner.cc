@@ -21,7 +21,7 @@ constexpr size_t kStoredImages = 24;
 constexpr double kMinCorrelation = 0.7;
 constexpr double kWrongCorrelation = 0.3;
 constexpr double kMinAddedCorrelation = 0.85;  // of a point that no descriptor confirms
-constexpr size_t kNeighbors = 10;              // keyframes whose points are searched
+constexpr size_t kRefinedNeighbors = 10;       // keyframes whose points are searched
 constexpr size_t kMaxAdded = 600;              // observations per keyframe, to limit the time of bundle adjustment
 constexpr double kMinViewCosine = 0.87;        // 30 degrees between the reference's ray and the new one
 constexpr double kMinOctaveScale = 0.7;
@@ -83,7 +83,7 @@ void ObservationRefiner::AddObservations(const Frame& frame, MapKeyframe& keyfra
   const HalvedImages& image = images_.at(keyframe.id);
   std::vector<Feature> features = UncorrectedFeatures(*keyframe.frame);
   std::vector<MapPointId> found;
-  for (const MapPointId id : PointsOf(map, Neighborhood(map, keyframe, kNeighbors, 0))) {
+  for (const MapPointId id : PointsOf(map, Neighborhood(map, keyframe, kRefinedNeighbors, 0))) {
     const PointTrack& track = *map.FindPoint(id);
     if (!track.patch || track.IsObservedBy(keyframe.id)) continue;
     const std::optional<FoundPatch> patch = FindPatch(track, keyframe, image, map);

@@ -15,15 +15,15 @@ namespace romap::slam {
 namespace {
 
 constexpr int kCandidates = 5;
-constexpr int kMaxDistance = 60;  // Hamming, bits
+constexpr int kMaxPlaceDistance = 60;  // Hamming, bits
 constexpr double kRatio = 0.85;
-constexpr int kMinFirstInliers = 12;  // of matches by descriptors
-constexpr int kMinPoints = 40;        // after a search by projection
-constexpr double kMinInlierShare = 0.5;
-constexpr double kWideRadius_px = 10;
+constexpr int kMinPlaceFirstInliers = 12;  // of matches by descriptors
+constexpr int kMinPoints = 40;             // after a search by projection
+constexpr double kMinPlaceInlierShare = 0.5;
+constexpr double kPlaceRadius_px = 10;
 constexpr double kNarrowRadius_px = 4;
 constexpr size_t kFewNeighbors = 3;
-constexpr size_t kNeighbors = 8;
+constexpr size_t kPlaceNeighbors = 8;
 constexpr double kRivalRotation_rad = 10 * std::numbers::pi / 180;
 constexpr double kRivalDistanceShare = 0.2;  // of the scene depth
 // A second place with this share of the best place's points fits the frame as well: descriptors and visibility
@@ -70,23 +70,24 @@ std::optional<LocatedFrame> PlaceRecognizer::Locate(const FrameFeatures& frame, 
                                                     uint64_t call) const {
   const std::vector<LocalPoint> points = MakeLocalPoints(*map_, PointsAround(around, kFewNeighbors));
   std::vector<PoseObservation> observations;
-  for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxDistance, kRatio)) {
+  for (const PointMatch& match : MatchByDescriptors(points, frame, kMaxPlaceDistance, kRatio)) {
     observations.push_back(
         MakeObservation(frame, match.feature, points[static_cast<size_t>(match.point)].position_world, config_));
   }
-  const auto pose = SolvePnp(frame.camera, observations, {.min_inliers = kMinFirstInliers, .seed = config_.Seed(call)});
+  const auto pose =
+      SolvePnp(frame.camera, observations, {.min_inliers = kMinPlaceFirstInliers, .seed = config_.Seed(call)});
   return pose ? LocateNear(frame, around, pose->T_world_camera) : std::nullopt;
 }
 
 std::optional<LocatedFrame> PlaceRecognizer::LocateNear(const FrameFeatures& frame, const MapKeyframe& around_keyframe,
                                                         const SE3<World, Camera>& T_world_camera) const {
-  const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(around_keyframe, kNeighbors));
+  const std::vector<LocalPoint> around = MakeLocalPoints(*map_, PointsAround(around_keyframe, kPlaceNeighbors));
   LocatedFrame located{.keyframe = around_keyframe.id, .T_world_camera = T_world_camera};
   std::vector<PoseObservation> observations;
   PoseEstimate refined;
-  for (const double radius_px : {kWideRadius_px, kNarrowRadius_px}) {
+  for (const double radius_px : {kPlaceRadius_px, kNarrowRadius_px}) {
     ProjectionMatcher matcher(frame, located.T_world_camera);
-    const auto matches = matcher.MatchAll(around, {.radius_px = radius_px, .max_distance = kMaxDistance}, {});
+    const auto matches = matcher.MatchAll(around, {.radius_px = radius_px, .max_distance = kMaxPlaceDistance}, {});
     observations.clear();
     for (const PointMatch& match : matches) {
       observations.push_back(
@@ -102,7 +103,8 @@ std::optional<LocatedFrame> PlaceRecognizer::LocateNear(const FrameFeatures& fra
   }
   spdlog::debug("slam: frame {} compared with {}: {} of {} points agree", frame.frame_id, around_keyframe.id.ToString(),
                 refined.inliers, observations.size());
-  if (refined.inliers < kMinPoints || refined.inliers < kMinInlierShare * static_cast<double>(observations.size())) {
+  if (refined.inliers < kMinPoints ||
+      refined.inliers < kMinPlaceInlierShare * static_cast<double>(observations.size())) {
     return std::nullopt;
   }
   const SE3<Camera, World> T_camera_world = located.T_world_camera.Inverse();

@@ -17,7 +17,7 @@ namespace romap::slam {
 namespace {
 
 constexpr double kMaxAxisTurnCosine = 0.77;  // 40 degrees between two cameras that are matched
-constexpr double kMaxSizeRatio = 1.9;        // between the sizes of a point according to two features
+constexpr double kMaxPointSizeRatio = 1.9;   // between the sizes of a point according to two features
 constexpr double kSearchRadius_px = 4;       // around the projection of a known point
 constexpr double kFuseRadius_px = 2.5;
 constexpr int kFuseDistance = 50;  // Hamming, bits
@@ -114,7 +114,7 @@ PointTrack* PointMaker::MakePoint(MapKeyframe& keyframe, int feature, MapKeyfram
   if (Parallax_rad(ray, other_ray, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
   const double size_mu = ray.bearing_sigma_rad * (p_world - ray.center_world).norm();
   const double other_size_mu = other_ray.bearing_sigma_rad * (p_world - other_ray.center_world).norm();
-  if (std::max(size_mu, other_size_mu) > kMaxSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
+  if (std::max(size_mu, other_size_mu) > kMaxPointSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
 
   PointTrack& track = map_->AddPoint(p_world);
   map_->AddObservation(track, other, other_feature);

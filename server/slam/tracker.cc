@@ -12,7 +12,7 @@ constexpr int kMinFeatures = 50;
 constexpr int kMinInliers = 25;
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
-constexpr double kWideRadius_px = 36;
+constexpr double kReferenceRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
 constexpr int kMinDepthsToInitialize = 150;
 constexpr int kFewInliers = 100;  // with fewer, the depth image would add many points
@@ -176,7 +176,7 @@ std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const L
       is_lost ? *motion_.last_pose() : motion_.Predict(frame, /*use_prior=*/pose_use_ == PoseUse::kPrior);
   std::optional<PoseFromPoints> first;
   if (!is_lost) first = tracking.TrackByProjection(last_points_, start, kFollowRadius_px);
-  if (!first) first = tracking.TrackByProjection(last_points_, start, kWideRadius_px);
+  if (!first) first = tracking.TrackByProjection(last_points_, start, kReferenceRadius_px);
   if (!first) first = tracking.TrackByDescriptors(last_points_);
   return first;
 }

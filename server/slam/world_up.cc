@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/angles.h"
 #include "server/slam/geometry/level_cameras.h"
 #include "server/slam/geometry/scene_planes.h"
 #include "server/slam/geometry/support_plane.h"
@@ -136,14 +137,13 @@ bool WorldUp::UpdateFromMap(const SlamMap& map, bool is_last) {
   }
   if (clues.empty()) return false;
   const FusedUp fused = FuseUp(clues, guess);
-  constexpr double kDegree = std::numbers::pi / 180;
   spdlog::debug(
       "slam: up with confidence {:.2f}, sigma {:.2f} deg, {:.2f} deg from z; support plane: {} points, confidence "
       "{:.2f}, sigma {:.2f} deg, {:.2f} deg from z; cameras: sigma {:.2f} deg, roll {:.2f} deg, {:.2f} deg from z",
-      fused.confidence, fused.sigma_rad / kDegree, std::acos(fused.direction_world.z()) / kDegree,
-      plane ? plane->inliers : 0, plane ? plane->confidence : 0, plane ? plane->sigma_rad / kDegree : 0,
-      plane ? std::acos(plane->normal_world.z()) / kDegree : 0, level ? level->sigma_rad / kDegree : 0,
-      level ? level->roll_rad / kDegree : 0, level ? std::acos(level->up_world.z()) / kDegree : 0);
+      fused.confidence, fused.sigma_rad / kRadPerDeg, std::acos(fused.direction_world.z()) / kRadPerDeg,
+      plane ? plane->inliers : 0, plane ? plane->confidence : 0, plane ? plane->sigma_rad / kRadPerDeg : 0,
+      plane ? std::acos(plane->normal_world.z()) / kRadPerDeg : 0, level ? level->sigma_rad / kRadPerDeg : 0,
+      level ? level->roll_rad / kRadPerDeg : 0, level ? std::acos(level->up_world.z()) / kRadPerDeg : 0);
   // A clearly worse estimate than before is probably due to another surface of the scene. At the end, all evidence is
   // available.
   const double turn_rad = std::acos(std::clamp(fused.direction_world.dot(up_world_), -1.0, 1.0));

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "client/files/sequence.h"
+#include "common/angles.h"
 #include "common/config.h"
-#include "server/objects/angles.h"
 #include "server/objects/detections.h"
 #include "server/objects/lines/line_segments.h"
 #include "server/objects/lines/yaw_from_lines.h"
@@ -57,7 +57,7 @@ void ObserveKeyframe(const KeyframeView& view, const objects::ObjectsConfig& con
         view.T_world_camera.rotation() *
         frame.camera.Unproject(box_px.x + (box_px.width - 1) / 2.0, box_px.y + (box_px.height - 1) / 2.0);
     const bool redundant = std::any_of(observed.directions.begin(), observed.directions.end(), [&](const auto& other) {
-      return objects::AngleBetween(other, direction) < config.silhouette_angle_deg * objects::kRadPerDeg;
+      return AngleBetween(other, direction) < config.silhouette_angle_deg * kRadPerDeg;
     });
     if (redundant || observed.directions.size() >= static_cast<size_t>(config.max_silhouettes)) continue;
     const double start_s = UserSeconds();
@@ -96,7 +96,7 @@ void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::s
     std::printf(" %s none", name);
     return;
   }
-  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence,
+  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / kRadPerDeg, yaw->confidence,
               yaw->edges, time_ms);
 }
 
@@ -105,7 +105,7 @@ void PrintGroups(const Eigen::Matrix3d& R_world_reference, std::span<const objec
     std::printf("    groups of %2zu:", count);
     for (size_t first = 0; first + count <= views.size(); first += count) {
       const auto yaw = objects::YawFromLines(R_world_reference, views.subspan(first, count));
-      if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / objects::kRadPerDeg, yaw->confidence);
+      if (yaw) std::printf(" %.0f(%.2f)", yaw->yaw_rad / kRadPerDeg, yaw->confidence);
     }
     std::printf("\n");
   }
@@ -122,7 +122,7 @@ void PrintObject(const files::Sequence& sequence, const Run& run, const files::O
   const Eigen::Matrix3d R_true = truth.T_world_object.RotationMatrix();
   std::printf("%-10s %2zu views", truth.name.c_str(), views.size());
   PrintYaw("|", R_true, views);
-  const double tilt_rad = 2 * objects::kRadPerDeg;
+  const double tilt_rad = 2 * kRadPerDeg;
   PrintYaw("| tilted", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitX()) * R_true, views);
   PrintYaw("|", Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()) * R_true, views);
   std::vector<Eigen::Vector3d> points;
@@ -132,7 +132,7 @@ void PrintObject(const files::Sequence& sequence, const Run& run, const files::O
   }
   const auto pca_rad = objects::PcaYaw(points);
   std::printf(" | PCA of %zu points", points.size());
-  if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / objects::kRadPerDeg, 90));
+  if (pca_rad) std::printf(" %5.1f deg", std::remainder(*pca_rad / kRadPerDeg, 90));
   std::printf("\n");
   PrintGroups(R_true, views);
 }

@@ -20,7 +20,7 @@ T Must(absl::StatusOr<T> result) {
 
 std::vector<Backend> AllBackends() {
   const std::vector<Backend> in_process = {
-      {"Fake", [] { return std::make_unique<testing::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
+      {"Fake", [] { return std::make_unique<testing_support::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
       {"Local",
        [] {
          session::ServerConfig config;

@@ -14,12 +14,12 @@
 
 namespace romap::contract {
 
-using testing::Eventually;
-using testing::MakeFrame;
-using testing::NextOf;
-using testing::Only;
-using testing::ReadToEnd;
-using testing::SmallCamera;
+using testing_support::Eventually;
+using testing_support::MakeFrame;
+using testing_support::NextOf;
+using testing_support::Only;
+using testing_support::ReadToEnd;
+using testing_support::SmallCamera;
 
 class MappingServiceContract : public ::testing::TestWithParam<Backend> {
  protected:
@@ -28,7 +28,7 @@ class MappingServiceContract : public ::testing::TestWithParam<Backend> {
   std::string NewSession(const std::string& name = "") {
     SessionOptions options;
     options.name = name;
-    options.camera = testing::SmallCamera();
+    options.camera = testing_support::SmallCamera();
     const auto info = service().CreateSession(options);
     EXPECT_TRUE(info.ok()) << Message(info.status());
     return info.ok() ? info->id : "";
@@ -43,7 +43,7 @@ class MappingServiceContract : public ::testing::TestWithParam<Backend> {
   // Opens a stream while the previous stream of the session may still be closing.
   std::unique_ptr<MapStream> Reopen(const std::string& session_id) {
     std::unique_ptr<MapStream> reopened;
-    EXPECT_TRUE(testing::Eventually([&] {
+    EXPECT_TRUE(testing_support::Eventually([&] {
       auto stream = service().OpenMap(session_id);
       if (stream.ok()) reopened = *std::move(stream);
       return stream.ok();

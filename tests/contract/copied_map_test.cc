@@ -13,11 +13,10 @@
 #include "tests/support/random_map.h"
 #include "tests/support/streams.h"
 
-namespace romap {
-namespace {
+namespace romap::copied_map_test {
 
-using testing::CheckedCopy;
-using testing::RandomMap;
+using testing_support::CheckedCopy;
+using testing_support::RandomMap;
 
 class OutboxStream : public EventStream {
  public:
@@ -32,7 +31,7 @@ class OutboxStream : public EventStream {
 };
 
 // Every Watch() subscribes to the same map, whatever the session id.
-class SharedMapService : public testing::FakeMappingService {
+class SharedMapService : public testing_support::FakeMappingService {
  public:
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& /*session_id*/) override {
     return std::make_unique<OutboxStream>(map.Subscribe(session::Outbox::Acks::kNewest, 1));
@@ -40,11 +39,11 @@ class SharedMapService : public testing::FakeMappingService {
   session::MapState map;
 };
 
-void ReadToEnd(EventStream& stream, testing::CheckedCopy& copy, std::chrono::microseconds pause) {
-  const auto deadline = std::chrono::steady_clock::now() + testing::kTimeout;
+void ReadToEnd(EventStream& stream, testing_support::CheckedCopy& copy, std::chrono::microseconds pause) {
+  const auto deadline = std::chrono::steady_clock::now() + testing_support::kTimeout;
   while (!stream.Done()) {
     if (std::chrono::steady_clock::now() > deadline) {
-      ADD_FAILURE() << "the stream did not end within " << testing::kTimeout.count() << " s";
+      ADD_FAILURE() << "the stream did not end within " << testing_support::kTimeout.count() << " s";
       return;
     }
     if (const auto event = stream.Next(std::chrono::milliseconds(100))) copy.Apply(*event);
@@ -58,11 +57,11 @@ TEST(CopiedMapOverGrpc, EqualsTheMapForFastAndSlowReaders) {
   config.listen_address = "127.0.0.1:0";
   const auto server = transport::GrpcServer::Start(&service, config).value();
   const auto remote = client::RemoteMappingService::Connect(server->address()).value();
-  testing::CheckedCopy fast, slow, late, truth;
+  testing_support::CheckedCopy fast, slow, late, truth;
   const auto fast_stream = remote->Watch("any").value(), slow_stream = remote->Watch("any").value();
   std::thread fast_reader([&] { ReadToEnd(*fast_stream, fast, std::chrono::microseconds(0)); });
   std::thread slow_reader([&] { ReadToEnd(*slow_stream, slow, std::chrono::microseconds(300)); });
-  testing::RandomMap random(7, &service.map);
+  testing_support::RandomMap random(7, &service.map);
   for (int step = 0; step < 6000; ++step) random.Step();
   const auto late_stream = remote->Watch("any").value();
   std::thread late_reader([&] { ReadToEnd(*late_stream, late, std::chrono::microseconds(0)); });
@@ -79,5 +78,4 @@ TEST(CopiedMapOverGrpc, EqualsTheMapForFastAndSlowReaders) {
   EXPECT_OK(slow_stream->status());
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::copied_map_test

@@ -2,8 +2,7 @@
 
 #include "tests/contract/contract_fixture.h"
 
-namespace romap::contract {
-namespace {
+namespace romap::contract::session_contract_test {
 
 using absl::StatusCode;
 using ::testing::SizeIs;
@@ -25,7 +24,7 @@ TEST_P(SessionContract, SessionsAreCreatedListedAndDeleted) {
 TEST_P(SessionContract, InfoReturnsTheOptions) {
   SessionOptions options;
   options.name = "café, second attempt";
-  options.camera = testing::SmallCamera();
+  options.camera = testing_support::SmallCamera();
   options.camera.distortion = {0.1, -0.2, 0.001, 0.002, 0.05};
   options.mode = FrameMode::kLive;
   const auto created = service().CreateSession(options);
@@ -55,13 +54,13 @@ TEST_P(SessionContract, ErrorContainsTheSessionId) {
 
 TEST_P(SessionContract, InvalidCameraIsRejected) {
   SessionOptions options;
-  options.camera = testing::SmallCamera();
+  options.camera = testing_support::SmallCamera();
   options.camera.fx_px = -1;
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
-  options.camera = testing::SmallCamera();
+  options.camera = testing_support::SmallCamera();
   options.camera.width_px = 0;
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
-  options.camera = testing::SmallCamera();
+  options.camera = testing_support::SmallCamera();
   options.camera.distortion[2] = std::nan("");
   EXPECT_CODE(service().CreateSession(options).status(), StatusCode::kInvalidArgument);
   EXPECT_THAT(service().ListSessions().value(), SizeIs(0));
@@ -72,7 +71,8 @@ TEST_P(SessionContract, FinishedSessionExistsUntilItIsDeleted) {
   const auto finishing = service().FinishSession(session);
   ASSERT_TRUE(finishing.ok());
   EXPECT_NE(finishing->state, SessionState::kOpen);
-  EXPECT_TRUE(testing::Eventually([&] { return service().GetSession(session)->state == SessionState::kFinished; }));
+  EXPECT_TRUE(
+      testing_support::Eventually([&] { return service().GetSession(session)->state == SessionState::kFinished; }));
   EXPECT_OK(service().FinishSession(session).status());
   EXPECT_OK(service().ExportMap(session).status());
   EXPECT_OK(service().DeleteSession(session));
@@ -82,9 +82,9 @@ TEST_P(SessionContract, FinishedSessionExistsUntilItIsDeleted) {
 TEST_P(SessionContract, ExportContainsTheTrajectory) {
   const std::string session = NewSession();
   const auto stream = Open(session);
-  for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+  for (uint64_t id = 1; id <= 5; ++id) EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
   EXPECT_OK(stream->CloseSend());
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   const auto map = service().ExportMap(session);
   ASSERT_TRUE(map.ok()) << Message(map.status());
   EXPECT_EQ(map->session_id, session);
@@ -92,7 +92,7 @@ TEST_P(SessionContract, ExportContainsTheTrajectory) {
   ASSERT_THAT(map->timestamps_ns, SizeIs(5));
   for (uint64_t i = 0; i < 5; ++i) {
     EXPECT_EQ(map->trajectory[i].frame_id, i + 1);
-    EXPECT_EQ(map->timestamps_ns[i], testing::MakeFrame(i + 1).timestamp_ns);
+    EXPECT_EQ(map->timestamps_ns[i], testing_support::MakeFrame(i + 1).timestamp_ns);
     ASSERT_TRUE(map->trajectory[i].T_world_camera.has_value());
     EXPECT_NEAR(map->trajectory[i].T_world_camera->translation().x(), 0.01 * (i + 1), 1e-12);
   }
@@ -103,10 +103,10 @@ TEST_P(SessionContract, ExportContainsTheObjects) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "this service needs frames of a consistent scene";
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
-  EXPECT_OK(stream->Send(testing::MakeFrame(2, "book")));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(2, "book")));
   EXPECT_OK(stream->CloseSend());
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   const auto map = service().ExportMap(session);
   ASSERT_TRUE(map.ok());
   ASSERT_THAT(map->objects, SizeIs(2));
@@ -118,5 +118,4 @@ TEST_P(SessionContract, ExportContainsTheObjects) {
   EXPECT_TRUE(map->objects[0].object.T_world_mesh.has_value());
 }
 
-}  // namespace
-}  // namespace romap::contract
+}  // namespace romap::contract::session_contract_test

@@ -5,8 +5,7 @@
 
 #include "tests/contract/contract_fixture.h"
 
-namespace romap::contract {
-namespace {
+namespace romap::contract::stream_contract_test {
 
 using absl::StatusCode;
 using ::testing::SizeIs;
@@ -18,9 +17,9 @@ INSTANTIATE_TEST_SUITE_P(All, StreamContract, ::testing::ValuesIn(AllBackends())
 TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsWithOk) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 40;
-  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id)).ok());
+  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing_support::MakeFrame(id)).ok());
   EXPECT_OK(stream->CloseSend());
-  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
+  const auto acks = testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(kFrames));
   for (uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(acks[i].frame_id, i + 1);
@@ -32,14 +31,15 @@ TEST_P(StreamContract, FramesAreAcknowledgedInOrderAndTheStreamEndsWithOk) {
 
 TEST_P(StreamContract, InvalidFrameIsRejectedAndTheStreamContinues) {
   const auto stream = Open(NewSession());
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  FrameInput bad = testing::MakeFrame(2);
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  FrameInput bad = testing_support::MakeFrame(2);
   bad.image.clear();
   EXPECT_OK(stream->Send(bad));
-  EXPECT_OK(stream->Send(testing::MakeFrame(3)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(3)));
   EXPECT_OK(stream->CloseSend());
   std::map<uint64_t, FrameAck> acks;
-  for (const FrameAck& ack : testing::Only<FrameAck>(testing::ReadToEnd(*stream))) acks[ack.frame_id] = ack;
+  for (const FrameAck& ack : testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream)))
+    acks[ack.frame_id] = ack;
   ASSERT_THAT(acks, SizeIs(3));
   EXPECT_TRUE(acks[1].accepted);
   EXPECT_FALSE(acks[2].accepted);
@@ -51,7 +51,7 @@ TEST_P(StreamContract, InvalidFrameIsRejectedAndTheStreamContinues) {
 MasksInput MasksOf(uint64_t frame_id, const std::string& class_name) {
   MasksInput masks;
   masks.frame_id = frame_id;
-  static_cast<EncodedMasks&>(masks) = testing::MakeFrame(frame_id, class_name);
+  static_cast<EncodedMasks&>(masks) = testing_support::MakeFrame(frame_id, class_name);
   return masks;
 }
 
@@ -59,13 +59,13 @@ TEST_P(StreamContract, LateMasksAreAcknowledgedInOrder) {
   const auto stream = Open(NewSession());
   constexpr uint64_t kFrames = 20, kDelay = 5;
   for (uint64_t id = 1; id <= kFrames + kDelay; ++id) {
-    if (id <= kFrames) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+    if (id <= kFrames) EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
     if (id > kDelay) EXPECT_OK(stream->SendMasks(MasksOf(id - kDelay, "mug")));
   }
   EXPECT_OK(stream->CloseSend());
-  const auto events = testing::ReadToEnd(*stream);
-  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(kFrames));
-  const auto acks = testing::Only<MasksAck>(events);
+  const auto events = testing_support::ReadToEnd(*stream);
+  EXPECT_THAT(testing_support::Only<FrameAck>(events), SizeIs(kFrames));
+  const auto acks = testing_support::Only<MasksAck>(events);
   ASSERT_THAT(acks, SizeIs(kFrames)) << "the stream must not end before the last masks are mapped";
   for (uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(acks[i].frame_id, i + 1);
@@ -78,22 +78,22 @@ TEST_P(StreamContract, LateMasksAreAcknowledgedInOrder) {
 TEST_P(StreamContract, LateMasksWithoutAMatchingFrameAreRejectedAndTheStreamContinues) {
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
-  EXPECT_OK(stream->Send(testing::MakeFrame(2)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1, "mug")));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(2)));
   EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));  // frame 1 has masks
   EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));
   EXPECT_OK(stream->SendMasks(MasksOf(2, "mug")));  // frame 2 now has masks
   EXPECT_OK(stream->SendMasks(MasksOf(9, "mug")));  // not sent yet
-  EXPECT_OK(stream->Send(testing::MakeFrame(3)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(3)));
   EXPECT_OK(stream->CloseSend());
-  const auto events = testing::ReadToEnd(*stream);
-  const auto acks = testing::Only<MasksAck>(events);
+  const auto events = testing_support::ReadToEnd(*stream);
+  const auto acks = testing_support::Only<MasksAck>(events);
   ASSERT_THAT(acks, SizeIs(4));
   for (size_t i = 0; i < acks.size(); ++i) {
     EXPECT_EQ(acks[i].accepted, i == 1) << i;
     EXPECT_EQ(acks[i].error.empty(), i == 1) << i;
   }
-  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(3));
+  EXPECT_THAT(testing_support::Only<FrameAck>(events), SizeIs(3));
   EXPECT_OK(stream->status());
   EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 3u) << "late masks do not count as frames";
 }
@@ -101,36 +101,36 @@ TEST_P(StreamContract, LateMasksWithoutAMatchingFrameAreRejectedAndTheStreamCont
 TEST_P(StreamContract, LateMasksCreateObjects) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "this service needs frames of a consistent scene";
   const auto stream = Open(NewSession());
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
   EXPECT_OK(stream->SendMasks(MasksOf(1, "mug")));
-  const auto object = testing::NextOf<ObjectUpdate>(*stream);
+  const auto object = testing_support::NextOf<ObjectUpdate>(*stream);
   ASSERT_TRUE(object.has_value());
   EXPECT_EQ(object->class_name, "mug");
 }
 
 TEST_P(StreamContract, LiveSessionAcknowledgesAllFramesAndMasks) {
   SessionOptions options;
-  options.camera = testing::SmallCamera();
+  options.camera = testing_support::SmallCamera();
   options.mode = FrameMode::kLive;
   const auto stream = Open(service().CreateSession(options)->id);
   constexpr uint64_t kFrames = 60;
   for (uint64_t id = 1; id <= kFrames; ++id) {
-    EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+    EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
     EXPECT_OK(stream->SendMasks(MasksOf(id, "mug")));
   }
   EXPECT_OK(stream->CloseSend());
-  const auto events = testing::ReadToEnd(*stream);
-  EXPECT_THAT(testing::Only<FrameAck>(events), SizeIs(kFrames)) << "accepted or dropped";
-  EXPECT_THAT(testing::Only<MasksAck>(events), SizeIs(kFrames));
+  const auto events = testing_support::ReadToEnd(*stream);
+  EXPECT_THAT(testing_support::Only<FrameAck>(events), SizeIs(kFrames)) << "accepted or dropped";
+  EXPECT_THAT(testing_support::Only<MasksAck>(events), SizeIs(kFrames));
 }
 
 TEST_P(StreamContract, FrameWithANonFinitePoseIsRejected) {
   const auto stream = Open(NewSession());
-  FrameInput frame = testing::MakeFrame(1);
+  FrameInput frame = testing_support::MakeFrame(1);
   frame.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(std::nan(""), 0, 0));
   EXPECT_OK(stream->Send(frame));
   EXPECT_OK(stream->CloseSend());
-  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
+  const auto acks = testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(1));
   // The fake does not check poses. Over gRPC, the transport rejects the frame.
   EXPECT_EQ(acks[0].accepted, GetParam().name == "Fake") << acks[0].error;
@@ -141,8 +141,8 @@ TEST_P(StreamContract, SecondMapStreamIsRejected) {
   const auto stream = Open(session);
   EXPECT_TRUE(service().GetSession(session)->stream_open);
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kFailedPrecondition);
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
 }
 
 TEST_P(StreamContract, SessionAcceptsOneStreamAfterAnother) {
@@ -150,9 +150,9 @@ TEST_P(StreamContract, SessionAcceptsOneStreamAfterAnother) {
   for (uint64_t id = 1; id <= 3; ++id) {
     const auto stream = Reopen(session);
     ASSERT_NE(stream, nullptr);
-    EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+    EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
     EXPECT_OK(stream->CloseSend());
-    testing::ReadToEnd(*stream);
+    testing_support::ReadToEnd(*stream);
     EXPECT_OK(stream->status());
   }
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(3));
@@ -167,10 +167,10 @@ TEST_P(StreamContract, FinishedSessionRejectsMapStreams) {
 TEST_P(StreamContract, SendFailsAfterCloseSend) {
   const auto stream = Open(NewSession());
   EXPECT_OK(stream->CloseSend());
-  EXPECT_CODE(stream->Send(testing::MakeFrame(1)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->Send(testing_support::MakeFrame(1)), StatusCode::kFailedPrecondition);
   EXPECT_CODE(stream->SendMasks(MasksOf(1, "mug")), StatusCode::kFailedPrecondition);
   EXPECT_CODE(stream->CloseSend(), StatusCode::kFailedPrecondition);
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   EXPECT_OK(stream->status());
 }
 
@@ -178,15 +178,15 @@ TEST_P(StreamContract, DisconnectKeepsTheSession) {
   const std::string session = NewSession();
   {
     const auto stream = Open(session);
-    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
-    for (int i = 0; i < 3; ++i) EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
   }
   EXPECT_EQ(service().GetSession(session)->state, SessionState::kOpen);
   const auto stream = Reopen(session);
   ASSERT_NE(stream, nullptr);
-  EXPECT_OK(stream->Send(testing::MakeFrame(4)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(4)));
   EXPECT_OK(stream->CloseSend());
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(4));
 }
 
@@ -195,14 +195,14 @@ TEST_P(StreamContract, FinishEndsOpenStreams) {
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
   EXPECT_OK(service().FinishSession(session).status());
-  testing::ReadToEnd(*stream);
-  testing::ReadToEnd(**watch);
+  testing_support::ReadToEnd(*stream);
+  testing_support::ReadToEnd(**watch);
   EXPECT_OK(stream->status());
   EXPECT_OK((*watch)->status());
-  EXPECT_CODE(stream->Send(testing::MakeFrame(2)), StatusCode::kFailedPrecondition);
+  EXPECT_CODE(stream->Send(testing_support::MakeFrame(2)), StatusCode::kFailedPrecondition);
 }
 
 TEST_P(StreamContract, DeleteEndsOpenStreams) {
@@ -210,13 +210,13 @@ TEST_P(StreamContract, DeleteEndsOpenStreams) {
   const auto stream = Open(session);
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
   EXPECT_OK(service().DeleteSession(session));
-  testing::ReadToEnd(*stream);
-  testing::ReadToEnd(**watch);
+  testing_support::ReadToEnd(*stream);
+  testing_support::ReadToEnd(**watch);
   EXPECT_CODE((*watch)->status(), StatusCode::kNotFound);
   EXPECT_FALSE(stream->status().ok());
-  EXPECT_FALSE(stream->Send(testing::MakeFrame(2)).ok());
+  EXPECT_FALSE(stream->Send(testing_support::MakeFrame(2)).ok());
   EXPECT_CODE(service().OpenMap(session).status(), StatusCode::kNotFound);
 }
 
@@ -224,24 +224,24 @@ TEST_P(StreamContract, DeleteDuringSendEndsSenderAndReader) {
   const std::string session = NewSession();
   const auto stream = Open(session);
   std::thread sender([&] {
-    for (uint64_t id = 1; stream->Send(testing::MakeFrame(id)).ok(); ++id) {
+    for (uint64_t id = 1; stream->Send(testing_support::MakeFrame(id)).ok(); ++id) {
     }
   });
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
   EXPECT_OK(service().DeleteSession(session));
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   sender.join();
   EXPECT_CODE(service().GetSession(session).status(), StatusCode::kNotFound);
 }
 
 TEST_P(StreamContract, CancelEndsAWaitingReader) {
   const auto stream = Open(NewSession());
-  std::thread reader([&] { testing::ReadToEnd(*stream); });
+  std::thread reader([&] { testing_support::ReadToEnd(*stream); });
   stream->Cancel();
   reader.join();
   EXPECT_TRUE(stream->Done());
   EXPECT_CODE(stream->status(), StatusCode::kCancelled);
-  EXPECT_FALSE(stream->Send(testing::MakeFrame(1)).ok());
+  EXPECT_FALSE(stream->Send(testing_support::MakeFrame(1)).ok());
 }
 
 TEST_P(StreamContract, WatchReceivesFrameAcks) {
@@ -249,8 +249,8 @@ TEST_P(StreamContract, WatchReceivesFrameAcks) {
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  const auto ack = testing::NextOf<FrameAck>(**watch);
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  const auto ack = testing_support::NextOf<FrameAck>(**watch);
   ASSERT_TRUE(ack.has_value());
   EXPECT_EQ(ack->frame_id, 1u);
   EXPECT_TRUE(ack->T_world_camera.has_value());
@@ -261,7 +261,7 @@ TEST_P(StreamContract, WatchOfAFinishedSessionEnds) {
   EXPECT_OK(service().FinishSession(session).status());
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  testing::ReadToEnd(**watch);
+  testing_support::ReadToEnd(**watch);
   EXPECT_OK((*watch)->status());
 }
 
@@ -269,19 +269,19 @@ TEST_P(StreamContract, WatchStartsWithTheCurrentObjects) {
   if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "this service needs frames of a consistent scene";
   const std::string session = NewSession();
   const auto stream = Open(session);
-  EXPECT_OK(stream->Send(testing::MakeFrame(1, "mug")));
-  ASSERT_TRUE(testing::NextOf<MeshUpdate>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1, "mug")));
+  ASSERT_TRUE(testing_support::NextOf<MeshUpdate>(*stream).has_value());
 
   const auto watch = service().Watch(session);
   ASSERT_TRUE(watch.ok());
-  const auto object = testing::NextOf<ObjectUpdate>(**watch);
-  const auto mesh = testing::NextOf<MeshUpdate>(**watch);
+  const auto object = testing_support::NextOf<ObjectUpdate>(**watch);
+  const auto mesh = testing_support::NextOf<MeshUpdate>(**watch);
   ASSERT_TRUE(object && mesh);
   EXPECT_EQ(object->class_name, "mug");
   EXPECT_EQ(mesh->id, object->id);
 
-  EXPECT_OK(stream->Send(testing::MakeFrame(2, "mug")));
-  const auto newer = testing::NextOf<ObjectUpdate>(**watch);
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(2, "mug")));
+  const auto newer = testing_support::NextOf<ObjectUpdate>(**watch);
   ASSERT_TRUE(newer.has_value());
   EXPECT_EQ(newer->id, object->id);
   EXPECT_GT(newer->revision, object->revision);
@@ -292,9 +292,9 @@ TEST_P(StreamContract, SessionsAreIndependent) {
   const auto run = [&](uint64_t first_id, std::vector<FrameAck>* acks) {
     const std::string session = NewSession();
     const auto stream = Open(session);
-    for (uint64_t id = first_id; id < first_id + kFrames; ++id) EXPECT_OK(stream->Send(testing::MakeFrame(id)));
+    for (uint64_t id = first_id; id < first_id + kFrames; ++id) EXPECT_OK(stream->Send(testing_support::MakeFrame(id)));
     EXPECT_OK(stream->CloseSend());
-    *acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
+    *acks = testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream));
     EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(kFrames));
   };
   std::vector<FrameAck> a, b;
@@ -309,5 +309,4 @@ TEST_P(StreamContract, SessionsAreIndependent) {
   }
 }
 
-}  // namespace
-}  // namespace romap::contract
+}  // namespace romap::contract::stream_contract_test

@@ -11,8 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace romap::house {
-namespace {
+namespace romap::house::layering_test {
 
 namespace fs = std::filesystem;
 
@@ -194,5 +193,4 @@ TEST(SourceTreeTest, HeadersAreGuarded) {
   }
 }
 
-}  // namespace
-}  // namespace romap::house
+}  // namespace romap::house::layering_test

@@ -11,8 +11,7 @@
 #include "tests/support/streams.h"
 #include "tests/support/subprocess.h"
 
-namespace romap {
-namespace {
+namespace romap::bench_command_test {
 
 using ::testing::HasSubstr;
 using testing_support::BackgroundProcess;
@@ -78,7 +77,7 @@ TEST(BenchCommandTest, InterruptWritesAPartialReport) {
   MakeSmallSequence(folder / "sequence");
   testing_support::BackgroundProcess bench(
       BenchPaper(folder, {"--methods", "fast", "--tables", "1", "--seeds", "500"}));
-  ASSERT_TRUE(testing::Eventually([&] { return fs::exists(folder / "out/paper.json"); }));
+  ASSERT_TRUE(testing_support::Eventually([&] { return fs::exists(folder / "out/paper.json"); }));
   bench.Signal(SIGINT);
   const testing_support::ProcessResult end = bench.Wait();
   EXPECT_EQ(end.exit_code, 130) << end.err;
@@ -89,5 +88,4 @@ TEST(BenchCommandTest, InterruptWritesAPartialReport) {
   EXPECT_LT(runs["done"], 1500);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::bench_command_test

@@ -15,8 +15,7 @@
 #include "tests/support/streams.h"
 #include "tests/support/subprocess.h"
 
-namespace romap {
-namespace {
+namespace romap::programs_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -138,7 +137,7 @@ TEST(ProgramsTest, InterruptWritesThePartialMap) {
   // Sending takes two seconds at the recorded rate. The folder is created just before sending starts.
   testing_support::BackgroundProcess run(
       {ROMAP_CLIENT, "run", folder / "sequence", "--local", "--realtime", "--out", folder / "map"});
-  ASSERT_TRUE(testing::Eventually([&] { return fs::exists(folder / "map/pictures"); }));
+  ASSERT_TRUE(testing_support::Eventually([&] { return fs::exists(folder / "map/pictures"); }));
   run.Signal(SIGINT);
   const testing_support::ProcessResult result = run.Wait();
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -264,5 +263,4 @@ TEST(InvalidInputTest, NoServerAndPortInUse) {
                 "cannot connect to romap-server at " + address);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::programs_test

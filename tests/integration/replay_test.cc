@@ -13,8 +13,7 @@
 #include "client/synth/synth.h"
 #include "tests/support/subprocess.h"
 
-namespace romap {
-namespace {
+namespace romap::replay_test {
 
 using ::testing::HasSubstr;
 using testing_support::ProcessResult;
@@ -122,5 +121,4 @@ TEST_F(ReplayTest, ReportsAMissingRecordingFolderBeforeSendingFrames) {
   EXPECT_THAT(run.err, HasSubstr("nowhere"));
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::replay_test

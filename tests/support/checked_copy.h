@@ -9,7 +9,7 @@
 #include "client/sdk/map_copy.h"
 #include "common/wire/events.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 // A client's copy of a map that checks the guarantees of an event stream: no event of an object precedes its first
 // update or follows its removal or merge, and revisions increase.
@@ -60,4 +60,4 @@ class CheckedCopy {
   std::set<ObjectId> ended_;
 };
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

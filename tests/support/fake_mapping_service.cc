@@ -8,8 +8,7 @@
 
 #include "common/status.h"
 
-namespace romap::testing {
-namespace {
+namespace romap::testing_support {
 
 // The event queue of one subscriber.
 class Mailbox {
@@ -51,6 +50,8 @@ class Mailbox {
   bool closed_ = false;
   absl::Status status_;
 };
+
+namespace {
 
 MeshUpdate MeshOf(const ObjectUpdate& object) {
   MeshUpdate mesh;
@@ -322,4 +323,4 @@ absl::StatusOr<std::shared_ptr<FakeSession>> FakeMappingService::Find(const std:
   return it->second;
 }
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -12,7 +12,7 @@
 
 #include "common/mapping_service.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 class FakeSession;
 
@@ -50,4 +50,4 @@ class FakeMappingService : public MappingService {
   std::map<std::string, std::shared_ptr<FakeSession>> sessions_;
 };
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -8,7 +8,7 @@
 #include "common/map_events.h"
 #include "server/session/map_state.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 // Applies random changes of every kind that the stages make to a map: objects are created, changed, confirmed, lost,
 // merged (in chains), removed, given meshes and moved by corrections. Some changes refer to objects that were already
@@ -117,4 +117,4 @@ class RandomMap {
   uint64_t last_id_ = 0, frames_ = 0;
 };
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -15,7 +15,7 @@
 
 // Helpers for tests of a MappingService. All waits end with a test failure after kTimeout.
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 // Long under a sanitizer, where a busy machine trains a small field in minutes.
 inline constexpr std::chrono::seconds kTimeout{testing_support::kUnderSanitizer ? 240 : 60};
@@ -96,7 +96,7 @@ inline bool Eventually(const std::function<bool()>& condition) {
   return false;
 }
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support
 
 // Assertions on absl::Status that print it on failure.
 #define EXPECT_OK(expression)                        \

@@ -10,7 +10,7 @@
 namespace romap::nerf {
 namespace {
 
-constexpr int kChunkSamples = 1024;
+constexpr int kRenderChunkSamples = 1024;
 
 // Appends the results of the rays of one chunk, whose samples have been placed and evaluated.
 void Composite(std::span<const Ray> rays, std::span<const RaySpan> spans, SampleChunk& c,
@@ -34,8 +34,8 @@ std::vector<RayResult> RenderRays(const FieldModel& model, const NerfConfig& con
   const KernelTable& kernels = SimdKernels();
   const SamplingRule rule{
       .occupied_bits = space.occupied_bits, .extent = space.extent, .budget = MakeSampleBudget(config)};
-  const size_t chunk_rays = static_cast<size_t>(kChunkSamples / config.max_samples_per_ray);
-  SampleChunk chunk(kChunkSamples, model.layout.features, model.mlp.hidden);
+  const size_t chunk_rays = static_cast<size_t>(kRenderChunkSamples / config.max_samples_per_ray);
+  SampleChunk chunk(kRenderChunkSamples, model.layout.features, model.mlp.hidden);
   std::vector<RaySpan> spans(chunk_rays);
   std::vector<RayResult> results;
   results.reserve(rays.size());

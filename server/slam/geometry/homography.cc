@@ -11,7 +11,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kRefineRounds = 5;
+constexpr int kHomographyRefineRounds = 5;
 constexpr int kRotationRounds = 5;
 // Translations below this share of the distance to the plane are rounding errors.
 constexpr double kNoTranslation = 1e-9;
@@ -84,7 +84,7 @@ Eigen::Matrix3d RefineHomography(const CameraModel& camera, const Eigen::Matrix3
                                  std::span<const RayMatch> matches) {
   Eigen::Matrix3d best = start;
   double best_support = TransferSupport(camera, best, matches);
-  for (int round = 0; round < kRefineRounds; ++round) {
+  for (int round = 0; round < kHomographyRefineRounds; ++round) {
     const std::optional<Eigen::Matrix3d> refitted = FitHomography(InliersOf(camera, best, matches));
     if (!refitted) break;
     const double support = TransferSupport(camera, *refitted, matches);

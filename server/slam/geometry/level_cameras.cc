@@ -3,22 +3,22 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "common/angles.h"
 
 namespace romap::slam {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr size_t kMinCameras = 4;
 // Cameras that turned by less than this show the same sway of the hand, so they count as one sample.
-constexpr double kSampleSpacing_rad = 10 * kDegree;
+constexpr double kSampleSpacing_rad = 10 * kRadPerDeg;
 constexpr double kMaxSamples = 16;
-constexpr double kMinSway_rad = 1.5 * kDegree;  // of the roll between samples; a steadier hand is luck
-constexpr double kHabit_rad = 2 * kDegree;      // standard deviation of the constant part of the roll
-constexpr double kMaxRoll_rad = 10 * kDegree;   // root mean square; beyond it, the cameras were not held level
-constexpr double kMaxTilt_rad = 75 * kDegree;   // of up from the mean of the cameras' own up axes
-constexpr double kMaxSigma_rad = 8 * kDegree;   // a vaguer result is no evidence
-constexpr int kIterations = 5;
+constexpr double kMinSway_rad = 1.5 * kRadPerDeg;      // of the roll between samples; a steadier hand is luck
+constexpr double kHabit_rad = 2 * kRadPerDeg;          // standard deviation of the constant part of the roll
+constexpr double kMaxRoll_rad = 10 * kRadPerDeg;       // root mean square; beyond it, the cameras were not held level
+constexpr double kMaxLevelTilt_rad = 75 * kRadPerDeg;  // of up from the mean of the cameras' own up axes
+constexpr double kMaxLevelSigma_rad = 8 * kRadPerDeg;  // a vaguer result is no evidence
+constexpr int kLevelIterations = 5;
 
 double SampleCount(std::span<const Eigen::Vector3d> x_axes) {
   double samples = 1;
@@ -74,7 +74,7 @@ std::optional<LevelUp> UpFromLevelCameras(std::span<const Eigen::Vector3d> x_axe
   const double samples = SampleCount(x_axes_world);
   LevelUp level{.up_world = mean_up.normalized()};
   double sway_rad = kMinSway_rad;
-  for (int i = 0; i < kIterations; ++i) {
+  for (int i = 0; i < kLevelIterations; ++i) {
     Eigen::Matrix<double, 3, 2> tangents;
     tangents.col(0) = level.up_world.unitOrthogonal();
     tangents.col(1) = level.up_world.cross(tangents.col(0));
@@ -87,8 +87,8 @@ std::optional<LevelUp> UpFromLevelCameras(std::span<const Eigen::Vector3d> x_axe
     level.roll_rad = std::sqrt(fit.roll_squared);
     level.sigma_rad = std::sqrt(fit.information.inverse().topLeftCorner<2, 2>().trace() / 2);
   }
-  const bool is_level = level.roll_rad < kMaxRoll_rad && level.sigma_rad < kMaxSigma_rad;
-  const bool is_upright = level.up_world.dot(mean_up.normalized()) > std::cos(kMaxTilt_rad);
+  const bool is_level = level.roll_rad < kMaxRoll_rad && level.sigma_rad < kMaxLevelSigma_rad;
+  const bool is_upright = level.up_world.dot(mean_up.normalized()) > std::cos(kMaxLevelTilt_rad);
   return is_level && is_upright ? std::optional(level) : std::nullopt;
 }
 

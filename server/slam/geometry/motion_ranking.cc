@@ -2,21 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/geometry/homography.h"
 
 namespace romap::slam {
 namespace {
 
-constexpr double kDegree_rad = std::numbers::pi / 180;
 // Refined motions closer to each other than this are the same minimum.
-constexpr double kSameRotation_rad = 0.02 * kDegree_rad;
-constexpr double kSameDirection_rad = 0.2 * kDegree_rad;
+constexpr double kSameRotation_rad = 0.02 * kRadPerDeg;
+constexpr double kSameDirection_rad = 0.2 * kRadPerDeg;
 // Motions closer to each other than this are the same solution.
-constexpr double kNearRotation_rad = 1 * kDegree_rad;
-constexpr double kNearDirection_rad = 10 * kDegree_rad;
+constexpr double kNearRotation_rad = 1 * kRadPerDeg;
+constexpr double kNearDirection_rad = 10 * kRadPerDeg;
 constexpr double kMedianChi2 = 0.4549;   // of chi-square with one degree of freedom
 constexpr double kMinNoiseRatio = 0.25;  // lower limit, as a share of the given noise
 

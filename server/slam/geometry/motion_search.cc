@@ -47,13 +47,14 @@ std::vector<Eigen::Matrix3d> SolveFivePoint(const Sample& sample) {
   return essentials;
 }
 
-struct Score {
+struct MotionScore {
   double support = 0;
   int inliers = 0;
 };
 
-Score ComputeScore(const CameraModel& camera, const Eigen::Matrix3d& essential, std::span<const RayMatch> matches) {
-  Score score;
+MotionScore ScoreMotion(const CameraModel& camera, const Eigen::Matrix3d& essential,
+                        std::span<const RayMatch> matches) {
+  MotionScore score;
   for (const RayMatch& match : matches) {
     const double chi2 = SampsonChi2(camera, essential, match);
     if (!(chi2 < kEpipolarChi2Bound)) continue;
@@ -146,7 +147,7 @@ MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> 
     std::transform(indices.begin(), indices.end(), sample.begin(), [&](int index) { return matches[index]; });
 
     for (const Eigen::Matrix3d& essential : SolveFivePoint(sample)) {
-      const Score score = ComputeScore(camera, essential, matches);
+      const MotionScore score = ScoreMotion(camera, essential, matches);
       if (score.support <= shortlist.Threshold()) continue;
       shortlist.Add(MotionFromEssential(camera, essential, matches), score.support);
       if (score.support <= search.essential_support) continue;

@@ -13,16 +13,16 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kSampleSize = 3;
+constexpr int kPoseSampleSize = 3;
 
-using Sample = std::array<PoseObservation, kSampleSize>;
+using PoseSample = std::array<PoseObservation, kPoseSampleSize>;
 
 // The poses, at most four, that agree with three observations. The input of OpenCV's solver are rays, so the camera
 // matrix is the identity.
-std::vector<CameraFromWorld> SolveP3p(const CameraModel& camera, const Sample& sample) {
-  std::array<cv::Point3d, kSampleSize> points;
-  std::array<cv::Point2d, kSampleSize> rays;
-  for (int i = 0; i < kSampleSize; ++i) {
+std::vector<CameraFromWorld> SolveP3p(const CameraModel& camera, const PoseSample& sample) {
+  std::array<cv::Point3d, kPoseSampleSize> points;
+  std::array<cv::Point2d, kPoseSampleSize> rays;
+  for (int i = 0; i < kPoseSampleSize; ++i) {
     const Eigen::Vector3d& p_world = sample[i].p_world;
     const Eigen::Vector3d ray = camera.Unproject(sample[i].pixel_px.x(), sample[i].pixel_px.y());
     points[i] = {p_world.x(), p_world.y(), p_world.z()};
@@ -47,14 +47,14 @@ std::vector<CameraFromWorld> SolveP3p(const CameraModel& camera, const Sample& s
   return poses;
 }
 
-struct Score {
+struct PoseScore {
   double support = 0;  // inliers, weighted from 1 (exact) to 0 (at the bound): MSAC, Torr and Zisserman 2000
   int inliers = 0;
 };
 
-Score ComputeScore(const CameraModel& camera, const CameraFromWorld& pose,
-                   std::span<const PoseObservation> observations) {
-  Score score;
+PoseScore ScorePose(const CameraModel& camera, const CameraFromWorld& pose,
+                    std::span<const PoseObservation> observations) {
+  PoseScore score;
   for (const PoseObservation& observation : observations) {
     const double normalized_chi2 = ErrorOf(camera, pose, observation).chi2 / Chi2Bound(observation);
     if (!(normalized_chi2 <= 1)) continue;
@@ -73,17 +73,17 @@ SE3<World, Camera> WorldFromCamera(const CameraFromWorld& pose) {
 std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const PoseObservation> observations,
                                      const PnpOptions& options) {
   const int count = static_cast<int>(observations.size());
-  if (count < std::max(kSampleSize, options.min_inliers)) return std::nullopt;
+  if (count < std::max(kPoseSampleSize, options.min_inliers)) return std::nullopt;
   std::mt19937_64 random(options.seed);
   std::optional<PoseEstimate> best;
   double best_support = 0;
   int needed = options.max_iterations;
   for (int iteration = 0; iteration < needed; ++iteration) {
-    Sample sample;
-    const std::array<int, kSampleSize> indices = SampleDistinct<kSampleSize>(count, random);
-    for (int i = 0; i < kSampleSize; ++i) sample[i] = observations[indices[i]];
+    PoseSample sample;
+    const std::array<int, kPoseSampleSize> indices = SampleDistinct<kPoseSampleSize>(count, random);
+    for (int i = 0; i < kPoseSampleSize; ++i) sample[i] = observations[indices[i]];
     for (const CameraFromWorld& pose : SolveP3p(camera, sample)) {
-      const Score score = ComputeScore(camera, pose, observations);
+      const PoseScore score = ScorePose(camera, pose, observations);
       if (score.support <= best_support) continue;
       best_support = score.support;
       // A pose from three noisy points is inaccurate and misses inliers. Immediate refinement (Chum et al. 2003) gives
@@ -92,7 +92,7 @@ std::optional<PoseEstimate> SolvePnp(const CameraModel& camera, std::span<const 
       if (best && refined.inliers < best->inliers) continue;
       best = std::move(refined);
       const double inlier_share = static_cast<double>(best->inliers) / count;
-      needed = SamplesNeeded(inlier_share, kSampleSize, options.max_iterations);
+      needed = SamplesNeeded(inlier_share, kPoseSampleSize, options.max_iterations);
     }
   }
   if (!best || best->inliers < options.min_inliers) return std::nullopt;

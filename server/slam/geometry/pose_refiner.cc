@@ -73,7 +73,8 @@ PoseEstimate RefinePose(const CameraModel& camera, const SE3<World, Camera>& sta
     return equations;
   };
   for (int round = 0; round < options.rounds && active_count >= kMinObservations; ++round) {
-    Minimize<6>(options.iterations_per_round, linearize, ApplyStep, pose);
+    const auto move = [](const CameraFromWorld& at, const PoseEquations::Vector& step) { return ApplyStep(at, step); };
+    Minimize<6>(options.iterations_per_round, linearize, move, pose);
     active_count = MarkInliers(camera, pose, observations, next_active);
     if (next_active == active) break;
     active.swap(next_active);

@@ -11,19 +11,19 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kTriples = 300;
+constexpr int kPlaneTriples = 300;
 constexpr size_t kMaxPlanes = 3;
-constexpr int kMinInliers = 30;
-constexpr double kInlierSigmas = 2.5;
-constexpr double kMinSigma = 0.002;  // scatter of points on a real surface, in terms of the size of the scene
-constexpr double kMaxSigma = 0.03;   // less accurate points are ignored, in the same terms
-constexpr int kRefinements = 6;
+constexpr int kMinPlaneInliers = 30;
+constexpr double kPlaneInlierSigmas = 2.5;
+constexpr double kMinPlaneSigma = 0.002;  // scatter of points on a real surface, in terms of the size of the scene
+constexpr double kMaxPlaneSigma = 0.03;   // less accurate points are ignored, in the same terms
+constexpr int kPlaneRefinements = 6;
 // A plane through a cloud of points has as many points beside it as on it.
 constexpr double kBesideWidths = 3;  // of the slab that is compared with the inliers, in terms of their slab
 constexpr double kMinContrast = 2;   // ratio of the densities
 constexpr double kMaxDirectionSigma_rad = 3 * std::numbers::pi / 180;
 // Maps from images are bent, most of all far from the cameras.
-constexpr double kSigmaFloor_rad = 2 * std::numbers::pi / 180;
+constexpr double kPlaneSigmaFloor_rad = 2 * std::numbers::pi / 180;
 // Nearly parallel planes are one surface or opposite walls: the second one adds nothing about the direction of up.
 constexpr double kParallel_rad = 20 * std::numbers::pi / 180;
 
@@ -56,9 +56,9 @@ Cloud AccuratePoints(std::span<const SupportPoint> points) {
   const double size_mu = LowerQuantile(std::move(distances), 0.5);
   cloud.points.clear();
   for (const SupportPoint& point : points) {
-    if (!point.position_world.allFinite() || !(point.sigma_mu < kMaxSigma * size_mu)) continue;
+    if (!point.position_world.allFinite() || !(point.sigma_mu < kMaxPlaneSigma * size_mu)) continue;
     cloud.points.push_back(point.position_world);
-    cloud.sigmas_mu.push_back(std::hypot(point.sigma_mu, kMinSigma * size_mu));
+    cloud.sigmas_mu.push_back(std::hypot(point.sigma_mu, kMinPlaneSigma * size_mu));
   }
   return cloud;
 }
@@ -67,10 +67,10 @@ std::optional<Plane> MostPopularPlane(const Cloud& cloud, std::mt19937_64& rando
   std::uniform_int_distribution<size_t> draw(0, cloud.points.size() - 1);
   std::optional<Plane> best;
   int best_count = 0;
-  for (int i = 0; i < kTriples; ++i) {
+  for (int i = 0; i < kPlaneTriples; ++i) {
     const auto plane = PlaneThrough(cloud.points[draw(random)], cloud.points[draw(random)], cloud.points[draw(random)]);
     if (!plane) continue;
-    const int count = cloud.CountWithin(*plane, kInlierSigmas);
+    const int count = cloud.CountWithin(*plane, kPlaneInlierSigmas);
     if (count <= best_count) continue;
     best_count = count;
     best = plane;
@@ -80,31 +80,31 @@ std::optional<Plane> MostPopularPlane(const Cloud& cloud, std::mt19937_64& rando
 
 std::optional<PlaneFit> Refit(const Cloud& cloud, const Plane& start) {
   PlaneFit fit{.plane = start};
-  for (int round = 0; round < kRefinements; ++round) {
+  for (int round = 0; round < kPlaneRefinements; ++round) {
     std::vector<double> weights(cloud.points.size(), 0.0);
     for (size_t i = 0; i < weights.size(); ++i) {
-      const double relative = cloud.Residual(fit.plane, i) / kInlierSigmas;
+      const double relative = cloud.Residual(fit.plane, i) / kPlaneInlierSigmas;
       if (relative < 1) weights[i] = std::pow((1 - relative * relative) / cloud.sigmas_mu[i], 2);
     }
     const auto refit = FitPlane(cloud.points, weights, fit.plane.normal);
     if (!refit) return std::nullopt;
     fit = *refit;
   }
-  fit.sigma_rad = std::hypot(fit.sigma_rad, kSigmaFloor_rad);
+  fit.sigma_rad = std::hypot(fit.sigma_rad, kPlaneSigmaFloor_rad);
   return fit;
 }
 
 bool StandsOut(const Cloud& cloud, const PlaneFit& fit) {
-  const int inliers = cloud.CountWithin(fit.plane, kInlierSigmas);
-  const int beside = cloud.CountWithin(fit.plane, kBesideWidths * kInlierSigmas) - inliers;
-  return inliers >= kMinInliers && inliers * (kBesideWidths - 1) >= kMinContrast * beside &&
+  const int inliers = cloud.CountWithin(fit.plane, kPlaneInlierSigmas);
+  const int beside = cloud.CountWithin(fit.plane, kBesideWidths * kPlaneInlierSigmas) - inliers;
+  return inliers >= kMinPlaneInliers && inliers * (kBesideWidths - 1) >= kMinContrast * beside &&
          fit.sigma_rad < kMaxDirectionSigma_rad;
 }
 
 void RemoveInliers(const Plane& plane, Cloud& cloud) {
   Cloud rest;
   for (size_t i = 0; i < cloud.points.size(); ++i) {
-    if (cloud.Residual(plane, i) < kInlierSigmas) continue;
+    if (cloud.Residual(plane, i) < kPlaneInlierSigmas) continue;
     rest.points.push_back(cloud.points[i]);
     rest.sigmas_mu.push_back(cloud.sigmas_mu[i]);
   }
@@ -119,7 +119,7 @@ std::vector<PlaneFit> FindScenePlanes(std::span<const SupportPoint> points, uint
   std::vector<PlaneFit> planes;
   // The most popular plane may lie across the scene; others are searched after it.
   for (size_t i = 0; i < 2 * kMaxPlanes && planes.size() < kMaxPlanes; ++i) {
-    if (cloud.points.size() < static_cast<size_t>(kMinInliers)) break;
+    if (cloud.points.size() < static_cast<size_t>(kMinPlaneInliers)) break;
     const auto plane = MostPopularPlane(cloud, random);
     const auto fit = plane ? Refit(cloud, *plane) : std::nullopt;
     if (!fit) break;

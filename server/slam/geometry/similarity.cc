@@ -12,9 +12,9 @@
 namespace romap::slam {
 namespace {
 
-constexpr int kSampleSize = 3;
-constexpr int kRefineRounds = 5;
-constexpr int kIterationsPerRound = 8;
+constexpr int kSimilaritySampleSize = 3;
+constexpr int kSimilarityRefineRounds = 5;
+constexpr int kSimilarityIterations = 8;
 // Minimum ratio of the second to the first singular value of the points' correlation. Below it, the points are
 // collinear (to a hundredth of their extent), and the rotation about the line is undetermined.
 constexpr double kMinSingularValueRatio = 1e-4;
@@ -33,8 +33,9 @@ bool Agrees(const CameraModel& camera, const Similarity& similarity, const Simil
          errors.is_in_front_of_both;
 }
 
-int MarkInliers(const CameraModel& camera, const Similarity& similarity, std::span<const SimilarityMatch> matches,
-                const SimilarityOptions& options, std::vector<uint8_t>& inlier) {
+int MarkSimilarityInliers(const CameraModel& camera, const Similarity& similarity,
+                          std::span<const SimilarityMatch> matches, const SimilarityOptions& options,
+                          std::vector<uint8_t>& inlier) {
   int count = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
     inlier[i] = Agrees(camera, similarity, matches[i], options);
@@ -78,23 +79,23 @@ std::optional<PointAlignment> AlignPointSets(std::span<const Eigen::Vector3d> p_
 std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std::span<const SimilarityMatch> matches,
                                                   const SimilarityOptions& options) {
   const int count = static_cast<int>(matches.size());
-  if (count < std::max(kSampleSize, options.min_inliers)) return std::nullopt;
+  if (count < std::max(kSimilaritySampleSize, options.min_inliers)) return std::nullopt;
   std::mt19937_64 random(options.seed);
   std::vector<uint8_t> inlier(matches.size());
   std::optional<SimilarityEstimate> best;
   int most_inliers = 0;
   int needed = options.max_iterations;
   for (int iteration = 0; iteration < needed; ++iteration) {
-    std::array<Eigen::Vector3d, kSampleSize> p_first;
-    std::array<Eigen::Vector3d, kSampleSize> p_second;
-    const std::array<int, kSampleSize> indices = SampleDistinct<kSampleSize>(count, random);
-    for (int i = 0; i < kSampleSize; ++i) {
+    std::array<Eigen::Vector3d, kSimilaritySampleSize> p_first;
+    std::array<Eigen::Vector3d, kSimilaritySampleSize> p_second;
+    const std::array<int, kSimilaritySampleSize> indices = SampleDistinct<kSimilaritySampleSize>(count, random);
+    for (int i = 0; i < kSimilaritySampleSize; ++i) {
       p_first[i] = matches[indices[i]].p_first;
       p_second[i] = matches[indices[i]].p_second;
     }
     const auto start = AlignPoints<Camera, Camera>(p_second, p_first, options.fix_scale);
     if (!start) continue;
-    const int inliers = MarkInliers(camera, FromSim3(*start), matches, options, inlier);
+    const int inliers = MarkSimilarityInliers(camera, FromSim3(*start), matches, options, inlier);
     if (inliers <= most_inliers) continue;
     most_inliers = inliers;
     // Refined immediately (Chum et al. 2003), because a similarity from three points with noisy depths misses many
@@ -102,7 +103,7 @@ std::optional<SimilarityEstimate> SolveSimilarity(const CameraModel& camera, std
     SimilarityEstimate refined = RefineSimilarity(camera, *start, matches, options);
     if (best && refined.inliers <= best->inliers) continue;
     best = std::move(refined);
-    needed = SamplesNeeded(static_cast<double>(best->inliers) / count, kSampleSize, options.max_iterations);
+    needed = SamplesNeeded(static_cast<double>(best->inliers) / count, kSimilaritySampleSize, options.max_iterations);
   }
   if (!best || best->inliers < options.min_inliers) return std::nullopt;
   return best;
@@ -113,7 +114,7 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
   Similarity similarity = FromSim3(start);
   std::vector<uint8_t> active(matches.size());
   std::vector<uint8_t> next_active(matches.size());
-  int inliers = MarkInliers(camera, similarity, matches, options, active);
+  int inliers = MarkSimilarityInliers(camera, similarity, matches, options, active);
   const auto linearize = [&](const Similarity& at) {
     SimilarityEquations equations;
     for (size_t i = 0; i < matches.size(); ++i) {
@@ -121,9 +122,9 @@ SimilarityEstimate RefineSimilarity(const CameraModel& camera, const Sim3<Camera
     }
     return equations;
   };
-  for (int round = 0; round < kRefineRounds && inliers >= kSampleSize; ++round) {
-    Minimize<7>(kIterationsPerRound, linearize, ApplySimilarityStep, similarity);
-    inliers = MarkInliers(camera, similarity, matches, options, next_active);
+  for (int round = 0; round < kSimilarityRefineRounds && inliers >= kSimilaritySampleSize; ++round) {
+    Minimize<7>(kSimilarityIterations, linearize, ApplySimilarityStep, similarity);
+    inliers = MarkSimilarityInliers(camera, similarity, matches, options, next_active);
     const bool is_settled = next_active == active;
     active.swap(next_active);
     if (is_settled) break;

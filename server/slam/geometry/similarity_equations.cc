@@ -8,7 +8,7 @@ namespace romap::slam {
 namespace {
 
 // Cost of a match that a step moves behind a camera; see reprojection.cc.
-constexpr double kCostBehindCamera = 1e4;
+constexpr double kPenaltyBehindCamera = 1e4;
 // Keeps the normal equations nonsingular if the scale is fixed.
 constexpr double kFixedScaleInformation = 1;
 
@@ -50,7 +50,7 @@ void AddSimilarityErrors(const CameraModel& camera, const Similarity& similarity
                          const SimilarityOptions& options, SimilarityEquations& equations) {
   const SimilarityErrors errors = ErrorsOf(camera, similarity, match);
   if (!errors.is_in_front_of_both) {
-    equations.cost += kCostBehindCamera;
+    equations.cost += kPenaltyBehindCamera;
     return;
   }
   // The step moves the second camera's point in the first camera's frame. The inverse of the step moves the first

@@ -4,25 +4,24 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <numeric>
 #include <random>
 #include <vector>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/geometry/plane_fit.h"
 
 namespace romap::slam {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kMaxTilt_rad = 75 * kDegree;
+constexpr double kMaxTilt_rad = 75 * kRadPerDeg;
 constexpr int kMinInliers = 12;
 constexpr size_t kMinObjectPoints = 3;
 constexpr int kTriples = 800;
 constexpr double kPromisingShare = 0.7;  // of the best score so far
 constexpr size_t kMaxCandidates = 30;
-constexpr double kSame_rad = 0.5 * kDegree;
+constexpr double kSame_rad = 0.5 * kRadPerDeg;
 constexpr int kRefinements = 10;
 // Lengths without a unit suffix are relative to the typical distance from a camera to the objects.
 constexpr double kMinSigma = 0.002;  // minimum scatter of points on a real surface
@@ -33,15 +32,13 @@ constexpr double kFarWeight = 0.3;
 constexpr double kReach = 0.25;  // distance around an object in which its support is searched
 constexpr double kMinCamerasAbove = 0.9;
 // Minimum standard deviation: the estimate covers only scatter, but maps are also bent and tables are not exactly flat.
-constexpr double kSigmaFloor_rad = 0.3 * kDegree;
+constexpr double kSigmaFloor_rad = 0.3 * kRadPerDeg;
 constexpr double kMinConfidence = 0.05;
 constexpr size_t kMaxObjectPoints = 300;
 
 double Ramp(double value, double zero_at, double one_at) {
   return std::clamp((value - zero_at) / (one_at - zero_at), 0.0, 1.0);
 }
-
-double Angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
 // The query without invalid values, with typical lengths and a weight for every point.
 struct Scene {
@@ -240,13 +237,13 @@ std::optional<PlaneFit> ChoosePlane(const Scene& scene, std::span<const Candidat
   std::vector<Eigen::Vector3d> normals;
   for (const FoundPlane& other : refined) {
     const auto is_same = [&](const Eigen::Vector3d& normal) {
-      return Angle_rad(normal, other.fit.plane.normal) < kSame_rad;
+      return AngleBetween(normal, other.fit.plane.normal) < kSame_rad;
     };
     if (std::ranges::any_of(normals, is_same)) continue;
     normals.push_back(other.fit.plane.normal);
     const double likelihood = RelativeLikelihood(scene, best, other);
     likelihoods += likelihood;
-    variance += likelihood * std::pow(Angle_rad(best.fit.plane.normal, other.fit.plane.normal), 2);
+    variance += likelihood * std::pow(AngleBetween(best.fit.plane.normal, other.fit.plane.normal), 2);
   }
   PlaneFit chosen = best.fit;
   chosen.sigma_rad = std::hypot(chosen.sigma_rad, std::sqrt(variance / likelihoods), kSigmaFloor_rad);
@@ -272,7 +269,7 @@ double Confidence(const Scene& scene, const PlaneFit& fit, std::span<const size_
     close_inliers += scene.closeness[i];
   }
   const double all_weight = std::accumulate(scene.weights.begin(), scene.weights.end(), 0.0);
-  const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kDegree), 2));
+  const double sharpness = 1 / (1 + std::pow(fit.sigma_rad / (2 * kRadPerDeg), 2));
   // Few inliers near the objects and many far away indicate another surface.
   return Ramp(inlier_weight / all_weight, 0.1, 0.4) * Ramp(close_inliers, 3, 15) * sharpness *
          SupportedShare(scene, fit.plane, inliers) * SupportPlausibility(scene, fit.plane);

@@ -1,8 +1,8 @@
 #include "server/slam/geometry/two_view.h"
 
 #include <algorithm>
-#include <numbers>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/homography.h"
@@ -12,7 +12,6 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kDegree_rad = std::numbers::pi / 180;
 // The scene counts as planar if the homography has more than this share of the support of both models (Mur-Artal et al.
 // 2015).
 constexpr double kPlanarShare = 0.45;
@@ -62,9 +61,9 @@ TwoViewResult SolveTwoView(const CameraModel& camera, std::span<const TwoViewMat
   if (agreeing < options.min_points) return result;
 
   if (RotationSupport(camera, search, ranking.matches) > options.max_rotation_support_ratio * best.support ||
-      result.points < options.min_points || result.parallax_rad < options.min_parallax_deg * kDegree_rad ||
-      best.rotation_sigma_rad > options.max_rotation_sigma_deg * kDegree_rad ||
-      best.direction_sigma_rad > options.max_direction_sigma_deg * kDegree_rad) {
+      result.points < options.min_points || result.parallax_rad < options.min_parallax_deg * kRadPerDeg ||
+      best.rotation_sigma_rad > options.max_rotation_sigma_deg * kRadPerDeg ||
+      best.direction_sigma_rad > options.max_direction_sigma_deg * kRadPerDeg) {
     result.outcome = TwoViewOutcome::kTooLittleParallax;
   } else if (ranking.SecondBestSupport() > options.max_second_best_ratio * best.support) {
     result.outcome = TwoViewOutcome::kAmbiguous;

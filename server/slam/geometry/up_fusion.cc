@@ -7,17 +7,18 @@
 #include <numbers>
 #include <vector>
 
+#include "common/angles.h"
+
 namespace romap::slam {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kGuessSigma_rad = 45 * kPi / 180;
-constexpr double kMaxTilt_rad = 75 * kPi / 180;
-constexpr double kMaxSigma_rad = 5 * kPi / 180;
+constexpr double kGuessSigma_rad = 45 * std::numbers::pi / 180;
+constexpr double kMaxUpTilt_rad = 75 * std::numbers::pi / 180;
+constexpr double kMaxSigma_rad = 5 * std::numbers::pi / 180;
 constexpr size_t kMaxClues = 10;
 constexpr int kIterations = 6;
 constexpr double kSameSigmas = 3;  // directions are about the same within this many standard deviations
-constexpr double kMinSame_rad = 1 * kPi / 180;
+constexpr double kMinSame_rad = 1 * std::numbers::pi / 180;
 
 // A set of clues that may be the right ones.
 struct ClueSet {
@@ -26,8 +27,6 @@ struct ClueSet {
   double weight = 0;  // probability, not normalized
   bool has_direction = false;
 };
-
-double Angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
 // Least squares over rotations of a direction: sums of residuals r with derivative J by the two angles about the
 // tangents of the direction.
@@ -43,7 +42,7 @@ class TangentFit {
     const Eigen::Vector3d across = target - target.dot(direction_) * direction_;
     const double length = across.norm();
     const Eigen::Vector2d offset =
-        length > 0 ? Eigen::Vector2d(Angle_rad(direction_, target) / length * tangents_.transpose() * across)
+        length > 0 ? Eigen::Vector2d(AngleBetween(direction_, target) / length * tangents_.transpose() * across)
                    : Eigen::Vector2d::Zero();
     information_ += Eigen::Matrix2d::Identity() / (sigma_rad * sigma_rad);
     gradient_ += offset / (sigma_rad * sigma_rad);
@@ -104,7 +103,7 @@ ClueSet Evaluate(std::span<const UpClue> clues, uint32_t members, const Eigen::V
       set.has_direction = true;
       log_weight += 2 * std::log(precision);
       // Of a clue without relation to up.
-      log_weight += std::pow(Angle_rad(clues[i].vector_world, guess) / kGuessSigma_rad, 2) / 2;
+      log_weight += std::pow(AngleBetween(clues[i].vector_world, guess) / kGuessSigma_rad, 2) / 2;
     } else {
       ++perpendicular;
       log_weight += std::log(precision);
@@ -122,7 +121,7 @@ ClueSet Evaluate(std::span<const UpClue> clues, uint32_t members, const Eigen::V
   set.sigma_rad = std::sqrt(covariance.trace() / 2);
   // The line of intersection of two walls; that of nearly parallel walls is too uncertain.
   set.has_direction |= perpendicular >= 2 && set.sigma_rad < kMaxSigma_rad;
-  const bool is_possible = Angle_rad(set.direction, guess) < kMaxTilt_rad;
+  const bool is_possible = AngleBetween(set.direction, guess) < kMaxUpTilt_rad;
   set.weight = is_possible ? std::exp(log_weight) : 0;
   return set;
 }
@@ -145,7 +144,7 @@ FusedUp FuseUp(std::span<const UpClue> clues, const Eigen::Vector3d& guess_world
   if (!best->has_direction) return up;
   const double same_rad = std::max(kMinSame_rad, kSameSigmas * best->sigma_rad);
   for (const ClueSet& set : sets) {
-    const bool is_same = set.has_direction && Angle_rad(set.direction, best->direction) < same_rad;
+    const bool is_same = set.has_direction && AngleBetween(set.direction, best->direction) < same_rad;
     if (is_same) up.confidence += set.weight / total;
   }
   return up;

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace romap::measure {
-namespace {
+namespace romap::measure::object_score_test {
 
 SE3<World, Object> Pose(const Eigen::Vector3d& center, double yaw_rad = 0) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), center};
@@ -91,5 +90,4 @@ TEST(ScoreMap, AnEmptyMapHasNoFoundObjects) {
   EXPECT_EQ(score.objects.size(), 2U);
 }
 
-}  // namespace
-}  // namespace romap::measure
+}  // namespace romap::measure::object_score_test

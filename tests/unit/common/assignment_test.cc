@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <random>
 
-namespace romap {
-namespace {
+namespace romap::assignment_test {
 
 using ::testing::ElementsAre;
 
@@ -41,5 +40,4 @@ TEST(AssignRowsTest, AgreesWithExhaustiveSearch) {
   }
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::assignment_test

@@ -5,8 +5,7 @@
 #include <atomic>
 #include <thread>
 
-namespace romap {
-namespace {
+namespace romap::bounded_queue_test {
 
 TEST(BoundedQueueTest, KeepsOrderAndDrainsAfterClose) {
   BoundedQueue<int> queue(4);
@@ -60,5 +59,4 @@ TEST(BoundedQueueTest, PushDroppingOldestKeepsTheNewest) {
   EXPECT_FALSE(accepted);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::bounded_queue_test

@@ -7,8 +7,7 @@
 #include "common/status.h"
 #include "tests/support/subprocess.h"
 
-namespace romap {
-namespace {
+namespace romap::config_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -159,5 +158,4 @@ TEST(ConfigTest, LoadingTheDumpGivesTheSameValues) {
   EXPECT_EQ(other.kind, "sdf");
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::config_test

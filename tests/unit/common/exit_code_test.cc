@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
-namespace {
+namespace romap::exit_code_test {
 
 TEST(ExitCodeTest, MatchesTheDocumentedTable) {
   EXPECT_EQ(ToExitCode(absl::OkStatus()), 0);
@@ -18,5 +17,4 @@ TEST(ExitCodeTest, MatchesTheDocumentedTable) {
   EXPECT_EQ(ToExitCode(absl::CancelledError("")), 130);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::exit_code_test

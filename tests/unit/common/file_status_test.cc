@@ -7,8 +7,7 @@
 
 #include "common/status.h"
 
-namespace romap {
-namespace {
+namespace romap::file_status_test {
 
 TEST(FileErrorTest, NamesPathActionAndReason) {
   const absl::Status status = FileError("/data/map.ply", "open for reading", ENOENT);
@@ -40,5 +39,4 @@ TEST(FileErrorTest, ReportsAnUnknownReason) {
   EXPECT_EQ(Message(FileError("f", "write", 0)), "f: cannot write: unknown reason");
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::file_status_test

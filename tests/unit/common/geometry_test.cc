@@ -7,8 +7,7 @@
 #include "common/camera_model.h"
 #include "common/status.h"
 
-namespace romap {
-namespace {
+namespace romap::geometry_test {
 
 SE3<World, Camera> SomePose() {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())), Eigen::Vector3d(1, -2, 3)};
@@ -71,5 +70,4 @@ TEST(CameraModelTest, ErrorsNameTheField) {
   EXPECT_NE(Message(ValidateCameraModel(bad)).find("distortion"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::geometry_test

@@ -4,8 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-namespace romap {
-namespace {
+namespace romap::image_sharpness_test {
 
 cv::Mat Checkerboard(int cell_px) {
   cv::Mat image(64, 64, CV_8UC3);
@@ -39,5 +38,4 @@ TEST(ImageSharpness, UsesOnlyThePixelsOfASubimage) {
   EXPECT_EQ(ImageSharpness(image(part)), ImageSharpness(image(part).clone()));
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::image_sharpness_test

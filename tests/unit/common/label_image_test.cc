@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
-namespace {
+namespace romap::label_image_test {
 
 TEST(LabelAt, IsZeroNearAnotherLabelAndOutside) {
   cv::Mat labels = cv::Mat::zeros(20, 30, CV_16UC1);
@@ -23,5 +22,4 @@ TEST(LabelAt, ImageBorderDoesNotErodeTheMask) {
   EXPECT_EQ(LabelAt(labels, {0, 0}, 3), 7);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::label_image_test

@@ -10,8 +10,7 @@
 
 #include "common/status.h"
 
-namespace romap {
-namespace {
+namespace romap::lens_test {
 
 CameraModel Camera(LensModel lens, const std::array<double, 5>& distortion) {
   return {.width_px = 640,
@@ -136,5 +135,4 @@ TEST(Lens, ErrorsNameTheCoefficients) {
   EXPECT_NE(Message(ValidateCameraModel(camera)).find("4 distortion coefficients"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::lens_test

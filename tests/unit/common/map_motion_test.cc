@@ -4,8 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace romap {
-namespace {
+namespace romap::map_motion_test {
 
 Sim3<World, World> SomeCorrection() {
   return {1.5, Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())), {4, -5, 6}};
@@ -40,5 +39,4 @@ TEST(MapMotionTest, MovedViewProjectsMovedPointsToTheSamePixels) {
   EXPECT_EQ(view.depth_mu.at<float>(1, 1), 2.0f) << "the pixels of the original view are shared and must not change";
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::map_motion_test

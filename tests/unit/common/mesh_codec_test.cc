@@ -10,8 +10,7 @@
 
 #include "common/status.h"
 
-namespace romap {
-namespace {
+namespace romap::mesh_codec_test {
 
 using ::testing::HasSubstr;
 
@@ -199,5 +198,4 @@ TEST(MeshCodec, DamagedStreamsGiveAValidMeshOrAnError) {
   }
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::mesh_codec_test

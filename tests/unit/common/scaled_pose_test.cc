@@ -4,8 +4,7 @@
 
 #include <Eigen/Geometry>
 
-namespace romap {
-namespace {
+namespace romap::scaled_pose_test {
 
 const SE3<World, Camera> kPose(Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), {1, 2, 3});
 const SE3<Camera, Camera> kMotion(Eigen::Quaterniond(Eigen::AngleAxisd(-0.2, Eigen::Vector3d::UnitX())), {0.1, 0, 0.5});
@@ -27,5 +26,4 @@ TEST(ScaledPose, RelativeInvertsCompose) {
   EXPECT_LT((back.Matrix() - kMotion.Matrix()).norm(), 1e-14);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::scaled_pose_test

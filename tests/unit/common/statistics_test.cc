@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
-namespace {
+namespace romap::statistics_test {
 
 TEST(Statistics, OrderStatisticCountsFromTheSmallest) {
   EXPECT_EQ(OrderStatistic(std::vector<int>{7, 3, 9}, 0), 3);
@@ -40,5 +39,4 @@ TEST(Statistics, QuantileInterpolatesLinearly) {
   EXPECT_DOUBLE_EQ(Quantile({7}, 0.3), 7);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::statistics_test

@@ -6,8 +6,7 @@
 
 #include <thread>
 
-namespace romap {
-namespace {
+namespace romap::thread_priority_test {
 
 int Niceness() { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); }
 
@@ -23,5 +22,4 @@ TEST(ThreadPriorityTest, LowersOnlyTheCallingThread) {
   EXPECT_EQ(Niceness(), before);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::thread_priority_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap {
-namespace {
+namespace romap::utf8_test {
 
 TEST(Utf8Test, AcceptsWellFormedText) {
   for (const char* text : {"", "cup", "caf\xC3\xA9", "\xE6\x9D\xAF", "\xF0\x9F\xA5\xA4", "\xF4\x8F\xBF\xBF"}) {
@@ -18,5 +17,4 @@ TEST(Utf8Test, RejectsMalformedText) {
   }
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::utf8_test

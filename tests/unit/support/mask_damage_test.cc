@@ -8,8 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-namespace romap {
-namespace {
+namespace romap::mask_damage_test {
 
 constexpr int64_t kFrame_ns = 40'000'000;
 
@@ -315,5 +314,4 @@ TEST(MaskDamage, PermutingLabelsKeepsTheMasks) {
   EXPECT_GT(labels_of_vase.size(), 10U);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::mask_damage_test

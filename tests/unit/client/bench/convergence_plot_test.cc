@@ -4,8 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::convergence_plot_test {
 
 // Mean position of the pixels with the color of a line, in the left (accuracy) or right (completion) panel, without the
 // legend.
@@ -51,5 +50,4 @@ TEST(ConvergencePlotTest, AcceptsZeroTimesAndNoCurves) {
   EXPECT_FALSE(DrawConvergence(results).empty());
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::convergence_plot_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::fma_peak_test {
 
 // Checks only a plausible range, i.e. the units.
 TEST(FmaPeakTest, IsInAPlausibleRange) {
@@ -16,5 +15,4 @@ TEST(FmaPeakTest, IsInAPlausibleRange) {
   EXPECT_GT(MeasureFmaPeakGflops(2, 0.01), 0.01);
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::fma_peak_test

@@ -8,8 +8,7 @@
 #include "server/mesh/extract_mesh.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::hull_field_test {
 
 struct HullFieldTest : public ::testing::Test {
   HullFieldTest() {
@@ -29,8 +28,8 @@ struct HullFieldTest : public ::testing::Test {
     return raw[0];
   }
 
-  testing::TinySequence data;
-  const float radius = static_cast<float>(testing::TinySequence::Balls().front().radius_m);
+  testing_support::TinySequence data;
+  const float radius = static_cast<float>(testing_support::TinySequence::Balls().front().radius_m);
   std::vector<ObjectView> views;
   FieldSnapshot snapshot;
 };
@@ -71,5 +70,4 @@ TEST_F(HullFieldTest, SurfaceIsCloseToTheBall) {
   EXPECT_NEAR(sum / static_cast<double>(mesh->vertices.size()), radius, 0.08 * radius);
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::hull_field_test

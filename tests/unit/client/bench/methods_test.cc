@@ -6,8 +6,7 @@
 
 #include "client/bench/published.h"
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::methods_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -119,5 +118,4 @@ TEST(MethodsTest, ParsesRows) {
   }
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::methods_test

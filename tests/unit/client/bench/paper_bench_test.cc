@@ -10,13 +10,12 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::paper_bench_test {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-PaperBenchOptions TinyBench(const testing::TinySequence& data) {
+PaperBenchOptions TinyBench(const testing_support::TinySequence& data) {
   PaperBenchOptions options;
   options.sequence_dir = data.dir();
   options.out_dir = data / "out";
@@ -44,7 +43,7 @@ absl::StatusOr<PaperResults> RunBench(const PaperBenchOptions& options) {
 nlohmann::json ReadJson(const std::string& path) { return nlohmann::json::parse(std::ifstream(path)); }
 
 TEST(PaperBenchTest, WritesReportPlotAndMeshes) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   const PaperBenchOptions options = TinyBench(data);
   const absl::StatusOr<PaperResults> results = RunBench(options);
   ASSERT_TRUE(results.ok()) << Message(results.status());
@@ -72,7 +71,7 @@ TEST(PaperBenchTest, WritesReportPlotAndMeshes) {
 }
 
 TEST(PaperBenchTest, RunsAllSeedsOnAllSubsets) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.seeds = 2;
   options.subsets = 2;
@@ -95,7 +94,7 @@ TEST(PaperBenchTest, RunsAllSeedsOnAllSubsets) {
 }
 
 TEST(PaperBenchTest, MethodsWithEqualSettingsRunOnce) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.tables = {"1", "ablation"};
   options.methods = {"fast", "all-parts", "no-density"};
@@ -111,7 +110,7 @@ TEST(PaperBenchTest, MethodsWithEqualSettingsRunOnce) {
 }
 
 TEST(PaperBenchTest, InterruptKeepsPartialResults) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.seeds = 3;
   std::string last;
@@ -128,7 +127,7 @@ TEST(PaperBenchTest, InterruptKeepsPartialResults) {
 }
 
 TEST(PaperBenchTest, RunsSignedDistanceFields) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.methods = {"fast", "sdf"};
   const absl::StatusOr<PaperResults> results = RunBench(options);
@@ -139,7 +138,7 @@ TEST(PaperBenchTest, RunsSignedDistanceFields) {
 }
 
 TEST(PaperBenchTest, RunsAdditionalRowsAndRejectsInvalidOnes) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   PaperBenchOptions options = TinyBench(data);
   options.more_methods = {{.id = "mine", .title = "mine", .settings = {"nerf.full_budget_steps=7"}}};
   options.methods = {"mine"};
@@ -153,7 +152,7 @@ TEST(PaperBenchTest, RunsAdditionalRowsAndRejectsInvalidOnes) {
 }
 
 TEST(PaperBenchTest, NamesInvalidInput) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   const auto error_of = [&](const std::function<void(PaperBenchOptions&)>& change) {
     PaperBenchOptions options = TinyBench(data);
     change(options);
@@ -181,5 +180,4 @@ TEST(PaperBenchTest, QuickReducesTheRun) {
   EXPECT_THAT(quick.methods, ::testing::ElementsAre("fast", "hull", "mine"));
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::paper_bench_test

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::paper_results_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -140,5 +139,4 @@ TEST(PaperResultsTest, JsonHasTheSameFigures) {
   EXPECT_EQ(json["curves"][1]["completion_cm"], 0.25);
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::paper_results_test

@@ -6,8 +6,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::timed_training_test {
 
 constexpr double kForever_s = 1e6;
 
@@ -39,7 +38,7 @@ struct TimedTrainingTest : public ::testing::Test {
     return raw;
   }
 
-  testing::TinySequence data;
+  testing_support::TinySequence data;
   files::ObjectRecord object;
   std::vector<ObjectView> views;
   TrainingRequest request;
@@ -109,5 +108,4 @@ TEST_F(TimedTrainingTest, RejectsAnObjectWithoutViews) {
   EXPECT_EQ(TrainWithin(request, seconds_per_step).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::timed_training_test

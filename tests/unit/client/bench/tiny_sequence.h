@@ -6,7 +6,7 @@
 #include "client/files/sequence.h"
 #include "tests/support/subprocess.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 struct TinyBall {
   int64_t id;
@@ -32,4 +32,4 @@ class TinySequence {
   testing_support::TemporaryFolder folder_;
 };
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -10,7 +10,7 @@
 
 #include "client/files/ply.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 namespace {
 
 namespace fs = std::filesystem;
@@ -136,4 +136,4 @@ const std::vector<TinyBall>& TinySequence::Balls() {
   return kBalls;
 }
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

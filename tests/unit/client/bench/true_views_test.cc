@@ -8,8 +8,7 @@
 
 #include "tests/unit/client/bench/tiny_sequence.h"
 
-namespace romap::bench {
-namespace {
+namespace romap::bench::true_views_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -21,7 +20,7 @@ std::vector<uint64_t> Ids(const TrueFrames& frames) {
 }
 
 TEST(TrueViewsTest, SubsetsAreDisjoint) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   const files::Sequence sequence = data.Open();
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 0)), ElementsAre(1, 9, 17));
   EXPECT_THAT(Ids(*LoadTrueFrames(sequence, 8, 3)), ElementsAre(4, 12, 20));
@@ -29,7 +28,7 @@ TEST(TrueViewsTest, SubsetsAreDisjoint) {
 }
 
 TEST(TrueViewsTest, ViewContainsTheObjectAndItsSurroundings) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   const files::Sequence sequence = data.Open();
   const TrueFrames frames = *LoadTrueFrames(sequence, 6, 0);
   for (const files::ObjectRecord& object : sequence.objects()->objects) {
@@ -58,7 +57,7 @@ TEST(TrueViewsTest, ViewContainsTheObjectAndItsSurroundings) {
 }
 
 TEST(TrueViewsTest, NoViewOfAnObjectWithFewPixels) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   const files::Sequence sequence = data.Open();
   Frame frame = *LoadTrueFrames(sequence, 24, 0)->front();
   const files::ObjectRecord& object = sequence.objects()->objects.front();
@@ -68,16 +67,15 @@ TEST(TrueViewsTest, NoViewOfAnObjectWithFewPixels) {
 }
 
 TEST(TrueViewsTest, RejectsLabelsThatAreNotObjectIds) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   std::ofstream(data.dir() + "/detections.csv") << "# timestamp,label,class,score\n0.0,1,bottle,1\n";
   EXPECT_THAT(Message(LoadTrueFrames(data.Open(), 8, 0).status()), HasSubstr("label 1 of frame 1 has class bottle"));
 }
 
 TEST(TrueViewsTest, RequiresCuboids) {
-  const testing::TinySequence data;
+  const testing_support::TinySequence data;
   std::filesystem::remove(data.dir() + "/objects.yaml");
   EXPECT_THAT(Message(LoadTrueFrames(data.Open(), 8, 0).status()), HasSubstr("objects.yaml"));
 }
 
-}  // namespace
-}  // namespace romap::bench
+}  // namespace romap::bench::true_views_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::cli {
-namespace {
+namespace romap::cli::cuboid_outline_test {
 
 const CameraModel kCamera{
     .width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 500, .cx_px = 320, .cy_px = 240, .distortion = {}};
@@ -29,5 +28,4 @@ TEST(CuboidOutlineTest, IsEmptyBehindTheCameraAndAcrossTheImageBorder) {
   EXPECT_FALSE(CuboidOutline(At(1.3, 0, 2.5), kCamera, SE3<World, Camera>()));
 }
 
-}  // namespace
-}  // namespace romap::cli
+}  // namespace romap::cli::cuboid_outline_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::cli {
-namespace {
+namespace romap::cli::map_collector_test {
 
 ObjectUpdate Update(uint64_t id, uint64_t revision, ObjectState state = ObjectState::kConfirmed) {
   ObjectUpdate update;
@@ -100,5 +99,4 @@ TEST(MapCollectorTest, BuildsTheTrajectoryFromAcknowledgements) {
   EXPECT_EQ(collector.faults()[0], "frame 2: image is truncated");
 }
 
-}  // namespace
-}  // namespace romap::cli
+}  // namespace romap::cli::map_collector_test

@@ -5,8 +5,7 @@
 
 #include "common/mesh_codec.h"
 
-namespace romap::cli {
-namespace {
+namespace romap::cli::map_files_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -56,5 +55,4 @@ TEST(MapFilesTest, TrajectorySkipsFramesWithoutPose) {
   EXPECT_EQ(trajectory[0].T_world_camera.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
-}  // namespace
-}  // namespace romap::cli
+}  // namespace romap::cli::map_files_test

@@ -2,8 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace romap::cli {
-namespace {
+namespace romap::cli::mask_schedule_test {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -73,5 +72,4 @@ TEST(MaskScheduleTest, DelaysMasksByFrameTimestamps) {
   EXPECT_FALSE(schedule.TakeDueBy(INT64_MAX).has_value());
 }
 
-}  // namespace
-}  // namespace romap::cli
+}  // namespace romap::cli::mask_schedule_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::boxes_eval_test {
 
 using eval_world::TempFolder;
 using eval_world::UprightCuboid;
@@ -136,5 +135,4 @@ TEST(MakeUprightTest, UsesTheAxisClosestToUpAndReportsTheTilt) {
   EXPECT_NEAR(box.tilt_deg, 5, 1e-9);
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::boxes_eval_test

@@ -6,8 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::calibration_test {
 
 // Lengths of 3D normal errors with standard deviation 1 per axis.
 std::vector<PoseError> NormalErrors(int count) {
@@ -41,5 +40,4 @@ TEST(CalibrationTest, SmallSigmasCoverLess) {
 
 TEST(CalibrationTest, NoPosesHaveNoCoverage) { EXPECT_FALSE(MeasureCalibration({}, {}, 1).has_value()); }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::calibration_test

@@ -4,8 +4,7 @@
 
 #include <vector>
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::frame_coverage_test {
 
 std::vector<int64_t> Range(int64_t first, int64_t end, int64_t step) {
   std::vector<int64_t> values;
@@ -48,5 +47,4 @@ TEST(FrameCoverageTest, ASinglePoseDeterminesNoPeriod) {
   EXPECT_EQ(coverage.tracked, 1u);
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::frame_coverage_test

@@ -5,8 +5,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::map_alignment_test {
 
 using eval_world::Moved;
 using eval_world::Orbit;
@@ -50,5 +49,4 @@ TEST(HaveSameWorldTest, OrientationsMustAgreeToo) {
   EXPECT_FALSE(HaveSameWorld({}, Orbit(), 0.02));
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::map_alignment_test

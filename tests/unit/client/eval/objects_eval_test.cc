@@ -12,8 +12,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::objects_eval_test {
 
 using eval_world::Box;
 using eval_world::SamplingFloor_cm;
@@ -230,5 +229,4 @@ TEST_F(ObjectsEvalWithMasksTest, NamesATrueSurfaceWithoutAnObject) {
   EXPECT_THAT(Error(), HasSubstr("objects.yaml: no object named bowl"));
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::objects_eval_test

@@ -7,8 +7,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::points_test {
 
 TEST(SampleSurfaceTest, SamplesUniformlyByArea) {
   Mesh mesh = eval_world::Box({1, 2, 3}, {0, 0, 0});
@@ -47,5 +46,4 @@ TEST(NearestIndexTest, AgreesWithExhaustiveSearch) {
   }
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::points_test

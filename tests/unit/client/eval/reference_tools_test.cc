@@ -15,8 +15,7 @@
 #include "client/files/mesh_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::reference_tools_test {
 
 using eval_world::Moved;
 using eval_world::TempFolder;
@@ -195,5 +194,4 @@ TEST_F(ReferenceToolsTest, AgreeOnASequenceWithMasksAndDepth) {
   CompareObjects(options, fmt::format("--no-cap --dataset '{}' --dataset-every 10", room));
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::reference_tools_test

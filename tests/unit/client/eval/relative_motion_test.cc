@@ -4,8 +4,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::relative_motion_test {
 
 using eval_world::Orbit;
 
@@ -88,5 +87,4 @@ TEST(RelativeMotionTest, MeasuresRelativeRotationErrors) {
   EXPECT_NEAR(figures.jumps.rotation_deg, 0.1, 1e-6);
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::relative_motion_test

@@ -7,8 +7,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::run_eval_test {
 
 using eval_world::Box;
 using eval_world::Moved;
@@ -106,5 +105,4 @@ TEST_F(RunEvalTest, TablesAndJsonContainTheFigures) {
   EXPECT_EQ(json["trajectory"]["frames"]["lost"], 0);
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::run_eval_test

@@ -6,8 +6,7 @@
 #include "client/files/text_file.h"
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::run_record_test {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -63,5 +62,4 @@ TEST_F(RunRecordTest, DeterminesTheFramesOfTheRun) {
   EXPECT_THAT(FramesOf({.first_frame = 9, .frames_sent = 2}, *sequence), IsEmpty());
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::run_record_test

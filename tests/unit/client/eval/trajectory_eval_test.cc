@@ -7,8 +7,7 @@
 
 #include "tests/unit/client/eval/eval_world.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::trajectory_eval_test {
 
 using eval_world::Moved;
 using eval_world::Orbit;
@@ -201,5 +200,4 @@ TEST(CompareTrajectoriesTest, MeasuresCalibrationIfSigmasAreGiven) {
   EXPECT_FALSE(CompareWithOrbit(estimated).calibration.has_value());
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::trajectory_eval_test

@@ -7,8 +7,7 @@
 
 #include "client/eval/trajectory_eval.h"
 
-namespace romap::eval {
-namespace {
+namespace romap::eval::verdict_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -75,5 +74,4 @@ TEST(VerdictTest, TranslationIsNotJudgedIfTheTrueCameraHardlyMoves) {
   EXPECT_EQ(Judge(report).level, VerdictLevel::kWrong);
 }
 
-}  // namespace
-}  // namespace romap::eval
+}  // namespace romap::eval::verdict_test

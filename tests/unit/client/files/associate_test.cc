@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace romap::files {
-namespace {
+namespace romap::files::associate_test {
 
 using ::testing::ElementsAre;
 using ::testing::Pair;
@@ -18,5 +17,4 @@ TEST(AssociateTimestampsTest, PairsOneToOneAndClosestFirst) {
   EXPECT_TRUE(AssociateTimestamps(a, {}, 10).empty());
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::associate_test

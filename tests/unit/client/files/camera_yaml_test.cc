@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace romap::files {
-namespace {
+namespace romap::files::camera_yaml_test {
 
 using ::testing::HasSubstr;
 
@@ -64,5 +63,4 @@ TEST(CameraYamlTest, NamesTheError) {
   EXPECT_EQ(ReadCameraYaml(path).status().code(), absl::StatusCode::kNotFound);
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::camera_yaml_test

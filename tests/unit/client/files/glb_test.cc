@@ -10,8 +10,7 @@
 #include "client/files/text_file.h"
 #include "tests/support/streams.h"
 
-namespace romap::files {
-namespace {
+namespace romap::files::glb_test {
 
 uint32_t WordAt(const std::string& bytes, size_t offset) {
   uint32_t word = 0;
@@ -119,5 +118,4 @@ TEST(GlbTest, RejectsInvalidMeshes) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::glb_test

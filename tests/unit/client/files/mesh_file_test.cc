@@ -9,8 +9,7 @@
 
 #include "client/files/ply.h"
 
-namespace romap::files {
-namespace {
+namespace romap::files::mesh_file_test {
 
 using ::testing::HasSubstr;
 
@@ -55,5 +54,4 @@ TEST(MeshFileDataTest, ReadsGroundTruthClouds) {
   EXPECT_EQ(cup->scalars.at("source").size(), 28754u);
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::mesh_file_test

@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace romap::files {
-namespace {
+namespace romap::files::obj_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -46,5 +45,4 @@ TEST(ObjTest, NamesTheInvalidLineOrFace) {
   std::filesystem::remove(path);
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::obj_test

@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace romap::files {
-namespace {
+namespace romap::files::objects_yaml_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -89,5 +88,4 @@ TEST(ObjectsYamlTest, NamesTheInvalidObject) {
   std::filesystem::remove(path);
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::objects_yaml_test

@@ -8,8 +8,7 @@
 
 #include "client/files/text_file.h"
 
-namespace romap::files {
-namespace {
+namespace romap::files::ply_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -154,5 +153,4 @@ TEST(PlyTest, WriteReportsAMissingFolder) {
   EXPECT_EQ(ErrorOf(status), "/nowhere/x.ply: cannot write: No such file or directory");
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::ply_test

@@ -9,8 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
-namespace romap::files {
-namespace {
+namespace romap::files::sequence_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -213,5 +212,4 @@ TEST(SequenceDataTest, OpensASequenceWithMasksInEverySecondFrame) {
   EXPECT_EQ(kitchen->Load(2)->instances[1].class_name, "cup");
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::sequence_test

@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace romap::files {
-namespace {
+namespace romap::files::text_file_test {
 
 using ::testing::ElementsAre;
 
@@ -45,5 +44,4 @@ TEST(ReadTableTest, SplitsAtBlanksOrCommas) {
   EXPECT_EQ(ReadTable(testing::TempDir(), ',').status().code(), absl::StatusCode::kPermissionDenied) << "a folder";
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::text_file_test

@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace romap::files {
-namespace {
+namespace romap::files::tum_test {
 
 using ::testing::HasSubstr;
 
@@ -59,5 +58,4 @@ TEST(PoseAtTest, InterpolatesBetweenTwoPoses) {
   EXPECT_FALSE(PoseAt({}, 0, 5'000'000).has_value());
 }
 
-}  // namespace
-}  // namespace romap::files
+}  // namespace romap::files::tum_test

@@ -7,8 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace romap::pictures {
-namespace {
+namespace romap::pictures::pictures_test {
 
 CameraModel SmallCamera() {
   return {.width_px = 320, .height_px = 240, .fx_px = 300, .fy_px = 300, .cx_px = 159.5, .cy_px = 119.5};
@@ -186,5 +185,4 @@ TEST(DrawOverviewTest, AcceptsAnEmptyMap) {
   EXPECT_EQ(picture.at<cv::Vec3b>(24, 32), cv::Vec3b(255, 255, 255));
 }
 
-}  // namespace
-}  // namespace romap::pictures
+}  // namespace romap::pictures::pictures_test

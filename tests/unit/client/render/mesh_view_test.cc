@@ -7,8 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-namespace romap::render {
-namespace {
+namespace romap::render::mesh_view_test {
 
 CameraModel SmallCamera() {
   return {.width_px = 64, .height_px = 64, .fx_px = 64, .fy_px = 64, .cx_px = 31.5, .cy_px = 31.5};
@@ -75,5 +74,4 @@ TEST(RenderMeshesTest, AcceptsEmptyMeshesAndSkipsInvalidTriangles) {
   EXPECT_EQ(nothing.color_bgr.at<cv::Vec3b>(0, 0), cv::Vec3b(5, 5, 5));
 }
 
-}  // namespace
-}  // namespace romap::render
+}  // namespace romap::render::mesh_view_test

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace romap::render {
-namespace {
+namespace romap::render::rasterizer_test {
 
 CameraModel SmallCamera() {
   return {.width_px = 100, .height_px = 80, .fx_px = 90, .fy_px = 90, .cx_px = 49.5, .cy_px = 39.5};
@@ -137,5 +136,4 @@ TEST(BarycentricsTest, ArePerspectiveCorrect) {
   EXPECT_TRUE(weights.isApprox(wanted, 1e-5F)) << weights.transpose();
 }
 
-}  // namespace
-}  // namespace romap::render
+}  // namespace romap::render::rasterizer_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::client {
-namespace {
+namespace romap::client::map_copy_test {
 
 ObjectUpdate Update(uint64_t id, uint64_t revision) {
   ObjectUpdate update;
@@ -57,5 +56,4 @@ TEST(MapCopyTest, IgnoresEventsThatDoNotConcernObjects) {
   EXPECT_TRUE(copy.objects().empty());
 }
 
-}  // namespace
-}  // namespace romap::client
+}  // namespace romap::client::map_copy_test

@@ -16,17 +16,16 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap::client {
-namespace {
+namespace romap::client::remote_mapping_service_test {
 
 using absl::StatusCode;
-using testing::Eventually;
 using ::testing::HasSubstr;
-using testing::MakeFrame;
-using testing::NextOf;
-using testing::Only;
-using testing::ReadToEnd;
 using ::testing::SizeIs;
+using testing_support::Eventually;
+using testing_support::MakeFrame;
+using testing_support::NextOf;
+using testing_support::Only;
+using testing_support::ReadToEnd;
 
 std::unique_ptr<transport::GrpcServer> StartServer(MappingService* service,
                                                    const std::string& address = "127.0.0.1:0") {
@@ -37,9 +36,11 @@ std::unique_ptr<transport::GrpcServer> StartServer(MappingService* service,
 
 class RemoteMappingServiceTest : public ::testing::Test {
  protected:
-  std::string NewSession() { return client_->CreateSession({.name = "", .camera = testing::SmallCamera()})->id; }
+  std::string NewSession() {
+    return client_->CreateSession({.name = "", .camera = testing_support::SmallCamera()})->id;
+  }
 
-  testing::FakeMappingService fake_;
+  testing_support::FakeMappingService fake_;
   std::unique_ptr<transport::GrpcServer> server_ = StartServer(&fake_);
   std::unique_ptr<RemoteMappingService> client_ = RemoteMappingService::Connect(server_->address()).value();
 };
@@ -68,9 +69,9 @@ TEST_F(RemoteMappingServiceTest, ConnectRejectsAServerThatIsNotRomap) {
 TEST_F(RemoteMappingServiceTest, ServerShutdownEndsTheStream) {
   const auto stream = client_->OpenMap(NewSession()).value();
   server_.reset();
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   EXPECT_CODE(stream->status(), StatusCode::kUnavailable);
-  EXPECT_CODE(stream->Send(testing::MakeFrame(1)), StatusCode::kUnavailable);
+  EXPECT_CODE(stream->Send(testing_support::MakeFrame(1)), StatusCode::kUnavailable);
   EXPECT_FALSE(client_->ListSessions().ok());
 }
 
@@ -83,23 +84,23 @@ TEST_F(RemoteMappingServiceTest, ReconnectsAfterServerRestart) {
   auto restarted = transport::GrpcServer::Start(&fake_, config);
   if (!restarted.ok()) GTEST_SKIP() << "another process took the port in the meantime";
   std::unique_ptr<MapStream> stream;
-  ASSERT_TRUE(testing::Eventually([&] {
+  ASSERT_TRUE(testing_support::Eventually([&] {
     auto opened = client_->OpenMap(session);
     if (opened.ok()) stream = *std::move(opened);
     return stream != nullptr;
   }));
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
 }
 
 TEST_F(RemoteMappingServiceTest, RejectsAnOversizedFrameAndKeepsTheStreamOpen) {
   const auto stream = client_->OpenMap(NewSession()).value();
-  FrameInput frame = testing::MakeFrame(1);
+  FrameInput frame = testing_support::MakeFrame(1);
   frame.image.assign(33 << 20, 'x');
   EXPECT_OK(stream->Send(std::move(frame)));
-  EXPECT_OK(stream->Send(testing::MakeFrame(2)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(2)));
   EXPECT_OK(stream->CloseSend());
-  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
+  const auto acks = testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(2));
   EXPECT_EQ(acks[0].frame_id, 1u);
   EXPECT_FALSE(acks[0].accepted);
@@ -109,10 +110,10 @@ TEST_F(RemoteMappingServiceTest, RejectsAnOversizedFrameAndKeepsTheStreamOpen) {
 
 TEST_F(RemoteMappingServiceTest, SendsAFrameJustBelowTheSizeLimit) {
   const auto stream = client_->OpenMap(NewSession()).value();
-  FrameInput frame = testing::MakeFrame(1);
+  FrameInput frame = testing_support::MakeFrame(1);
   frame.image.assign((32 << 20) - 1000, 'x');
   EXPECT_OK(stream->Send(std::move(frame)));
-  const auto ack = testing::NextOf<FrameAck>(*stream);
+  const auto ack = testing_support::NextOf<FrameAck>(*stream);
   ASSERT_TRUE(ack.has_value());
   EXPECT_TRUE(ack->accepted);
 }
@@ -120,9 +121,9 @@ TEST_F(RemoteMappingServiceTest, SendsAFrameJustBelowTheSizeLimit) {
 TEST_F(RemoteMappingServiceTest, DeliversAllEventsToALateReader) {
   constexpr uint64_t kFrames = 500;  // three events each, more than the client buffers
   const auto stream = client_->OpenMap(NewSession()).value();
-  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());
+  for (uint64_t id = 1; id <= kFrames; ++id) ASSERT_TRUE(stream->Send(testing_support::MakeFrame(id, "mug")).ok());
   EXPECT_OK(stream->CloseSend());
-  const auto acks = testing::Only<FrameAck>(testing::ReadToEnd(*stream));
+  const auto acks = testing_support::Only<FrameAck>(testing_support::ReadToEnd(*stream));
   ASSERT_THAT(acks, SizeIs(kFrames));
   for (uint64_t i = 0; i < kFrames; ++i) ASSERT_EQ(acks[i].frame_id, i + 1);
 }
@@ -131,16 +132,16 @@ TEST_F(RemoteMappingServiceTest, StreamCanBeDestroyedWithUnreadEvents) {
   const auto session = NewSession();
   const auto watch = client_->Watch(session).value();
   auto stream = client_->OpenMap(session).value();
-  for (uint64_t id = 1; id <= 200; ++id) ASSERT_TRUE(stream->Send(testing::MakeFrame(id, "mug")).ok());
+  for (uint64_t id = 1; id <= 200; ++id) ASSERT_TRUE(stream->Send(testing_support::MakeFrame(id, "mug")).ok());
   stream.reset();
-  EXPECT_TRUE(testing::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
+  EXPECT_TRUE(testing_support::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
 }
 
 TEST_F(RemoteMappingServiceTest, StreamOutlivesItsService) {
   const auto stream = client_->OpenMap(NewSession()).value();
   client_.reset();
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
 }
 
 // A server of another romap release.
@@ -188,7 +189,7 @@ TEST(RemoteMappingServiceOtherReleaseTest, IgnoresUnknownEvents) {
   OtherServer server;
   const auto client = RemoteMappingService::Connect(server.address()).value();
   const auto watch = client->Watch("any").value();
-  const auto events = testing::ReadToEnd(*watch);
+  const auto events = testing_support::ReadToEnd(*watch);
   ASSERT_THAT(events, SizeIs(1));
   EXPECT_EQ(std::get<ObjectRemoved>(events[0]).id, ObjectId{7});
   EXPECT_OK(watch->status());
@@ -202,5 +203,4 @@ TEST(RemoteMappingServiceOtherReleaseTest, OpenMapTimesOut) {
   EXPECT_CODE(client->OpenMap("any").status(), StatusCode::kDeadlineExceeded);
 }
 
-}  // namespace
-}  // namespace romap::client
+}  // namespace romap::client::remote_mapping_service_test

@@ -8,8 +8,7 @@
 #include "client/synth/random.h"
 #include "client/synth/solid.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::bvh_test {
 
 TEST(BvhTest, ContainsAgreesWithTheBall) {
   const Mesh ball = Ellipsoid(Point(0.1F, -0.2F, 0.3F), Point::Constant(0.08F));
@@ -101,5 +100,4 @@ TEST(BvhTest, AcceptsNoTriangles) {
   EXPECT_FALSE(bvh.Contains(Point::Zero()));
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::bvh_test

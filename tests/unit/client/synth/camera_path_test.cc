@@ -9,8 +9,7 @@
 #include "client/synth/scene.h"
 #include "client/synth/synth_camera.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::camera_path_test {
 
 constexpr double kDegree = M_PI / 180;
 
@@ -251,5 +250,4 @@ TEST(CameraPathTest, SeedsDiffer) {
             2 * kDegree);
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::camera_path_test

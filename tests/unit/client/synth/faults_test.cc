@@ -7,8 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::faults_test {
 
 // Four squares of 40 px with labels 1..4 in an image of 200 x 200 px.
 cv::Mat FourSquares() {
@@ -177,5 +176,4 @@ TEST(DegradeDepthTest, ChangesNothingByDefault) {
   EXPECT_EQ(cv::countNonZero(depth_m != 1.5), 0);
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::faults_test

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <set>
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::frame_plan_test {
 
 TEST(PlanFramesTest, ChangesNothingByDefault) {
   const auto plans = PlanFrames({.frames = 20});
@@ -82,5 +81,4 @@ TEST(PlanFramesTest, GainChangesInStepsWithinItsRange) {
   EXPECT_LE(gains.size(), 39U);
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::frame_plan_test

@@ -11,8 +11,7 @@
 #include "client/synth/solid.h"
 #include "client/synth/synth_camera.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::frame_renderer_test {
 
 // The pixel of a ray (x, y, 1) by the distortion formulas in OpenCV's documentation.
 Eigen::Vector2d PixelByTheBook(const CameraModel& camera, double x, double y) {
@@ -193,5 +192,4 @@ TEST(FrameRendererTest, PixelsWithoutSurfaceHaveTheBackgroundColor) {
   }
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::frame_renderer_test

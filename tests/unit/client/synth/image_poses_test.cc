@@ -8,8 +8,7 @@
 #include "client/synth/synth_camera.h"
 #include "common/lens.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::image_poses_test {
 
 // A camera at (0, 0, -1 m) that faces along z; rotates by `pitch_rad` and `yaw_rad` and moves by `move_m` during the
 // readout.
@@ -64,5 +63,4 @@ TEST(ImagePosesTest, PointsAreVisibleInTheRowOfTheirPose) {
   }
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::image_poses_test

@@ -4,8 +4,7 @@
 
 #include <limits>
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::options_test {
 
 TEST(ParseFrameRangeTest, ParsesTwoNumbers) {
   const auto range = ParseFrameRange("100:130");
@@ -101,5 +100,4 @@ TEST(ValidateSynthOptionsTest, NamesOptionsOutOfRange) {
   EXPECT_TRUE(ValidateSynthOptions({}).ok());
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::options_test

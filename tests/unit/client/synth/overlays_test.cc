@@ -8,8 +8,7 @@
 
 #include "client/synth/synth_camera.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::overlays_test {
 
 constexpr int kWidth_px = 160;
 constexpr int kHeight_px = 120;
@@ -80,5 +79,4 @@ TEST(OverlaysTest, SeedsDiffer) {
   EXPECT_GT(cv::norm(first.color_bgr, Drawn(options, 50).color_bgr), 1000);
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::overlays_test

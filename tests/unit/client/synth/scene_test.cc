@@ -12,8 +12,7 @@
 #include "client/synth/lighting.h"
 #include "client/synth/noise.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::scene_test {
 
 TEST(MakeSceneTest, ObjectsStandOnTheTableWithoutContact) {
   for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -224,5 +223,4 @@ TEST(SurroundingsTest, BlackAndGrayBackgroundsHaveOnlyObjects) {
   }
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::scene_test

@@ -7,8 +7,7 @@
 #include "client/synth/scene.h"
 #include "client/synth/synth_camera.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::shutter_test {
 
 constexpr double kDegree = M_PI / 180;
 
@@ -68,5 +67,4 @@ TEST_F(ShutterTest, NoBlurWithoutMotion) {
   EXPECT_TRUE(PosesDuringExposure(CameraPath(options, scene_, camera), camera, options, 40, 1).empty());
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::shutter_test

@@ -9,8 +9,7 @@
 
 #include "client/synth/bvh.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::solids_test {
 
 class EverySolidTest : public ::testing::TestWithParam<SolidKind> {
  protected:
@@ -115,5 +114,4 @@ TEST(BowlTest, IsHollow) {
   EXPECT_FALSE(inside.Contains(Point(0, 0, 2 * bounds.max().z())));
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::solids_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::synth_camera_test {
 
 TEST(SynthCameraTest, HasTheGivenFocalLengths) {
   const CameraModel camera = SynthCamera({.fx_px = 900, .fy_px = 800});
@@ -23,5 +22,4 @@ TEST(SynthCameraTest, CropKeepsTheRays) {
   EXPECT_LT((whole.Unproject(110, 70) - cropped.Unproject(10, 20)).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::synth_camera_test

@@ -16,8 +16,7 @@
 #include "client/files/sequence.h"
 #include "client/files/text_file.h"
 
-namespace romap::synth {
-namespace {
+namespace romap::synth::synth_test {
 
 namespace fs = std::filesystem;
 
@@ -332,5 +331,4 @@ TEST_F(MakeSequenceTest, ReportsAMissingParentFolder) {
   EXPECT_NE(Message(status).find("missing/sequence: cannot create"), std::string::npos) << status;
 }
 
-}  // namespace
-}  // namespace romap::synth
+}  // namespace romap::synth::synth_test

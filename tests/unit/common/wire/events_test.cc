@@ -7,8 +7,7 @@
 
 #include "common/status.h"
 
-namespace romap::wire {
-namespace {
+namespace romap::wire::events_test {
 
 using ::testing::HasSubstr;
 
@@ -185,5 +184,4 @@ TEST(WireEvents, ErrorsNameTheField) {
   ExpectError(proto, "event.frame_ack.latency_s");
 }
 
-}  // namespace
-}  // namespace romap::wire
+}  // namespace romap::wire::events_test

@@ -9,8 +9,7 @@
 
 #include "common/status.h"
 
-namespace romap::wire {
-namespace {
+namespace romap::wire::frame_test {
 
 using ::testing::HasSubstr;
 
@@ -205,5 +204,4 @@ INSTANTIATE_TEST_SUITE_P(
     }),
     [](const auto& info) { return info.param.name; });
 
-}  // namespace
-}  // namespace romap::wire
+}  // namespace romap::wire::frame_test

@@ -12,8 +12,7 @@
 #include "common/wire/frame.h"
 #include "common/wire/sessions.h"
 
-namespace romap::wire {
-namespace {
+namespace romap::wire::random_messages_test {
 
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
@@ -210,5 +209,4 @@ TEST(WireRandomMessages, CorruptedBytesAreValidOrRejected) {
   EXPECT_GT(parsed, 0);
 }
 
-}  // namespace
-}  // namespace romap::wire
+}  // namespace romap::wire::random_messages_test

@@ -10,8 +10,7 @@
 #include "common/wire/frame.h"
 #include "tests/support/subprocess.h"
 
-namespace romap::wire {
-namespace {
+namespace romap::wire::recording_test {
 
 using testing_support::TemporaryFolder;
 
@@ -197,5 +196,4 @@ TEST_F(RecordingTest, ReportsWhyTheFileCannotBeWritten) {
   EXPECT_EQ(full.status().code(), absl::StatusCode::kResourceExhausted);
 }
 
-}  // namespace
-}  // namespace romap::wire
+}  // namespace romap::wire::recording_test

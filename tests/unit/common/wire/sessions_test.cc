@@ -6,8 +6,7 @@
 #include "common/status.h"
 #include "common/wire/status.h"
 
-namespace romap::wire {
-namespace {
+namespace romap::wire::sessions_test {
 
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
@@ -160,5 +159,4 @@ TEST(WireStatus, EveryCodeRoundTripsWithItsMessage) {
   }
 }
 
-}  // namespace
-}  // namespace romap::wire
+}  // namespace romap::wire::sessions_test

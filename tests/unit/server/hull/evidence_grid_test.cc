@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::hull {
-namespace {
+namespace romap::hull::evidence_grid_test {
 
 // A grid of 2^3 cells whose first cell has this evidence.
 EvidenceGrid WithFirstCell(int object, int background, int occluded) {
@@ -89,5 +88,4 @@ TEST(EvidenceGridTest, ScalingKeepsTheCounts) {
   EXPECT_TRUE(grid.Contains({-2, -2, -2}, {.min_object = 1}));
 }
 
-}  // namespace
-}  // namespace romap::hull
+}  // namespace romap::hull::evidence_grid_test

@@ -4,8 +4,7 @@
 
 #include <Eigen/Geometry>
 
-namespace romap::hull {
-namespace {
+namespace romap::hull::grid_projection_test {
 
 const CameraModel kCamera{.width_px = 640, .height_px = 480, .fx_px = 500, .fy_px = 510, .cx_px = 320, .cy_px = 240};
 const VoxelGrid kGrid{.half_extents = {0.4, 0.3, 0.5}, .cells = 20};
@@ -58,5 +57,4 @@ TEST(RowProjectorTest, RejectsRowsThatReachBehindTheCamera) {
   EXPECT_GT(rejected, 10);
 }
 
-}  // namespace
-}  // namespace romap::hull
+}  // namespace romap::hull::grid_projection_test

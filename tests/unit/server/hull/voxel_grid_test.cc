@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::hull {
-namespace {
+namespace romap::hull::voxel_grid_test {
 
 const VoxelGrid kGrid{.half_extents = {1, 2, 3}, .cells = 4};
 
@@ -38,5 +37,4 @@ TEST(VoxelGridTest, CellAtReturnsNothingOutsideTheBox) {
   EXPECT_EQ(VoxelGrid().CellAt({0, 0, 0}), std::nullopt);
 }
 
-}  // namespace
-}  // namespace romap::hull
+}  // namespace romap::hull::voxel_grid_test

@@ -8,8 +8,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::confidence_test {
 
 constexpr double kFar = 4.0;
 
@@ -136,5 +135,4 @@ TEST(TrimUnseen, FailsIfNoViewObservedTheObject) {
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::confidence_test

@@ -10,8 +10,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::extract_mesh_test {
 
 using ::testing::HasSubstr;
 
@@ -279,5 +278,4 @@ TEST(MeshConfig, FieldsCanBeSet) {
   EXPECT_FALSE(config.fill_unseen);
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::extract_mesh_test

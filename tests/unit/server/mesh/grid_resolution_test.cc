@@ -4,8 +4,7 @@
 
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::grid_resolution_test {
 
 TEST(ChooseNodes, CellsAreCubesUnlessASideIsTooShort) {
   const FieldSnapshot snapshot = SnapshotOf(Sphere(0.5f), {1.0f, 0.5f, 0.02f});
@@ -48,5 +47,4 @@ TEST(ChooseNodes, InvalidViewsAreIgnored) {
   EXPECT_EQ(ChooseNodes(snapshot, MeshConfig()).x(), 64);
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::grid_resolution_test

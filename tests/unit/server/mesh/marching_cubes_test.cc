@@ -8,8 +8,7 @@
 #include "server/mesh/marching_cubes_table.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::marching_cubes_test {
 
 template <class Value>
 FieldGrid GridOf(int resolution, Value value) {
@@ -134,5 +133,4 @@ TEST(MarchingCubes, EmptyGridGivesEmptyMesh) {
   EXPECT_TRUE(mesh.triangles.empty());
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::marching_cubes_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/config_faults.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::mesh_config_test {
 
 std::string Faults(const std::vector<std::string>& assignments) {
   return testing_support::FaultsOf<MeshConfig>("mesh", assignments);
@@ -18,5 +17,4 @@ TEST(MeshConfigTest, NodesOfShortSidesMustNotExceedThoseOfTheLongest) {
   EXPECT_EQ(Faults({"mesh.resolution=32"}), "--set: mesh.min_side_nodes = 48 must not exceed mesh.resolution = 32");
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::mesh_config_test

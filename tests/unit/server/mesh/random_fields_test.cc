@@ -8,8 +8,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::random_fields_test {
 
 class Dice {
  public:
@@ -123,5 +122,4 @@ TEST(RandomFields, GiveTheSameMeshEachTime) {
   }
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::random_fields_test

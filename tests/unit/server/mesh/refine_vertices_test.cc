@@ -6,8 +6,7 @@
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::refine_vertices_test {
 
 double LargestVertexDistance(const Mesh& mesh, const InsideDistance& distance) {
   double largest = 0;
@@ -68,5 +67,4 @@ TEST(RefineVertices, KeepsVerticesOnTheirEdges) {
   }
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::refine_vertices_test

@@ -4,8 +4,7 @@
 
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::sample_field_test {
 
 constexpr int kNodes = 64;
 
@@ -98,5 +97,4 @@ TEST(SampleField, NodesOutsideTheHullAreEmptyAndNotSampled) {
   }
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::sample_field_test

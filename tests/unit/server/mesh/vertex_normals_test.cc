@@ -9,8 +9,7 @@
 #include "server/mesh/sample_field.h"
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap::mesh {
-namespace {
+namespace romap::mesh::vertex_normals_test {
 
 constexpr float kRadius = 0.6f;
 
@@ -79,5 +78,4 @@ TEST(VertexNormals, HaveUnitLengthOnTrianglesWithoutArea) {
   for (const Eigen::Vector3f& normal : mesh.normals) EXPECT_EQ(normal, Eigen::Vector3f::UnitZ());
 }
 
-}  // namespace
-}  // namespace romap::mesh
+}  // namespace romap::mesh::vertex_normals_test

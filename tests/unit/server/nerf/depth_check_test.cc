@@ -7,10 +7,9 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::depth_check_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 std::vector<ObjectView> ViewsWithDepth(double scale) {
   BallScene scene;
@@ -55,5 +54,4 @@ TEST(DepthCheckTest, ViewsWithoutDepthAreConsistent) {
   EXPECT_TRUE(DepthIsConsistent(views));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::depth_check_test

@@ -5,10 +5,9 @@
 #include "server/nerf/model/occupancy.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::field_probe_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 TEST(FieldProbeTest, LossIsTheWeightedMeanOverTheViews) {
   const ProbeReport report{{{0.1f, 0.2f, 0.2f}, {0.3f, 0.0f, 0.4f}, {9.0f, 9.0f, 9.0f}}};
@@ -41,5 +40,4 @@ TEST(FieldProbeTest, MeasuresRaysThatMissTheBoxAndTheResidualOfAnEmptyField) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::field_probe_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::field_surface_test {
 
 TEST(FieldSurfaceTest, DescribesDensityAndDistanceFields) {
   NerfConfig config;
@@ -28,5 +27,4 @@ TEST(FieldSurfaceTest, DescribesDensityAndDistanceFields) {
   EXPECT_LT(snapshot.connect_level, 0);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::field_surface_test

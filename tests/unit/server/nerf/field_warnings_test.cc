@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::field_warnings_test {
 
 TEST(FieldWarningsTest, IsEmptyWithoutProblems) {
   FieldWarnings warnings;
@@ -37,5 +36,4 @@ TEST(FieldWarningsTest, AValidBoxClearsTheWarningOfTheLastOne) {
   EXPECT_EQ(warnings.Text(0, {}), "");
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::field_warnings_test

@@ -4,10 +4,9 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::general_field_test {
 
-ObjectField TrainedBall(const testing::BallScene& scene, const NerfConfig& config, int threads) {
+ObjectField TrainedBall(const testing_support::BallScene& scene, const NerfConfig& config, int threads) {
   ObjectField field(config, scene.object, 1);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
@@ -17,7 +16,7 @@ ObjectField TrainedBall(const testing::BallScene& scene, const NerfConfig& confi
 
 // The whole training of two baselines: frequency encoding with a deep MLP, and a hash grid with a deep MLP.
 TEST(GeneralFieldTest, LearnsTheShapeOfABall) {
-  testing::BallScene scene;
+  testing_support::BallScene scene;
   scene.with_depth = true;
   NerfConfig frequency;
   frequency.encoding = "frequency";
@@ -25,22 +24,21 @@ TEST(GeneralFieldTest, LearnsTheShapeOfABall) {
   frequency.hidden_layers = 4;
   frequency.learning_rate = 0.003;
   frequency.contrast_weight = 0;  // the baselines have none
-  EXPECT_LT(testing::BallSurfaceError(scene, TrainedBall(scene, frequency, 1).Snapshot()), 0.1);
+  EXPECT_LT(testing_support::BallSurfaceError(scene, TrainedBall(scene, frequency, 1).Snapshot()), 0.1);
   NerfConfig deep;
   deep.hidden_layers = 3;
   deep.learning_rate = 0.005;
   deep.contrast_weight = 0;
-  EXPECT_LT(testing::BallSurfaceError(scene, TrainedBall(scene, deep, 1).Snapshot()), 0.1);
+  EXPECT_LT(testing_support::BallSurfaceError(scene, TrainedBall(scene, deep, 1).Snapshot()), 0.1);
 }
 
 TEST(GeneralFieldTest, IsDeterministicOnTwoThreads) {
-  const testing::BallScene scene;
+  const testing_support::BallScene scene;
   NerfConfig config;
   config.encoding = "frequency";
   config.hidden_layers = 2;
-  EXPECT_EQ(testing::RawOnGrid(TrainedBall(scene, config, 2).Snapshot()),
-            testing::RawOnGrid(TrainedBall(scene, config, 2).Snapshot()));
+  EXPECT_EQ(testing_support::RawOnGrid(TrainedBall(scene, config, 2).Snapshot()),
+            testing_support::RawOnGrid(TrainedBall(scene, config, 2).Snapshot()));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::general_field_test

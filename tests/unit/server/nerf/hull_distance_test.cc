@@ -7,8 +7,7 @@
 
 #include "server/nerf/math/types.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::hull_distance_test {
 
 constexpr int kSide = kOccupancyResolution;
 
@@ -52,5 +51,4 @@ TEST(HullDistanceTest, WithoutABorderAllDistancesAreLarge) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::hull_distance_test

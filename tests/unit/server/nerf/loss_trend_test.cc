@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::loss_trend_test {
 
 TEST(LossTrendTest, MeasuresTheRelativeDecrease) {
   LossTrend trend;
@@ -48,5 +47,4 @@ TEST(LossTrendTest, NeedsThreeValidMeasurementsAfterARestart) {
   EXPECT_FALSE(trend.DecreasePer100Steps());
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::loss_trend_test

@@ -5,8 +5,7 @@
 #include "server/nerf/presets.h"
 #include "tests/support/config_faults.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::nerf_config_test {
 
 using ::testing::HasSubstr;
 
@@ -60,5 +59,4 @@ TEST(NerfConfigTest, CudaSupportsDensityOnAHashGridWithOneLayerOfAtMost128Neuron
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::nerf_config_test

@@ -10,12 +10,11 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_field_box_test {
 
-using testing::BallScene;
-using testing::BallSurfaceError;
-using testing::RawOnGrid;
+using testing_support::BallScene;
+using testing_support::BallSurfaceError;
+using testing_support::RawOnGrid;
 
 NerfConfig ShortConfig() {
   NerfConfig config;
@@ -187,5 +186,4 @@ TEST(ObjectFieldBoxTest, IsDeterministic) {
   EXPECT_EQ(train(2), train(2));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_field_box_test

@@ -8,13 +8,12 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_field_correction_test {
 
-using testing::BallScene;
-using testing::BallSurfaceError;
-using testing::RawOnGrid;
-using testing::SmallFieldConfig;
+using testing_support::BallScene;
+using testing_support::BallSurfaceError;
+using testing_support::RawOnGrid;
+using testing_support::SmallFieldConfig;
 
 NerfConfig ShortConfig() {
   NerfConfig config = SmallFieldConfig();
@@ -176,5 +175,4 @@ TEST(ObjectFieldCorrectionTest, InvalidPosesAndUnknownViewsChangeNothing) {
   EXPECT_EQ(field.steps(), 2u);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_field_correction_test

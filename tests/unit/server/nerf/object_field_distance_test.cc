@@ -8,12 +8,11 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_field_distance_test {
 
-using testing::BallScene;
-using testing::BallSurfaceError;
-using testing::RawOnGrid;
+using testing_support::BallScene;
+using testing_support::BallSurfaceError;
+using testing_support::RawOnGrid;
 
 NerfConfig DistanceConfig() {
   NerfConfig config;
@@ -101,5 +100,4 @@ TEST(ObjectFieldDistanceTest, TheSurfaceSharpensOverThePlan) {
   EXPECT_NEAR(late.raw_per_efold, 1 / (config.final_sharpness * kDistancePerRaw), 1e-4);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_field_distance_test

@@ -12,15 +12,14 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_field_input_test {
 
-using testing::BallScene;
-using testing::BallSurfaceError;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::RawOnGrid;
-using testing::SmallFieldConfig;
+using testing_support::BallScene;
+using testing_support::BallSurfaceError;
+using testing_support::RawOnGrid;
+using testing_support::SmallFieldConfig;
 
 NerfConfig SmallConfig() {
   NerfConfig config = SmallFieldConfig();
@@ -267,5 +266,4 @@ TEST(ObjectFieldInputTest, EvaluationsDoNotDependOnTheSlices) {
   EXPECT_EQ(train(120), train(8));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_field_input_test

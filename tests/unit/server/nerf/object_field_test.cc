@@ -10,14 +10,13 @@
 #include "common/status.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_field_test {
 
-using testing::BallScene;
-using testing::BallSurfaceError;
 using ::testing::HasSubstr;
-using testing::RawOnGrid;
-using testing::SmallFieldConfig;
+using testing_support::BallScene;
+using testing_support::BallSurfaceError;
+using testing_support::RawOnGrid;
+using testing_support::SmallFieldConfig;
 
 ObjectField MakeField(const BallScene& scene, const NerfConfig& config, uint64_t seed = 1) {
   ObjectField field(config, scene.object, seed);
@@ -199,5 +198,4 @@ TEST(ObjectFieldTest, AViewOfTheSameKeyframeReplacesTheOldOne) {
   EXPECT_EQ(RawOnGrid(field.Snapshot()), RawOnGrid(clean.Snapshot()));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_field_test

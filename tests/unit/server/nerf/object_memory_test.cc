@@ -5,8 +5,7 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::object_memory_test {
 
 size_t HeapBytes() {
   const struct mallinfo2 info = mallinfo2();
@@ -15,7 +14,7 @@ size_t HeapBytes() {
 
 TEST(ObjectMemoryTest, FortyViewsStayWithinTheLimit) {
   if (HeapBytes() == 0) GTEST_SKIP() << "the allocator does not report its size";
-  testing::BallScene scene;
+  testing_support::BallScene scene;
   scene.views = 40;
   scene.size_px = 240;  // the crop of a large object in a VGA image
   const size_t before = HeapBytes();
@@ -28,5 +27,4 @@ TEST(ObjectMemoryTest, FortyViewsStayWithinTheLimit) {
   EXPECT_LE(HeapBytes() - before, 21u << 20);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::object_memory_test

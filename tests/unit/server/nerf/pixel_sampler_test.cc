@@ -11,10 +11,9 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::pixel_sampler_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 class PixelSamplerTest : public ::testing::Test {
  protected:
@@ -195,5 +194,4 @@ TEST_F(PixelSamplerTest, PairedObjectPixelsAreOfOneViewAtTheConfiguredDistance) 
   for (int i = 0; i < config_.rays_per_step; ++i) EXPECT_EQ(single.At(7, i).partner, 0);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::pixel_sampler_test

@@ -7,11 +7,10 @@
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::pose_refiner_test {
 
-using testing::BallScene;
-using testing::SmallFieldConfig;
+using testing_support::BallScene;
+using testing_support::SmallFieldConfig;
 
 NerfConfig ShortConfig() {
   NerfConfig config = SmallFieldConfig();
@@ -131,5 +130,4 @@ TEST(PoseRefinerTest, FewViewsAreNotRefined) {
   EXPECT_LT(errors_px[0], 1e-6);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::pose_refiner_test

@@ -4,8 +4,7 @@
 
 #include "common/status.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::presets_test {
 
 ConfigFields FieldsOf(NerfConfig& config) {
   ConfigFields fields;
@@ -80,5 +79,4 @@ TEST(PresetsTest, AssignmentsAreAppliedInOrder) {
   EXPECT_EQ(config.preset, "fast");
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::presets_test

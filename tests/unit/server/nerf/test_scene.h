@@ -8,7 +8,7 @@
 #include "common/stage_messages.h"
 #include "server/nerf/nerf_config.h"
 
-namespace romap::testing {
+namespace romap::testing_support {
 
 // A striped ball of radius `radius_mu` seen by a ring of cameras, rendered exactly.
 struct BallScene {
@@ -36,4 +36,4 @@ double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot);
 // Raw values on a regular grid of 1000 points, from -reach to +reach of the box.
 std::vector<float> RawOnGrid(const FieldSnapshot& snapshot, float reach = 1);
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-namespace romap::testing {
+namespace romap::testing_support {
 namespace {
 
 CameraModel SquareCamera(int size_px) {
@@ -138,4 +138,4 @@ double BallSurfaceError(const BallScene& scene, const FieldSnapshot& snapshot) {
   return sum / kDirections;
 }
 
-}  // namespace romap::testing
+}  // namespace romap::testing_support

@@ -7,8 +7,7 @@
 #include "server/nerf/math/hash_grid.h"
 #include "server/nerf/model/field_model.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_box_test {
 
 SE3<World, Object> Pose(double yaw_rad, const Eigen::Vector3d& center) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), center};
@@ -74,5 +73,4 @@ TEST(HashGridTest, CornersOfADenseLevelAreDistinctInAnyWindowAroundTheFirstBox) 
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_box_test

@@ -4,8 +4,7 @@
 
 #include <optional>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_plan_test {
 
 TEST(TrainingPlanTest, RateDecreasesOverThePlanAndALateViewRaisesIt) {
   NerfConfig config;
@@ -48,5 +47,4 @@ TEST(TrainingPlanTest, ADecreasingLossExtendsThePlan) {
   EXPECT_EQ(plan.AllowedSteps(5, true), planned + 50);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_plan_test

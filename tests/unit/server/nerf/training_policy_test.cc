@@ -4,8 +4,7 @@
 
 #include <chrono>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_policy_test {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
@@ -106,5 +105,4 @@ TEST_F(TrainingPolicyTest, ProgressIsTheShareOfThePlannedSteps) {
   EXPECT_EQ(Policy().Progress(job), 1);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_policy_test

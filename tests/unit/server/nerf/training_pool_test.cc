@@ -13,10 +13,9 @@
 #include "common/map_motion.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_pool_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 NerfConfig TinyConfig() {
   NerfConfig config;
@@ -335,5 +334,4 @@ TEST(TrainingPoolTest, WithoutWorkersTrainingIsDeterministic) {
   EXPECT_EQ(first_steps.back(), 40u);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_pool_test

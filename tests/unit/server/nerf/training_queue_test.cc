@@ -5,8 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_queue_test {
 
 ObjectViews UpdateOf(uint64_t object) { return {.object = ObjectId{object}, .cuboid = {}}; }
 
@@ -95,5 +94,4 @@ TEST_F(TrainingQueueTest, UnknownAndClosingSessionsHaveNoJobs) {
   EXPECT_EQ(queue.FindSession(session), nullptr);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_queue_test

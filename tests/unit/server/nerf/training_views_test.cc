@@ -6,10 +6,9 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::training_views_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 struct TrainingViewsTest : public ::testing::Test {
   TrainingViewsTest() {
@@ -98,5 +97,4 @@ TEST_F(TrainingViewsTest, RejectsMoreViewsThanTheHullCanCount) {
   EXPECT_EQ(views.size(), TrainingViews::kMaxViews);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::training_views_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::view_alignment_test {
 
 constexpr double kFocal_px = 500, kDistance_mu = 2;
 
@@ -143,5 +142,4 @@ TEST(ViewAlignmentTest, WithoutEvidenceReturnsToTheGivenPose) {
   EXPECT_TRUE(ViewAlignment(view).Align({}, image.Pose(view), applied, 2).isZero()) << "no rendering";
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::view_alignment_test

@@ -10,11 +10,10 @@
 
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::view_check_test {
 
-using testing::BallScene;
 using ::testing::HasSubstr;
+using testing_support::BallScene;
 
 // The error of a view of the ball after `modify`.
 template <class Modify>
@@ -69,5 +68,4 @@ TEST(ViewCheckTest, RejectsInvalidImages) {
               HasSubstr("mask must have at least 16 object pixels, has 1"));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::view_check_test

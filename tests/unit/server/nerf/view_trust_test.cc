@@ -4,8 +4,7 @@
 
 #include <vector>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::view_trust_test {
 
 ProbeReport Report(size_t views, ViewResidual ordinary = {0.02f, 0.05f, 0.01f}) {
   return {std::vector<ViewResidual>(views, ordinary)};
@@ -83,5 +82,4 @@ TEST(ViewTrustTest, RestartTrustsAllViews) {
   EXPECT_FALSE(trust.Update(report, 25));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::view_trust_test

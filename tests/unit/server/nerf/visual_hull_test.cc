@@ -11,10 +11,9 @@
 #include "common/geometry.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::visual_hull_test {
 
-using testing::BallScene;
+using testing_support::BallScene;
 
 constexpr int kSide = kOccupancyResolution;
 
@@ -210,5 +209,4 @@ TEST(UnconfirmedSpaceTest, OutsideTheCropIsNoConfirmationButOutsideTheImageIsNoE
   EXPECT_TRUE(IsKept({whole, narrow, narrow, narrow, narrow}, kWallCenter));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::visual_hull_test

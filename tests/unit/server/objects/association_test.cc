@@ -7,8 +7,7 @@
 
 #include "server/objects/projection.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::association_test {
 
 using ::testing::NotNull;
 
@@ -210,5 +209,4 @@ TEST_F(AssociationTest, WithoutMasksEveryLandmarkIsVisibleAndUnmatched) {
   EXPECT_DOUBLE_EQ(association.visible_share[0], 1);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::association_test

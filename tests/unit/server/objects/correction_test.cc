@@ -14,8 +14,7 @@
 #include "server/objects/projection.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::correction_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -261,5 +260,4 @@ TEST(MeanMotion, AveragesTheMotionsAtTheCenter) {
   EXPECT_TRUE((half * center).isApprox((center + S * center) / 2, 1e-12));
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::correction_test

@@ -10,8 +10,7 @@
 #include "server/objects/projection.h"
 #include "tests/unit/server/objects/observed_object.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::cuboid_fitter_test {
 
 const Eigen::Vector3d kHalf(0.10, 0.07, 0.05);
 constexpr double kYaw_rad = 0.4;
@@ -113,5 +112,4 @@ TEST(CuboidFitterTest, ReturnsNothingWithoutAHull) {
   EXPECT_FALSE(Fitted(observed.evidence, observed.silhouettes, {}).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::cuboid_fitter_test

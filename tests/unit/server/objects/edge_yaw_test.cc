@@ -7,8 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::edge_yaw_test {
 
 constexpr double kYaw_rad = 0.3;
 
@@ -65,5 +64,4 @@ TEST(EdgeYawTest, ReturnsNothingWithoutEdges) {
   EXPECT_FALSE(EdgeYaw(plain, Eigen::Matrix3d::Identity()).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::edge_yaw_test

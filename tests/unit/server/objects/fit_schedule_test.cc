@@ -12,8 +12,7 @@
 #include "server/objects/object_mapper.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::fit_schedule_test {
 
 using ::testing::ElementsAre;
 
@@ -111,5 +110,4 @@ TEST(FitScheduleTest, IsDeterministic) {
   EXPECT_EQ(Map(SyntheticWorld(options), 1).log, Map(SyntheticWorld(options), 1).log);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::fit_schedule_test

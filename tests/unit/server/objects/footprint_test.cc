@@ -7,8 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::footprint_test {
 
 constexpr double kCell = 0.01;
 
@@ -75,5 +74,4 @@ TEST(FootprintTest, ReturnsNothingForThreeCells) {
   EXPECT_FALSE(Fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, 0.3).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::footprint_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::frame_history_test {
 
 constexpr int64_t kFramePeriod_ns = 40'000'000;
 
@@ -123,5 +122,4 @@ TEST(FrameHistory, FramesWithoutMasksFollowCorrections) {
   EXPECT_NEAR(other->tracked.T_world_camera.translation().x(), 0.03, 1e-12);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::frame_history_test

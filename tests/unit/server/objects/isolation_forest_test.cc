@@ -9,8 +9,7 @@
 
 #include "tests/support/sanitizer.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::isolation_forest_test {
 
 using testing_support::kUnderSanitizer;
 
@@ -160,5 +159,4 @@ TEST(IsolationForestTest, EqualPointsAreNotAnomalies) {
   for (const double score : Scores(equal)) EXPECT_NEAR(score, 0.5, 1e-6);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::isolation_forest_test

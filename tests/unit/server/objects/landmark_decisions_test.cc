@@ -4,8 +4,7 @@
 
 #include <string>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::landmark_decisions_test {
 
 Cuboid CubeAt(double x_mu, double half_extent_mu = 0.1) {
   return {.T_world_object = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(x_mu, 0, 0)},
@@ -212,5 +211,4 @@ TEST(DecideMerge, ComparesALandmarkWithoutCuboidByItsPoints) {
   EXPECT_STREQ(DecideMerge(b, b, {}).reason, "neither has a cuboid");
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::landmark_decisions_test

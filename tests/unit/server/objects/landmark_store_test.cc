@@ -6,8 +6,7 @@
 #include <limits>
 #include <memory>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::landmark_store_test {
 
 using ::testing::ElementsAre;
 using ::testing::Pair;
@@ -165,5 +164,4 @@ TEST_F(LandmarkStoreTest, LandmarksMoveWithTheirKeyframes) {
   EXPECT_TRUE(landmark.geometry.body_world[0].isApprox(Eigen::Vector3d(1.1, 0, 0)));
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::landmark_store_test

@@ -10,8 +10,7 @@
 #include "server/objects/detections.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::mask_base_test {
 
 // Solids on a table that are parts of one object.
 class MaskBaseTest : public ::testing::Test {
@@ -112,5 +111,4 @@ TEST_F(MaskBaseTest, IsUnknownIfAnotherObjectHidesTheLowerEnd) {
   EXPECT_FALSE(Base(0.27).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::mask_base_test

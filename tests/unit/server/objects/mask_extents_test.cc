@@ -4,8 +4,7 @@
 
 #include <numbers>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::mask_extents_test {
 
 constexpr double kBorder_px = 0.5;  // from the center of a mask's last pixel to its border
 
@@ -49,5 +48,4 @@ TEST(MaskExtentsTest, IgnoreOtherLabels) {
   EXPECT_LT(alone.reach_px[2], std::numbers::sqrt2 / 2 * (49 + 49));  // the corner filled by the other mask
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::mask_extents_test

@@ -12,8 +12,7 @@
 
 #include "tests/support/synthetic_world.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::object_mapper_test {
 
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -392,5 +391,4 @@ TEST(ObjectMapper, ViewsCoverAllDirectionsAndClassifyRays) {
   }
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::object_mapper_test

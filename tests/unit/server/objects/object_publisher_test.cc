@@ -5,8 +5,7 @@
 
 #include <variant>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::object_publisher_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -129,5 +128,4 @@ TEST_F(ObjectPublisherTest, NeverReusesIds) {
   EXPECT_LT(id, publisher_.AssignId(AddLandmark().key));
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::object_publisher_test

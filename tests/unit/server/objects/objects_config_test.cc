@@ -4,8 +4,7 @@
 
 #include "tests/support/config_faults.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::objects_config_test {
 
 std::string Faults(const std::vector<std::string>& assignments) {
   return testing_support::FaultsOf<ObjectsConfig>("objects", assignments);
@@ -30,5 +29,4 @@ TEST(ObjectsConfigTest, FirstViewsMustNotExceedAllViews) {
   EXPECT_EQ(Faults({"objects.max_views=3"}), "--set: objects.first_views = 4 must not exceed objects.max_views = 3");
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::objects_config_test

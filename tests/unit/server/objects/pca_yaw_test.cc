@@ -8,8 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::pca_yaw_test {
 
 // Points uniformly distributed in an upright cuboid.
 std::vector<Eigen::Vector3d> Fill(const Eigen::Vector3d& half_extents, double yaw_rad, int count) {
@@ -57,5 +56,4 @@ TEST(PcaYawTest, AcceptsPointsOnALine) {
   EXPECT_NEAR(*yaw, std::numbers::pi / 4, 1e-6);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::pca_yaw_test

@@ -7,8 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::point_cuboid_test {
 
 // Points on the faces of a box with half extents (3, 1, 0.5), rotated by `yaw_rad`, around (10, 20, 30).
 std::vector<Eigen::Vector3d> BoxPoints(double yaw_rad) {
@@ -58,5 +57,4 @@ TEST(CuboidOfPoints, ReturnsNothingWithoutVolume) {
   EXPECT_FALSE(CuboidOfPoints({}, broken, 0.0));
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::point_cuboid_test

@@ -7,8 +7,7 @@
 #include <numeric>
 #include <random>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::score_assignment_test {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -59,5 +58,4 @@ TEST(AssignByScore, EqualsExhaustiveSearch) {
   }
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::score_assignment_test

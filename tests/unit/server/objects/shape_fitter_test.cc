@@ -7,8 +7,7 @@
 
 #include "tests/support/synthetic_world.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::shape_fitter_test {
 
 using ::testing::SizeIs;
 
@@ -92,5 +91,4 @@ TEST_F(ShapeFitterTest, FitsAtMostTheConfiguredNumberPerKeyframe) {
   EXPECT_TRUE(fitter_.FitMostUrgent(/*frame_index=*/10, {}, &store_).empty()) << "no landmark changed";
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::shape_fitter_test

@@ -10,8 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::silhouette_hull_test {
 
 constexpr int kCells = 20;
 constexpr uint16_t kObjectLabel = 1;
@@ -150,5 +149,4 @@ TEST(SilhouetteHullTest, BoundsSurroundTheCells) {
   EXPECT_TRUE(hull.Bounds(rule).isApprox(expected, 1e-12));
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::silhouette_hull_test

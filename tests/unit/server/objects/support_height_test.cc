@@ -6,8 +6,7 @@
 
 #include "tests/unit/server/objects/observed_object.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::support_height_test {
 
 ObservedObject ObserveBox() {
   SyntheticWorldOptions options;
@@ -85,5 +84,4 @@ TEST(FindSupportHeightTest, IsUnknownWithoutAHull) {
   EXPECT_FALSE(FindSupportHeight(observed.evidence, {}).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::support_height_test

@@ -6,8 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::two_sample_test_test {
 
 using Points = std::vector<Eigen::Vector3d>;
 
@@ -157,5 +156,4 @@ TEST(MeansAgreeTest, ReturnsNothingForTooFewOrInvalidPoints) {
   EXPECT_FALSE(MeansAgree(broken, kB, 0.05, 0, 0.01).has_value());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::two_sample_test_test

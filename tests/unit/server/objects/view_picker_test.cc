@@ -9,8 +9,7 @@
 
 #include "server/objects/projection.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::view_picker_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -170,5 +169,4 @@ TEST_F(ViewPickerTest, ReturnsACorrectedPoseOnceItChangedNoticeably) {
   EXPECT_THAT(picker_.TakeCorrectedPoses(cuboid_), IsEmpty());
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::view_picker_test

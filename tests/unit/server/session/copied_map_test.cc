@@ -6,11 +6,10 @@
 #include "tests/support/checked_copy.h"
 #include "tests/support/random_map.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::copied_map_test {
 
-using testing::CheckedCopy;
-using testing::RandomMap;
+using testing_support::CheckedCopy;
+using testing_support::RandomMap;
 
 constexpr std::chrono::milliseconds kNoWait{0};
 constexpr uint64_t kSeeds = 100;
@@ -21,7 +20,7 @@ class Reader {
  public:
   Reader(MapState& map, Outbox::Acks acks, int share) : outbox_(map.Subscribe(acks, 50)), share_(share) {}
 
-  void MaybeRead(testing::RandomMap& random) {
+  void MaybeRead(testing_support::RandomMap& random) {
     if (random.Pick(0, 9) >= share_) return;
     for (int n = random.Pick(1, 12); n > 0; --n) ReadOne();
   }
@@ -35,7 +34,7 @@ class Reader {
     }
     return of_objects;
   }
-  const testing::CheckedCopy& copy() const { return copy_; }
+  const testing_support::CheckedCopy& copy() const { return copy_; }
 
  private:
   std::optional<MapEvent> ReadOne() {
@@ -44,7 +43,7 @@ class Reader {
     return event;
   }
 
-  testing::CheckedCopy copy_;
+  testing_support::CheckedCopy copy_;
   std::shared_ptr<Outbox> outbox_;
   int share_;
 };
@@ -59,7 +58,7 @@ TEST(CopiedMapTest, EqualsTheMapForFastAndSlowReaders) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    testing::RandomMap random(seed, &map);
+    testing_support::RandomMap random(seed, &map);
     std::vector<Reader> readers;
     for (const int share : {10, 5, 1}) readers.emplace_back(map, Outbox::Acks::kAll, share);
     for (int step = 0; step < kSteps; ++step) {
@@ -79,13 +78,13 @@ TEST(CopiedMapTest, SnapshotIsTheMapWithoutProvisionalObjects) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    testing::RandomMap random(seed, &map);
+    testing_support::RandomMap random(seed, &map);
     for (int step = 0; step < kSteps; ++step) random.Step();
     const std::vector<ObjectSnapshot> objects = map.Snapshot().objects;
     const auto truth = TruthOf(map);
     for (const ObjectSnapshot& object : objects) {
       EXPECT_NE(object.object.state, ObjectState::kProvisional);
-      EXPECT_EQ(testing::CheckedCopy::ToBytes(object), truth.at(object.object.id));
+      EXPECT_EQ(testing_support::CheckedCopy::ToBytes(object), truth.at(object.object.id));
     }
     EXPECT_EQ(objects.size(), map.ConfirmedObjects());
     exported += objects.size();
@@ -99,7 +98,7 @@ TEST(CopiedMapTest, WaitingEventsOfAReaderThatNeverReadsAreBounded) {
   for (uint64_t seed = 0; seed < kSeeds && !HasFailure(); ++seed) {
     SCOPED_TRACE(seed);
     MapState map;
-    testing::RandomMap random(seed, &map);
+    testing_support::RandomMap random(seed, &map);
     Reader idle(map, Outbox::Acks::kAll, 0);
     for (int step = 0; step < kSteps; ++step) random.Step();
     const auto truth = TruthOf(map);
@@ -108,5 +107,4 @@ TEST(CopiedMapTest, WaitingEventsOfAReaderThatNeverReadsAreBounded) {
   }
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::copied_map_test

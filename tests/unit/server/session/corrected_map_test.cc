@@ -15,8 +15,7 @@
 #include "tests/support/streams.h"
 #include "tests/support/synthetic_world.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::corrected_map_test {
 
 using ::testing::SizeIs;
 
@@ -89,12 +88,13 @@ class Stages {
     WaitUntilIdle();
   }
   void WaitUntilIdle() const {
-    ASSERT_TRUE(testing::Eventually([&] { return pool_.IsIdle(pool_session_) && mesher_.IsIdle(mesher_session_); }));
+    ASSERT_TRUE(
+        testing_support::Eventually([&] { return pool_.IsIdle(pool_session_) && mesher_.IsIdle(mesher_session_); }));
   }
   // Waits until at least one more training step was done, or nothing is left to train.
   void WaitForTraining() const {
     const uint64_t steps = pool_.GetProgress(pool_session_).steps;
-    ASSERT_TRUE(testing::Eventually(
+    ASSERT_TRUE(testing_support::Eventually(
         [&] { return pool_.GetProgress(pool_session_).steps > steps || pool_.IsIdle(pool_session_); }));
   }
 
@@ -197,5 +197,4 @@ TEST(CorrectedMapTest, MeshesMadeDuringCorrectionsAreInsideTheirCuboids) {
   }
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::corrected_map_test

@@ -6,8 +6,7 @@
 
 #include "common/status.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::frame_ledger_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
 
@@ -131,5 +130,4 @@ TEST_F(FrameLedgerTest, SettleAllEndsAllWaits) {
   EXPECT_TRUE(later_done);
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::frame_ledger_test

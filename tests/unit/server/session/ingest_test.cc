@@ -8,8 +8,7 @@
 
 #include "common/status.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::ingest_test {
 
 using ::testing::HasSubstr;
 
@@ -348,5 +347,4 @@ TEST(IngestTest, ExtremeTimestampsDoNotOverflow) {
   EXPECT_THAT(MaskErrorOf(ingest, ValidMasks(1)), HasSubstr("too late"));
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::ingest_test

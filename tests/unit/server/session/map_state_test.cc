@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::session {
-namespace {
+namespace romap::session::map_state_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
 
@@ -245,5 +244,4 @@ TEST(MapStateTest, CloseEndsCurrentAndLaterSubscriptions) {
   }
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::map_state_test

@@ -11,8 +11,7 @@
 #include "tests/support/streams.h"
 #include "tests/unit/server/mesh/field_fakes.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::mesher_test {
 
 FieldSnapshot BallSnapshot(uint64_t object, uint64_t steps) {
   FieldSnapshot snapshot = mesh::SnapshotOf(mesh::Sphere(0.6f));
@@ -104,7 +103,7 @@ TEST(MesherTest, OnlyTheNewestSnapshotOfAnObjectWaits) {
   });
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   mesher.Offer(blocking, BallSnapshot(1, 10));
-  const bool is_blocked = entered.get_future().wait_for(testing::kTimeout) == std::future_status::ready;
+  const bool is_blocked = entered.get_future().wait_for(testing_support::kTimeout) == std::future_status::ready;
   EXPECT_TRUE(is_blocked) << "the mesh thread did not call the sink";
   mesher.Offer(session, BallSnapshot(2, 10));
   mesher.Offer(session, BallSnapshot(3, 10));
@@ -113,7 +112,7 @@ TEST(MesherTest, OnlyTheNewestSnapshotOfAnObjectWaits) {
   mesher.RemoveObject(session, ObjectId{4});
   EXPECT_FALSE(mesher.IsIdle(session));
   release.set_value();
-  ASSERT_TRUE(testing::Eventually([&] { return mesher.IsIdle(session); }));
+  ASSERT_TRUE(testing_support::Eventually([&] { return mesher.IsIdle(session); }));
   const std::vector<MeshUpdate> meshes = received.meshes();
   ASSERT_EQ(meshes.size(), 2u);
   EXPECT_EQ(meshes[0].id, ObjectId{2}) << "oldest first";
@@ -121,5 +120,4 @@ TEST(MesherTest, OnlyTheNewestSnapshotOfAnObjectWaits) {
   EXPECT_EQ(meshes[1].id, ObjectId{3});
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::mesher_test

@@ -4,8 +4,7 @@
 
 #include <thread>
 
-namespace romap::session {
-namespace {
+namespace romap::session::outbox_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
 
@@ -157,5 +156,4 @@ TEST(OutboxTest, CloseEndsABlockedNext) {
   reader.join();
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::outbox_test

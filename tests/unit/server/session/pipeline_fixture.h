@@ -19,7 +19,7 @@ class PipelineFixture : public ::testing::Test {
 
   static SessionOptions Options() {
     SessionOptions options;
-    options.camera = testing::SmallCamera();
+    options.camera = testing_support::SmallCamera();
     return options;
   }
 

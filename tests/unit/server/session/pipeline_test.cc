@@ -7,8 +7,7 @@
 
 #include "tests/unit/server/session/pipeline_fixture.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::pipeline_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
 
@@ -38,7 +37,7 @@ class PipelineTest : public PipelineFixture {
 };
 
 TEST_F(PipelineTest, AcknowledgesAFrameBeforeItIsMapped) {
-  Process(testing::MakeFrame(1));
+  Process(testing_support::MakeFrame(1));
   const auto ack = NextAck();
   ASSERT_TRUE(ack.has_value());
   EXPECT_TRUE(ack->accepted) << ack->error;
@@ -51,7 +50,7 @@ TEST_F(PipelineTest, AcknowledgesAFrameBeforeItIsMapped) {
 }
 
 TEST_F(PipelineTest, RejectedInputsAreNotMapped) {
-  FrameInput frame = testing::MakeFrame(1);
+  FrameInput frame = testing_support::MakeFrame(1);
   frame.image.clear();
   Process(frame);
   const auto ack = NextAck();
@@ -63,10 +62,10 @@ TEST_F(PipelineTest, RejectedInputsAreNotMapped) {
 }
 
 TEST_F(PipelineTest, LateMasksAreNeverSkipped) {
-  Process(testing::MakeFrame(1));
+  Process(testing_support::MakeFrame(1));
   MasksInput masks;
   masks.frame_id = 1;
-  static_cast<EncodedMasks&>(masks) = testing::MakeFrame(1, "mug");
+  static_cast<EncodedMasks&>(masks) = testing_support::MakeFrame(1, "mug");
   Process(masks);
   ASSERT_EQ(steps_.size(), 2u);
   EXPECT_FALSE(steps_[1].may_be_skipped);
@@ -78,12 +77,11 @@ TEST_F(PipelineTest, LateMasksAreNeverSkipped) {
 }
 
 TEST_F(PipelineTest, FinishMappingWithoutObjectsLeavesNothingToTrain) {
-  Process(testing::MakeFrame(1));
+  Process(testing_support::MakeFrame(1));
   steps_[0].run();
   pipeline_.FinishMapping();
   EXPECT_TRUE(pipeline_.IsTrainingDone());
   EXPECT_EQ(pipeline_.TrainingProgress().objects_total, 0);
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::pipeline_test

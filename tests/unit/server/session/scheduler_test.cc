@@ -12,8 +12,7 @@
 
 #include "tests/unit/server/session/pipeline_fixture.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::scheduler_test {
 
 // Runs a pipeline without objects, so that there is nothing to train.
 class SchedulerTest : public PipelineFixture {
@@ -33,9 +32,9 @@ class SchedulerTest : public PipelineFixture {
 
   void ExpectAllFramesProcessed(bool single_thread) {
     Start(FrameMode::kReplay, single_thread);
-    for (uint64_t id = 1; id <= 5; ++id) EXPECT_TRUE(scheduler_->Offer(testing::MakeFrame(id)));
+    for (uint64_t id = 1; id <= 5; ++id) EXPECT_TRUE(scheduler_->Offer(testing_support::MakeFrame(id)));
     scheduler_->CloseInputs();
-    ASSERT_TRUE(testing::Eventually([&] { return finished_.load(); }));
+    ASSERT_TRUE(testing_support::Eventually([&] { return finished_.load(); }));
     const std::vector<FrameAck> acks = ReadAcks();
     ASSERT_EQ(acks.size(), 5u);
     for (size_t i = 0; i < acks.size(); ++i) {
@@ -43,7 +42,7 @@ class SchedulerTest : public PipelineFixture {
       EXPECT_TRUE(acks[i].accepted) << acks[i].error;
     }
     EXPECT_EQ(Counters().frames_processed, 5u);
-    EXPECT_FALSE(scheduler_->Offer(testing::MakeFrame(6))) << "the inputs are closed";
+    EXPECT_FALSE(scheduler_->Offer(testing_support::MakeFrame(6))) << "the inputs are closed";
   }
 
   std::atomic<bool> finished_ = false;
@@ -59,7 +58,7 @@ TEST_F(SchedulerTest, StopEndsWithoutFinishing) {
   Start(FrameMode::kReplay, /*single_thread=*/false);
   scheduler_->Stop();
   EXPECT_FALSE(finished_);
-  EXPECT_FALSE(scheduler_->Offer(testing::MakeFrame(1)));
+  EXPECT_FALSE(scheduler_->Offer(testing_support::MakeFrame(1)));
   scheduler_->Stop();  // has no effect
 }
 
@@ -72,13 +71,13 @@ TEST_F(SchedulerTest, LiveModeDropsTheOldestWaitingFrame) {
     entered.set_value();
     release.get_future().wait();
   });
-  EXPECT_TRUE(scheduler_->Offer(testing::MakeFrame(1)));
-  const bool is_blocked = entered.get_future().wait_for(testing::kTimeout) == std::future_status::ready;
+  EXPECT_TRUE(scheduler_->Offer(testing_support::MakeFrame(1)));
+  const bool is_blocked = entered.get_future().wait_for(testing_support::kTimeout) == std::future_status::ready;
   EXPECT_TRUE(is_blocked) << "the first frame was not processed";
-  for (uint64_t id = 2; id <= 4; ++id) EXPECT_TRUE(scheduler_->Offer(testing::MakeFrame(id)));
+  for (uint64_t id = 2; id <= 4; ++id) EXPECT_TRUE(scheduler_->Offer(testing_support::MakeFrame(id)));
   release.set_value();
   scheduler_->CloseInputs();
-  EXPECT_TRUE(testing::Eventually([&] { return finished_.load(); }));
+  EXPECT_TRUE(testing_support::Eventually([&] { return finished_.load(); }));
   EXPECT_EQ(Counters().frames_dropped, 1u);
   EXPECT_EQ(Counters().frames_processed, 3u);
   for (const FrameAck& ack : ReadAcks()) EXPECT_EQ(ack.accepted, ack.frame_id != 2) << ack.frame_id << " " << ack.error;
@@ -87,14 +86,13 @@ TEST_F(SchedulerTest, LiveModeDropsTheOldestWaitingFrame) {
 
 TEST_F(SchedulerTest, AnExceptionEndsProcessingAndIsReported) {
   Start(FrameMode::kReplay, /*single_thread=*/true, [] { throw std::runtime_error("broken invariant"); });
-  EXPECT_TRUE(scheduler_->Offer(testing::MakeFrame(1)));
+  EXPECT_TRUE(scheduler_->Offer(testing_support::MakeFrame(1)));
   std::future<std::string> failure = failure_.get_future();
-  ASSERT_EQ(failure.wait_for(testing::kTimeout), std::future_status::ready) << "no failure was reported";
+  ASSERT_EQ(failure.wait_for(testing_support::kTimeout), std::future_status::ready) << "no failure was reported";
   EXPECT_EQ(failure.get(), "mapping: broken invariant");
-  EXPECT_FALSE(scheduler_->Offer(testing::MakeFrame(2)));
+  EXPECT_FALSE(scheduler_->Offer(testing_support::MakeFrame(2)));
   EXPECT_FALSE(finished_);
   scheduler_->Stop();
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::scheduler_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/config_faults.h"
 
-namespace romap::session {
-namespace {
+namespace romap::session::server_config_test {
 
 std::string Faults(const std::vector<std::string>& assignments) {
   return testing_support::FaultsOf<ServerConfig>("", assignments);
@@ -44,5 +43,4 @@ TEST(ServerConfigTest, EveryFieldHasAHelpTextThatStartsWithACapital) {
   }
 }
 
-}  // namespace
-}  // namespace romap::session
+}  // namespace romap::session::server_config_test

@@ -7,8 +7,7 @@
 
 #include "tests/unit/server/slam/random_descriptor.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::descriptor_matching_test {
 
 TEST(MatchDescriptors, FindsMutualBestMatchesWithinTheLimits) {
   std::mt19937_64 random(3);
@@ -28,5 +27,4 @@ TEST(MatchDescriptors, FindsMutualBestMatchesWithinTheLimits) {
   EXPECT_TRUE(MatchDescriptors(first, {}, 50, 0.8).empty());
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::descriptor_matching_test

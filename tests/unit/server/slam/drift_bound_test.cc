@@ -6,8 +6,7 @@
 
 #include "tests/unit/server/slam/loop_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::drift_bound_test {
 
 TEST(DriftBoundTest, GrowsWithThePath) {
   LoopWorld world(LoopWorld::kKeyframesPerRound, {});
@@ -37,5 +36,4 @@ TEST(DriftBoundTest, SeparatesDriftFromJumps) {
   EXPECT_FALSE(IsWithin(bound, moved(0, 0, 1.1), world.newest()));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::drift_bound_test

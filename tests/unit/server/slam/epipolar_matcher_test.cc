@@ -6,8 +6,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::epipolar_matcher_test {
 
 // Two cameras side by side, 10 degrees of parallax at the points' depth, and exact features of random points.
 class EpipolarMatcherTest : public ::testing::Test {
@@ -109,5 +108,4 @@ TEST_F(EpipolarMatcherTest, ReturnsNoMatchesWithoutBaseline) {
   EXPECT_TRUE(MatchAlongEpipolarPlanes(keyframe, keyframe, SlamConfig{}).empty());
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::epipolar_matcher_test

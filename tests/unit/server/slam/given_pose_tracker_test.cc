@@ -7,8 +7,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::given_pose_tracker_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -119,5 +118,4 @@ TEST(GivenPoseTracker, DueKeyframeWaitsForMasksIfOnlySomeFramesHaveThem) {
   for (const uint64_t keyframe : Keyframes(frames)) EXPECT_EQ(keyframe % 3, 0) << keyframe;
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::given_pose_tracker_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::global_adjuster_test {
 
 // Four keyframes on a line that observe the same points with exact pixels. Except for the first keyframe, all poses and
 // points of the map have errors.
@@ -134,5 +133,4 @@ TEST_F(GlobalAdjusterTest, GivenPosesAreNotAdjusted) {
   EXPECT_EQ(Centers(), before);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::global_adjuster_test

@@ -6,8 +6,7 @@
 
 #include "tests/unit/server/slam/loop_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::loop_detector_test {
 
 constexpr LoopWorld::Drift kDrift{.rotation_deg = 0.12, .shift_mu = 0.003};
 
@@ -77,5 +76,4 @@ TEST(LoopDetectorTest, ARejectedLoopIsNotProposedAgain) {
   EXPECT_FALSE(detector.Find(world.newest(), /*scale_is_known=*/true));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::loop_detector_test

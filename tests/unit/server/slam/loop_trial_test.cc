@@ -4,8 +4,7 @@
 
 #include "tests/unit/server/slam/loop_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::loop_trial_test {
 
 class LoopTrialTest : public ::testing::Test {
  protected:
@@ -50,5 +49,4 @@ TEST_F(LoopTrialTest, AWrongLoopLeavesTheMapAsItWas) {
   EXPECT_EQ(world_.map().points().size(), points);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::loop_trial_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::mask_voter_test {
 
 constexpr uint16_t kLabel = 5;
 constexpr double kDepth_mu = 5;
@@ -171,5 +170,4 @@ TEST_F(MaskVoterTest, MergedPointsKeepTheirVotes) {
   EXPECT_EQ(same.votes.inside, 1);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::mask_voter_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::mask_zones_test {
 
 constexpr uint16_t kLabel = 3;
 
@@ -58,5 +57,4 @@ TEST(MaskVotes, IgnoresUnknownZones) {
   EXPECT_EQ(votes.total(), 5);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::mask_zones_test

@@ -4,8 +4,7 @@
 
 #include <Eigen/Geometry>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::motion_model_test {
 
 constexpr int64_t kInterval_ns = 40'000'000;
 
@@ -95,5 +94,4 @@ TEST_F(MotionModelTest, ResetDiscardsTheLastPose) {
   EXPECT_FALSE(model_.last_pose());
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::motion_model_test

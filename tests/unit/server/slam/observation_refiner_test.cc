@@ -11,8 +11,7 @@
 #include "server/slam/point_maker.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::observation_refiner_test {
 
 // Two keyframes of the textured world at their true poses, with points by parallax and detected pixels.
 class ObservationRefinerTest : public ::testing::Test {
@@ -105,5 +104,4 @@ TEST_F(ObservationRefinerTest, RemovesObservationsOfOtherTexture) {
   EXPECT_LT(observed(), before);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::observation_refiner_test

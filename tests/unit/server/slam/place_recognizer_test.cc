@@ -4,8 +4,7 @@
 
 #include "tests/unit/server/slam/loop_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::place_recognizer_test {
 
 TEST(PlaceRecognizerTest, RelocalizesAFrameOfTheMap) {
   LoopWorld world(LoopWorld::kKeyframesPerRound, {});
@@ -20,5 +19,4 @@ TEST(PlaceRecognizerTest, DoesNotChooseBetweenPlacesThatLookAlike) {
   EXPECT_FALSE(world.places().Relocalize(*world.map().FindKeyframe(KeyframeId{9})->frame));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::place_recognizer_test

@@ -7,8 +7,7 @@
 #include "tests/unit/server/slam/random_descriptor.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::projection_search_test {
 
 class ProjectionSearchTest : public ::testing::Test {
  protected:
@@ -76,5 +75,4 @@ TEST_F(ProjectionSearchTest, DescriptorsAloneFindThePoints) {
   for (const PointMatch& match : matches) EXPECT_EQ(match.point, match.feature);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::projection_search_test

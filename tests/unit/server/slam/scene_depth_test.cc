@@ -4,8 +4,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::scene_depth_test {
 
 // Looks straight down from 3 mu above the floor, shifted along x.
 SE3<World, Camera> PoseAbove(double x_mu) { return TexturedWorld::LookAt({x_mu, 0.9, 3}, {x_mu, 0.9, 0}); }
@@ -50,5 +49,4 @@ TEST(MakeDepthView, BlurredFrameIsLessSharp) {
   EXPECT_LT(MakeDepthView(*frame, PoseAbove(0)).sharpness, 0.6 * sharp);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::scene_depth_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/config_faults.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::slam_config_test {
 
 std::string Faults(const std::vector<std::string>& assignments) {
   return testing_support::FaultsOf<SlamConfig>("slam", assignments);
@@ -26,5 +25,4 @@ TEST(SlamConfigTest, MatchedAndAdjustedKeyframesMustFitIntoTheMap) {
             "--set: slam.window_keyframes = 12 must not exceed slam.max_keyframes = 10");
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::slam_config_test

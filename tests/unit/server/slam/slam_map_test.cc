@@ -8,8 +8,7 @@
 #include "server/slam/correction_log.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::slam_map_test {
 
 // Keyframes on a line along x that observe the same points.
 class SlamMapTest : public ::testing::Test {
@@ -174,5 +173,4 @@ TEST_F(SlamMapTest, LensCorrectionAppliesToOldAndNewKeyframes) {
   EXPECT_LT((before.features()[0].pixel_px - image_px).norm(), 1e-3);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::slam_map_test

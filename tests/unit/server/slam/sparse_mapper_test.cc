@@ -11,8 +11,7 @@
 #include "tests/support/sparse_mapper_inspector.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::sparse_mapper_test {
 
 // A keyframe with a pose given by the client.
 TrackedImage Keyframe(std::shared_ptr<const Frame> frame) {
@@ -227,5 +226,4 @@ TEST(SparseMapper, ImplausiblePoseDoesNotDamageTheMap) {
   }
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::sparse_mapper_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::tracking_status_test {
 
 TEST(TrackingStatus, ReportsRelocalizationOnceAfterALoss) {
   TrackingStatus status;
@@ -48,5 +47,4 @@ TEST(TrackingStatus, MapResetStartsInitialization) {
   EXPECT_FALSE(status.IsLost());
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::tracking_status_test

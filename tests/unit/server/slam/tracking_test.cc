@@ -16,8 +16,7 @@
 #include "tests/support/sparse_mapper_inspector.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::tracking_test {
 
 using ::testing::HasSubstr;
 
@@ -340,5 +339,4 @@ TEST_F(TrackingTest, ImagesCorrectPriors) {
   EXPECT_LT(tracking_error, 0.7 * prior_error);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::tracking_test

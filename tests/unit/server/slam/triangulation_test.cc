@@ -6,8 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::triangulation_test {
 
 ObservedRay RayFrom(const Eigen::Vector3d& center_world, const Eigen::Vector3d& p_world, double sigma_rad = 1e-3) {
   return {.center_world = center_world,
@@ -92,5 +91,4 @@ TEST(RefinePoint, RangeDeterminesDepthOfASingleRay) {
   EXPECT_LT((RefinePoint({ray}, {0.01, 0, 2.02}) - Eigen::Vector3d(0, 0, 2)).norm(), 1e-4);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::triangulation_test

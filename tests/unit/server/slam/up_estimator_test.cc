@@ -7,8 +7,7 @@
 #include <numbers>
 #include <random>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::up_estimator_test {
 
 // A frame with the gravity of a world whose up direction is `up_world`.
 Frame FrameWithGravity(const Eigen::Vector3d& up_world, const SE3<World, Camera>& T_world_camera) {
@@ -52,5 +51,4 @@ TEST(UpEstimator, AveragesNoiseAndIgnoresJolts) {
   EXPECT_LT(AngleBetween_deg(up.up_world(), truth), 0.6);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::up_estimator_test

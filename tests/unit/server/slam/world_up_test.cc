@@ -12,8 +12,7 @@
 
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::world_up_test {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -152,5 +151,4 @@ TEST_F(WorldUpTest, SmallRotationsAreProposedOnlyAtTheEnd) {
   EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.1 * kDegree);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::world_up_test

@@ -14,17 +14,16 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap::transport {
-namespace {
+namespace romap::transport::grpc_server_test {
 
 using absl::StatusCode;
-using testing::Eventually;
-using testing::FakeMappingService;
 using ::testing::HasSubstr;
-using testing::MakeFrame;
-using testing::NextOf;
-using testing::ReadToEnd;
 using ::testing::SizeIs;
+using testing_support::Eventually;
+using testing_support::FakeMappingService;
+using testing_support::MakeFrame;
+using testing_support::NextOf;
+using testing_support::ReadToEnd;
 
 TransportConfig AnyPort() {
   TransportConfig config;
@@ -38,9 +37,11 @@ class GrpcServerTest : public ::testing::Test {
     server_ = GrpcServer::Start(service, config).value();
     client_ = client::RemoteMappingService::Connect(server_->address()).value();
   }
-  std::string NewSession() { return client_->CreateSession({.name = "", .camera = testing::SmallCamera()})->id; }
+  std::string NewSession() {
+    return client_->CreateSession({.name = "", .camera = testing_support::SmallCamera()})->id;
+  }
 
-  testing::FakeMappingService fake_;
+  testing_support::FakeMappingService fake_;
   std::unique_ptr<GrpcServer> server_;
   std::unique_ptr<client::RemoteMappingService> client_;
 };
@@ -118,13 +119,13 @@ TEST_F(GrpcServerTest, BusyServiceAppliesBackPressure) {
   Start(&fake_);
   const auto stream = client_->OpenMap(NewSession()).value();
   for (uint64_t id = 1; id <= kFrames; ++id) {
-    FrameInput frame = testing::MakeFrame(id);
+    FrameInput frame = testing_support::MakeFrame(id);
     frame.image.assign(kFrameBytes, '\0');
     ++sent;
     ASSERT_TRUE(stream->Send(std::move(frame)).ok());
   }
   EXPECT_OK(stream->CloseSend());
-  testing::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*stream);
   EXPECT_EQ(accepted, kFrames);
   // At most what the HTTP/2 windows and socket buffers hold.
   EXPECT_LT(most_in_flight, kFrames / 2);
@@ -135,15 +136,15 @@ TEST_F(GrpcServerTest, ShutdownEndsStreamsAndKeepsAcceptedFrames) {
   const std::string session = NewSession();
   const auto stream = client_->OpenMap(session).value();
   const auto watch = client_->Watch(session).value();
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
-  EXPECT_TRUE(testing::NextOf<FrameAck>(*stream).has_value());
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
+  EXPECT_TRUE(testing_support::NextOf<FrameAck>(*stream).has_value());
   server_->Shutdown();
-  testing::ReadToEnd(*stream);
-  testing::ReadToEnd(*watch);
+  testing_support::ReadToEnd(*stream);
+  testing_support::ReadToEnd(*watch);
   EXPECT_CODE(stream->status(), StatusCode::kUnavailable);
   EXPECT_CODE(watch->status(), StatusCode::kUnavailable);
   EXPECT_THAT(Message(watch->status()), HasSubstr("shutting down"));
-  EXPECT_CODE(stream->Send(testing::MakeFrame(2)), StatusCode::kUnavailable);
+  EXPECT_CODE(stream->Send(testing_support::MakeFrame(2)), StatusCode::kUnavailable);
   EXPECT_FALSE(fake_.GetSession(session)->stream_open);
   EXPECT_THAT(fake_.ExportMap(session)->trajectory, SizeIs(1));
 }
@@ -157,7 +158,7 @@ TEST_F(GrpcServerTest, ShutdownWaitsForAFrameInProgress) {
   Start(&fake_);
   const std::string session = NewSession();
   const auto stream = client_->OpenMap(session).value();
-  EXPECT_OK(stream->Send(testing::MakeFrame(1)));
+  EXPECT_OK(stream->Send(testing_support::MakeFrame(1)));
   in_progress.get_future().wait();
   std::thread shutdown([&] { server_->Shutdown(); });
   release.set_value();
@@ -180,7 +181,7 @@ TEST_F(GrpcServerTest, DisconnectFreesTheSession) {
   EXPECT_TRUE(fake_.GetSession(session)->stream_open);
   stream.reset();
   other.reset();
-  EXPECT_TRUE(testing::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
+  EXPECT_TRUE(testing_support::Eventually([&] { return !fake_.GetSession(session)->stream_open; }));
   EXPECT_EQ(fake_.GetSession(session)->state, SessionState::kOpen);
 }
 
@@ -191,15 +192,15 @@ TEST_F(GrpcServerTest, CallsAboveTheLimitAreRejectedUntilOneEnds) {
   const std::string session = NewSession();
   // The thread of CreateSession may still count as a call for a moment.
   absl::StatusOr<std::unique_ptr<EventStream>> first = absl::UnknownError("not called");
-  ASSERT_TRUE(testing::Eventually([&] { return (first = client_->Watch(session)).ok(); }));
+  ASSERT_TRUE(testing_support::Eventually([&] { return (first = client_->Watch(session)).ok(); }));
   const auto second = client_->Watch(session).value();
   EXPECT_CODE(client_->ListSessions().status(), StatusCode::kResourceExhausted);
   EXPECT_CODE(client_->Watch(session).status(), StatusCode::kResourceExhausted);
   second->Cancel();
-  EXPECT_TRUE(testing::Eventually([&] { return client_->ListSessions().ok(); }));
+  EXPECT_TRUE(testing_support::Eventually([&] { return client_->ListSessions().ok(); }));
 }
 
-class ThrowingService : public testing::FakeMappingService {
+class ThrowingService : public testing_support::FakeMappingService {
  public:
   absl::StatusOr<SessionInfo> GetSession(const std::string&) override { throw std::runtime_error("broken invariant"); }
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string&) override {
@@ -216,5 +217,4 @@ TEST_F(GrpcServerTest, ExceptionEndsOnlyItsCall) {
   server_->Shutdown();
 }
 
-}  // namespace
-}  // namespace romap::transport
+}  // namespace romap::transport::grpc_server_test

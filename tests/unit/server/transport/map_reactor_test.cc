@@ -14,11 +14,10 @@
 #include "tests/support/fake_mapping_service.h"
 #include "tests/support/streams.h"
 
-namespace romap::transport {
-namespace {
+namespace romap::transport::map_reactor_test {
 
 using ::testing::HasSubstr;
-using testing::MakeFrame;
+using testing_support::MakeFrame;
 
 class MapReactorTest : public ::testing::Test {
  protected:
@@ -27,7 +26,7 @@ class MapReactorTest : public ::testing::Test {
     config.listen_address = "127.0.0.1:0";
     server_ = GrpcServer::Start(&fake_, config).value();
     stub_ = v1::Mapping::NewStub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
-    session_ = fake_.CreateSession({.name = "", .camera = testing::SmallCamera()})->id;
+    session_ = fake_.CreateSession({.name = "", .camera = testing_support::SmallCamera()})->id;
     call_ = stub_->Map(&context_);
   }
 
@@ -47,7 +46,7 @@ class MapReactorTest : public ::testing::Test {
     return call_->Finish();
   }
 
-  testing::FakeMappingService fake_;
+  testing_support::FakeMappingService fake_;
   std::unique_ptr<GrpcServer> server_;
   std::unique_ptr<v1::Mapping::Stub> stub_;
   std::string session_;
@@ -65,7 +64,7 @@ TEST_F(MapReactorTest, FirstResponseIsOpened) {
 }
 
 TEST_F(MapReactorTest, FrameBeforeStartIsRejected) {
-  WriteFrame(wire::ToProto(testing::MakeFrame(1)));
+  WriteFrame(wire::ToProto(testing_support::MakeFrame(1)));
   const grpc::Status status = Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_THAT(status.error_message(), HasSubstr("first request must be `start`"));
@@ -87,7 +86,7 @@ TEST_F(MapReactorTest, SecondStartEndsTheStreamAndFreesTheSession) {
 
 TEST_F(MapReactorTest, MalformedLateMasksAreRejectedWithTheField) {
   WriteStart();
-  WriteFrame(wire::ToProto(testing::MakeFrame(1)));
+  WriteFrame(wire::ToProto(testing_support::MakeFrame(1)));
   v1::MapRequest request;
   request.mutable_late_masks()->set_frame_id(1);
   request.mutable_late_masks()->mutable_masks()->set_label_png("");
@@ -109,7 +108,7 @@ TEST_F(MapReactorTest, MalformedLateMasksAreRejectedWithTheField) {
 
 TEST_F(MapReactorTest, UnknownEnumValueIsRejectedWithTheField) {
   WriteStart();
-  v1::Frame frame = wire::ToProto(testing::MakeFrame(1));
+  v1::Frame frame = wire::ToProto(testing_support::MakeFrame(1));
   frame.mutable_image()->set_encoding(static_cast<v1::ImageEncoding>(77));
   WriteFrame(frame);
   v1::MapResponse response;
@@ -119,7 +118,7 @@ TEST_F(MapReactorTest, UnknownEnumValueIsRejectedWithTheField) {
   EXPECT_FALSE(response.event().frame_ack().accepted());
   EXPECT_THAT(response.event().frame_ack().error(), HasSubstr("frame.image.encoding: must be one of"));
 
-  WriteFrame(wire::ToProto(testing::MakeFrame(2)));
+  WriteFrame(wire::ToProto(testing_support::MakeFrame(2)));
   ASSERT_TRUE(call_->Read(&response));
   EXPECT_EQ(response.event().frame_ack().frame_id(), 2u);
   EXPECT_TRUE(response.event().frame_ack().accepted());
@@ -127,5 +126,4 @@ TEST_F(MapReactorTest, UnknownEnumValueIsRejectedWithTheField) {
   EXPECT_TRUE(Finish().ok());
 }
 
-}  // namespace
-}  // namespace romap::transport
+}  // namespace romap::transport::map_reactor_test

@@ -8,8 +8,7 @@
 
 #include "tests/unit/support/cuda_on_host/sample_kernels.h"
 
-namespace romap {
-namespace {
+namespace romap::cuda_on_host_test {
 
 // Device memory that holds a copy of a vector.
 template <class T>
@@ -196,5 +195,4 @@ TEST_P(CudaOnHost, MemoryStartsAsNan) {
   cudaFree(out);
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::cuda_on_host_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/cuda_on_host/cuda_on_host.h"
 
-namespace romap {
-namespace {
+namespace romap::limits_test {
 
 class CudaLimits : public testing::Test {
  protected:
@@ -138,5 +137,4 @@ TEST_F(CudaLimitsDeathTest, StrictBarriersMustBeReachedByAll) {
   EXPECT_DEATH(ROMAP_LAUNCH(BarrierThatSomeSkip, dim3(1), dim3(32), 0, nullptr), "__syncthreads");
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::limits_test

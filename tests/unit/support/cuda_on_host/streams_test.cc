@@ -5,8 +5,7 @@
 
 #include "tests/support/cuda_on_host/cuda_on_host.h"
 
-namespace romap {
-namespace {
+namespace romap::streams_test {
 
 __global__ void AddOne(int* value, const int* limit) {
   if (*value < *limit) *value += 1;
@@ -107,5 +106,4 @@ TEST_F(CudaStreams, AFaultPersistsUntilTheDeviceIsReset) {
   EXPECT_EQ(Value(), 1);  // the effect of the first kernel
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::streams_test

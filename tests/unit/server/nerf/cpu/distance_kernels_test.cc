@@ -11,10 +11,9 @@
 #include "server/nerf/math/random.h"
 #include "tests/unit/server/nerf/math/gradient_check.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::distance_kernels_test {
 
-using testing::ExpectGradient;
+using testing_support::ExpectGradient;
 
 constexpr float kSharpness = 30;
 
@@ -92,7 +91,7 @@ TEST(DistanceKernelsTest, GradientMatchesFiniteDifferencesOfTheLoss) {
     PlainKernels().distance_backward(rays.spans.data(), 2, kSharpness, c);
     const std::vector<float> d_raw(c.d_raw.data(), c.d_raw.data() + c.size * kOutputs);
     const auto count = static_cast<size_t>(c.size * kOutputs);
-    testing::ExpectGradient(loss, c.raw.data(), d_raw.data(), count, count, 1e-3f, 1e-2);
+    testing_support::ExpectGradient(loss, c.raw.data(), d_raw.data(), count, count, 1e-3f, 1e-2);
   }
 }
 
@@ -119,5 +118,4 @@ TEST(DistanceKernelsTest, EveryInstructionSetEqualsThePlainForm) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::distance_kernels_test

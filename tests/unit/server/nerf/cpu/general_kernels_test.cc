@@ -11,8 +11,7 @@
 #include "server/nerf/cpu/kernels.h"
 #include "server/nerf/math/random.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::general_kernels_test {
 
 constexpr int kPoints = 101;  // not a multiple of any vector, tile or block size
 
@@ -254,5 +253,4 @@ TEST(ShrinkFeaturesTest, KeepsTheOutputs) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::general_kernels_test

@@ -9,10 +9,9 @@
 #include "server/nerf/math/random.h"
 #include "tests/unit/server/nerf/math/gradient_check.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::gradient_test {
 
-using testing::ExpectGradient;
+using testing_support::ExpectGradient;
 
 float Noise(uint64_t stream, uint64_t i) { return 2.0f * RandomUniform(11, stream, i) - 1.0f; }
 
@@ -110,5 +109,4 @@ TEST(GradientTest, ContrastIsPartOfTheGradientOfBothRays) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::gradient_test

@@ -12,8 +12,7 @@
 
 #include "server/nerf/math/random.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::kernels_test {
 
 float Noise(uint64_t stream, uint64_t i) { return 2.0f * RandomUniform(12, stream, i) - 1.0f; }
 
@@ -328,5 +327,4 @@ std::vector<int64_t> Targets() {
 INSTANTIATE_TEST_SUITE_P(Targets, KernelsTest, ::testing::ValuesIn(Targets()),
                          [](const auto& info) { return std::string(hwy::TargetName(info.param)); });
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::kernels_test

@@ -6,8 +6,7 @@
 #include <thread>
 #include <vector>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::step_tasks_test {
 
 TEST(StepTasksTest, ReturnsEveryTaskInOrder) {
   StepTasks tasks(2, {2, 3});
@@ -77,5 +76,4 @@ TEST(StepTasksTest, APhaseWaitsForAllTasksOfThePreviousOne) {
   EXPECT_FALSE(tasks.Next());
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::step_tasks_test

@@ -8,8 +8,7 @@
 #include "server/nerf/cuda/cuda_trainer.h"
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::cuda_trainer_test {
 
 using CudaTrainerTest = DeviceTest;
 
@@ -250,5 +249,4 @@ TEST_F(CudaTrainerTest, TheConfigurationChoosesTheBackEnd) {
   EXPECT_FALSE(kernels_run("cuda", 0));
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::cuda_trainer_test

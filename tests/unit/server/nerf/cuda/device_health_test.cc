@@ -5,8 +5,7 @@
 #include "server/nerf/cuda/cuda_field.h"
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::device_health_test {
 
 using DeviceHealthTest = DeviceTest;
 
@@ -44,5 +43,4 @@ TEST_F(DeviceHealthTest, WideFieldsAndUnequalCoordinatesAreRejected) {
   EXPECT_TRUE(device->Evaluate({}, {}, {})->empty());
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::device_health_test

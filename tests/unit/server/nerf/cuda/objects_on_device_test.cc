@@ -10,8 +10,7 @@
 #include "server/nerf/training_pool.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::objects_on_device_test {
 
 using ObjectsOnDeviceTest = DeviceTest;
 
@@ -33,8 +32,8 @@ NerfConfig TinyConfig() {
   return config;
 }
 
-testing::BallScene TinyScene(uint64_t object) {
-  testing::BallScene scene;
+testing_support::BallScene TinyScene(uint64_t object) {
+  testing_support::BallScene scene;
   scene.object = ObjectId{object};
   scene.views = 4;
   scene.size_px = 32;
@@ -42,13 +41,13 @@ testing::BallScene TinyScene(uint64_t object) {
 }
 
 std::vector<float> Train(const NerfConfig& config, int steps) {
-  const testing::BallScene scene = TinyScene(1);
+  const testing_support::BallScene scene = TinyScene(1);
   ObjectField field(config, scene.object, 5);
   EXPECT_TRUE(field.SetBox(scene.Box()).ok());
   for (const ObjectView& view : scene.Views()) EXPECT_TRUE(field.AddView(view).ok());
   EXPECT_EQ(field.Train(steps, 1).steps, steps);
   EXPECT_EQ(field.steps(), static_cast<uint64_t>(steps));
-  return testing::RawOnGrid(field.Snapshot(), 0.7f);
+  return testing_support::RawOnGrid(field.Snapshot(), 0.7f);
 }
 
 void WaitUntilIdle(TrainingPool& pool, TrainingPool::SessionId session) {
@@ -79,7 +78,7 @@ TEST_F(ObjectsOnDeviceTest, TrainingTimeIsLimited) {
   config.max_training_time_per_view_s = 0;
   TrainingPool pool(config, 1);
   const TrainingPool::SessionId session = pool.AddSession([](FieldSnapshot) {});
-  const testing::BallScene scene = TinyScene(1);
+  const testing_support::BallScene scene = TinyScene(1);
   pool.Offer(session, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   pool.Finish(session);
   WaitUntilIdle(pool, session);
@@ -97,7 +96,7 @@ TEST_F(ObjectsOnDeviceTest, APoolFinishesEveryObjectAfterADeviceFailure) {
   });
   cuda_on_host::SetDeviceTraits({.kernels_before_fault = 14});  // of 48
   for (uint64_t object = 1; object <= 2; ++object) {
-    const testing::BallScene scene = TinyScene(object);
+    const testing_support::BallScene scene = TinyScene(object);
     pool.Offer(session, {.object = scene.object, .cuboid = scene.Box(), .new_views = scene.Views()});
   }
   pool.Finish(session);
@@ -108,10 +107,9 @@ TEST_F(ObjectsOnDeviceTest, APoolFinishesEveryObjectAfterADeviceFailure) {
   for (const auto& [object, snapshot] : last) {
     EXPECT_TRUE(snapshot.converged);
     EXPECT_EQ(snapshot.steps, 8u);
-    for (const float raw : testing::RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
+    for (const float raw : testing_support::RawOnGrid(snapshot)) ASSERT_TRUE(std::isfinite(raw));
   }
   EXPECT_EQ(cuda_on_host::AllocatedBytes(), 0u);
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::objects_on_device_test

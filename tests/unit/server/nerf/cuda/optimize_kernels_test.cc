@@ -9,8 +9,7 @@
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
 #include "tests/unit/server/nerf/cuda/step_on_device.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::optimize_kernels_test {
 
 using OptimizeKernelsTest = OrderedDeviceTest;
 INSTANTIATE_TEST_SUITE_P(Orders, OptimizeKernelsTest, AllOrders(), OrderName);
@@ -228,5 +227,4 @@ TEST_P(OptimizeKernelsTest, ScoresAndOccupiedCellsEqualThoseOfTheCpu) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::optimize_kernels_test

@@ -3,8 +3,7 @@
 
 #include "tests/unit/server/nerf/cuda/device_test.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::runtime_table_test {
 
 using RuntimeTableTest = DeviceTest;
 
@@ -27,5 +26,4 @@ TEST_F(RuntimeTableTest, EveryPartIsMeasured) {
   EXPECT_NE(text.find("| small |"), std::string::npos) << text;
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::runtime_table_test

@@ -8,8 +8,7 @@
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
 #include "tests/unit/server/nerf/cuda/step_on_device.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::step_kernel_test {
 
 // kPlain: same formulas and precision, only the order of sums differs. kRounded: sums halfway between two halves may be
 // rounded to either one. kSimd: cells of the finest level amplify the rounding of positions, as between the kernels of
@@ -219,5 +218,4 @@ TEST(DifferenceTest, DetectsDifferencesAndNan) {
   EXPECT_NE(Difference(values, std::vector<float>{1, 2}, 1e-2), "");
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::step_kernel_test

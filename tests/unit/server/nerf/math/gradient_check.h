@@ -9,7 +9,7 @@
 
 #include "server/nerf/math/random.h"
 
-namespace romap::nerf::testing {
+namespace romap::testing_support {
 
 // Compares gradient[i] with (f(x + e) - f(x - e)) / 2 e for `checks` of the `count` entries of x.
 inline void ExpectGradient(const std::function<double()>& f, float* x, const float* gradient, size_t count,
@@ -18,7 +18,7 @@ inline void ExpectGradient(const std::function<double()>& f, float* x, const flo
   for (size_t i = 0; i < count; ++i) largest = std::max<double>(largest, std::fabs(gradient[i]));
   ASSERT_GT(largest, 0);
   for (size_t check = 0; check < checks; ++check) {
-    const size_t i = checks >= count ? check % count : RandomBits(3, 9, check) % count;
+    const size_t i = checks >= count ? check % count : nerf::RandomBits(3, 9, check) % count;
     const float before = x[i];
     x[i] = before + step;
     const double above = f();
@@ -29,4 +29,4 @@ inline void ExpectGradient(const std::function<double()>& f, float* x, const flo
   }
 }
 
-}  // namespace romap::nerf::testing
+}  // namespace romap::testing_support

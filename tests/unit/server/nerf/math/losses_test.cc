@@ -11,8 +11,7 @@
 #include "server/nerf/math/random.h"
 #include "tests/unit/server/nerf/math/gradient_check.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::losses_test {
 
 constexpr int kSamples = 9;
 
@@ -82,7 +81,7 @@ TEST_P(LossGradientTest, MatchesFiniteDifferences) {
   const RayLoss own = LossOf(ray.Render(c.depth), c);
   std::array<float, kSamples* kOutputs> d_raw = {};
   plain::CompositeBackward(ray.Samples(), c.depth, own, ray.weight.data(), ray.behind.data(), d_raw.data());
-  testing::ExpectGradient(loss, ray.raw.data(), d_raw.data(), d_raw.size(), d_raw.size(), 1e-2f, 5e-3);
+  testing_support::ExpectGradient(loss, ray.raw.data(), d_raw.data(), d_raw.size(), d_raw.size(), 1e-2f, 5e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -142,5 +141,4 @@ TEST(LossOfRayTest, OutlierDepthsHaveAConstantLoss) {
   EXPECT_FLOAT_EQ(outlier.value, 0.2f);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::losses_test

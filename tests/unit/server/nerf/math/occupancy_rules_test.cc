@@ -4,8 +4,7 @@
 
 #include <limits>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::occupancy_rules_test {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
@@ -37,5 +36,4 @@ TEST(OccupancyRulesTest, NeighborsStayWithinTheRow) {
   EXPECT_EQ(WithNeighborsInRow(uint64_t{1} << 63), uint64_t{3} << 62);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::occupancy_rules_test

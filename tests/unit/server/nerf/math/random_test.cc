@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::random_test {
 
 TEST(RandomTest, IsUniformAndDependsOnEveryCounter) {
   double sum = 0;
@@ -14,5 +13,4 @@ TEST(RandomTest, IsUniformAndDependsOnEveryCounter) {
   EXPECT_NE(RandomBits(1, 2, 3), RandomBits(1, 2, 4));
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::random_test

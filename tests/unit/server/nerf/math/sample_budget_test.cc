@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::sample_budget_test {
 
 TEST(SampleCountTest, FollowsTheFinestStepWithinTheLimits) {
   const SampleBudget budget{.finest_step = 0.1f, .min_samples = 4, .max_samples = 16};
@@ -25,5 +24,4 @@ TEST(RaysThatFitTest, IsEven) {
   EXPECT_EQ(RaysThatFit(128, 64), 2);
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::sample_budget_test

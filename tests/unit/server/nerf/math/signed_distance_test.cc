@@ -9,8 +9,7 @@
 #include "server/nerf/math/random.h"
 #include "tests/unit/server/nerf/math/gradient_check.h"
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::signed_distance_test {
 
 float Noise(uint64_t stream, uint64_t i) { return 2.0f * RandomUniform(13, stream, i) - 1.0f; }
 
@@ -54,10 +53,9 @@ TEST(ShapeLossTest, GradientMatchesFiniteDifferences) {
     std::array<float, kStencilPoints> distance, d;
     for (size_t i = 0; i < distance.size(); ++i) distance[i] = 0.02f * Noise(7, i);
     plain::ShapeLoss(weights, kSpacing, distance.data(), d.data());
-    testing::ExpectGradient([&] { return Loss(weights, distance); }, distance.data(), d.data(), kStencilPoints,
-                            kStencilPoints, 1e-4f, 1e-2);
+    testing_support::ExpectGradient([&] { return Loss(weights, distance); }, distance.data(), d.data(), kStencilPoints,
+                                    kStencilPoints, 1e-4f, 1e-2);
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::signed_distance_test

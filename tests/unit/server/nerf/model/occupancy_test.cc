@@ -4,8 +4,7 @@
 
 #include <vector>
 
-namespace romap::nerf {
-namespace {
+namespace romap::nerf::occupancy_test {
 
 TEST(OccupancyTest, ScoresMoveToAnotherBox) {
   constexpr int kSide = kOccupancyResolution;
@@ -49,5 +48,4 @@ TEST(OccupancyTest, TrimmedHullEndsWhereRaysEnd) {
   EXPECT_EQ(occupancy.TrimmedHull(0), occupancy.hull());
 }
 
-}  // namespace
-}  // namespace romap::nerf
+}  // namespace romap::nerf::occupancy_test

@@ -9,8 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::line_segments_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -148,5 +147,4 @@ TEST(LineSegmentsTest, DoesNotDependOnEarlierCalls) {
   }
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::line_segments_test

@@ -10,8 +10,7 @@
 
 #include "common/geometry.h"
 
-namespace romap::objects {
-namespace {
+namespace romap::objects::yaw_from_lines_test {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kDeg = kPi / 180;
@@ -264,5 +263,4 @@ TEST(YawFromLinesTest, IsExactWithoutNoise) {
   EXPECT_NEAR(yaw->yaw_rad, 0.123456, 1e-6);
 }
 
-}  // namespace
-}  // namespace romap::objects
+}  // namespace romap::objects::yaw_from_lines_test

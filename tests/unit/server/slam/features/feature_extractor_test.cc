@@ -12,8 +12,7 @@
 #include "common/lens.h"
 #include "tests/unit/server/slam/textured_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::feature_extractor_test {
 
 size_t CountLabeled(const std::vector<Feature>& features) {
   return static_cast<size_t>(
@@ -230,5 +229,4 @@ TEST(FeatureExtractor, AnglesAndPositionsRotateWithTheImage) {
   EXPECT_GT(similar_descriptors, 0.95 * same);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::feature_extractor_test

@@ -5,8 +5,7 @@
 #include <bitset>
 #include <random>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::feature_test {
 
 TEST(HammingDistance, CountsDifferingBits) {
   std::mt19937_64 random(1);
@@ -30,5 +29,4 @@ TEST(HammingDistance, IsZeroForEqualAnd256ForInvertedDescriptors) {
   EXPECT_EQ(HammingDistance(zeros, ones), 256);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::feature_test

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::patch_test {
 
 using Image = double (*)(double x, double y);
 
@@ -85,5 +84,4 @@ TEST(PatchTest, RejectsImagesWithoutTextureAndPatchesBeyondTheBorder) {
   EXPECT_FALSE(Align(Draw(Blobs, 0, 0), Draw(Blobs, 0, 0), {158, 60}));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::patch_test

@@ -10,8 +10,7 @@
 #include <set>
 #include <tuple>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::steered_brief_test {
 
 constexpr int kCenter_px = 60;
 
@@ -95,5 +94,4 @@ TEST(SteeredBrief, IsInvariantToRotationAndDistinguishesImages) {
   }
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::steered_brief_test

@@ -7,8 +7,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::epipolar_test {
 
 Motion TestMotion() { return {RotationXyz(3, -5, 8).toRotationMatrix(), Eigen::Vector3d(0.8, -0.1, 0.3).normalized()}; }
 
@@ -88,5 +87,4 @@ TEST(Epipolar, SigmasMatchTheActualErrors) {
   EXPECT_LT(error2, 4 * sigma2);  // the error has three axes, and outlier rejection removes the tail of the noise
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::epipolar_test

@@ -8,8 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::level_cameras_test {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -102,5 +101,4 @@ TEST(LevelCameras, NothingFollowsFromOneDirection) {
   EXPECT_FALSE(UpFromLevelCameras({}, {}).has_value());
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::level_cameras_test

@@ -6,8 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::plane_fit_test {
 
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
@@ -80,5 +79,4 @@ TEST(FitPlane, SigmaMatchesTheScatterOfTheNormal) {
   EXPECT_NEAR(std::sqrt(squared_sigma / squared_error), 1, 0.12);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::plane_fit_test

@@ -7,8 +7,7 @@
 
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::pnp_test {
 
 struct Scene {
   CameraModel camera = TestCamera();
@@ -99,5 +98,4 @@ TEST(Pnp, IsDeterministicForASeed) {
   EXPECT_EQ(once->inlier, again->inlier);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::pnp_test

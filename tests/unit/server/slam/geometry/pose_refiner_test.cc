@@ -7,8 +7,7 @@
 
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::pose_refiner_test {
 
 struct Scene {
   CameraModel camera = TestCamera();
@@ -145,5 +144,4 @@ TEST(PoseRefiner, ConvergesDespitePointsNearTheCameraPlane) {
   EXPECT_GE(estimate.inliers, 45);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::pose_refiner_test

@@ -5,8 +5,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::reprojection_test {
 
 class ReprojectionGradient : public testing::TestWithParam<PoseObservation> {};
 
@@ -19,7 +18,8 @@ TEST_P(ReprojectionGradient, AgreesWithFiniteDifferences) {
     return equations;
   };
   ASSERT_GT(linearize(pose).cost, 0);
-  ExpectGradientOfCost<6>(linearize, ApplyStep, pose);
+  const auto move = [](const CameraFromWorld& at, const PoseEquations::Vector& step) { return ApplyStep(at, step); };
+  ExpectGradientOfCost<6>(linearize, move, pose);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -43,5 +43,4 @@ TEST(Reprojection, DepthRequiresAStandardDeviation) {
   EXPECT_TRUE(HasDepth({.depth_mu = 2, .depth_sigma_mu = 0.1}));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::reprojection_test

@@ -9,8 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::scene_planes_test {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -68,5 +67,4 @@ TEST_F(ScenePlanesTest, IgnoresFewAndInvalidPoints) {
   EXPECT_EQ(FindScenePlanes(points_, 1).size(), 1u);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::scene_planes_test

@@ -8,8 +8,7 @@
 #include "tests/unit/server/slam/geometry/gradient_check.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::similarity_test {
 
 const Sim3<Camera, Camera> kTruth(1.6, RotationXyz(12, -20, 5), {0.4, -0.1, 0.3});
 
@@ -161,5 +160,4 @@ TEST(Similarity, GradientAgreesWithFiniteDifferences) {
   }
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::similarity_test

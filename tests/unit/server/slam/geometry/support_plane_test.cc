@@ -9,8 +9,7 @@
 
 #include "tests/unit/server/slam/geometry/support_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::support_plane_test {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -150,5 +149,4 @@ TEST(SupportPlane, IsDeterministicForASeedAndSimilarForAnother) {
   EXPECT_GT(first->normal_world.dot(other->normal_world), std::cos(0.3 * kDegree));
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::support_plane_test

@@ -16,8 +16,7 @@
 #include "server/slam/geometry/two_view.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::two_view_real_test {
 
 struct TimedPose {
   double time_s = 0;
@@ -103,5 +102,4 @@ TEST(TwoViewReal, NeverReturnsAWrongMotionForHandHeldFrames) {
   EXPECT_GT(found, tried / 4);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::two_view_real_test

@@ -8,8 +8,7 @@
 #include "common/statistics.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::two_view_test {
 
 // The z depth at which a ray (z = 1) of the first camera intersects the scene.
 using Surface = std::function<double(const Eigen::Vector3d& ray, Noise& noise)>;
@@ -215,5 +214,4 @@ TEST(TwoView, NeverReturnsAWrongMotion) {
   EXPECT_LT(Median(rotation_errors_deg), 0.5);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::two_view_test

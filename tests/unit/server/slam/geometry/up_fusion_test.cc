@@ -7,8 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::up_fusion_test {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -79,5 +78,4 @@ TEST(UpFusion, TwoWallsShowUpAndOneDoesNot) {
   EXPECT_EQ(FuseUp({}, kGuess).confidence, 0);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::up_fusion_test

@@ -10,8 +10,7 @@
 
 #include "tests/unit/server/slam/optimize/bundle_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::bundle_adjustment_test {
 
 BundleWorldOptions NoisyStart() {
   BundleWorldOptions options;
@@ -395,5 +394,4 @@ TEST(BundleFitTest, CountsOutliers) {
   EXPECT_FALSE(world.problem.observations[5].outlier);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::bundle_adjustment_test

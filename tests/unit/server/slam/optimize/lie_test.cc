@@ -5,8 +5,7 @@
 #include <numbers>
 #include <vector>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::lie_test {
 
 // Increments from tiny to large: rotation up to 3 rad, scale from 1/20 to 20.
 std::vector<Sim3Vector> Samples() {
@@ -104,5 +103,4 @@ TEST(Lie, AdjointConvertsRightToLeftIncrements) {
   EXPECT_LT((by_right - by_left).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::lie_test

@@ -9,8 +9,7 @@
 #include "server/slam/optimize/pose_graph_cost.h"
 #include "tests/unit/server/slam/optimize/jacobians.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::pose_graph_test {
 
 using std::numbers::pi;
 
@@ -174,5 +173,4 @@ TEST(PoseGraph, InvalidInputIsIgnoredOrRejected) {
   EXPECT_FALSE(OptimizePoseGraph(loop.nodes, loop.edges, {}).usable);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::pose_graph_test

@@ -5,8 +5,7 @@
 #include "server/slam/optimize/bundle_adjustment.h"
 #include "tests/unit/server/slam/optimize/bundle_world.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::radial_correction_test {
 
 constexpr BundleOptions kManyIterations{.max_iterations = 30, .function_tolerance = 1e-6};
 
@@ -71,5 +70,4 @@ TEST(RadialCorrection, TightPriorDominates) {
   EXPECT_NEAR(world.problem.lens->correction.k1, 0, 0.001);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::radial_correction_test

@@ -8,8 +8,7 @@
 #include "tests/unit/server/slam/optimize/bundle_world.h"
 #include "tests/unit/server/slam/optimize/jacobians.h"
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::reprojection_cost_test {
 
 // A camera away from its start, so that the Jacobians of the increment matter, and a point in its view.
 struct PointView {
@@ -149,5 +148,4 @@ TEST(CameraState, PoseAgreesWithTheCachedMatrices) {
   EXPECT_LT((pose.translation() - view.camera.t_world_camera).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::reprojection_cost_test

@@ -7,8 +7,7 @@
 #include <random>
 #include <set>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::descriptor_tree_test {
 
 constexpr int kAllLeaves = std::numeric_limits<int>::max();
 
@@ -86,5 +85,4 @@ TEST_F(DescriptorTreeTest, RemovesEntriesByOwner) {
   EXPECT_EQ(owners.count(3), 0u);
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::descriptor_tree_test

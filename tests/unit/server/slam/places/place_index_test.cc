@@ -6,8 +6,7 @@
 #include <random>
 #include <string>
 
-namespace romap::slam {
-namespace {
+namespace romap::slam::place_index_test {
 
 using ::testing::Field;
 using ::testing::IsEmpty;
@@ -196,5 +195,4 @@ TEST_F(PlaceIndexTest, IsDeterministicForASeed) {
   }
 }
 
-}  // namespace
-}  // namespace romap::slam
+}  // namespace romap::slam::place_index_test

@@ -5,8 +5,7 @@
 #include "tests/support/cuda_on_host/block_runner.h"
 #include "tests/unit/support/cuda_on_host/race/race_kernels.h"
 
-namespace romap {
-namespace {
+namespace romap::race_checker_test {
 
 using cuda_on_host::FirstRace;
 using cuda_on_host::RaceCount;
@@ -54,5 +53,4 @@ TEST_P(RaceChecker, MistakesAreReported) {
   }
 }
 
-}  // namespace
-}  // namespace romap
+}  // namespace romap::race_checker_test

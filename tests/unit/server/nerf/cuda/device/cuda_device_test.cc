@@ -7,8 +7,7 @@
 #include "server/nerf/cuda/device_health.h"
 #include "tests/unit/server/nerf/cuda/step_on_cpu.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::cuda_device_test {
 
 TEST(CudaDeviceTest, FieldOnTheDeviceHasTheValuesOfTheCpu) {
   if (!DeviceStatus().ok()) GTEST_SKIP() << Message(DeviceStatus());
@@ -43,5 +42,4 @@ TEST(CudaDeviceTest, NoDeviceIsReportedInOneLine) {
   EXPECT_EQ(CudaField::Create(NoisyField(2, 16)).status().code(), absl::StatusCode::kUnavailable);
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::cuda_device_test

@@ -17,8 +17,7 @@
 #include "server/nerf/model/field_model.h"
 #include "tests/support/subprocess.h"
 
-namespace romap::nerf::cuda {
-namespace {
+namespace romap::nerf::cuda::resources_test {
 
 struct KernelUsage {
   std::string kernel;  // without namespaces and parameters
@@ -119,5 +118,4 @@ TEST(CudaResources, PtxIsForEveryDeviceSinceComputeCapability8) {
   }
 }
 
-}  // namespace
-}  // namespace romap::nerf::cuda
+}  // namespace romap::nerf::cuda::resources_test
