@@ -1,14 +1,13 @@
 #include "client/eval/points.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>
 #include <numeric>
 #include <random>
+
+#include "common/parallel_for.h"
 
 namespace romap::eval {
 namespace {
@@ -76,14 +75,13 @@ NearestIndex::NearestIndex(NearestIndex&&) noexcept = default;
 Neighbors NearestIndex::Query(const Points& queries) const {
   Neighbors result{std::vector<uint32_t>(queries.size()), std::vector<double>(queries.size())};
   constexpr size_t kGrain = 512;  // queries per task
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, queries.size(), kGrain),
-                    [&](const tbb::blocked_range<size_t>& range) {
-                      for (size_t k = range.begin(); k < range.end(); ++k) {
-                        double squared_distance = 0;
-                        tree_->index.knnSearch(queries[k].data(), 1, &result.index[k], &squared_distance);
-                        result.distance[k] = std::sqrt(squared_distance);
-                      }
-                    });
+  ParallelForRanges(queries.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t k = begin; k < end; ++k) {
+      double squared_distance = 0;
+      tree_->index.knnSearch(queries[k].data(), 1, &result.index[k], &squared_distance);
+      result.distance[k] = std::sqrt(squared_distance);
+    }
+  });
   return result;
 }
 

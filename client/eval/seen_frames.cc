@@ -1,11 +1,10 @@
 #include "client/eval/seen_frames.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
 #include "client/files/sequence.h"
+#include "common/parallel_for.h"
 
 namespace romap::eval {
 namespace {
@@ -74,7 +73,7 @@ bool SeenFrames::SeenIn(const View& view, const Eigen::Vector3d& p_world, int64_
 
 std::vector<bool> SeenFrames::Seen(const Points& points, int64_t label) const {
   std::vector<char> seen(points.size());  // not vector<bool>: its elements share bytes, which would be a data race
-  tbb::parallel_for(size_t{0}, points.size(), [&](size_t k) {
+  ParallelFor(points.size(), [&](size_t k) {
     for (const View& view : views_) {
       if (SeenIn(view, points[k], label)) {
         seen[k] = 1;

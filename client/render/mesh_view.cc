@@ -1,12 +1,12 @@
 #include "client/render/mesh_view.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
+
+#include "common/parallel_for.h"
 
 namespace romap::render {
 namespace {
@@ -83,7 +83,7 @@ RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraMode
   view.ids.create(camera.height_px, camera.width_px, CV_16UC1);
   const Eigen::Vector3f background(static_cast<float>(background_bgr[0]), static_cast<float>(background_bgr[1]),
                                    static_cast<float>(background_bgr[2]));
-  tbb::parallel_for(0, camera.height_px, [&](int v) {
+  ParallelFor(camera.height_px, [&](int v) {
     for (int u = 0; u < camera.width_px; ++u) {
       const int32_t triangle = centers.triangle[centers.Index(u, v)];
       view.depth_mu.at<float>(v, u) = centers.Depth(u, v);

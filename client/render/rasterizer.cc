@@ -1,11 +1,10 @@
 #include "client/render/rasterizer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "common/parallel_for.h"
 
 namespace romap::render {
 namespace {
@@ -42,7 +41,7 @@ class TileRasterizer {
   }
 
   void Draw(VisibilityImage& image) const {
-    tbb::parallel_for(size_t{0}, tile_begin_.size() - 1, [&](size_t tile) {
+    ParallelFor(tile_begin_.size() - 1, [&](size_t tile) {
       const int u_min = static_cast<int>(tile % tiles_across_) * kTileSide_px;
       const int v_min = static_cast<int>(tile / tiles_across_) * kTileSide_px;
       const PixelBox tile_box{u_min, v_min, std::min(u_min + kTileSide_px, camera_.width_px) - 1,
@@ -56,8 +55,8 @@ class TileRasterizer {
     const Eigen::Matrix3d rotation = T_camera_world.RotationMatrix();
     const Eigen::Vector3d translation = T_camera_world.translation();
     positions_camera_.resize(soup_.positions_world.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, positions_camera_.size(), 4096), [&](const auto& range) {
-      for (size_t i = range.begin(); i < range.end(); ++i) {
+    ParallelForRanges(positions_camera_.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
         positions_camera_[i] = rotation * soup_.positions_world[i].cast<double>() + translation;
       }
     });
@@ -65,8 +64,8 @@ class TileRasterizer {
 
   void BoundTriangles() {
     boxes_.resize(soup_.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, boxes_.size(), 4096), [&](const auto& range) {
-      for (size_t i = range.begin(); i < range.end(); ++i) boxes_[i] = Bound(soup_.triangles[i]);
+    ParallelForRanges(boxes_.size(), 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) boxes_[i] = Bound(soup_.triangles[i]);
     });
   }
 

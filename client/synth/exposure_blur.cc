@@ -1,12 +1,11 @@
 #include "client/synth/exposure_blur.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 #include <optional>
 
 #include "client/synth/shading.h"
 #include "common/lens.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 namespace {
@@ -65,7 +64,7 @@ void ExposureBlur::AddMoment(const SharpImage& sharp, const ImagePoses& poses, c
                              std::vector<Rgb>& sum) const {
   const render::VisibilityImage image = visibility.Find(poses);
   const auto pixel_rad = static_cast<float>(1 / camera_.fx_px);
-  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+  ParallelFor(camera_.height_px, [&](int v) {
     const SE3<World, Camera> T_world_camera = poses.Row(visibility.Row_px(v));
     const Eigen::Matrix3d rotation = T_world_camera.RotationMatrix();
     for (int u = 0; u < camera_.width_px; ++u) {

@@ -1,12 +1,11 @@
 #include "client/synth/frame_renderer.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include "client/synth/shading.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 namespace {
@@ -88,7 +87,7 @@ std::vector<Rgb> FrameRenderer::SharpColors(const ImagePoses& poses) const {
   const render::VisibilityImage fine = fine_.Find(poses);
   const auto width = static_cast<size_t>(camera_.width_px);
   std::vector<Rgb> colors(width * static_cast<size_t>(camera_.height_px));
-  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+  ParallelFor(camera_.height_px, [&](int v) {
     for (int u = 0; u < camera_.width_px; ++u) {
       colors[static_cast<size_t>(v) * width + static_cast<size_t>(u)] = MeanColor(fine, poses, u, v);
     }
@@ -100,7 +99,7 @@ std::vector<Rgb> FrameRenderer::SharpColors(const ImagePoses& poses) const {
 std::vector<Rgb> FrameRenderer::ExposedColors(const render::VisibilityImage& centers, const ImagePoses& poses,
                                               std::span<const ImagePoses> exposure) const {
   std::vector<Rgb> colors(centers.triangle.size());
-  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+  ParallelFor(camera_.height_px, [&](int v) {
     for (int u = 0; u < camera_.width_px; ++u) colors[centers.Index(u, v)] = CenterColor(centers, poses, u, v);
   });
   return blur_.Average({poses, centers, colors}, exposure);

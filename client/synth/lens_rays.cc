@@ -1,12 +1,11 @@
 #include "client/synth/lens_rays.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/LU>
 #include <limits>
 
 #include "client/render/rasterizer.h"
 #include "common/lens.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 namespace {
@@ -36,7 +35,7 @@ std::vector<Eigen::Vector2d> LensRays(const CameraModel& camera, int samples_acr
   constexpr double kTolerance_px = 1e-6;
   const CameraModel fine = render::Supersampled(camera, samples_across);
   std::vector<Eigen::Vector2d> rays(static_cast<size_t>(fine.width_px) * static_cast<size_t>(fine.height_px));
-  tbb::parallel_for(0, fine.height_px, [&](int v) {
+  ParallelFor(fine.height_px, [&](int v) {
     std::vector<Eigen::Vector2f> pixels_px;
     for (int u = 0; u < fine.width_px; ++u) pixels_px.emplace_back(u, v);
     const std::vector<Eigen::Vector2f> starts_px = UndistortPixels(fine, pixels_px);

@@ -1,14 +1,12 @@
 #include "client/synth/lighting.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "client/synth/bvh.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 namespace {
@@ -71,8 +69,8 @@ Rgb AmbientLight(const Bvh& bvh, const Point& p, const Point& normal) {
 void BakeLight(Scene& scene) {
   const Bvh bvh(scene.positions_world, scene.triangles);
   scene.irradiance.resize(scene.positions_world.size());
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, scene.irradiance.size(), 256), [&](const auto& range) {
-    for (size_t i = range.begin(); i < range.end(); ++i) {
+  ParallelForRanges(scene.irradiance.size(), 256, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
       const Point& normal = scene.normals_world[i];
       const Point p = scene.positions_world[i] + kOffset_m * normal;
       Rgb sum = AmbientLight(bvh, p, normal);

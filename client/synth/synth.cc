@@ -1,7 +1,5 @@
 #include "client/synth/synth.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -25,6 +23,7 @@
 #include "client/synth/shutter.h"
 #include "client/synth/synth_camera.h"
 #include "common/file_status.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 namespace {
@@ -89,7 +88,7 @@ class SequenceMaker {
     std::mutex mutex;
     absl::Status status;
     int done = 0;
-    tbb::parallel_for(0, options_.frames, [&](int i) {
+    ParallelFor(options_.frames, [&](int i) {
       {
         const std::lock_guard lock(mutex);
         if (!status.ok()) return;

@@ -1,12 +1,10 @@
 #include "client/synth/visibility.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <optional>
 #include <utility>
 
 #include "client/synth/lens_rays.h"
+#include "common/parallel_for.h"
 
 namespace romap::synth {
 
@@ -37,8 +35,8 @@ render::VisibilityImage Visibility::Rasterize(const ImagePoses& poses) const {
   if (!poses.Rolling()) return render::Rasterize(camera_, poses.Row(0), scene_.Soup(), kOptions);
   // Each vertex is moved to the camera frame of its own row. Triangles are small, so their edges remain straight.
   std::vector<Eigen::Vector3f> positions_camera(scene_.positions_world.size());
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, positions_camera.size(), 4096), [&](const auto& range) {
-    for (size_t i = range.begin(); i < range.end(); ++i) {
+  ParallelForRanges(positions_camera.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
       positions_camera[i] = poses.CameraPoint(scene_.positions_world[i].cast<double>()).cast<float>();
     }
   });
@@ -51,7 +49,7 @@ render::VisibilityImage Visibility::Trace(const ImagePoses& poses) const {
   image.height_px = camera_.height_px;
   image.triangle.assign(lens_rays_.size(), render::VisibilityImage::kNothing);
   image.inverse_depth_mu.assign(lens_rays_.size(), 0.0F);
-  tbb::parallel_for(0, camera_.height_px, [&](int v) {
+  ParallelFor(camera_.height_px, [&](int v) {
     const SE3<World, Camera> T_world_camera = poses.Row(Row_px(v));
     const Eigen::Vector3f origin_m = T_world_camera.translation().cast<float>();
     const Eigen::Matrix3d rotation = T_world_camera.RotationMatrix();

@@ -1,12 +1,12 @@
 #include "server/objects/isolation_forest.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "common/parallel_for.h"
 
 namespace romap::objects {
 namespace {
@@ -96,7 +96,7 @@ void ForEach(size_t count, size_t point_steps, const Body& body) {
   if (point_steps < kMinStepsForThreads) {
     for (size_t i = 0; i < count; ++i) body(i);
   } else {
-    oneapi::tbb::parallel_for(size_t{0}, count, body);
+    ParallelFor(count, body);
   }
 }
 
