@@ -35,6 +35,16 @@ class BoundedQueue {
     return true;
   }
 
+  // Does not wait: exceeds the capacity if the queue is full. False if the queue was closed; then the item is
+  // discarded.
+  bool ForcePush(T item) {
+    std::lock_guard lock(mutex_);
+    if (closed_) return false;
+    items_.push_back(std::move(item));
+    not_empty_.notify_one();
+    return true;
+  }
+
   // Does not wait: if the queue is full, removes and returns the oldest item. `accepted` is false if the queue is
   // closed.
   std::optional<T> PushDroppingOldest(T item, bool* accepted) {

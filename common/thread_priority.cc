@@ -5,11 +5,10 @@
 
 namespace romap {
 
-void LowerThreadPriority() {
-  constexpr int kNiceIncrement = 10;
+void LowerThreadPriority(int nice) {
   // On Linux the nice value is per thread, and increasing it is always allowed.
   const auto thread = static_cast<id_t>(gettid());
-  setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + kNiceIncrement);
+  setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + nice);
 }
 
 }  // namespace romap

@@ -8,6 +8,15 @@
 #include "common/status.h"
 
 namespace romap::session {
+namespace {
+
+slam::SparseMapper::Background BackgroundWork(FrameMode mode, const SessionConfig& config) {
+  using Background = slam::SparseMapper::Background;
+  if (config.single_thread) return Background::kNothing;
+  return mode == FrameMode::kLive ? Background::kAllAdjustment : Background::kGlobalAdjustment;
+}
+
+}  // namespace
 
 // ---------------------------------------------------------------------------------------------------- the data path
 
@@ -32,6 +41,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execu
   MappingStep step;
   step.is_keyframe = image.tracked.is_keyframe;
   step.may_be_skipped = !image.tracked.is_keyframe && !image.initial_views;
+  step.relocalizes = is_lost;
   step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.initial_views || is_lost);
 
   step.run = [this, image = std::move(image)] {
@@ -117,7 +127,7 @@ Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const 
       ingest_(options.camera, config.objects.max_mask_delay_s),
       recorder_(std::move(recorder)),
       tracker_(config.slam, options.pose_use, &local_map_),
-      sparse_mapper_(config.slam, &local_map_, config.session.single_thread),
+      sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session)),
       object_mapper_(config.objects) {
   mesher_session_ =
       mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });

@@ -29,6 +29,7 @@ struct MappingStep {
   bool is_keyframe = false;
   bool may_be_skipped = false;     // under load; then only the object masks of this frame are lost
   bool changes_local_map = false;  // later frames are tracked against the result
+  bool relocalizes = false;        // the frame was lost; the newest such frame is the most useful one
 };
 
 // The stages of one session and the data path through them:

@@ -117,13 +117,24 @@ void Scheduler::ExecuteReplay(MappingStep step) {
 
 void Scheduler::ExecuteLive(MappingStep step) {
   if (step.is_keyframe) pipeline_->RequestEarlyStop(++keyframes_waiting_ > 0);
+  // An older lost frame would be relocalized too late.
+  if (step.relocalizes && lost_frames_waiting_ > 0) return ledger_->SkipMapping();
+  if (step.relocalizes) ++lost_frames_waiting_;
   if (steps_.TryPush(step)) return;
+  if (step.relocalizes) --lost_frames_waiting_;
   if (step.may_be_skipped) return ledger_->SkipMapping();
-  steps_.Push(std::move(step));
+  // Tracking never waits for keyframes: it makes no more of them while several wait. Clients that send masks faster
+  // than they are mapped have to wait.
+  if (step.is_keyframe || step.changes_local_map) {
+    steps_.ForcePush(std::move(step));
+  } else {
+    steps_.Push(std::move(step));
+  }
 }
 
 void Scheduler::RunStep(const MappingStep& step) {
   if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->RequestEarlyStop(--keyframes_waiting_ > 0);
+  if (mode_ == FrameMode::kLive && step.relocalizes) --lost_frames_waiting_;
   if (!stopping_) step.run();
   if (mode_ == FrameMode::kReplay && step.changes_local_map) {
     std::lock_guard lock(mutex_);

@@ -22,7 +22,7 @@ namespace romap::session {
 //   client threads -> inputs -> [tracking thread: Pipeline::Process()] -> steps -> [mapping thread: MappingStep::run()]
 //
 // Replay: a full queue blocks, and steps that change the local map are executed before the next frame is tracked. Live:
-// a full input queue drops its oldest input; tracking never waits for the mapping of an ordinary frame. Single thread
+// a full input queue drops its oldest input; tracking never waits for the mapping of a frame. Single thread
 // (session.single_thread): the tracking thread maps and trains too, in a fixed order, so that equal input gives an
 // identical map. In this mode the training pool and the mesher must have no threads.
 class Scheduler {
@@ -72,7 +72,8 @@ class Scheduler {
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> failed_ = false;
 
-  std::atomic<int> keyframes_waiting_ = 0;  // live: in `steps_`
+  std::atomic<int> keyframes_waiting_ = 0;    // live: in `steps_`
+  std::atomic<int> lost_frames_waiting_ = 0;  // the same
   std::mutex mutex_;
   std::condition_variable local_map_changed_;
   int map_changes_waiting_ = 0;  // replay: steps in `steps_` that change the local map

@@ -13,37 +13,23 @@ namespace {
 
 constexpr int kFewPoints = 100;  // with fewer known points in a keyframe, tracking may fail soon
 
-}  // namespace
+constexpr size_t kFirstKeyframes = 2;
 
-MapKeyframe& KeyframeBuilder::Add(const TrackedImage& image, const SE3<World, Camera>& T_world_camera,
-                                  KeyframeId previous, bool use_prior, SlamMap& map) {
-  MapKeyframe& keyframe = Insert(image, T_world_camera, use_prior, map);
-  FindPoints(keyframe, map);
-  const auto neighbors = map.Covisible(keyframe, 1);
-  keyframe.parent = neighbors.empty() ? previous : neighbors.front().first;
-  MakePoints(keyframe, map);
+void RefreshPoints(const MapKeyframe& keyframe, SlamMap& map) {
   for (const MapPointId id : keyframe.points) {
     if (id) map.Refresh(*map.FindPoint(id));
   }
-  return keyframe;
 }
 
+}  // namespace
+
 MapKeyframe& KeyframeBuilder::Insert(const TrackedImage& image, const SE3<World, Camera>& T_world_camera,
-                                     bool use_prior, SlamMap& map) {
-  std::shared_ptr<const FrameFeatures> features = image.features;
-  const Frame& frame = *image.tracked.frame;
-  if (!image.pose_given) {
-    // Objects are small, so keyframes get additional features on them.
-    const std::vector<Feature> object_features = extractor_.ExtractObjects(frame, UncorrectedFeatures(*features));
-    if (!object_features.empty()) {
-      std::vector<Feature> all = UncorrectedFeatures(*features);
-      all.insert(all.end(), object_features.begin(), object_features.end());
-      features = MakeFrameFeatures(frame, std::move(all));
-    }
-  }
-  MapKeyframe& keyframe = map.AddKeyframe(std::move(features), T_world_camera);
+                                     KeyframeId previous, bool use_prior, SlamMap& map) const {
+  MapKeyframe& keyframe = map.AddKeyframe(image.features, T_world_camera);
   keyframe.scene_features = image.features->size();
   keyframe.pose_given = image.pose_given;
+  keyframe.parent = previous;
+  const Frame& frame = *image.tracked.frame;
   if (!image.pose_given && frame.T_world_camera && use_prior) {
     keyframe.prior = PosePrior{.T_world_camera = *frame.T_world_camera,
                                .rotation_sigma_rad = config_.prior_sigma_rad,
@@ -54,6 +40,36 @@ MapKeyframe& KeyframeBuilder::Insert(const TrackedImage& image, const SE3<World,
     if (PointTrack* track = map.FindPoint(image.points[i])) map.AddObservation(*track, keyframe, static_cast<int>(i));
   }
   return keyframe;
+}
+
+void KeyframeBuilder::MakeFirstPoints(MapKeyframe& keyframe, SlamMap& map) const {
+  PointMaker maker(config_, &map);
+  std::vector<MapKeyframe*> newest;
+  for (auto it = map.keyframes().rbegin(); it != map.keyframes().rend() && newest.size() < kFirstKeyframes; ++it) {
+    if (it->first != keyframe.id) newest.push_back(&it->second);
+  }
+  maker.MakePointsByParallax(keyframe, newest);
+  maker.MakePointsByDepth(keyframe);
+  RefreshPoints(keyframe, map);
+}
+
+void KeyframeBuilder::Complete(const TrackedImage& image, MapKeyframe& keyframe, SlamMap& map) {
+  if (!keyframe.pose_given) AddObjectFeatures(*image.tracked.frame, keyframe);
+  FindPoints(keyframe, map);
+  const auto neighbors = map.Covisible(keyframe, 1);
+  if (!neighbors.empty()) keyframe.parent = neighbors.front().first;
+  MakePoints(keyframe, map);
+  RefreshPoints(keyframe, map);
+}
+
+// Objects are small, so keyframes get additional features on them.
+void KeyframeBuilder::AddObjectFeatures(const Frame& frame, MapKeyframe& keyframe) {
+  std::vector<Feature> features = UncorrectedFeatures(*keyframe.frame);
+  const std::vector<Feature> object_features = extractor_.ExtractObjects(frame, features);
+  if (object_features.empty()) return;
+  features.insert(features.end(), object_features.begin(), object_features.end());
+  keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens);
+  keyframe.points.resize(keyframe.frame->size());
 }
 
 void KeyframeBuilder::FindPoints(MapKeyframe& keyframe, SlamMap& map) const {

@@ -12,15 +12,19 @@ class KeyframeBuilder {
  public:
   explicit KeyframeBuilder(const SlamConfig& config) : config_(config), extractor_(config) {}
 
-  // `T_world_camera`: the pose of `image` in the current map. `previous`: the keyframe added before, 0 = none; it
-  // becomes the parent if the new one shares no points with any other. `use_prior`: the client's pose of the frame is
-  // kept as a prior.
-  MapKeyframe& Add(const TrackedImage& image, const SE3<World, Camera>& T_world_camera, KeyframeId previous,
-                   bool use_prior, SlamMap& map);
+  // Inserts the frame with the features and points it was tracked by. `T_world_camera`: the pose of `image` in the
+  // current map. `previous`: the keyframe added before, 0 = none; it is the parent until Complete(). `use_prior`: the
+  // client's pose of the frame is kept as a prior.
+  MapKeyframe& Insert(const TrackedImage& image, const SE3<World, Camera>& T_world_camera, KeyframeId previous,
+                      bool use_prior, SlamMap& map) const;
+  // Makes points with the newest keyframes alone, in a fraction of the time of Complete().
+  void MakeFirstPoints(MapKeyframe& keyframe, SlamMap& map) const;
+  // Adds the features on objects, finds known points, and makes new ones. The keyframe it shares most points with
+  // becomes the parent.
+  void Complete(const TrackedImage& image, MapKeyframe& keyframe, SlamMap& map);
 
  private:
-  MapKeyframe& Insert(const TrackedImage& image, const SE3<World, Camera>& T_world_camera, bool use_prior,
-                      SlamMap& map);
+  void AddObjectFeatures(const Frame& frame, MapKeyframe& keyframe);
   void FindPoints(MapKeyframe& keyframe, SlamMap& map) const;
   void MakePoints(MapKeyframe& keyframe, SlamMap& map) const;
 

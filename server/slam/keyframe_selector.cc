@@ -21,8 +21,8 @@ constexpr double kProgressWithoutGap = 2.5;    // above this progress the minimu
 constexpr double kMaxProgressToWait = 1.5;     // above this progress a keyframe does not wait for a sharp frame
 constexpr double kLowTrackedShare = 0.7;       // of the newest keyframe's points; below it a keyframe is due
 constexpr double kUrgentTrackedShare = 0.45;   // below it tracking may fail soon
-constexpr int kWaitingForUrgentOnly = 2;       // with this many unmapped keyframes only urgent ones are added
-constexpr int kWaitingForNone = 4;             // with this many unmapped keyframes none is added
+constexpr double kMinProgressWhileBusy = 2;    // minimum progress while an earlier keyframe is being mapped
+constexpr int kWaitingForNone = 2;  // with this many unmapped keyframes none is added: they would come too late
 constexpr double kMinProgressToMeasure = 0.5;  // below this progress the baseline is too short to measure depth
 
 }  // namespace
@@ -53,7 +53,7 @@ bool KeyframeSelector::IsKeyframe(const Frame& frame, const SE3<World, Camera>& 
       (quality.tracked_share < kLowTrackedShare && progress > kMinProgressAfterGap) || quality.has_new_depth;
   const bool is_urgent = quality.tracked_share < kUrgentTrackedShare || progress > kProgressWithoutGap;
   bool is_due = progress >= 1 || timed_out || has_few_points || is_urgent;
-  if (quality.keyframes_waiting >= kWaitingForUrgentOnly) is_due = is_urgent;
+  if (quality.keyframes_waiting > 0) is_due = is_due && progress >= kMinProgressWhileBusy;
   if (quality.keyframes_waiting >= kWaitingForNone) is_due = false;
   frames_due_ = is_due ? frames_due_ + 1 : 0;
   if (!is_due) return false;

@@ -1,30 +1,72 @@
 #include "server/slam/local_adjuster.h"
 
 #include <algorithm>
-#include <chrono>
-
-#include "server/slam/map_adjustment.h"
 
 namespace romap::slam {
 namespace {
 
 constexpr int kMaxLocalIterations = 8;  // enough to converge
+constexpr int kLocalNice = 5;           // after tracking and mapping, before training
 
 }  // namespace
 
 void LocalAdjuster::Adjust(const MapKeyframe& newest, SlamMap& map) {
-  const auto begin = std::chrono::steady_clock::now();
-  MapProblem problem = WindowProblem(map, newest, config_);
-  // At least every second adjustment runs to completion.
-  const std::atomic<bool>* abort = last_was_stopped_ ? nullptr : &stop_;
-  const BundleSummary summary =
-      AdjustBundle(problem.bundle, {.max_iterations = kMaxLocalIterations, .dense = true, .abort = abort});
-  last_was_stopped_ = summary.aborted;
-  if (summary.usable) ApplyWindow(problem, map);
-  const double time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  waiting_ = newest.id;
+  if (!run_) StartWaiting(map);
+  if (run_inline_) Finish(map);
+}
+
+bool LocalAdjuster::Apply(bool wait, SlamMap& map) {
+  bool changed = false;
+  if (!run_ && waiting_) StartWaiting(map);
+  while (run_ && (wait || run_->IsFinished())) {
+    run_->Wait();
+    changed |= Finish(map);
+    if (waiting_) StartWaiting(map);
+  }
+  return changed;
+}
+
+void LocalAdjuster::Move(const Sim3<World, World>& S_new_old) {
+  if (run_) run_->Move(S_new_old);
+}
+
+void LocalAdjuster::Discard() {
+  if (!run_) return;
+  aborted_.Add(std::move(run_));
+  if (!waiting_) waiting_ = running_;
+}
+
+void LocalAdjuster::Reset() {
+  aborted_.Add(std::move(run_));
+  waiting_ = {};
+}
+
+void LocalAdjuster::StartWaiting(const SlamMap& map) {
+  running_ = std::exchange(waiting_, {});
+  const MapKeyframe* newest = map.FindKeyframe(running_);
+  if (newest == nullptr) return;  // it was redundant
+  // On the calling thread, at least every second adjustment runs to completion.
+  const std::atomic<bool>* early_stop = run_inline_ && !last_was_stopped_ ? &stop_ : nullptr;
+  const auto solve = [early_stop](BundleProblem& problem, const std::atomic<bool>& abort) {
+    return AdjustBundle(
+        problem,
+        {.max_iterations = kMaxLocalIterations, .dense = true, .abort = early_stop != nullptr ? early_stop : &abort});
+  };
+  run_ = std::make_unique<AdjustmentRun>(WindowProblem(map, *newest, config_), solve, run_inline_, kLocalNice);
+}
+
+// Requires a finished run.
+bool LocalAdjuster::Finish(SlamMap& map) {
+  if (!run_) return false;
+  const bool usable = run_->summary().usable;
+  if (usable) ApplyWindow(run_->TakeSolution(), map);
+  last_was_stopped_ = run_->summary().aborted;
   ++times_.runs;
-  times_.total_s += time_s;
-  times_.longest_s = std::max(times_.longest_s, time_s);
+  times_.total_s += run_->time_s();
+  times_.longest_s = std::max(times_.longest_s, run_->time_s());
+  run_ = nullptr;
+  return usable;
 }
 
 }  // namespace romap::slam

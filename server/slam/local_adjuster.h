@@ -1,19 +1,34 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 
+#include "server/slam/adjustment_run.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
 namespace romap::slam {
 
-// Local bundle adjustment around each new keyframe. Not thread-safe, except RequestEarlyStop().
+// Local bundle adjustment around each new keyframe. In the background, a copy is adjusted while the map grows, so that
+// new keyframes and their points need not wait for it. Not thread-safe, except RequestEarlyStop().
 class LocalAdjuster {
  public:
-  explicit LocalAdjuster(const SlamConfig& config) : config_(config) {}
+  // `run_inline`: every adjustment is finished when Adjust() returns.
+  LocalAdjuster(const SlamConfig& config, bool run_inline) : config_(config), run_inline_(run_inline) {}
 
+  // Adjusts around the keyframe. In the background: starts now, or after the pending run is applied.
   void Adjust(const MapKeyframe& newest, SlamMap& map);
-  // From any thread: `stop` ends the current and the following adjustments early, but never two in a row.
+  // In the background: writes a finished run to the map, and starts the next one if a keyframe waits for it. `wait`:
+  // finishes all of them. Returns whether the map changed.
+  bool Apply(bool wait, SlamMap& map);
+  // The map was moved as a whole.
+  void Move(const Sim3<World, World>& S_new_old);
+  // The map was changed by something else. The window of the discarded run is adjusted again in Apply().
+  void Discard();
+  // Forgets everything about the map.
+  void Reset();
+
+  // From any thread: `stop` ends adjustments on the calling thread early, but never two in a row.
   void RequestEarlyStop(bool stop) { stop_ = stop; }
   bool is_stop_requested() const { return stop_; }
 
@@ -25,9 +40,17 @@ class LocalAdjuster {
   const Times& times() const { return times_; }
 
  private:
+  void StartWaiting(const SlamMap& map);
+  bool Finish(SlamMap& map);
+
   const SlamConfig config_;
+  const bool run_inline_;
   std::atomic<bool> stop_ = false;
   bool last_was_stopped_ = false;
+  std::unique_ptr<AdjustmentRun> run_;  // null: none is pending
+  AbortedRuns aborted_;
+  KeyframeId running_;  // the keyframe of `run_`
+  KeyframeId waiting_;  // the newest keyframe that was not adjusted; 0: none
   Times times_;
 };
 

@@ -15,6 +15,7 @@
 #include "common/scaled_pose.h"
 #include "server/slam/features/feature.h"
 #include "server/slam/optimize/radial_correction.h"
+#include "server/slam/patch_search.h"
 
 namespace romap::slam {
 
@@ -25,6 +26,7 @@ struct LocalPoint {
   Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
   double size_mu = 0;                                          // of one pixel of its octave, at the point
   Descriptor descriptor{};
+  std::shared_ptr<const ReferencePatch> patch = {};  // null: none yet
 };
 
 // A copy of the sparse map around the camera, made by the mapping thread for the tracking thread. Immutable, so that

@@ -19,15 +19,10 @@ void LoopTrial::Start(const SlamMap& map, const LoopMatch& loop, bool scale_is_k
   Cancel();
   loop_ = loop;
   scale_is_known_ = scale_is_known;
-  find_lens_ = find_lens;
-  Restart(map);
-}
-
-void LoopTrial::Restart(const SlamMap& map) {
   before_ = MeasureFit(GlobalProblem(map, config_, /*find_lens=*/false).bundle);
   SlamMap trial = map;
   CloseLoop(*loop_, scale_is_known_, config_, trial);
-  adjuster_.Start(trial, find_lens_);
+  adjuster_.Start(trial, find_lens);
 }
 
 void LoopTrial::Cancel() {

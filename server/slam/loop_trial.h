@@ -18,8 +18,8 @@ class LoopTrial {
 
   // Copies the map and starts the trial. `find_lens`: see GlobalProblem.
   void Start(const SlamMap& map, const LoopMatch& loop, bool scale_is_known, bool find_lens);
-  // Repeats the pending trial, because the world frame of the map changed.
-  void Restart(const SlamMap& map);
+  // The map was moved as a whole.
+  void Move(const Sim3<World, World>& S_new_old) { adjuster_.Move(S_new_old); }
   void Cancel();
   bool IsPending() const { return loop_.has_value(); }
 
@@ -35,7 +35,6 @@ class LoopTrial {
   GlobalAdjuster adjuster_;
   std::optional<LoopMatch> loop_;
   bool scale_is_known_ = false;
-  bool find_lens_ = false;
   BundleFit before_;  // of the map without the loop
 };
 

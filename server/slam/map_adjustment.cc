@@ -15,6 +15,8 @@ class ProblemBuilder {
  public:
   ProblemBuilder(const SlamMap& map, const SlamConfig& config, const CameraModel& camera) : map_(map), config_(config) {
     problem_.bundle.camera = camera;
+    problem_.newest_keyframe = KeyframeId{map.keyframe_count()};
+    problem_.newest_point = MapPointId{map.point_count()};
   }
 
   // The observations become pixels of the image, before the lens correction. Call it before AddPoint.
@@ -117,18 +119,33 @@ MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find
 }
 
 void ApplyWindow(const MapProblem& problem, SlamMap& map) {
+  std::map<KeyframeId, Sim3<World, World>> moved;  // transformation of the space around each adjusted or newer keyframe
   for (size_t i = 0; i < problem.keyframes.size(); ++i) {
-    if (!problem.bundle.cameras[i].fixed) {
-      map.FindKeyframe(problem.keyframes[i])->SetPose(problem.bundle.cameras[i].T_world_camera);
-    }
+    if (problem.bundle.cameras[i].fixed) continue;
+    const SE3<World, Camera>& after = problem.bundle.cameras[i].T_world_camera;
+    moved[problem.keyframes[i]] = Sim3<World, World>(after * problem.before[i].Inverse());
+    if (MapKeyframe* keyframe = map.FindKeyframe(problem.keyframes[i])) keyframe->SetPose(after);
+  }
+  for (auto it = map.keyframes().upper_bound(problem.newest_keyframe); it != map.keyframes().end(); ++it) {
+    MapKeyframe& keyframe = it->second;
+    const auto parent = moved.find(keyframe.parent);
+    if (parent == moved.end() || keyframe.pose_given) continue;
+    keyframe.SetPose(parent->second.Moved(keyframe.T_world_camera()));
+    moved[keyframe.id] = parent->second;
   }
   for (size_t i = 0; i < problem.points.size(); ++i) {
-    map.FindPoint(problem.points[i])->point.position_world = problem.bundle.points[i].position_world;
+    const auto it = map.points().find(problem.points[i]);
+    if (it != map.points().end()) it->second.point.position_world = problem.bundle.points[i].position_world;
+  }
+  for (auto it = map.points().upper_bound(problem.newest_point); it != map.points().end(); ++it) {
+    PointTrack& track = it->second;
+    const auto first = track.observations.empty() ? moved.end() : moved.find(track.observations.front().keyframe);
+    if (first != moved.end()) track.point.position_world = first->second * track.point.position_world;
   }
   for (const BundleObservation& observation : problem.bundle.observations) {
-    if (!observation.outlier) continue;
-    map.RemoveObservation(problem.points[static_cast<size_t>(observation.point)],
-                          problem.keyframes[static_cast<size_t>(observation.camera)]);
+    const MapPointId point = problem.points[static_cast<size_t>(observation.point)];
+    if (!observation.outlier || !map.points().contains(point)) continue;
+    map.RemoveObservation(point, problem.keyframes[static_cast<size_t>(observation.camera)]);
   }
 }
 

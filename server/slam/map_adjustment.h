@@ -16,6 +16,8 @@ struct MapProblem {
   std::vector<KeyframeId> keyframes;       // of bundle.cameras
   std::vector<MapPointId> points;          // of bundle.points
   std::vector<SE3<World, Camera>> before;  // poses of bundle.cameras when the problem was made
+  KeyframeId newest_keyframe;              // of the map when the problem was made
+  MapPointId newest_point;                 // the same
 };
 
 // The newest keyframe, those that share most points with it, and all their points; other keyframes that observe these
@@ -26,7 +28,8 @@ MapProblem WindowProblem(const SlamMap& map, const MapKeyframe& newest, const Sl
 // determine the scale; the damping of the solver keeps it. `find_lens`: the lens correction is estimated too.
 MapProblem GlobalProblem(const SlamMap& map, const SlamConfig& config, bool find_lens);
 
-// Writes the solution of a window back and removes the outlier observations.
+// Writes the solution of a window back and removes the outlier observations. Keyframes and points that are newer than
+// the problem move with their parents and with their first keyframes; the others outside the window stay.
 void ApplyWindow(const MapProblem& problem, SlamMap& map);
 
 // Writes back a solution that was found while the map changed: newer keyframes move with their parents, and newer

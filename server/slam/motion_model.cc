@@ -14,11 +14,6 @@ void MotionModel::Reset() {
   motion_.reset();
 }
 
-void MotionModel::RestartAt(const SE3<World, Camera>& T_world_camera) {
-  last_pose_ = T_world_camera;
-  motion_.reset();
-}
-
 void MotionModel::Update(const SE3<World, Camera>& T_world_camera, const std::optional<SE3<World, Camera>>& prior,
                          int64_t timestamp_ns, bool is_continuous) {
   motion_.reset();

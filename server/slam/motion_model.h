@@ -15,8 +15,6 @@ class MotionModel {
   void Reset();
   // Discards the motion, but keeps the last pose.
   void ResetMotion() { motion_.reset(); }
-  // Sets the last pose and discards the motion.
-  void RestartAt(const SE3<World, Camera>& T_world_camera);
   // Records a tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame
   // is usable; false if tracking was lost in between.
   void Update(const SE3<World, Camera>& T_world_camera, const std::optional<SE3<World, Camera>>& prior,

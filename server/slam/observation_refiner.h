@@ -39,17 +39,9 @@ class ObservationRefiner {
     Eigen::Vector2d image_px = Eigen::Vector2d::Zero();
   };
 
-  // A point found by its patch.
-  struct FoundPatch {
-    Eigen::Vector2d image_px = Eigen::Vector2d::Zero();  // before the lens correction
-    double octave_scale = 1;
-  };
-
   void Align(const PointTrack& track, const FeatureRef& observation, SlamMap& map);
   void Apply(SlamMap& map);
   void AddObservations(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
-  std::optional<FoundPatch> FindPatch(const PointTrack& track, const MapKeyframe& keyframe, const HalvedImages& image,
-                                      const SlamMap& map) const;
 
   const int mask_erosion_px_;
   std::map<KeyframeId, HalvedImages> images_;  // of recent keyframes

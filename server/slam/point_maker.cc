@@ -36,7 +36,8 @@ LocalPoint MakeLocalPoint(const PointTrack& track) {
           .position_world = track.point.position_world,
           .direction_world = track.direction_world,
           .size_mu = track.size_mu,
-          .descriptor = track.descriptor};
+          .descriptor = track.descriptor,
+          .patch = track.patch};
 }
 
 SlamConfig PointMaker::RelaxedConfig(SlamConfig config) {

@@ -10,9 +10,9 @@
 
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
-#include "server/slam/features/patch.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/optimize/bundle_adjustment.h"
+#include "server/slam/patch_search.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/triangulation.h"
 
@@ -55,13 +55,6 @@ struct MapKeyframe {
 struct FeatureRef {
   KeyframeId keyframe;
   int feature = 0;
-};
-
-// The appearance of a map point, to which its observations are aligned.
-struct ReferencePatch {
-  Patch patch;
-  KeyframeId keyframe;      // it was read there
-  double octave_scale = 1;  // pixels of that keyframe per grid unit of the patch
 };
 
 // A map point with the data for matching it and for refining its position.

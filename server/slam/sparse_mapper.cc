@@ -53,19 +53,25 @@ SparseMapper::CurrentMap::CurrentMap(const SlamConfig& config, uint64_t keyframe
       refiner(config),
       next_global_adjustment(keyframes_used + kFirstGlobalAdjustment_keyframes) {}
 
-SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment)
+SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background)
     : config_(config),
+      background_(background),
       slot_(local_map),
       keyframe_builder_(config),
-      local_adjuster_(config),
-      global_adjuster_(config, inline_adjustment),
-      loop_trial_(config, inline_adjustment),
+      local_adjuster_(config, /*run_inline=*/background != Background::kAllAdjustment),
+      global_adjuster_(config, /*run_inline=*/background == Background::kNothing),
+      loop_trial_(config, /*run_inline=*/background == Background::kNothing),
       current_(std::make_unique<CurrentMap>(config, 0, 0)) {}
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
-  const bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed;
+  bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed;
+  was_adjusted |= ApplyLocalAdjustment(/*wait=*/false);
+  if (!current_->unchecked.empty() && !local_adjuster_.is_stop_requested()) {
+    CheckLoops();
+    was_adjusted = true;
+  }
   const bool is_of_current_map = image.pose_given || image.generation == generation_;
   if (image.initial_views) {
     InitializeFrom(image, mapped);
@@ -87,6 +93,8 @@ void SparseMapper::ObserveMasks(const FrameMasks& masks) {
 }
 
 MapCorrection SparseMapper::Finish() {
+  ApplyLocalAdjustment(/*wait=*/true);
+  CheckLoops();
   ConcludeLoopTrial(/*wait=*/true);
   ApplyGlobalAdjustment(/*wait=*/true);
   if (!current_->world_is_given && current_->map.keyframes().size() > 2) {
@@ -106,6 +114,7 @@ std::vector<SessionWarning> SparseMapper::Warnings() const {
 // ------------------------------------------------------------------------------------------------ steps of Process
 
 void SparseMapper::ResetMap() {
+  local_adjuster_.Reset();
   global_adjuster_.Cancel();
   loop_trial_.Cancel();
   // Ids are never reused within a session.
@@ -166,8 +175,9 @@ void SparseMapper::HandleLostFrame(const TrackedImage& image, MappedFrame& mappe
   const auto found = current_->places.Relocalize(*image.features);
   if (!found) return;
   ++counts_.relocalizations;
-  PublishLocalMap(found->keyframe, LocalMap::Relocalization{.frame_id = image.features->frame_id,
-                                                            .T_world_camera = found->T_world_camera});
+  current_->relocalized =
+      LocalMap::Relocalization{.frame_id = image.features->frame_id, .T_world_camera = found->T_world_camera};
+  PublishLocalMap(found->keyframe);
 }
 
 void SparseMapper::ReportCorrections(bool map_moved, MappedFrame& mapped) {
@@ -190,8 +200,15 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
     current_->world_is_given = true;
   }
   MapKeyframe& keyframe =
-      keyframe_builder_.Add(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
+      keyframe_builder_.Insert(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
   current_->newest = keyframe.id;
+  const bool is_live = background_ == Background::kAllAdjustment && !keyframe.pose_given;
+  if (is_live) {
+    // A fast camera needs the new points in the next frame.
+    keyframe_builder_.MakeFirstPoints(keyframe, map);
+    PublishLocalMap(keyframe.id);
+  }
+  keyframe_builder_.Complete(image, keyframe, map);
   if (!keyframe.pose_given && config_.refine_observations) {
     // The search for more observations takes as long as all other steps, so it is omitted while keyframes wait.
     current_->refiner.Refine(*image.tracked.frame, /*search_points=*/!local_adjuster_.is_stop_requested(), keyframe,
@@ -203,7 +220,8 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
     for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current_->places.Remove(removed);
   }
   current_->places.Add(keyframe);
-  if (!keyframe.pose_given) CloseLoopOrAdjust(keyframe);
+  if (!keyframe.pose_given && !loop_trial_.IsPending()) current_->unchecked.push_back(keyframe.id);
+  if (!is_live) CheckLoops();
   AlignWithUp();
   PublishLocalMap(keyframe.id);
 
@@ -214,10 +232,25 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   mapped.view->up_world = mapped.tracked.up_world;
 }
 
+// Returns whether the map changed.
+bool SparseMapper::ApplyLocalAdjustment(bool wait) {
+  if (!local_adjuster_.Apply(wait, current_->map)) return false;
+  PublishLocalMap(current_->reference);
+  return true;
+}
+
+// Checks keyframes for loops until one starts a trial. Live, this has time until no keyframe waits.
+void SparseMapper::CheckLoops() {
+  while (!current_->unchecked.empty() && !loop_trial_.IsPending()) {
+    const MapKeyframe* keyframe = current_->map.FindKeyframe(current_->unchecked.front());
+    current_->unchecked.pop_front();
+    if (keyframe != nullptr) CloseLoopOrAdjust(*keyframe);  // null: it was redundant
+  }
+}
+
 void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
   CurrentMap& current = *current_;
   const bool scale_is_known = current.has_depth_scale || current.world_is_given;
-  if (loop_trial_.IsPending()) return;
   std::optional<LoopMatch> loop;
   if (config_.close_loops) loop = current.loops.Find(keyframe, scale_is_known);
   if (loop && loop->drift_px > kNoDrift_px) {
@@ -226,6 +259,7 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
     return;
   }
   if (loop) {
+    local_adjuster_.Discard();
     CloseLoop(*loop, scale_is_known, config_, current.map);
     ++counts_.loops_merged;
     return;
@@ -250,8 +284,9 @@ bool SparseMapper::CanEstimateLens() const {
 
 bool SparseMapper::ApplyGlobalAdjustment(bool wait) {
   if (!global_adjuster_.Apply(wait, current_->map)) return false;
+  local_adjuster_.Discard();
   current_->up.RequestUpdate();
-  if (current_->newest) PublishLocalMap(current_->newest);
+  if (current_->newest) PublishLocalMap(current_->reference);
   return true;
 }
 
@@ -262,9 +297,10 @@ bool SparseMapper::ConcludeLoopTrial(bool wait) {
   if (verdict == LoopTrial::Verdict::kPending) return false;
   const bool closed = verdict == LoopTrial::Verdict::kClosed;
   if (closed) {
+    local_adjuster_.Discard();
     ++counts_.loops_corrected;
     current_->up.RequestUpdate();
-    if (current_->newest) PublishLocalMap(current_->newest);
+    if (current_->newest) PublishLocalMap(current_->reference);
   } else {
     ++counts_.loops_rejected;
     current_->loops.Reject(loop_trial_.loop());
@@ -277,12 +313,12 @@ void SparseMapper::AlignWithUp(bool is_last) {
   if (current_->world_is_given) return;
   const std::optional<Eigen::Quaterniond> R_new_old = current_->up.ProposeRotation(current_->map, is_last);
   if (!R_new_old) return;
-  const bool was_pending = global_adjuster_.IsPending();
-  global_adjuster_.Cancel();
-  current_->map.Transform({1.0, *R_new_old, Eigen::Vector3d::Zero()});
+  const Sim3<World, World> S_new_old(1.0, *R_new_old, Eigen::Vector3d::Zero());
+  current_->map.Transform(S_new_old);
   current_->up.Rotate(*R_new_old);
-  if (was_pending) StartGlobalAdjustment();
-  if (loop_trial_.IsPending()) loop_trial_.Restart(current_->map);
+  local_adjuster_.Move(S_new_old);
+  global_adjuster_.Move(S_new_old);
+  loop_trial_.Move(S_new_old);
 }
 
 void SparseMapper::UpdatePose(TrackedFrame& tracked) const {
@@ -290,8 +326,9 @@ void SparseMapper::UpdatePose(TrackedFrame& tracked) const {
   if (reference) tracked.T_world_camera = reference->Compose(tracked.T_reference_camera);
 }
 
-void SparseMapper::PublishLocalMap(KeyframeId reference, std::optional<LocalMap::Relocalization> relocalized) {
-  slot_->Put(MakeLocalMap(current_->map, reference, generation_, relocalized));
+void SparseMapper::PublishLocalMap(KeyframeId reference) {
+  current_->reference = reference;
+  slot_->Put(MakeLocalMap(current_->map, reference, generation_, current_->relocalized));
 }
 
 void SparseMapper::LogSummary() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -40,9 +41,16 @@ struct MappedFrame {
 // masks or whose masks have not arrived.
 class SparseMapper {
  public:
-  // `local_map` outlives the mapper. `inline_adjustment`: global bundle adjustment runs inside Process() instead of on
-  // a background thread, so that the same frames give the same map.
-  SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, bool inline_adjustment = false);
+  // What runs on background threads instead of inside Process().
+  enum class Background {
+    kNothing,           // the same frames give the same map
+    kGlobalAdjustment,  // of the whole map; the result of Process() is final for the newest keyframes
+    kAllAdjustment,     // the fastest; a new keyframe is published before it is adjusted
+  };
+
+  // `local_map` outlives the mapper.
+  SparseMapper(const SlamConfig& config, LocalMapSlot* local_map,
+               Background background = Background::kGlobalAdjustment);
 
   MappedFrame Process(const TrackedImage& image);
   // Masks that arrive after their frame, in the order of their frames. They show which points lie on objects, which
@@ -72,6 +80,9 @@ class SparseMapper {
     MaskVoter mask_voter;
     ObservationRefiner refiner;
     KeyframeId newest;
+    KeyframeId reference;  // of the published local map: the newest keyframe, or where the camera was relocalized
+    std::optional<LocalMap::Relocalization> relocalized = {};  // the newest one
+    std::deque<KeyframeId> unchecked = {};                     // keyframes that were not checked for loops
     bool world_is_given = false;      // the client's poses, given or as priors, define the world
     bool has_depth_scale = false;     // depth images define the scale
     uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
@@ -95,16 +106,19 @@ class SparseMapper {
 
   void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
+  void CheckLoops();
+  bool ApplyLocalAdjustment(bool wait);
   bool ConcludeLoopTrial(bool wait);
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
   void AlignWithUp(bool is_last = false);
   void UpdatePose(TrackedFrame& tracked) const;
-  void PublishLocalMap(KeyframeId reference, std::optional<LocalMap::Relocalization> relocalized = {});
+  void PublishLocalMap(KeyframeId reference);
   void LogSummary() const;
 
   const SlamConfig config_;
+  const Background background_;
   LocalMapSlot* const slot_;
   KeyframeBuilder keyframe_builder_;
   LocalAdjuster local_adjuster_;

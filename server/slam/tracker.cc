@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace romap::slam {
@@ -10,6 +11,8 @@ namespace {
 
 constexpr int kMinFeatures = 50;
 constexpr int kMinInliers = 25;
+constexpr int kMinInliersBeforePatches = 10;
+constexpr int kInliersWithoutPatches = 250;
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
@@ -36,7 +39,7 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
   if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame));
   auto features = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
-  if (!HasMap() || waiting_since_generation_) return Initialize(std::move(frame), std::move(features));
+  if (!HasMap() || pending_map_) return Initialize(std::move(frame), std::move(features));
   return TrackByImage(std::move(frame), std::move(features));
 }
 
@@ -60,11 +63,10 @@ void Tracker::TakeNewestMap() {
 }
 
 void Tracker::AdoptNewMap(const LocalMap& newest) {
-  if (waiting_since_generation_ && newest.generation > *waiting_since_generation_) {
-    waiting_since_generation_.reset();
+  if (pending_map_ && newest.generation > pending_map_->generation) {
+    const PendingMap pending = *std::exchange(pending_map_, std::nullopt);
     if (!newest.points.empty()) {
-      // The newer initial view is the last known pose of the camera.
-      motion_.RestartAt(newest.keyframes.find(newest.reference)->second.T_world_camera);
+      StartMotion(newest, pending);
       status_.OnMapInitialized();
     } else {
       motion_.ResetMotion();
@@ -78,10 +80,23 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
   keyframes_sent_ = std::max(keyframes_sent_, newest.keyframes_done);
 }
 
+// The initial views are the last known poses of the camera. A fast camera has moved on while the map was initialized,
+// so its motion is needed to predict the next pose.
+void Tracker::StartMotion(const LocalMap& initial, const PendingMap& pending) {
+  const auto reference = initial.keyframes.find(initial.reference);
+  if (reference != initial.keyframes.begin() && pending.newest_timestamp_ns > pending.first_timestamp_ns) {
+    motion_.Update(std::prev(reference)->second.T_world_camera, {}, pending.first_timestamp_ns, false);
+    motion_.Update(reference->second.T_world_camera, {}, pending.newest_timestamp_ns, true);
+  } else {
+    motion_.Update(reference->second.T_world_camera, {}, pending.newest_timestamp_ns, false);
+  }
+  last_points_.clear();
+}
+
 // ------------------------------------------------------------------------------------------------ given poses
 
 bool Tracker::ShouldUseGivenPose(const Frame& frame) const {
-  if (!frame.T_world_camera || pose_use_ == PoseUse::kIgnore || waiting_since_generation_) return false;
+  if (!frame.T_world_camera || pose_use_ == PoseUse::kIgnore || pending_map_) return false;
   // A map that was initialized from images has a different world frame than the client.
   if (HasMap() && !world_is_given_) return false;
   const bool map_suffices = pose_use_ == PoseUse::kPrior && HasMap() &&
@@ -116,7 +131,7 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   image.tracked.frame = frame;
   image.tracked.state = TrackingState::kInitializing;
   image.features = features;
-  if (waiting_since_generation_) {
+  if (pending_map_) {
     image.tracked.reason = "map initialization in progress";
     return image;
   }
@@ -130,7 +145,10 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
     image.initial_views = monocular_initializer_.AddFrame(features, &image.tracked.reason);
   }
   if (!image.initial_views) return image;
-  waiting_since_generation_ = image.generation;
+  const FrameFeatures& newest = image.initial_views->second ? *image.initial_views->second : *features;
+  pending_map_ = PendingMap{.generation = image.generation,
+                            .first_timestamp_ns = image.initial_views->first->timestamp_ns,
+                            .newest_timestamp_ns = newest.timestamp_ns};
   world_is_given_ = false;
   keyframes_sent_ += image.initial_views->second ? 2 : 1;
   motion_.Reset();
@@ -160,13 +178,13 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
 
 std::optional<PoseFromPoints> Tracker::FindPose(const Frame& frame, const LocalMapTracking& tracking) const {
   if (const auto first = FindFirstPose(frame, tracking)) {
-    if (auto confirmed = ConfirmByAllPoints(*first, tracking)) return confirmed;
+    if (auto confirmed = ConfirmByAllPoints(frame, *first, tracking)) return confirmed;
   }
   // A frame that was relocalized before the current loss would be misleading.
   const auto& relocalized = map_->relocalized;
   if (!status_.IsLost() || !relocalized || relocalized->frame_id < status_.lost_since_frame()) return std::nullopt;
   const auto first = tracking.TrackNear(relocalized->T_world_camera);
-  return first ? ConfirmByAllPoints(*first, tracking) : std::nullopt;
+  return first ? ConfirmByAllPoints(frame, *first, tracking) : std::nullopt;
 }
 
 std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const {
@@ -177,14 +195,21 @@ std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const L
   std::optional<PoseFromPoints> first;
   if (!is_lost) first = tracking.TrackByProjection(last_points_, start, kFollowRadius_px);
   if (!first) first = tracking.TrackByProjection(last_points_, start, kReferenceRadius_px);
+  if (!first && !is_lost) first = tracking.TrackLoosely(start, kFollowRadius_px);
   if (!first) first = tracking.TrackByDescriptors(last_points_);
   return first;
 }
 
-std::optional<PoseFromPoints> Tracker::ConfirmByAllPoints(const PoseFromPoints& first,
+std::optional<PoseFromPoints> Tracker::ConfirmByAllPoints(const Frame& frame, const PoseFromPoints& first,
                                                           const LocalMapTracking& tracking) const {
-  auto pose = tracking.TrackAllPoints(first, status_.NeedsConfirmation() ? kMinInliersToConfirm : kMinInliers);
-  if (pose && motion_.last_pose() && status_.IsTracking()) {
+  auto pose = tracking.TrackAllPoints(first, kMinInliersBeforePatches);
+  if (!pose) return std::nullopt;
+  // Detector and descriptors are less repeatable than the image itself.
+  if (config_.refine_observations && pose->inliers < kInliersWithoutPatches) {
+    pose = tracking.AddPatches(*pose, HalvedImages(frame.image_bgr));
+  }
+  if (!pose || pose->inliers < (status_.NeedsConfirmation() ? kMinInliersToConfirm : kMinInliers)) return std::nullopt;
+  if (motion_.last_pose() && status_.IsTracking()) {
     const double step_mu = (pose->T_world_camera.translation() - motion_.last_pose()->translation()).norm();
     if (step_mu > kMaxStepShare * tracking.MedianDepth_mu(*pose)) return std::nullopt;
   }
@@ -202,6 +227,7 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& trackin
   for (const int point : pose.point_of_feature) {
     if (point >= 0) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
   }
+  for (const int point : pose.points_by_patch) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
   image.tracked.is_keyframe = DecideKeyframe(pose, tracking, image);
   if (!image.tracked.is_keyframe) return;
   ++keyframes_sent_;
@@ -225,7 +251,8 @@ bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking&
   const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
   TrackingQuality quality;
   quality.scene_depth_mu = tracking.MedianDepth_mu(pose);
-  quality.tracked_share = pose.inliers / std::max(1.0, static_cast<double>(map_->reference_points));
+  quality.tracked_share = (pose.inliers - static_cast<int>(pose.points_by_patch.size())) /
+                          std::max(1.0, static_cast<double>(map_->reference_points));
   quality.keyframes_waiting = static_cast<int>(waiting);
   quality.has_new_depth = image.features->HasDepth() && pose.inliers < kFewInliers;
   return selector_.IsKeyframe(*image.tracked.frame, pose.T_world_camera, quality);

@@ -47,8 +47,16 @@ class Tracker {
   TrackedImage Track(std::shared_ptr<const Frame> frame);
 
  private:
+  // Initial views that were sent to mapping, while the initialized map is pending.
+  struct PendingMap {
+    int generation = 0;  // of the local map when they were sent
+    int64_t first_timestamp_ns = 0;
+    int64_t newest_timestamp_ns = 0;  // equal if there is only one view
+  };
+
   void TakeNewestMap();
   void AdoptNewMap(const LocalMap& newest);
+  void StartMotion(const LocalMap& initial, const PendingMap& pending);
   bool HasMap() const { return map_ && !map_->points.empty(); }
   bool ShouldUseGivenPose(const Frame& frame) const;
 
@@ -58,7 +66,8 @@ class Tracker {
 
   std::optional<PoseFromPoints> FindPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const;
-  std::optional<PoseFromPoints> ConfirmByAllPoints(const PoseFromPoints& first, const LocalMapTracking& tracking) const;
+  std::optional<PoseFromPoints> ConfirmByAllPoints(const Frame& frame, const PoseFromPoints& first,
+                                                   const LocalMapTracking& tracking) const;
   void Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image);
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image);
@@ -79,8 +88,7 @@ class Tracker {
   std::vector<MapPointId> last_points_;  // matched in the last tracked frame
   bool world_is_given_ = false;          // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
-  // Generation of the local map when initial views were sent to mapping; set while the initialized map is pending.
-  std::optional<int> waiting_since_generation_;
+  std::optional<PendingMap> pending_map_;
 };
 
 }  // namespace romap::slam

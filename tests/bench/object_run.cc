@@ -37,7 +37,7 @@ class Runner {
       : ingest_(sequence.camera(), options.objects.max_mask_delay_s),
         damager_(options.damage, ClassNames(sequence)),
         tracker_(options.slam, options.poses, &local_map_),
-        sparse_mapper_(options.slam, &local_map_, /*inline_adjustment=*/true),
+        sparse_mapper_(options.slam, &local_map_, slam::SparseMapper::Background::kNothing),
         object_mapper_(options.objects) {}
 
   absl::Status Process(const FrameInput& input) {

@@ -126,7 +126,7 @@ absl::Status Bench(const std::string& dir, slam::SlamConfig config, bool sensor_
   ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(dir, {.use_depth = true}));
   slam::LocalMapSlot local_map;
   slam::Tracker tracker(config, PoseUse::kGiven, &local_map);
-  slam::SparseMapper mapper(config, &local_map, /*inline_adjustment=*/true);
+  slam::SparseMapper mapper(config, &local_map, slam::SparseMapper::Background::kNothing);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
     ROMAP_ASSIGN_OR_RETURN(FrameInput input, sequence.Load(i));

@@ -119,11 +119,17 @@ void Write(const std::filesystem::path& path, const std::vector<TimedFrame>& fra
   }
 }
 
+slam::SparseMapper::Background BackgroundWork(const Options& options) {
+  using Background = slam::SparseMapper::Background;
+  if (options.one_thread) return Background::kNothing;
+  return options.fps > 0 ? Background::kAllAdjustment : Background::kGlobalAdjustment;
+}
+
 class Run {
  public:
   explicit Run(Options options)
       : options_(std::move(options)),
-        mapper_(options_.slam, &slot_, options_.one_thread),
+        mapper_(options_.slam, &slot_, BackgroundWork(options_)),
         tracker_(options_.slam, options_.poses, &slot_),
         queue_(8) {}
 
@@ -210,7 +216,12 @@ class Run {
     if (options_.one_thread) return Map(image);
     const bool is_keyframe = image.tracked.is_keyframe;
     if (is_keyframe) mapper_.RequestEarlyStop(++waiting_ > 0);
-    queue_.Push(std::move(image));
+    // As a live session: tracking waits for nothing, and mapping omits frames that are no keyframes when it is late.
+    if (options_.fps == 0) {
+      queue_.Push(std::move(image));
+    } else if (!queue_.TryPush(image) && (is_keyframe || image.initial_views)) {
+      queue_.ForcePush(std::move(image));
+    }
   }
 
   void Map(const slam::TrackedImage& image) {

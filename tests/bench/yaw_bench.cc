@@ -76,7 +76,7 @@ absl::StatusOr<Run> ObserveSequence(const files::Sequence& sequence) {
   const objects::ObjectsConfig objects;
   slam::LocalMapSlot local_map;
   slam::Tracker tracker(slam, PoseUse::kGiven, &local_map);
-  slam::SparseMapper sparse(slam, &local_map, /*inline_adjustment=*/true);
+  slam::SparseMapper sparse(slam, &local_map, slam::SparseMapper::Background::kNothing);
   session::Ingest ingest(sequence.camera(), /*max_mask_delay_s=*/0);
   Run run;
   for (size_t i = 0; i < sequence.size(); ++i) {
@@ -96,8 +96,8 @@ void PrintYaw(const char* name, const Eigen::Matrix3d& R_world_reference, std::s
     std::printf(" %s none", name);
     return;
   }
-  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / kRadPerDeg, yaw->confidence,
-              yaw->edges, time_ms);
+  std::printf(" %s %5.1f deg (%.2f) %d edges %.2f ms", name, yaw->yaw_rad / kRadPerDeg, yaw->confidence, yaw->edges,
+              time_ms);
 }
 
 void PrintGroups(const Eigen::Matrix3d& R_world_reference, std::span<const objects::LineView> views) {

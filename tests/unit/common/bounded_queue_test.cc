@@ -45,6 +45,17 @@ TEST(BoundedQueueTest, CloseEndsABlockedPush) {
   EXPECT_EQ(queue.Pop(), 1);
 }
 
+TEST(BoundedQueueTest, ForcePushExceedsTheCapacity) {
+  BoundedQueue<int> queue(1);
+  EXPECT_TRUE(queue.Push(1));
+  EXPECT_TRUE(queue.ForcePush(2));
+  EXPECT_EQ(queue.Size(), 2U);
+  EXPECT_EQ(queue.Pop(), 1);
+  EXPECT_EQ(queue.Pop(), 2);
+  queue.Close();
+  EXPECT_FALSE(queue.ForcePush(3));
+}
+
 TEST(BoundedQueueTest, PushDroppingOldestKeepsTheNewest) {
   BoundedQueue<int> queue(2);
   bool accepted = false;

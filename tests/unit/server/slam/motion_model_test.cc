@@ -55,8 +55,6 @@ TEST_F(MotionModelTest, PredictsTheLastPoseIfTheMotionIsUnknown) {
 
   model_.ResetMotion();
   ExpectNear(Predict(2 * kInterval_ns), Pose(0.2, 1.3));
-  model_.RestartAt(Pose(0.5, 2));
-  ExpectNear(Predict(2 * kInterval_ns), Pose(0.5, 2));
 }
 
 TEST_F(MotionModelTest, IgnoresTheMotionAcrossALoss) {

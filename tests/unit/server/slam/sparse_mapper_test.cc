@@ -28,7 +28,7 @@ TrackedImage Keyframe(std::shared_ptr<const Frame> frame) {
 // A mapper for keyframes with given poses.
 class Mapper {
  public:
-  explicit Mapper(const SlamConfig& config = {}) : mapper_(config, &slot_, /*inline_adjustment=*/true) {}
+  explicit Mapper(const SlamConfig& config = {}) : mapper_(config, &slot_, SparseMapper::Background::kNothing) {}
   KeyframeView AddKeyframe(const TrackedImage& image) { return *mapper_.Process(image).view; }
   size_t points() const { return mapper_.points(); }
   size_t keyframes() const { return SparseMapperInspector(mapper_).keyframes_made(); }

@@ -26,7 +26,7 @@ class TrackingTest : public ::testing::Test {
 
   void Restart(PoseUse pose_use) {
     slot_ = std::make_unique<LocalMapSlot>();
-    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), /*inline_adjustment=*/true);
+    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing);
     tracker_ = std::make_unique<Tracker>(SlamConfig{}, pose_use, slot_.get());
   }
 
