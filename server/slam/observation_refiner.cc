@@ -26,7 +26,7 @@ constexpr size_t kMaxAdded = 600;         // observations per keyframe, to limit
 
 }  // namespace
 
-void ObservationRefiner::Refine(const Frame& frame, bool search_points, MapKeyframe& keyframe, SlamMap& map) {
+void ObservationRefiner::Refine(const Frame& frame, MapKeyframe& keyframe, SlamMap& map) {
   images_[keyframe.id] = HalvedImages(frame.image_bgr);
   if (images_.size() > kStoredImages) images_.erase(images_.begin());
   for (size_t i = 0; i < keyframe.points.size(); ++i) {
@@ -46,14 +46,15 @@ void ObservationRefiner::Refine(const Frame& frame, bool search_points, MapKeyfr
     }
   }
   Apply(map);
-  if (search_points) AddObservations(frame, keyframe, map);
 }
 
-// Finds points by their patches where the detector found no corner, or one with another descriptor.
-void ObservationRefiner::AddObservations(const Frame& frame, MapKeyframe& keyframe, SlamMap& map) {
+// The detector found no corner there, or one with another descriptor.
+void ObservationRefiner::Search(const Frame& frame, MapKeyframe& keyframe, SlamMap& map) {
+  const auto stored = images_.find(keyframe.id);
+  const HalvedImages image = stored == images_.end() ? HalvedImages(frame.image_bgr) : stored->second;
   const PatchTarget target{.camera = keyframe.camera(),
                            .lens = keyframe.frame->lens,
-                           .image = images_.at(keyframe.id),
+                           .image = image,
                            .T_camera_world = keyframe.T_camera_world(),
                            .center_world = keyframe.center_world()};
   std::vector<Feature> features = UncorrectedFeatures(*keyframe.frame);

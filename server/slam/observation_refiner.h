@@ -20,10 +20,11 @@ class ObservationRefiner {
  public:
   explicit ObservationRefiner(const SlamConfig& config) : mask_erosion_px_(config.mask_erosion_px) {}
 
-  // Call after the keyframe's points are known and new ones were made. `search_points`: also observes points that are
-  // visible but were not matched, at the positions of their patches. Long tracks reduce the drift more than precise
-  // ones.
-  void Refine(const Frame& frame, bool search_points, MapKeyframe& keyframe, SlamMap& map);
+  // Call after the keyframe's points are known and new ones were made.
+  void Refine(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
+  // Also observes points that are visible but were not matched, at the positions of their patches. Long tracks reduce
+  // the drift more than precise ones. Call after Refine(), at any time. `frame`: of the keyframe.
+  void Search(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
 
   struct Counts {
     int aligned = 0;
@@ -41,7 +42,6 @@ class ObservationRefiner {
 
   void Align(const PointTrack& track, const FeatureRef& observation, SlamMap& map);
   void Apply(SlamMap& map);
-  void AddObservations(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
 
   const int mask_erosion_px_;
   std::map<KeyframeId, HalvedImages> images_;  // of recent keyframes

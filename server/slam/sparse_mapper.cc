@@ -20,6 +20,7 @@ constexpr size_t kMaxKeyframesToReset = 6;
 constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
+constexpr size_t kMaxUnsearched = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
   return tracked.state != TrackingState::kLost && tracked.state != TrackingState::kInitializing;
@@ -68,10 +69,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
   bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed;
   was_adjusted |= ApplyLocalAdjustment(/*wait=*/false);
-  if (!current_->unchecked.empty() && !local_adjuster_.is_stop_requested()) {
-    CheckLoops();
-    was_adjusted = true;
-  }
+  if (!image.tracked.is_keyframe) was_adjusted |= DoPostponedWork();
   const bool is_of_current_map = image.pose_given || image.generation == generation_;
   if (image.initial_views) {
     InitializeFrom(image, mapped);
@@ -94,8 +92,14 @@ void SparseMapper::ObserveMasks(const FrameMasks& masks) {
 
 MapCorrection SparseMapper::Finish() {
   ApplyLocalAdjustment(/*wait=*/true);
-  CheckLoops();
-  ConcludeLoopTrial(/*wait=*/true);
+  if (!current_->unsearched.empty()) {
+    SearchPoints(0);
+    StartGlobalAdjustment();
+    ApplyGlobalAdjustment(/*wait=*/true);
+  }
+  do {
+    ConcludeLoopTrial(/*wait=*/true);
+  } while (CheckNextLoop());
   ApplyGlobalAdjustment(/*wait=*/true);
   if (!current_->world_is_given && current_->map.keyframes().size() > 2) {
     StartGlobalAdjustment();
@@ -210,9 +214,10 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   keyframe_builder_.Complete(image, keyframe, map);
   if (!keyframe.pose_given && config_.refine_observations) {
-    // The search for more observations takes as long as all other steps, so it is omitted while keyframes wait.
-    current_->refiner.Refine(*image.tracked.frame, /*search_points=*/!local_adjuster_.is_stop_requested(), keyframe,
-                             map);
+    current_->refiner.Refine(*image.tracked.frame, keyframe, map);
+    current_->unsearched.emplace_back(keyframe.id, image.tracked.frame);
+    // The search takes as long as all other steps.
+    SearchPoints(local_adjuster_.is_stop_requested() ? kMaxUnsearched : 0);
   }
   CullPoints(config_, map);
   if (!keyframe.pose_given) {
@@ -221,7 +226,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   current_->places.Add(keyframe);
   if (!keyframe.pose_given && !loop_trial_.IsPending()) current_->unchecked.push_back(keyframe.id);
-  if (!is_live) CheckLoops();
+  if (!is_live) CheckNextLoop();
   AlignWithUp();
   PublishLocalMap(keyframe.id);
 
@@ -239,13 +244,31 @@ bool SparseMapper::ApplyLocalAdjustment(bool wait) {
   return true;
 }
 
-// Checks keyframes for loops until one starts a trial. Live, this has time until no keyframe waits.
-void SparseMapper::CheckLoops() {
-  while (!current_->unchecked.empty() && !loop_trial_.IsPending()) {
-    const MapKeyframe* keyframe = current_->map.FindKeyframe(current_->unchecked.front());
-    current_->unchecked.pop_front();
-    if (keyframe != nullptr) CloseLoopOrAdjust(*keyframe);  // null: it was redundant
+// Searches more points in the keyframes where that was postponed, the oldest first, except the `keyframes_to_leave`
+// newest.
+void SparseMapper::SearchPoints(size_t keyframes_to_leave) {
+  auto& unsearched = current_->unsearched;
+  for (; unsearched.size() > keyframes_to_leave; unsearched.pop_front()) {
+    MapKeyframe* keyframe = current_->map.FindKeyframe(unsearched.front().first);
+    if (keyframe != nullptr) current_->refiner.Search(*unsearched.front().second, *keyframe, current_->map);
   }
+}
+
+// Live, while no keyframe waits: one piece of the work that was postponed. Returns whether the map changed.
+bool SparseMapper::DoPostponedWork() {
+  if (local_adjuster_.is_stop_requested()) return false;
+  if (current_->unsearched.empty()) return CheckNextLoop();
+  SearchPoints(current_->unsearched.size() - 1);
+  return true;
+}
+
+// Checks the oldest keyframe that was not checked for loops. Returns whether there was one.
+bool SparseMapper::CheckNextLoop() {
+  if (current_->unchecked.empty() || loop_trial_.IsPending()) return false;
+  const MapKeyframe* keyframe = current_->map.FindKeyframe(current_->unchecked.front());
+  current_->unchecked.pop_front();
+  if (keyframe != nullptr) CloseLoopOrAdjust(*keyframe);  // null: it was redundant
+  return true;
 }
 
 void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {

@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/stage_messages.h"
@@ -82,7 +83,9 @@ class SparseMapper {
     KeyframeId newest;
     KeyframeId reference;  // of the published local map: the newest keyframe, or where the camera was relocalized
     std::optional<LocalMap::Relocalization> relocalized = {};  // the newest one
-    std::deque<KeyframeId> unchecked = {};                     // keyframes that were not checked for loops
+    // Work on keyframes that has time until no new ones wait.
+    std::deque<KeyframeId> unchecked = {};                                            // for loops
+    std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
     bool world_is_given = false;      // the client's poses, given or as priors, define the world
     bool has_depth_scale = false;     // depth images define the scale
     uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
@@ -106,7 +109,9 @@ class SparseMapper {
 
   void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
-  void CheckLoops();
+  void SearchPoints(size_t keyframes_to_leave);
+  bool CheckNextLoop();
+  bool DoPostponedWork();
   bool ApplyLocalAdjustment(bool wait);
   bool ConcludeLoopTrial(bool wait);
   void StartGlobalAdjustment();

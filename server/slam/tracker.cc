@@ -196,7 +196,7 @@ std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const L
   if (!is_lost) first = tracking.TrackByProjection(last_points_, start, kFollowRadius_px);
   if (!first) first = tracking.TrackByProjection(last_points_, start, kReferenceRadius_px);
   if (!first && !is_lost) first = tracking.TrackLoosely(start, kFollowRadius_px);
-  if (!first) first = tracking.TrackByDescriptors(last_points_);
+  if (!first) first = tracking.TrackByDescriptors(is_lost ? std::vector<MapPointId>() : last_points_);
   return first;
 }
 

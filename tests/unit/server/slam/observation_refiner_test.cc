@@ -52,17 +52,19 @@ class ObservationRefinerTest : public ::testing::Test {
 };
 
 TEST_F(ObservationRefinerTest, ObservationsBecomeMorePrecise) {
-  refiner_.Refine(*frames_[0], /*search_points=*/false, keyframe(1), map_);
+  refiner_.Refine(*frames_[0], keyframe(1), map_);
   ASSERT_GT(map_.points().size(), 60U);
   const double before_px = MedianEpipolarError_px();
-  refiner_.Refine(*frames_[1], /*search_points=*/false, keyframe(2), map_);
+  refiner_.Refine(*frames_[1], keyframe(2), map_);
   EXPECT_GT(refiner_.counts().aligned, 40);
   EXPECT_LT(MedianEpipolarError_px(), 0.6 * before_px);
 }
 
 TEST_F(ObservationRefinerTest, FindsVisiblePointsThatWereNotMatched) {
-  refiner_.Refine(*frames_[0], /*search_points=*/true, keyframe(1), map_);
-  refiner_.Refine(*frames_[1], /*search_points=*/true, keyframe(2), map_);
+  refiner_.Refine(*frames_[0], keyframe(1), map_);
+  refiner_.Search(*frames_[0], keyframe(1), map_);
+  refiner_.Refine(*frames_[1], keyframe(2), map_);
+  refiner_.Search(*frames_[1], keyframe(2), map_);
   MapKeyframe& third = AddKeyframe(8);
   // Connected by a few matches, as after tracking.
   PointMaker maker(config_, &map_);
@@ -75,7 +77,8 @@ TEST_F(ObservationRefinerTest, FindsVisiblePointsThatWereNotMatched) {
   };
   const auto before = observed();
   const size_t detected = third.points.size();
-  refiner_.Refine(*frames_[2], /*search_points=*/true, third, map_);
+  refiner_.Refine(*frames_[2], third, map_);
+  refiner_.Search(*frames_[2], third, map_);
   EXPECT_GT(observed(), before + 15);
   ASSERT_EQ(third.points.size(), third.frame->size());
   for (size_t i = detected; i < third.points.size(); ++i) {
@@ -86,8 +89,8 @@ TEST_F(ObservationRefinerTest, FindsVisiblePointsThatWereNotMatched) {
 }
 
 TEST_F(ObservationRefinerTest, RemovesObservationsOfOtherTexture) {
-  refiner_.Refine(*frames_[0], /*search_points=*/false, keyframe(1), map_);
-  refiner_.Refine(*frames_[1], /*search_points=*/false, keyframe(2), map_);
+  refiner_.Refine(*frames_[0], keyframe(1), map_);
+  refiner_.Refine(*frames_[1], keyframe(2), map_);
   // The third keyframe looks at the right place, but at the image of another world.
   MapKeyframe& third = AddKeyframe(2);
   const std::shared_ptr<Frame> other = TexturedWorld(320, 240, /*seed=*/9).Render(3, TexturedWorld::OrbitPose(2));
@@ -100,7 +103,7 @@ TEST_F(ObservationRefinerTest, RemovesObservationsOfOtherTexture) {
   };
   const auto before = observed();
   ASSERT_GT(before, 20);
-  refiner_.Refine(*other, /*search_points=*/false, third, map_);
+  refiner_.Refine(*other, third, map_);
   EXPECT_LT(observed(), before);
 }
 
