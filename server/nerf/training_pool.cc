@@ -77,7 +77,7 @@ bool TrainingPool::IsIdle(SessionId session) const {
 }
 
 void TrainingPool::RunWorker() {
-  LowerThreadPriority();
+  LowerThreadPriority(kTrainingNice);
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     std::optional<TrainingQueue::Lease> lease = queue_.Next(Clock::now());

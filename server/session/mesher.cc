@@ -95,7 +95,7 @@ void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
 }
 
 void Mesher::Run() {
-  LowerThreadPriority();
+  LowerThreadPriority(kTrainingNice);
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [&] { return stopping_ || !waiting_.empty(); });

@@ -20,22 +20,40 @@ slam::SparseMapper::Background BackgroundWork(FrameMode mode, const SessionConfi
 
 // ---------------------------------------------------------------------------------------------------- the data path
 
-void Pipeline::Process(const Arrival& arrival, const MappingExecutor& execute) {
-  if (std::holds_alternative<FrameInput>(arrival.input)) {
-    ProcessFrame(arrival, execute);
+std::optional<AcceptedInput> Pipeline::Accept(Arrival arrival) {
+  AcceptedInput accepted;
+  if (const auto* input = std::get_if<FrameInput>(&arrival.input)) {
+    auto frame = ingest_.Accept(*input);
+    if (!frame.ok()) {
+      ledger_->Reject(arrival, frame.status());
+      return std::nullopt;
+    }
+    accepted.content = *std::move(frame);
   } else {
-    ProcessLateMasks(arrival, execute);
+    auto masks = ingest_.AcceptMasks(std::get<MasksInput>(arrival.input));
+    if (!masks.ok()) {
+      ledger_->Reject(arrival, masks.status());
+      return std::nullopt;
+    }
+    accepted.content = *std::move(masks);
+  }
+  Record(arrival.input);
+  accepted.arrival = std::move(arrival);
+  return accepted;
+}
+
+void Pipeline::Process(const AcceptedInput& input, const MappingExecutor& execute) {
+  if (const auto* frame = std::get_if<std::shared_ptr<const Frame>>(&input.content)) {
+    ProcessFrame(input.arrival, *frame, execute);
+  } else {
+    ProcessLateMasks(std::get<FrameMasks>(input.content), execute);
   }
 }
 
-void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execute) {
-  // Ingest.
-  const auto frame = ingest_.Accept(std::get<FrameInput>(arrival.input));
-  if (!frame.ok()) return ledger_->Reject(arrival, frame.status());
-  Record(arrival.input);
-
+void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame,
+                            const MappingExecutor& execute) {
   // Track.
-  slam::TrackedImage image = tracker_.Track(*frame);
+  slam::TrackedImage image = tracker_.Track(frame);
   ledger_->AcknowledgeFrame(arrival, image.tracked);
   const bool is_lost = image.tracked.state == TrackingState::kLost;
   MappingStep step;
@@ -59,14 +77,11 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const MappingExecutor& execu
 }
 
 // Late masks take the same path, so that every stage has processed the frame before its masks.
-void Pipeline::ProcessLateMasks(const Arrival& arrival, const MappingExecutor& execute) {
-  auto masks = ingest_.AcceptMasks(std::get<MasksInput>(arrival.input));
-  if (!masks.ok()) return ledger_->Reject(arrival, masks.status());
-  Record(arrival.input);
-  ledger_->AcknowledgeMasks(*masks);
+void Pipeline::ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& execute) {
+  ledger_->AcknowledgeMasks(masks);
 
   MappingStep step;
-  step.run = [this, masks = *std::move(masks)] {
+  step.run = [this, masks] {
     sparse_mapper_.ObserveMasks(masks);
     Publish(object_mapper_.ObserveLateMasks(masks));
     ledger_->CountMappedMasks();

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <variant>
 
 #include "common/field_snapshot.h"
 #include "common/mapping_service.h"
@@ -32,13 +34,20 @@ struct MappingStep {
   bool relocalizes = false;        // the frame was lost; the newest such frame is the most useful one
 };
 
+// An input that was decoded, checked and recorded.
+struct AcceptedInput {
+  Arrival arrival;
+  std::variant<std::shared_ptr<const Frame>, FrameMasks> content;
+};
+
 // The stages of one session and the data path through them:
 //
 //   Ingest -> Tracker -> SparseMapper -> ObjectMapper -> TrainingPool -> Mesher -> MapState -> clients
 //
-// Process() reads in that order. The pipeline has no thread: the caller runs Process() on one thread and the
-// MappingSteps, in their order, on the same or on a second one. The sparse map is returned to the tracker by value
-// (LocalMapSlot). The training pool and the mesher belong to the server; they call MeshField() and PublishMesh().
+// Accept(), Process() and the MappingSteps read in that order. The pipeline has no thread: the caller runs each of the
+// three on one thread, in the order of the inputs; the threads may be the same. The sparse map is returned to the
+// tracker by value (LocalMapSlot). The training pool and the mesher belong to the server; they call MeshField() and
+// PublishMesh().
 class Pipeline {
  public:
   // Runs the step, or queues it for the mapping thread.
@@ -51,9 +60,10 @@ class Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  // Processes a frame or late masks. `execute` is called at most once, before Process() returns: not at all for an
-  // input that is rejected.
-  void Process(const Arrival& arrival, const MappingExecutor& execute);
+  // Decodes, checks and records a frame or late masks. nullopt: rejected; the client is told.
+  std::optional<AcceptedInput> Accept(Arrival arrival);
+  // Processes an accepted input. `execute` is called once, before Process() returns.
+  void Process(const AcceptedInput& input, const MappingExecutor& execute);
 
   // Call on the mapping thread after the last step. Publishes the last corrections and cuboids, and lets the fields
   // train to completion.
@@ -68,8 +78,8 @@ class Pipeline {
   nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_session_); }
 
  private:
-  void ProcessFrame(const Arrival& arrival, const MappingExecutor& execute);
-  void ProcessLateMasks(const Arrival& arrival, const MappingExecutor& execute);
+  void ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame, const MappingExecutor& execute);
+  void ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& execute);
   void Record(const SessionInput& input);
   void Correct(const MapCorrection& correction);
   void Publish(objects::ObjectOutput output);
@@ -84,9 +94,10 @@ class Pipeline {
   FrameLedger* const ledger_;
 
   slam::LocalMapSlot local_map_;  // from the mapper to the tracker
-  // Used by Process().
+  // Used by Accept().
   Ingest ingest_;
   std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
+  // Used by Process().
   slam::Tracker tracker_;
   // Used by the mapping steps.
   slam::SparseMapper sparse_mapper_;

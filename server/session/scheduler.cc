@@ -13,6 +13,9 @@ constexpr int kSlicesPerKeyframe = 4;
 
 constexpr std::chrono::milliseconds kTrainingPollPeriod{20};
 
+// Decoded inputs that wait for tracking: enough that it never waits for the decoder.
+constexpr size_t kAcceptedQueue = 2;
+
 }  // namespace
 
 Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger,
@@ -23,10 +26,12 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
       ledger_(ledger),
       callbacks_(std::move(callbacks)),
       inputs_(config.frame_queue),
+      accepted_(kAcceptedQueue),
       steps_(config.mapping_queue) {
   if (config_.single_thread) {
     tracking_thread_ = std::thread([this] { RunSingleThread(); });
   } else {
+    ingest_thread_ = std::thread([this] { RunIngest(); });
     tracking_thread_ = std::thread([this] { RunTracking(); });
     mapping_thread_ = std::thread([this] { RunMapping(); });
   }
@@ -50,9 +55,23 @@ bool Scheduler::Offer(SessionInput input) {
 void Scheduler::Stop() {
   stopping_ = true;
   inputs_.Close();
+  accepted_.Close();
   steps_.Close();
+  if (ingest_thread_.joinable()) ingest_thread_.join();
   if (tracking_thread_.joinable()) tracking_thread_.join();
   if (mapping_thread_.joinable()) mapping_thread_.join();
+}
+
+void Scheduler::RunIngest() {
+  try {
+    while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (stopping_) continue;
+      if (auto accepted = pipeline_->Accept(*std::move(arrival))) accepted_.Push(*std::move(accepted));
+    }
+  } catch (const std::exception& e) {
+    Fail("ingest", e.what());
+  }
+  accepted_.Close();
 }
 
 void Scheduler::RunTracking() {
@@ -60,8 +79,8 @@ void Scheduler::RunTracking() {
     mode_ == FrameMode::kLive ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
   };
   try {
-    while (std::optional<Arrival> arrival = inputs_.Pop()) {
-      if (!stopping_) pipeline_->Process(*arrival, execute);
+    while (const std::optional<AcceptedInput> input = accepted_.Pop()) {
+      if (!stopping_) pipeline_->Process(*input, execute);
     }
   } catch (const std::exception& e) {
     Fail("tracking", e.what());
@@ -88,7 +107,9 @@ void Scheduler::RunSingleThread() {
   const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteImmediately(step); };
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
-      if (!stopping_) pipeline_->Process(*arrival, execute);
+      if (!stopping_) {
+        if (const auto accepted = pipeline_->Accept(*std::move(arrival))) pipeline_->Process(*accepted, execute);
+      }
       callbacks_.tick();
     }
     EndMapping();
@@ -169,6 +190,7 @@ void Scheduler::TrainToCompletion() {
 void Scheduler::Fail(const char* stage, const std::string& what) {
   failed_ = true;
   inputs_.Close();
+  accepted_.Close();
   steps_.Close();
   callbacks_.failed(stage, what);
 }

@@ -19,12 +19,14 @@ namespace romap::session {
 
 // Runs a session's pipeline: queues and threads only.
 //
-//   client threads -> inputs -> [tracking thread: Pipeline::Process()] -> steps -> [mapping thread: MappingStep::run()]
+//   client threads -> inputs -> [ingest thread: Pipeline::Accept()] -> accepted -> [tracking thread: Process()] ->
+//   steps
+//   -> [mapping thread: MappingStep::run()]
 //
 // Replay: a full queue blocks, and steps that change the local map are executed before the next frame is tracked. Live:
 // a full input queue drops its oldest input; tracking never waits for the mapping of a frame. Single thread
-// (session.single_thread): the tracking thread maps and trains too, in a fixed order, so that equal input gives an
-// identical map. In this mode the training pool and the mesher must have no threads.
+// (session.single_thread): the tracking thread does all this and trains too, in a fixed order, so that equal input
+// gives an identical map. In this mode the training pool and the mesher must have no threads.
 class Scheduler {
  public:
   // Called on the scheduler's threads.
@@ -47,9 +49,10 @@ class Scheduler {
   void Stop();
 
  private:
+  void RunIngest();        // the ingest thread
   void RunTracking();      // the tracking thread
   void RunMapping();       // the mapping thread
-  void RunSingleThread();  // tracking and mapping on one thread
+  void RunSingleThread();  // all on one thread
 
   // How a mapping step is executed in each mode; called by the pipeline on the tracking thread.
   void ExecuteImmediately(const MappingStep& step);
@@ -68,6 +71,7 @@ class Scheduler {
   const Callbacks callbacks_;
 
   BoundedQueue<Arrival> inputs_;
+  BoundedQueue<AcceptedInput> accepted_;
   BoundedQueue<MappingStep> steps_;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> failed_ = false;
@@ -79,6 +83,7 @@ class Scheduler {
   int map_changes_waiting_ = 0;  // replay: steps in `steps_` that change the local map
   bool mapping_ended_ = false;
 
+  std::thread ingest_thread_;
   std::thread tracking_thread_;
   std::thread mapping_thread_;
 };

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <atomic>
 
+#include "common/thread_priority.h"
 #include "server/slam/map_adjustment.h"
 
 namespace romap::slam {
 namespace {
 
 constexpr double kMinNoise = 0.2;  // of the assumed one
-constexpr int kGlobalNice = 10;
 
 // Adjusts again with the measured noise instead of the assumed one, so that errors that are large for this camera and
 // scene lose their influence. The observations remain classified by the assumed noise.
@@ -35,7 +35,8 @@ BundleSummary SolveGlobal(BundleProblem& problem, const std::atomic<bool>& abort
 
 void GlobalAdjuster::Start(const SlamMap& map, bool find_lens) {
   Cancel();
-  run_ = std::make_unique<AdjustmentRun>(GlobalProblem(map, config_, find_lens), SolveGlobal, run_inline_, kGlobalNice);
+  run_ = std::make_unique<AdjustmentRun>(GlobalProblem(map, config_, find_lens), SolveGlobal, run_inline_,
+                                         kGlobalAdjustmentNice);
 }
 
 std::optional<BundleFit> GlobalAdjuster::Fit(bool wait) const {

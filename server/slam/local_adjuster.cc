@@ -2,11 +2,12 @@
 
 #include <algorithm>
 
+#include "common/thread_priority.h"
+
 namespace romap::slam {
 namespace {
 
 constexpr int kMaxLocalIterations = 8;  // enough to converge
-constexpr int kLocalNice = 5;           // after tracking and mapping, before training
 
 }  // namespace
 
@@ -53,7 +54,8 @@ void LocalAdjuster::StartWaiting(const SlamMap& map) {
         problem,
         {.max_iterations = kMaxLocalIterations, .dense = true, .abort = early_stop != nullptr ? early_stop : &abort});
   };
-  run_ = std::make_unique<AdjustmentRun>(WindowProblem(map, *newest, config_), solve, run_inline_, kLocalNice);
+  run_ =
+      std::make_unique<AdjustmentRun>(WindowProblem(map, *newest, config_), solve, run_inline_, kLocalAdjustmentNice);
 }
 
 // Requires a finished run.

@@ -26,21 +26,31 @@ constexpr size_t kMaxAdded = 600;         // observations per keyframe, to limit
 
 }  // namespace
 
-void ObservationRefiner::Refine(const Frame& frame, MapKeyframe& keyframe, SlamMap& map) {
-  images_[keyframe.id] = HalvedImages(frame.image_bgr);
+void ObservationRefiner::ReadPatches(const Frame& frame, const MapKeyframe& keyframe, SlamMap& map) {
+  const HalvedImages image = images_.try_emplace(keyframe.id, frame.image_bgr).first->second;  // may be erased below
   if (images_.size() > kStoredImages) images_.erase(images_.begin());
   for (size_t i = 0; i < keyframe.points.size(); ++i) {
     if (!keyframe.points[i]) continue;
     PointTrack& track = *map.FindPoint(keyframe.points[i]);
-    if (track.patch) {
+    if (track.patch) continue;
+    const double octave_scale = keyframe.features()[i].octave_scale;
+    const auto patch = Patch::Read(image, keyframe.frame->image_px[i].cast<double>(), octave_scale);
+    if (!patch) continue;
+    track.patch = std::make_shared<const ReferencePatch>(
+        ReferencePatch{.patch = *patch, .keyframe = keyframe.id, .octave_scale = octave_scale});
+  }
+}
+
+void ObservationRefiner::Refine(const Frame& frame, MapKeyframe& keyframe, SlamMap& map) {
+  ReadPatches(frame, keyframe, map);
+  for (size_t i = 0; i < keyframe.points.size(); ++i) {
+    if (!keyframe.points[i]) continue;
+    const PointTrack& track = *map.FindPoint(keyframe.points[i]);
+    if (!track.patch) continue;
+    if (track.patch->keyframe != keyframe.id) {
       Align(track, {keyframe.id, static_cast<int>(i)}, map);
       continue;
     }
-    const auto patch = Patch::Read(images_.at(keyframe.id), keyframe.frame->image_px[i].cast<double>(),
-                                   keyframe.features()[i].octave_scale);
-    if (!patch) continue;
-    track.patch = std::make_shared<const ReferencePatch>(
-        ReferencePatch{.patch = *patch, .keyframe = keyframe.id, .octave_scale = keyframe.features()[i].octave_scale});
     for (const FeatureRef& observation : track.observations) {
       if (observation.keyframe != keyframe.id) Align(track, observation, map);
     }

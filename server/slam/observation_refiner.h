@@ -20,6 +20,8 @@ class ObservationRefiner {
  public:
   explicit ObservationRefiner(const SlamConfig& config) : mask_erosion_px_(config.mask_erosion_px) {}
 
+  // Reads the patches of points that have none; the keyframe becomes their reference.
+  void ReadPatches(const Frame& frame, const MapKeyframe& keyframe, SlamMap& map);
   // Call after the keyframe's points are known and new ones were made.
   void Refine(const Frame& frame, MapKeyframe& keyframe, SlamMap& map);
   // Also observes points that are visible but were not matched, at the positions of their patches. Long tracks reduce

@@ -20,7 +20,7 @@ constexpr size_t kMaxKeyframesToReset = 6;
 constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
-constexpr size_t kMaxUnsearched = 60;  // keyframes, whose images are kept
+constexpr size_t kMaxPostponed = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
   return tracked.state != TrackingState::kLost && tracked.state != TrackingState::kInitializing;
@@ -206,18 +206,33 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   MapKeyframe& keyframe =
       keyframe_builder_.Insert(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
   current_->newest = keyframe.id;
+  mapped.tracked.reference = image.pose_given ? KeyframeId{} : keyframe.id;
+  mapped.tracked.T_reference_camera = {};
   const bool is_live = background_ == Background::kAllAdjustment && !keyframe.pose_given;
   if (is_live) {
     // A fast camera needs the new points in the next frame.
     keyframe_builder_.MakeFirstPoints(keyframe, map);
+    if (config_.refine_observations) current_->refiner.ReadPatches(*image.tracked.frame, keyframe, map);
     PublishLocalMap(keyframe.id);
   }
+  CompleteKeyframe(image, keyframe);
+  if (!is_live) CheckNextLoop();
+  AlignWithUp();
+  PublishLocalMap(keyframe.id);
+
+  mapped.view = MakeView(image.tracked, keyframe, map);
+  mapped.tracked.T_world_camera = mapped.view->T_world_camera;
+  mapped.view->up_world = mapped.tracked.up_world;
+}
+
+void SparseMapper::CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyframe) {
+  SlamMap& map = current_->map;
   keyframe_builder_.Complete(image, keyframe, map);
   if (!keyframe.pose_given && config_.refine_observations) {
     current_->refiner.Refine(*image.tracked.frame, keyframe, map);
     current_->unsearched.emplace_back(keyframe.id, image.tracked.frame);
     // The search takes as long as all other steps.
-    SearchPoints(local_adjuster_.is_stop_requested() ? kMaxUnsearched : 0);
+    SearchPoints(local_adjuster_.is_stop_requested() ? kMaxPostponed : 0);
   }
   CullPoints(config_, map);
   if (!keyframe.pose_given) {
@@ -226,15 +241,6 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   current_->places.Add(keyframe);
   if (!keyframe.pose_given && !loop_trial_.IsPending()) current_->unchecked.push_back(keyframe.id);
-  if (!is_live) CheckNextLoop();
-  AlignWithUp();
-  PublishLocalMap(keyframe.id);
-
-  mapped.view = MakeView(image.tracked, keyframe, map);
-  mapped.tracked.T_world_camera = mapped.view->T_world_camera;
-  mapped.tracked.reference = image.pose_given ? KeyframeId{} : keyframe.id;
-  mapped.tracked.T_reference_camera = {};
-  mapped.view->up_world = mapped.tracked.up_world;
 }
 
 // Returns whether the map changed.

@@ -109,6 +109,7 @@ class SparseMapper {
 
   void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
+  void CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyframe);
   void SearchPoints(size_t keyframes_to_leave);
   bool CheckNextLoop();
   bool DoPostponedWork();

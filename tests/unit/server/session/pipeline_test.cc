@@ -23,8 +23,9 @@ class PipelineTest : public PipelineFixture {
   }
 
   void Process(SessionInput input) {
-    pipeline_.Process({std::move(input), std::chrono::steady_clock::now()},
-                      [this](MappingStep step) { steps_.push_back(std::move(step)); });
+    const auto accepted = pipeline_.Accept({std::move(input), std::chrono::steady_clock::now()});
+    if (!accepted) return;
+    pipeline_.Process(*accepted, [this](MappingStep step) { steps_.push_back(std::move(step)); });
   }
   std::optional<FrameAck> NextAck() {
     while (const auto event = outbox_->Next(kNoWait)) {
