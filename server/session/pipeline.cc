@@ -20,30 +20,29 @@ slam::SparseMapper::Background BackgroundWork(FrameMode mode, const SessionConfi
 
 // ---------------------------------------------------------------------------------------------------- the data path
 
-std::optional<AcceptedInput> Pipeline::Accept(Arrival arrival) {
-  AcceptedInput accepted;
-  if (const auto* input = std::get_if<FrameInput>(&arrival.input)) {
-    auto frame = ingest_.Accept(*input);
-    if (!frame.ok()) {
-      ledger_->Reject(arrival, frame.status());
-      return std::nullopt;
+CheckedInput Pipeline::Check(Arrival arrival) {
+  CheckedInput checked{.arrival = std::move(arrival), .content = absl::OkStatus()};
+  const SessionInput& input = checked.arrival.input;
+  const auto set_content = [&](auto result) {
+    if (!result.ok()) {
+      checked.content = result.status();
+      return;
     }
-    accepted.content = *std::move(frame);
+    checked.content = *std::move(result);
+    Record(input);
+  };
+  if (const auto* frame = std::get_if<FrameInput>(&input)) {
+    set_content(ingest_.Accept(*frame));
   } else {
-    auto masks = ingest_.AcceptMasks(std::get<MasksInput>(arrival.input));
-    if (!masks.ok()) {
-      ledger_->Reject(arrival, masks.status());
-      return std::nullopt;
-    }
-    accepted.content = *std::move(masks);
+    set_content(ingest_.AcceptMasks(std::get<MasksInput>(input)));
   }
-  Record(arrival.input);
-  accepted.arrival = std::move(arrival);
-  return accepted;
+  return checked;
 }
 
-void Pipeline::Process(const AcceptedInput& input, const MappingExecutor& execute) {
-  if (const auto* frame = std::get_if<std::shared_ptr<const Frame>>(&input.content)) {
+void Pipeline::Process(const CheckedInput& input, const MappingExecutor& execute) {
+  if (const auto* error = std::get_if<absl::Status>(&input.content)) {
+    ledger_->Reject(input.arrival, *error);
+  } else if (const auto* frame = std::get_if<std::shared_ptr<const Frame>>(&input.content)) {
     ProcessFrame(input.arrival, *frame, execute);
   } else {
     ProcessLateMasks(std::get<FrameMasks>(input.content), execute);

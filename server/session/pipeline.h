@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <variant>
 
@@ -34,17 +33,17 @@ struct MappingStep {
   bool relocalizes = false;        // the frame was lost; the newest such frame is the most useful one
 };
 
-// An input that was decoded, checked and recorded.
-struct AcceptedInput {
+// An input that was decoded, checked and, if it is valid, recorded.
+struct CheckedInput {
   Arrival arrival;
-  std::variant<std::shared_ptr<const Frame>, FrameMasks> content;
+  std::variant<absl::Status, std::shared_ptr<const Frame>, FrameMasks> content;  // the status: why it is rejected
 };
 
 // The stages of one session and the data path through them:
 //
 //   Ingest -> Tracker -> SparseMapper -> ObjectMapper -> TrainingPool -> Mesher -> MapState -> clients
 //
-// Accept(), Process() and the MappingSteps read in that order. The pipeline has no thread: the caller runs each of the
+// Check(), Process() and the MappingSteps read in that order. The pipeline has no thread: the caller runs each of the
 // three on one thread, in the order of the inputs; the threads may be the same. The sparse map is returned to the
 // tracker by value (LocalMapSlot). The training pool and the mesher belong to the server; they call MeshField() and
 // PublishMesh().
@@ -60,10 +59,11 @@ class Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  // Decodes, checks and records a frame or late masks. nullopt: rejected; the client is told.
-  std::optional<AcceptedInput> Accept(Arrival arrival);
-  // Processes an accepted input. `execute` is called once, before Process() returns.
-  void Process(const AcceptedInput& input, const MappingExecutor& execute);
+  // Decodes, checks and records a frame or late masks.
+  CheckedInput Check(Arrival arrival);
+  // Processes a checked input, or rejects it. `execute` is called at most once, before Process() returns: not at all
+  // for an input that is rejected. The client is told about all inputs in their order.
+  void Process(const CheckedInput& input, const MappingExecutor& execute);
 
   // Call on the mapping thread after the last step. Publishes the last corrections and cuboids, and lets the fields
   // train to completion.
@@ -94,7 +94,7 @@ class Pipeline {
   FrameLedger* const ledger_;
 
   slam::LocalMapSlot local_map_;  // from the mapper to the tracker
-  // Used by Accept().
+  // Used by Check().
   Ingest ingest_;
   std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
   // Used by Process().

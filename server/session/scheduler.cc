@@ -14,7 +14,7 @@ constexpr int kSlicesPerKeyframe = 4;
 constexpr std::chrono::milliseconds kTrainingPollPeriod{20};
 
 // Decoded inputs that wait for tracking: enough that it never waits for the decoder.
-constexpr size_t kAcceptedQueue = 2;
+constexpr size_t kCheckedQueue = 2;
 
 }  // namespace
 
@@ -26,7 +26,7 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
       ledger_(ledger),
       callbacks_(std::move(callbacks)),
       inputs_(config.frame_queue),
-      accepted_(kAcceptedQueue),
+      checked_(kCheckedQueue),
       steps_(config.mapping_queue) {
   if (config_.single_thread) {
     tracking_thread_ = std::thread([this] { RunSingleThread(); });
@@ -55,7 +55,7 @@ bool Scheduler::Offer(SessionInput input) {
 void Scheduler::Stop() {
   stopping_ = true;
   inputs_.Close();
-  accepted_.Close();
+  checked_.Close();
   steps_.Close();
   if (ingest_thread_.joinable()) ingest_thread_.join();
   if (tracking_thread_.joinable()) tracking_thread_.join();
@@ -66,12 +66,12 @@ void Scheduler::RunIngest() {
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
       if (stopping_) continue;
-      if (auto accepted = pipeline_->Accept(*std::move(arrival))) accepted_.Push(*std::move(accepted));
+      checked_.Push(pipeline_->Check(*std::move(arrival)));
     }
   } catch (const std::exception& e) {
     Fail("ingest", e.what());
   }
-  accepted_.Close();
+  checked_.Close();
 }
 
 void Scheduler::RunTracking() {
@@ -79,7 +79,7 @@ void Scheduler::RunTracking() {
     mode_ == FrameMode::kLive ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
   };
   try {
-    while (const std::optional<AcceptedInput> input = accepted_.Pop()) {
+    while (const std::optional<CheckedInput> input = checked_.Pop()) {
       if (!stopping_) pipeline_->Process(*input, execute);
     }
   } catch (const std::exception& e) {
@@ -107,9 +107,7 @@ void Scheduler::RunSingleThread() {
   const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteImmediately(step); };
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
-      if (!stopping_) {
-        if (const auto accepted = pipeline_->Accept(*std::move(arrival))) pipeline_->Process(*accepted, execute);
-      }
+      if (!stopping_) pipeline_->Process(pipeline_->Check(*std::move(arrival)), execute);
       callbacks_.tick();
     }
     EndMapping();
@@ -190,7 +188,7 @@ void Scheduler::TrainToCompletion() {
 void Scheduler::Fail(const char* stage, const std::string& what) {
   failed_ = true;
   inputs_.Close();
-  accepted_.Close();
+  checked_.Close();
   steps_.Close();
   callbacks_.failed(stage, what);
 }

@@ -71,7 +71,7 @@ class Scheduler {
   const Callbacks callbacks_;
 
   BoundedQueue<Arrival> inputs_;
-  BoundedQueue<AcceptedInput> accepted_;
+  BoundedQueue<CheckedInput> checked_;
   BoundedQueue<MappingStep> steps_;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> failed_ = false;

@@ -14,6 +14,7 @@ namespace {
 constexpr int kFewPoints = 100;  // with fewer known points in a keyframe, tracking may fail soon
 
 constexpr size_t kFirstKeyframes = 2;
+constexpr float kFixedRadius_px = 12;  // around features that are fixed to the camera: on the same thing
 
 void RefreshPoints(const MapKeyframe& keyframe, SlamMap& map) {
   for (const MapPointId id : keyframe.points) {
@@ -54,7 +55,7 @@ void KeyframeBuilder::MakeFirstPoints(MapKeyframe& keyframe, SlamMap& map) const
 }
 
 void KeyframeBuilder::Complete(const TrackedImage& image, MapKeyframe& keyframe, SlamMap& map) {
-  if (!keyframe.pose_given) AddObjectFeatures(*image.tracked.frame, keyframe);
+  if (!keyframe.pose_given) AddObjectFeatures(image, keyframe);
   FindPoints(keyframe, map);
   const auto neighbors = map.Covisible(keyframe, 1);
   if (!neighbors.empty()) keyframe.parent = neighbors.front().first;
@@ -63,9 +64,15 @@ void KeyframeBuilder::Complete(const TrackedImage& image, MapKeyframe& keyframe,
 }
 
 // Objects are small, so keyframes get additional features on them.
-void KeyframeBuilder::AddObjectFeatures(const Frame& frame, MapKeyframe& keyframe) {
+void KeyframeBuilder::AddObjectFeatures(const TrackedImage& image, MapKeyframe& keyframe) {
+  const Frame& frame = *image.tracked.frame;
   std::vector<Feature> features = UncorrectedFeatures(*keyframe.frame);
-  const std::vector<Feature> object_features = extractor_.ExtractObjects(frame, features);
+  std::vector<Feature> object_features = extractor_.ExtractObjects(frame, features);
+  std::erase_if(object_features, [&](const Feature& feature) {
+    return std::any_of(image.fixed_px.begin(), image.fixed_px.end(), [&](const Eigen::Vector2f& fixed_px) {
+      return (fixed_px - feature.pixel_px).norm() < kFixedRadius_px;
+    });
+  });
   if (object_features.empty()) return;
   features.insert(features.end(), object_features.begin(), object_features.end());
   keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens);

@@ -24,7 +24,7 @@ class KeyframeBuilder {
   void Complete(const TrackedImage& image, MapKeyframe& keyframe, SlamMap& map);
 
  private:
-  void AddObjectFeatures(const Frame& frame, MapKeyframe& keyframe);
+  void AddObjectFeatures(const TrackedImage& image, MapKeyframe& keyframe);
   void FindPoints(MapKeyframe& keyframe, SlamMap& map) const;
   void MakePoints(MapKeyframe& keyframe, SlamMap& map) const;
 

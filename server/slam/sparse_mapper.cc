@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/angles.h"
+#include "common/statistics.h"
 #include "server/slam/local_map_builder.h"
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"
@@ -20,6 +22,7 @@ constexpr size_t kMaxKeyframesToReset = 6;
 constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
+constexpr double kMinMedianParallax_rad = 3 * kRadPerDeg;
 constexpr size_t kMaxPostponed = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
@@ -112,7 +115,28 @@ MapCorrection SparseMapper::Finish() {
 
 std::vector<SessionWarning> SparseMapper::Warnings() const {
   if (current_->world_is_given || current_->map.keyframes().empty()) return {};
-  return current_->up.Warnings();
+  std::vector<SessionWarning> warnings = current_->up.Warnings();
+  const double parallax_rad = MedianParallax_rad();
+  if (!current_->has_depth_scale && parallax_rad < kMinMedianParallax_rad) {
+    warnings.push_back({.name = "translation_unobservable",
+                        .text = fmt::format(
+                            "the camera has rotated with hardly any translation: half of the map points were seen from "
+                            "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
+                            "the translation are not known; move the camera sideways, or send depth images",
+                            parallax_rad / kRadPerDeg, kMinMedianParallax_rad / kRadPerDeg)});
+  }
+  return warnings;
+}
+
+// Over the points that the newest keyframe observes.
+double SparseMapper::MedianParallax_rad() const {
+  const MapKeyframe* newest = current_->map.FindKeyframe(current_->newest);
+  if (newest == nullptr) return 0;
+  std::vector<double> parallaxes_rad;
+  for (const MapPointId id : newest->points) {
+    if (id) parallaxes_rad.push_back(current_->map.FindPoint(id)->point.max_parallax_rad);
+  }
+  return parallaxes_rad.empty() ? 0 : Median(std::move(parallaxes_rad));
 }
 
 // ------------------------------------------------------------------------------------------------ steps of Process

@@ -101,6 +101,7 @@ class SparseMapper {
     int resets = 0;
   };
 
+  double MedianParallax_rad() const;
   void ResetMap();
   void InitializeFrom(const TrackedImage& image, MappedFrame& mapped);
   void MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped);

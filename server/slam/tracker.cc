@@ -12,7 +12,7 @@ namespace {
 constexpr int kMinFeatures = 50;
 constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
-constexpr int kInliersWithoutPatches = 250;
+constexpr int kInliersWithoutPatches = 150;
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
@@ -38,9 +38,28 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
   if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame));
-  auto features = MakeFrameFeatures(*frame, extractor_.ExtractScene(*frame), map_ ? map_->lens : RadialCorrection{});
-  if (!HasMap() || pending_map_) return Initialize(std::move(frame), std::move(features));
-  return TrackByImage(std::move(frame), std::move(features));
+  auto features = MakeFrameFeatures(*frame, RemoveFixed(*frame, extractor_.ExtractScene(*frame)),
+                                    map_ ? map_->lens : RadialCorrection{});
+  const bool has_map = HasMap() && !pending_map_;
+  TrackedImage image =
+      has_map ? TrackByImage(std::move(frame), std::move(features)) : Initialize(std::move(frame), std::move(features));
+  image.fixed_px = fixed_px_;
+  return image;
+}
+
+std::vector<Feature> Tracker::RemoveFixed(const Frame& frame, std::vector<Feature> features) {
+  const std::vector<uint8_t> is_fixed = fixed_features_.Find(frame.camera, features);
+  fixed_px_.clear();
+  std::vector<Feature> moving;
+  moving.reserve(features.size());
+  for (size_t i = 0; i < features.size(); ++i) {
+    if (is_fixed[i] != 0) {
+      fixed_px_.push_back(features[i].pixel_px);
+    } else {
+      moving.push_back(features[i]);
+    }
+  }
+  return moving;
 }
 
 // ------------------------------------------------------------------------------------------------ the local map
@@ -117,7 +136,7 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   last_points_.clear();
   if (!image.pose_given) AnchorToReference(image.tracked);
   if (!image.tracked.is_keyframe) return image;
-  image.features = MakeFrameFeatures(*frame, extractor_.Extract(*frame));
+  image.features = MakeFrameFeatures(*frame, RemoveFixed(*frame, extractor_.Extract(*frame)));
   image.points.resize(image.features->size());
   ++keyframes_sent_;
   return image;

@@ -8,6 +8,7 @@
 
 #include "common/stage_messages.h"
 #include "server/slam/features/feature_extractor.h"
+#include "server/slam/fixed_features.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/given_pose_tracker.h"
 #include "server/slam/keyframe_selector.h"
@@ -24,6 +25,7 @@ namespace romap::slam {
 struct TrackedImage {
   TrackedFrame tracked;
   std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is not a keyframe
+  std::vector<Eigen::Vector2f> fixed_px = {};          // features that are fixed to the camera, not in `features`
   std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
@@ -60,6 +62,7 @@ class Tracker {
   bool HasMap() const { return map_ && !map_->points.empty(); }
   bool ShouldUseGivenPose(const Frame& frame) const;
 
+  std::vector<Feature> RemoveFixed(const Frame& frame, std::vector<Feature> features);
   TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
@@ -78,6 +81,8 @@ class Tracker {
   const LocalMapSlot* const slot_;
 
   FeatureExtractor extractor_;
+  FixedFeatures fixed_features_;
+  std::vector<Eigen::Vector2f> fixed_px_;  // in the newest frame
   GivenPoseTracker given_;
   MonocularInitializer monocular_initializer_;
   KeyframeSelector selector_;

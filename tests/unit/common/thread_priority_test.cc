@@ -14,11 +14,11 @@ TEST(ThreadPriorityTest, LowersOnlyTheCallingThread) {
   const int before = Niceness();
   int inside = before;
   std::thread thread([&] {
-    LowerThreadPriority();
+    LowerThreadPriority(3);
     inside = Niceness();
   });
   thread.join();
-  EXPECT_GT(inside, before);
+  EXPECT_EQ(inside, before + 3);
   EXPECT_EQ(Niceness(), before);
 }
 

@@ -23,9 +23,8 @@ class PipelineTest : public PipelineFixture {
   }
 
   void Process(SessionInput input) {
-    const auto accepted = pipeline_.Accept({std::move(input), std::chrono::steady_clock::now()});
-    if (!accepted) return;
-    pipeline_.Process(*accepted, [this](MappingStep step) { steps_.push_back(std::move(step)); });
+    pipeline_.Process(pipeline_.Check({std::move(input), std::chrono::steady_clock::now()}),
+                      [this](MappingStep step) { steps_.push_back(std::move(step)); });
   }
   std::optional<FrameAck> NextAck() {
     while (const auto event = outbox_->Next(kNoWait)) {

@@ -50,7 +50,7 @@ class SchedulerTest : public PipelineFixture {
   std::unique_ptr<Scheduler> scheduler_;  // last: its threads use all of the above
 };
 
-TEST_F(SchedulerTest, TwoThreadsProcessAllFramesInOrder) { ExpectAllFramesProcessed(/*single_thread=*/false); }
+TEST_F(SchedulerTest, ThreadsProcessAllFramesInOrder) { ExpectAllFramesProcessed(/*single_thread=*/false); }
 
 TEST_F(SchedulerTest, OneThreadProcessesAllFramesInOrder) { ExpectAllFramesProcessed(/*single_thread=*/true); }
 

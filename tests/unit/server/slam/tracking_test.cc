@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <memory>
@@ -138,6 +139,39 @@ TEST_F(TrackingTest, TracksFromImagesAlone) {
   const auto [worst, scale] = Error();
   EXPECT_LT(worst, 0.02);  // for a path of two units
   EXPECT_GT(map().keyframe_count(), 5U);
+}
+
+// 3.4 degrees a frame, as at 25 frames per second on a busy machine: every result of mapping is two frames late.
+TEST_F(TrackingTest, TracksAFastCameraWhileMappingIsLate) {
+  mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kAllAdjustment);
+  std::deque<TrackedImage> waiting;
+  int initializing = 0;
+  int lost = 0;
+  for (int i = 0; i < 50; ++i) {
+    waiting.push_back(tracker_->Track(world_.Render(static_cast<uint64_t>(i + 1), Pose(3 * i))));
+    const TrackedImage& image = waiting.back();
+    initializing += image.tracked.state == TrackingState::kInitializing ? 1 : 0;
+    lost += image.tracked.state == TrackingState::kLost ? 1 : 0;
+    if (waiting.size() < 3) continue;
+    mapper_->Process(waiting.front());
+    waiting.pop_front();
+  }
+  EXPECT_EQ(lost, 0);
+  EXPECT_LE(initializing, 8);
+}
+
+TEST_F(TrackingTest, WarnsWhileTheTranslationIsTooSmallToMeasureDistances) {
+  const auto warns = [&] {
+    const std::vector<SessionWarning> warnings = mapper_->Warnings();
+    return std::any_of(warnings.begin(), warnings.end(),
+                       [](const SessionWarning& warning) { return warning.name == "translation_unobservable"; });
+  };
+  EXPECT_FALSE(warns()) << "there is no map";
+  const int first = ProcessFrames(4);
+  ASSERT_LT(first, 4);
+  EXPECT_TRUE(warns()) << "the first two views are about two degrees apart";
+  for (int i = 4; i < 20; ++i) ProcessFrame(Render(i));
+  EXPECT_FALSE(warns());
 }
 
 TEST_F(TrackingTest, StaticCameraReportsTooLittleParallax) {
