@@ -72,8 +72,8 @@ class Pipeline {
   // For a training pool without threads: trains for at most `count` slices.
   void TrainSlices(int count);
 
-  // Makes bundle adjustment stop early while keyframes are waiting. Thread-safe.
-  void RequestEarlyStop(bool keyframes_wait) { sparse_mapper_.RequestEarlyStop(keyframes_wait); }
+  // Live: whether keyframes wait to be mapped. Thread-safe.
+  void SetKeyframesWait(bool wait) { sparse_mapper_.SetKeyframesWait(wait); }
 
   nerf::TrainingPool::Progress TrainingProgress() const { return pool_->GetProgress(pool_session_); }
 

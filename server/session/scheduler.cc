@@ -135,7 +135,7 @@ void Scheduler::ExecuteReplay(MappingStep step) {
 }
 
 void Scheduler::ExecuteLive(MappingStep step) {
-  if (step.is_keyframe) pipeline_->RequestEarlyStop(++keyframes_waiting_ > 0);
+  if (step.is_keyframe) pipeline_->SetKeyframesWait(++keyframes_waiting_ > 0);
   // An older lost frame would be relocalized too late.
   if (step.relocalizes && lost_frames_waiting_ > 0) return ledger_->SkipMapping();
   if (step.relocalizes) ++lost_frames_waiting_;
@@ -152,7 +152,7 @@ void Scheduler::ExecuteLive(MappingStep step) {
 }
 
 void Scheduler::RunStep(const MappingStep& step) {
-  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->RequestEarlyStop(--keyframes_waiting_ > 0);
+  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->SetKeyframesWait(--keyframes_waiting_ > 0);
   if (mode_ == FrameMode::kLive && step.relocalizes) --lost_frames_waiting_;
   if (!stopping_) step.run();
   if (mode_ == FrameMode::kReplay && step.changes_local_map) {

@@ -1,6 +1,7 @@
 #include "server/slam/local_adjuster.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/thread_priority.h"
 
@@ -47,12 +48,8 @@ void LocalAdjuster::StartWaiting(const SlamMap& map) {
   running_ = std::exchange(waiting_, {});
   const MapKeyframe* newest = map.FindKeyframe(running_);
   if (newest == nullptr) return;  // it was redundant
-  // On the calling thread, at least every second adjustment runs to completion.
-  const std::atomic<bool>* early_stop = run_inline_ && !last_was_stopped_ ? &stop_ : nullptr;
-  const auto solve = [early_stop](BundleProblem& problem, const std::atomic<bool>& abort) {
-    return AdjustBundle(
-        problem,
-        {.max_iterations = kMaxLocalIterations, .dense = true, .abort = early_stop != nullptr ? early_stop : &abort});
+  const auto solve = [](BundleProblem& problem, const std::atomic<bool>& abort) {
+    return AdjustBundle(problem, {.max_iterations = kMaxLocalIterations, .dense = true, .abort = &abort});
   };
   run_ =
       std::make_unique<AdjustmentRun>(WindowProblem(map, *newest, config_), solve, run_inline_, kLocalAdjustmentNice);
@@ -63,7 +60,6 @@ bool LocalAdjuster::Finish(SlamMap& map) {
   if (!run_) return false;
   const bool usable = run_->summary().usable;
   if (usable) ApplyWindow(run_->TakeSolution(), map);
-  last_was_stopped_ = run_->summary().aborted;
   ++times_.runs;
   times_.total_s += run_->time_s();
   times_.longest_s = std::max(times_.longest_s, run_->time_s());

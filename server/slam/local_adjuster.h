@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <memory>
 
 #include "server/slam/adjustment_run.h"
@@ -10,7 +9,7 @@
 namespace romap::slam {
 
 // Local bundle adjustment around each new keyframe. In the background, a copy is adjusted while the map grows, so that
-// new keyframes and their points need not wait for it. Not thread-safe, except RequestEarlyStop().
+// new keyframes and their points need not wait for it. Not thread-safe.
 class LocalAdjuster {
  public:
   // `run_inline`: every adjustment is finished when Adjust() returns.
@@ -28,10 +27,6 @@ class LocalAdjuster {
   // Forgets everything about the map.
   void Reset();
 
-  // From any thread: `stop` ends adjustments on the calling thread early, but never two in a row.
-  void RequestEarlyStop(bool stop) { stop_ = stop; }
-  bool is_stop_requested() const { return stop_; }
-
   struct Times {
     int runs = 0;
     double total_s = 0;
@@ -45,8 +40,6 @@ class LocalAdjuster {
 
   const SlamConfig config_;
   const bool run_inline_;
-  std::atomic<bool> stop_ = false;
-  bool last_was_stopped_ = false;
   std::unique_ptr<AdjustmentRun> run_;  // null: none is pending
   AbortedRuns aborted_;
   KeyframeId running_;  // the keyframe of `run_`

@@ -85,6 +85,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   } else if (image.tracked.state == TrackingState::kLost && is_of_current_map) {
     HandleLostFrame(image, mapped);
   }
+  current_->ignores_poses |= image.pose_ignored;
   ReportCorrections(was_adjusted, mapped);
   return mapped;
 }
@@ -124,6 +125,12 @@ std::vector<SessionWarning> SparseMapper::Warnings() const {
                             "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
                             "the translation are not known; move the camera sideways, or send depth images",
                             parallax_rad / kRadPerDeg, kMinMedianParallax_rad / kRadPerDeg)});
+  }
+  if (current_->ignores_poses) {
+    warnings.push_back({.name = "poses_ignored",
+                        .text =
+                            "t_world_camera is ignored: the map was started from images before the first given pose, "
+                            "and has its own world; give poses from the first frame on"});
   }
   return warnings;
 }
@@ -256,7 +263,7 @@ void SparseMapper::CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyf
     current_->refiner.Refine(*image.tracked.frame, keyframe, map);
     current_->unsearched.emplace_back(keyframe.id, image.tracked.frame);
     // The search takes as long as all other steps.
-    SearchPoints(local_adjuster_.is_stop_requested() ? kMaxPostponed : 0);
+    SearchPoints(keyframes_wait_ ? kMaxPostponed : 0);
   }
   CullPoints(config_, map);
   if (!keyframe.pose_given) {
@@ -286,7 +293,7 @@ void SparseMapper::SearchPoints(size_t keyframes_to_leave) {
 
 // Live, while no keyframe waits: one piece of the work that was postponed. Returns whether the map changed.
 bool SparseMapper::DoPostponedWork() {
-  if (local_adjuster_.is_stop_requested()) return false;
+  if (keyframes_wait_) return false;
   if (current_->unsearched.empty()) return CheckNextLoop();
   SearchPoints(current_->unsearched.size() - 1);
   return true;

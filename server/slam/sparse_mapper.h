@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <deque>
 #include <memory>
@@ -35,7 +36,7 @@ struct MappedFrame {
 
 // The mapping half of slam: builds the sparse map from tracked frames, keeps it consistent (local and global bundle
 // adjustment, loop closing, gravity), relocalizes a lost camera, and publishes the part of the map around the camera
-// for tracking. Not thread-safe, except RequestEarlyStop().
+// for tracking. Not thread-safe, except SetKeyframesWait().
 //
 // The labels of a point's observations, one per keyframe that observes it, indicate which object it lies on. Single
 // labels are not reliable: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without
@@ -59,8 +60,8 @@ class SparseMapper {
   void ObserveMasks(const FrameMasks& masks);
   // Call after the last frame. Runs a final global adjustment and returns the resulting correction.
   MapCorrection Finish();
-  // From any thread: `stop` makes local bundle adjustment end early, because keyframes are waiting.
-  void RequestEarlyStop(bool stop) { local_adjuster_.RequestEarlyStop(stop); }
+  // From any thread, live: whether keyframes wait to be mapped. Work that is not urgent is postponed meanwhile.
+  void SetKeyframesWait(bool wait) { keyframes_wait_ = wait; }
 
   size_t points() const { return current_->map.points().size(); }
   // What the client should know about the accuracy of the map. Empty while there is no map.
@@ -87,6 +88,7 @@ class SparseMapper {
     std::deque<KeyframeId> unchecked = {};                                            // for loops
     std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
     bool world_is_given = false;      // the client's poses, given or as priors, define the world
+    bool ignores_poses = false;       // the client's poses began after the map
     bool has_depth_scale = false;     // depth images define the scale
     uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
     int frames_lost = 0;              // in a row
@@ -126,6 +128,7 @@ class SparseMapper {
 
   const SlamConfig config_;
   const Background background_;
+  std::atomic<bool> keyframes_wait_ = false;
   LocalMapSlot* const slot_;
   KeyframeBuilder keyframe_builder_;
   LocalAdjuster local_adjuster_;

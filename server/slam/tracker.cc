@@ -41,9 +41,11 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   auto features = MakeFrameFeatures(*frame, RemoveFixed(*frame, extractor_.ExtractScene(*frame)),
                                     map_ ? map_->lens : RadialCorrection{});
   const bool has_map = HasMap() && !pending_map_;
+  const bool has_pose = frame->T_world_camera.has_value();
   TrackedImage image =
       has_map ? TrackByImage(std::move(frame), std::move(features)) : Initialize(std::move(frame), std::move(features));
   image.fixed_px = fixed_px_;
+  image.pose_ignored = has_pose && pose_use_ != PoseUse::kIgnore && has_map && !world_is_given_;
   return image;
 }
 

@@ -29,6 +29,7 @@ struct TrackedImage {
   std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
+  bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
 };
 

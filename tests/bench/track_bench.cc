@@ -215,7 +215,7 @@ class Run {
     }
     if (options_.one_thread) return Map(image);
     const bool is_keyframe = image.tracked.is_keyframe;
-    if (is_keyframe) mapper_.RequestEarlyStop(++waiting_ > 0);
+    if (is_keyframe) mapper_.SetKeyframesWait(++waiting_ > 0);
     // As a live session: tracking waits for nothing, and mapping omits frames that are no keyframes when it is late.
     if (options_.fps == 0) {
       queue_.Push(std::move(image));
@@ -225,7 +225,7 @@ class Run {
   }
 
   void Map(const slam::TrackedImage& image) {
-    if (image.tracked.is_keyframe) mapper_.RequestEarlyStop(--waiting_ > 0);
+    if (image.tracked.is_keyframe) mapper_.SetKeyframesWait(--waiting_ > 0);
     const Clock::time_point begin = Clock::now();
     const slam::MappedFrame mapped = mapper_.Process(image);
     if (mapped.was_reset) ++resets_;

@@ -8,6 +8,7 @@
 #include <deque>
 #include <memory>
 #include <numbers>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -68,6 +69,12 @@ class TrackingTest : public ::testing::Test {
       }
     }
     return initializing;
+  }
+
+  bool HasWarning(const std::string& name) const {
+    const std::vector<SessionWarning> warnings = mapper_->Warnings();
+    return std::any_of(warnings.begin(), warnings.end(),
+                       [&](const SessionWarning& warning) { return warning.name == name; });
   }
 
   struct TrackedPose {
@@ -161,17 +168,30 @@ TEST_F(TrackingTest, TracksAFastCameraWhileMappingIsLate) {
 }
 
 TEST_F(TrackingTest, WarnsWhileTheTranslationIsTooSmallToMeasureDistances) {
-  const auto warns = [&] {
-    const std::vector<SessionWarning> warnings = mapper_->Warnings();
-    return std::any_of(warnings.begin(), warnings.end(),
-                       [](const SessionWarning& warning) { return warning.name == "translation_unobservable"; });
-  };
+  const auto warns = [&] { return HasWarning("translation_unobservable"); };
   EXPECT_FALSE(warns()) << "there is no map";
   const int first = ProcessFrames(4);
   ASSERT_LT(first, 4);
   EXPECT_TRUE(warns()) << "the first two views are about two degrees apart";
   for (int i = 4; i < 20; ++i) ProcessFrame(Render(i));
   EXPECT_FALSE(warns());
+}
+
+TEST_F(TrackingTest, WarnsThatPosesAfterAStartFromImagesAreIgnored) {
+  Restart(PoseUse::kGiven);
+  const auto without_pose = [&](int i) {
+    auto frame = Render(i);
+    frame->T_world_camera.reset();
+    return frame;
+  };
+  for (int i = 0; i < 10; ++i) {
+    const TrackedImage image = tracker_->Track(without_pose(i));
+    mapper_->Process(image);
+  }
+  ASSERT_GT(mapper_->points(), 0U);
+  EXPECT_FALSE(HasWarning("poses_ignored"));
+  EXPECT_EQ(ProcessFrame(Render(10)), TrackingState::kTracking);
+  EXPECT_TRUE(HasWarning("poses_ignored"));
 }
 
 TEST_F(TrackingTest, StaticCameraReportsTooLittleParallax) {
