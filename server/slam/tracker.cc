@@ -13,6 +13,7 @@ constexpr int kMinFeatures = 50;
 constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
 constexpr int kInliersWithoutPatches = 150;
+constexpr size_t kFewLastPoints = 150;
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
@@ -217,7 +218,9 @@ std::optional<PoseFromPoints> Tracker::FindFirstPose(const Frame& frame, const L
   if (!is_lost) first = tracking.TrackByProjection(last_points_, start, kFollowRadius_px);
   if (!first) first = tracking.TrackByProjection(last_points_, start, kReferenceRadius_px);
   if (!first && !is_lost) first = tracking.TrackLoosely(start, kFollowRadius_px);
-  if (!first) first = tracking.TrackByDescriptors(is_lost ? std::vector<MapPointId>() : last_points_);
+  if (!first && !is_lost) first = tracking.TrackLoosely(start, kReferenceRadius_px);
+  const bool has_few = is_lost || last_points_.size() < kFewLastPoints;
+  if (!first) first = tracking.TrackByDescriptors(has_few ? std::vector<MapPointId>() : last_points_);
   return first;
 }
 
