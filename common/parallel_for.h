@@ -12,7 +12,7 @@ namespace romap {
 //
 // The distribution's oneTBB is built without ThreadSanitizer, which then sees neither the start nor the end of a loop.
 // The two atomic variables order the caller's writes before the bodies, and the bodies' writes before the return, in a
-// way that it does see; they cost nothing beside a piece of work worth a task.
+// way that it does see; their time is negligible beside that of a task.
 
 // Calls body(begin, end) for disjoint ranges that together are [0, count), of about `grain` elements or more.
 template <class Body>

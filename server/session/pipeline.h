@@ -62,7 +62,7 @@ class Pipeline {
   // Decodes, checks and records a frame or late masks.
   CheckedInput Check(Arrival arrival);
   // Processes a checked input, or rejects it. `execute` is called at most once, before Process() returns: not at all
-  // for an input that is rejected. The client is told about all inputs in their order.
+  // for an input that is rejected. Acknowledgments and rejections keep the order of the inputs.
   void Process(const CheckedInput& input, const MappingExecutor& execute);
 
   // Call on the mapping thread after the last step. Publishes the last corrections and cuboids, and lets the fields

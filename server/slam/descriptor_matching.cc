@@ -1,6 +1,8 @@
 #include "server/slam/descriptor_matching.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdlib>
 #include <limits>
 
 namespace romap::slam {
@@ -77,6 +79,22 @@ std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first,
     matches.push_back({static_cast<int>(i), best.index, best.distance});
   }
   return matches;
+}
+
+NearestFeature FindNearest(const Feature& feature, std::span<const Feature> others, std::span<const int> candidates,
+                           int max_octave_difference) {
+  NearestFeature nearest;
+  for (const int index : candidates) {
+    const Feature& other = others[static_cast<size_t>(index)];
+    if (std::abs(other.octave - feature.octave) > max_octave_difference) continue;
+    const int distance = HammingDistance(feature.descriptor, other.descriptor);
+    if (distance < nearest.distance) {
+      nearest = {.index = index, .distance = distance, .second_distance = nearest.distance};
+    } else {
+      nearest.second_distance = std::min(nearest.second_distance, distance);
+    }
+  }
+  return nearest;
 }
 
 }  // namespace romap::slam

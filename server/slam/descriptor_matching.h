@@ -19,4 +19,19 @@ struct DescriptorMatch {
 std::vector<DescriptorMatch> MatchDescriptors(std::span<const Descriptor> first, std::span<const Descriptor> second,
                                               int max_distance, double ratio);
 
+// The feature with the most similar descriptor, and the distance to the second most similar one.
+struct NearestFeature {
+  int index = -1;  // -1: no candidate
+  int distance = 256;
+  int second_distance = 256;
+
+  bool IsDistinct(int max_distance, double ratio) const {
+    return index >= 0 && distance <= max_distance && distance <= ratio * second_distance;
+  }
+};
+
+// Searches `others` at the indices `candidates`, up to `max_octave_difference` octaves above or below the feature's.
+NearestFeature FindNearest(const Feature& feature, std::span<const Feature> others, std::span<const int> candidates,
+                           int max_octave_difference);
+
 }  // namespace romap::slam

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/statistics.h"
+#include "server/slam/descriptor_matching.h"
 
 namespace romap::slam {
 namespace {
@@ -36,26 +37,13 @@ bool Stays(const Feature& feature, const std::vector<Feature>& others, const Fea
   });
 }
 
-// Distance to the feature that looks most similar and unlike all others around; nullopt if there is none.
+// Distance to the feature with the most similar descriptor around; nullopt if that is not distinct.
 std::optional<double> Motion_px(const Feature& feature, const std::vector<Feature>& others, const FeatureGrid& grid,
                                 double radius_px, std::vector<int>& near) {
   grid.Near(feature.pixel_px.cast<double>(), radius_px, near);
-  int best = -1;
-  int best_distance = 256;
-  int second_distance = 256;
-  for (const int index : near) {
-    const int distance = HammingDistance(others[static_cast<size_t>(index)].descriptor, feature.descriptor);
-    if (distance < best_distance) {
-      second_distance = std::exchange(best_distance, distance);
-      best = index;
-    } else {
-      second_distance = std::min(second_distance, distance);
-    }
-  }
-  if (best < 0 || best_distance > kMaxStayDistance || best_distance > kMotionRatio * second_distance) {
-    return std::nullopt;
-  }
-  return (others[static_cast<size_t>(best)].pixel_px - feature.pixel_px).norm();
+  const NearestFeature nearest = FindNearest(feature, others, near, kOctaves);
+  if (!nearest.IsDistinct(kMaxStayDistance, kMotionRatio)) return std::nullopt;
+  return (others[static_cast<size_t>(nearest.index)].pixel_px - feature.pixel_px).norm();
 }
 
 }  // namespace

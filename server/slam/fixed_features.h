@@ -11,7 +11,7 @@
 namespace romap::slam {
 
 // Finds features that are fixed to the camera, such as those on a gripper, a hand or an overlay. They stay at their
-// pixels while most of the image moves, and would look like points that move with the camera. Features of a static
+// pixels while most of the image moves, and would be triangulated as points that move with it. Features of a static
 // camera stay too, so a feature counts as fixed only if it stayed while the scene moved several times.
 class FixedFeatures {
  public:

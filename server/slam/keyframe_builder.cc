@@ -14,7 +14,7 @@ namespace {
 constexpr int kFewPoints = 100;  // with fewer known points in a keyframe, tracking may fail soon
 
 constexpr size_t kFirstKeyframes = 2;
-constexpr float kFixedRadius_px = 12;  // around features that are fixed to the camera: on the same thing
+constexpr float kFixedRadius_px = 12;  // around features that are fixed to the camera: of the same object
 
 void RefreshPoints(const MapKeyframe& keyframe, SlamMap& map) {
   for (const MapPointId id : keyframe.points) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/statistics.h"
+#include "server/slam/descriptor_matching.h"
 
 namespace romap::slam {
 namespace {
@@ -42,25 +43,11 @@ void MonocularInitializer::Follow(const FrameFeatures& frame, FollowedView& view
     const Feature& feature = view.frame->features[i];
     if (feature.octave > kMaxOctave) continue;
     frame.grid.Near(view.latest_px[i], radius_px, near);
-    int best = -1;
-    int best_distance = 256;
-    int second_distance = 256;
-    for (const int index : near) {
-      const Feature& other = frame.features[static_cast<size_t>(index)];
-      if (std::abs(other.octave - feature.octave) > 1) continue;
-      const int distance = HammingDistance(feature.descriptor, other.descriptor);
-      if (distance < best_distance) {
-        second_distance = best_distance;
-        best_distance = distance;
-        best = index;
-      } else {
-        second_distance = std::min(second_distance, distance);
-      }
-    }
-    if (best < 0 || best_distance > kMaxStartDistance || best_distance > kStartRatio * second_distance) continue;
-    const auto k = static_cast<size_t>(best);
-    if (best_distance >= distance_of[k]) continue;
-    distance_of[k] = best_distance;
+    const NearestFeature nearest = FindNearest(feature, frame.features, near, /*max_octave_difference=*/1);
+    if (!nearest.IsDistinct(kMaxStartDistance, kStartRatio)) continue;
+    const auto k = static_cast<size_t>(nearest.index);
+    if (nearest.distance >= distance_of[k]) continue;
+    distance_of[k] = nearest.distance;
     first_of[k] = static_cast<int>(i);
   }
   view.matches.clear();
