@@ -22,7 +22,7 @@ constexpr size_t kMaxKeyframesToReset = 6;
 constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
-constexpr double kMinMedianParallax_rad = 3 * kRadPerDeg;
+constexpr double kMinParallax_rad = 3 * kRadPerDeg;
 constexpr size_t kMaxPostponed = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
@@ -117,14 +117,14 @@ MapCorrection SparseMapper::Finish() {
 std::vector<SessionWarning> SparseMapper::Warnings() const {
   if (current_->world_is_given || current_->map.keyframes().empty()) return {};
   std::vector<SessionWarning> warnings = current_->up.Warnings();
-  const double parallax_rad = MedianParallax_rad();
-  if (!current_->has_depth_scale && parallax_rad < kMinMedianParallax_rad) {
+  const double parallax_rad = current_->parallax_rad;
+  if (!current_->has_depth_scale && parallax_rad < kMinParallax_rad) {
     warnings.push_back({.name = "translation_unobservable",
                         .text = fmt::format(
-                            "the camera has rotated with hardly any translation: half of the map points were seen from "
+                            "the camera has rotated with hardly any translation: most of the map points were seen from "
                             "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
                             "the translation are not known; move the camera sideways, or send depth images",
-                            parallax_rad / kRadPerDeg, kMinMedianParallax_rad / kRadPerDeg)});
+                            parallax_rad / kRadPerDeg, kMinParallax_rad / kRadPerDeg)});
   }
   if (current_->ignores_poses) {
     warnings.push_back({.name = "poses_ignored",
@@ -135,15 +135,12 @@ std::vector<SessionWarning> SparseMapper::Warnings() const {
   return warnings;
 }
 
-// Over the points that the newest keyframe observes.
-double SparseMapper::MedianParallax_rad() const {
-  const MapKeyframe* newest = current_->map.FindKeyframe(current_->newest);
-  if (newest == nullptr) return 0;
+// The parallax that a quarter of the map points exceed. A camera that moves forward sees most points from similar
+// directions, but passes some at the side.
+double SparseMapper::UpperParallax_rad() const {
   std::vector<double> parallaxes_rad;
-  for (const MapPointId id : newest->points) {
-    if (id) parallaxes_rad.push_back(current_->map.FindPoint(id)->point.max_parallax_rad);
-  }
-  return parallaxes_rad.empty() ? 0 : Median(std::move(parallaxes_rad));
+  for (const auto& [id, track] : current_->map.points()) parallaxes_rad.push_back(track.point.max_parallax_rad);
+  return parallaxes_rad.empty() ? 0 : Quantile(std::move(parallaxes_rad), 0.75);
 }
 
 // ------------------------------------------------------------------------------------------------ steps of Process
@@ -221,6 +218,7 @@ void SparseMapper::ReportCorrections(bool map_moved, MappedFrame& mapped) {
     if (!correction.keyframes.empty() || !correction.points.empty()) mapped.correction = std::move(correction);
   }
   if (mapped.view) {
+    current_->parallax_rad = UpperParallax_rad();
     current_->corrections.Record(*mapped.view, current_->map.FindKeyframe(mapped.view->id)->scale);
   }
 }

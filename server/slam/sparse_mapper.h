@@ -91,6 +91,7 @@ class SparseMapper {
     bool ignores_poses = false;       // the client's poses began after the map
     bool has_depth_scale = false;     // depth images define the scale
     uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
+    double parallax_rad = 0;          // see UpperParallax_rad(); as of the newest keyframe
     int frames_lost = 0;              // in a row
   };
 
@@ -103,7 +104,7 @@ class SparseMapper {
     int resets = 0;
   };
 
-  double MedianParallax_rad() const;
+  double UpperParallax_rad() const;
   void ResetMap();
   void InitializeFrom(const TrackedImage& image, MappedFrame& mapped);
   void MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped);
