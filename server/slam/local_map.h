@@ -21,7 +21,7 @@ namespace romap::slam {
 
 // The data needed to find a map point in a frame.
 struct LocalPoint {
-  MapPointId id;
+  MapPointId id;  // 0: a tentative point (tentative_points.h)
   Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction_world = Eigen::Vector3d::UnitZ();  // unit length, mean of its rays
   double size_mu = 0;                                          // of one pixel of its octave, at the point

@@ -104,6 +104,9 @@ std::optional<PoseFromPoints> LocalMapTracking::TrackAllPoints(const PoseFromPoi
     if (is_point_matched[p] != 0) continue;
     const auto found = matcher.Find(map_.points[p], search, is_feature_matched);
     if (!found || found->distance >= distance_of[static_cast<size_t>(found->feature)]) continue;
+    // Map points are more accurate than tentative ones.
+    const bool is_tentative = !map_.points[p].id;
+    if (is_tentative && point_of_feature[static_cast<size_t>(found->feature)] >= 0) continue;
     distance_of[static_cast<size_t>(found->feature)] = found->distance;
     point_of_feature[static_cast<size_t>(found->feature)] = static_cast<int>(p);
   }

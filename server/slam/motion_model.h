@@ -13,6 +13,7 @@ class MotionModel {
  public:
   // Discards the last pose and the motion.
   void Reset();
+  bool HasMotion() const { return motion_.has_value(); }
   // Discards the motion, but keeps the last pose.
   void ResetMotion() { motion_.reset(); }
   // Records a tracked frame. `prior`: the client's pose of it, if any. `is_continuous`: the motion since the last frame
@@ -34,5 +35,9 @@ class MotionModel {
   std::optional<SE3<Camera, Camera>> motion_;  // T_previous_last
   double motion_duration_s_ = 0;               // duration of `motion_`
 };
+
+// Whether a pose is as close to its prediction by a known motion as the acceleration of a hand, a robot or a headset
+// between two frames allows. `depth_mu`: of the scene; the unit of length is arbitrary.
+bool IsPlausible(const SE3<World, Camera>& predicted, const SE3<World, Camera>& pose, double depth_mu);
 
 }  // namespace romap::slam

@@ -14,12 +14,13 @@ constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
 constexpr int kInliersWithoutPatches = 150;
 constexpr size_t kFewLastPoints = 150;
+constexpr size_t kManyLastPoints = 200;   // tracking needs no other points
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
 constexpr int kMinDepthsToInitialize = 150;
-constexpr int kFewInliers = 100;  // with fewer, the depth image would add many points
+constexpr int kFewInliers = 100;  // with fewer, a pose may be wrong, and the depth image would add many points
 // A map that is initialized with priors inherits their errors. Priors are used as poses until the map has enough points
 // and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
@@ -34,7 +35,8 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       extractor_(config),
       given_(config),
       monocular_initializer_(config),
-      selector_(config) {}
+      selector_(config),
+      tentative_points_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
@@ -72,6 +74,7 @@ void Tracker::TakeNewestMap() {
   if (!newest || newest == map_) return;
   const bool was_reset = !map_ || newest->generation != map_->generation;
   if (was_reset) {
+    tentative_points_.Reset();
     AdoptNewMap(*newest);
   } else if (!world_is_given_) {
     // The camera moves with the keyframe it was tracked against.
@@ -79,6 +82,7 @@ void Tracker::TakeNewestMap() {
     const auto after = newest->keyframes.find(map_->reference);
     if (before != map_->keyframes.end() && after != newest->keyframes.end()) {
       motion_.Correct(before->second, after->second);
+      tentative_points_.Correct(before->second, after->second);
     }
   }
   map_ = newest;
@@ -189,13 +193,25 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
     MarkLost(fmt::format("too little texture: {} features, {} needed", features->size(), kMinFeatures), image);
     return image;
   }
-  const LocalMapTracking tracking(*map_, *features, config_);
+  const std::shared_ptr<const LocalMap> local_map = MapForNextFrame();
+  const LocalMapTracking tracking(*local_map, *features, config_);
   if (const std::optional<PoseFromPoints> pose = FindPose(*frame, tracking)) {
-    Accept(*pose, tracking, image);
+    Accept(*pose, *local_map, tracking, image);
   } else {
     MarkLost("too few map points matched", image);
   }
   return image;
+}
+
+// The newest local map, with tentative points while few points were matched or keyframes wait to be mapped.
+std::shared_ptr<const LocalMap> Tracker::MapForNextFrame() const {
+  const bool keyframes_wait = keyframes_sent_ > map_->keyframes_done;
+  if (last_points_.size() >= kManyLastPoints && !keyframes_wait) return map_;
+  const std::vector<LocalPoint> tentative = tentative_points_.Make();
+  if (tentative.empty()) return map_;
+  auto extended = std::make_shared<LocalMap>(*map_);
+  extended->points.insert(extended->points.end(), tentative.begin(), tentative.end());
+  return extended;
 }
 
 std::optional<PoseFromPoints> Tracker::FindPose(const Frame& frame, const LocalMapTracking& tracking) const {
@@ -234,13 +250,19 @@ std::optional<PoseFromPoints> Tracker::ConfirmByAllPoints(const Frame& frame, co
   }
   if (!pose || pose->inliers < (status_.NeedsConfirmation() ? kMinInliersToConfirm : kMinInliers)) return std::nullopt;
   if (motion_.last_pose() && status_.IsTracking()) {
+    const double depth_mu = tracking.MedianDepth_mu(*pose);
     const double step_mu = (pose->T_world_camera.translation() - motion_.last_pose()->translation()).norm();
-    if (step_mu > kMaxStepShare * tracking.MedianDepth_mu(*pose)) return std::nullopt;
+    if (step_mu > kMaxStepShare * depth_mu) return std::nullopt;
+    // Few points may agree on a wrong pose, but not on one that continues the motion.
+    const SE3<World, Camera> predicted = motion_.Predict(frame, /*use_prior=*/pose_use_ == PoseUse::kPrior);
+    const bool is_doubtful = pose->inliers < kFewInliers && motion_.HasMotion();
+    if (is_doubtful && !IsPlausible(predicted, pose->T_world_camera, depth_mu)) return std::nullopt;
   }
   return pose;
 }
 
-void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image) {
+void Tracker::Accept(const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
+                     TrackedImage& image) {
   const bool was_lost = status_.IsLost();
   const Frame& frame = *image.tracked.frame;
   image.tracked.state = status_.OnTracked();
@@ -248,18 +270,21 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& trackin
   AnchorToReference(image.tracked);
   motion_.Update(pose.T_world_camera, frame.T_world_camera, frame.timestamp_ns, /*is_continuous=*/!was_lost);
   last_points_.clear();
-  for (const int point : pose.point_of_feature) {
-    if (point >= 0) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
-  }
-  for (const int point : pose.points_by_patch) last_points_.push_back(map_->points[static_cast<size_t>(point)].id);
-  image.tracked.is_keyframe = DecideKeyframe(pose, tracking, image);
-  if (!image.tracked.is_keyframe) return;
-  ++keyframes_sent_;
-  image.points.resize(image.features->size());
+  image.points.assign(image.features->size(), {});
   for (size_t i = 0; i < image.points.size(); ++i) {
     const int point = pose.point_of_feature[i];
-    if (point >= 0) image.points[i] = map_->points[static_cast<size_t>(point)].id;
+    if (point < 0) continue;
+    image.points[i] = local_map.points[static_cast<size_t>(point)].id;
+    if (image.points[i]) last_points_.push_back(image.points[i]);
   }
+  const auto points_by_feature = static_cast<int>(last_points_.size());
+  for (const int point : pose.points_by_patch) {
+    last_points_.push_back(local_map.points[static_cast<size_t>(point)].id);
+  }
+  const double depth_mu = tracking.MedianDepth_mu(pose);
+  tentative_points_.Record(image.features, pose.T_world_camera, image.points, depth_mu);
+  image.tracked.is_keyframe = DecideKeyframe(image, depth_mu, points_by_feature);
+  if (image.tracked.is_keyframe) ++keyframes_sent_;
 }
 
 void Tracker::MarkLost(const std::string& why, TrackedImage& image) {
@@ -267,19 +292,19 @@ void Tracker::MarkLost(const std::string& why, TrackedImage& image) {
   image.tracked.state = TrackingState::kLost;
   image.tracked.reason = why;
   motion_.ResetMotion();
+  tentative_points_.Reset();
 }
 
-bool Tracker::DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image) {
+bool Tracker::DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature) {
   // The pose of a camera that was just relocalized may be wrong: do not extend the map with it yet.
   if (status_.frames_since_recovery() < 2 && map_->keyframes_done > 4) return false;
   const uint64_t waiting = keyframes_sent_ - std::min(keyframes_sent_, map_->keyframes_done);
   TrackingQuality quality;
-  quality.scene_depth_mu = tracking.MedianDepth_mu(pose);
-  quality.tracked_share = (pose.inliers - static_cast<int>(pose.points_by_patch.size())) /
-                          std::max(1.0, static_cast<double>(map_->reference_points));
+  quality.scene_depth_mu = depth_mu;
+  quality.tracked_share = points_by_feature / std::max(1.0, static_cast<double>(map_->reference_points));
   quality.keyframes_waiting = static_cast<int>(waiting);
-  quality.has_new_depth = image.features->HasDepth() && pose.inliers < kFewInliers;
-  return selector_.IsKeyframe(*image.tracked.frame, pose.T_world_camera, quality);
+  quality.has_new_depth = image.features->HasDepth() && last_points_.size() < kFewInliers;
+  return selector_.IsKeyframe(*image.tracked.frame, image.tracked.T_world_camera, quality);
 }
 
 void Tracker::AnchorToReference(TrackedFrame& tracked) const {

@@ -17,6 +17,7 @@
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
 #include "server/slam/slam_config.h"
+#include "server/slam/tentative_points.h"
 #include "server/slam/tracking_status.h"
 
 namespace romap::slam {
@@ -26,7 +27,7 @@ struct TrackedImage {
   TrackedFrame tracked;
   std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is not a keyframe
   std::vector<Eigen::Vector2f> fixed_px = {};          // features that are fixed to the camera, not in `features`
-  std::vector<MapPointId> points = {};                 // keyframes: per feature of `features`, 0 = none
+  std::vector<MapPointId> points = {};                 // tracked: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
@@ -68,13 +69,16 @@ class Tracker {
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
+  std::shared_ptr<const LocalMap> MapForNextFrame() const;
   std::optional<PoseFromPoints> FindPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> ConfirmByAllPoints(const Frame& frame, const PoseFromPoints& first,
                                                    const LocalMapTracking& tracking) const;
-  void Accept(const PoseFromPoints& pose, const LocalMapTracking& tracking, TrackedImage& image);
+  // `local_map`: that `pose` refers to.
+  void Accept(const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
+              TrackedImage& image);
   void MarkLost(const std::string& why, TrackedImage& image);
-  bool DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image);
+  bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
 
   const SlamConfig config_;
@@ -92,7 +96,8 @@ class Tracker {
   TrackingStatus status_;
   MotionModel motion_;
   std::vector<MapPointId> last_points_;  // matched in the last tracked frame
-  bool world_is_given_ = false;          // the client's poses define the world
+  TentativePoints tentative_points_;
+  bool world_is_given_ = false;  // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
   std::optional<PendingMap> pending_map_;
 };

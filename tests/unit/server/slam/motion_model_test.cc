@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 
+#include "common/angles.h"
+
 namespace romap::slam::motion_model_test {
 
 constexpr int64_t kInterval_ns = 40'000'000;
@@ -90,6 +92,17 @@ TEST_F(MotionModelTest, ResetDiscardsTheLastPose) {
   EXPECT_FALSE(model_.last_pose());
   model_.Correct({Pose(0, 0), 1}, {Pose(1, 1), 1});
   EXPECT_FALSE(model_.last_pose());
+}
+
+TEST(IsPlausible, LimitsTheDistanceFromThePrediction) {
+  const auto moved = [](double distance_mu, double angle_deg) {
+    return SE3<World, Camera>(Eigen::Quaterniond(Eigen::AngleAxisd(angle_deg * kRadPerDeg, Eigen::Vector3d::UnitY())),
+                              Eigen::Vector3d(0, distance_mu, 0));
+  };
+  EXPECT_TRUE(IsPlausible(moved(0, 0), moved(0.19, 7), /*depth_mu=*/2));
+  EXPECT_FALSE(IsPlausible(moved(0, 0), moved(0.21, 0), /*depth_mu=*/2));
+  EXPECT_FALSE(IsPlausible(moved(0, 0), moved(0, 9), /*depth_mu=*/2));
+  EXPECT_TRUE(IsPlausible(moved(5, 40), moved(5.1, 43), /*depth_mu=*/2));
 }
 
 }  // namespace romap::slam::motion_model_test

@@ -168,6 +168,25 @@ TEST_F(TrackingTest, TracksAFastCameraWhileMappingIsLate) {
   EXPECT_LE(initializing, 8);
 }
 
+// Mapping is stopped while the camera moves on by the width of its view: nothing that it sees then is in the map.
+TEST_F(TrackingTest, TracksNewTerritoryWhileMappingIsStopped) {
+  const auto render = [&](int i) {
+    const double x_mu = -1.7 + 0.08 * i;
+    return world_.Render(static_cast<uint64_t>(i + 1),
+                         TexturedWorld::LookAt({x_mu, -0.8 + 0.15 * std::sin(0.2 * i), 1}, {x_mu, 0, 0}));
+  };
+  int next = 0;
+  for (; next < 16; ++next) ProcessFrame(render(next));
+  std::deque<TrackedImage> waiting;
+  for (; next < 34; ++next) {
+    waiting.push_back(tracker_->Track(render(next)));
+    EXPECT_EQ(waiting.back().tracked.state, TrackingState::kTracking) << next;
+  }
+  for (const TrackedImage& image : waiting) mapper_->Process(image);
+  for (; next < 42; ++next) EXPECT_EQ(ProcessFrame(render(next)), TrackingState::kTracking) << next;
+  EXPECT_LT(Error().first, 0.06);  // after 3.3 units
+}
+
 // A part of the robot covers a third of the image and has most of the corners.
 TEST_F(TrackingTest, TracksBesideATexturedObjectFixedToTheCamera) {
   const cv::Rect area(0, 110, 210, 130);
