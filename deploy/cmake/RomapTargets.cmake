@@ -70,7 +70,7 @@ target_precompile_headers(romap_precompiled PRIVATE
 set(ROMAP_TEST_OPTIMIZATION -O1)
 set(ROMAP_TEST_TIMEOUT_s 300)
 if(ROMAP_SANITIZER)
-  set(ROMAP_TEST_TIMEOUT_s 1200)
+  set(ROMAP_TEST_TIMEOUT_s 2400)
 endif()
 if(ROMAP_BUILD_TESTS)
   find_package(GTest CONFIG REQUIRED)
@@ -118,10 +118,15 @@ function(romap_library name)
   endif()
 endfunction()
 
-# romap_tests(folder [LIBS targets...]): one GoogleTest program `<folder with _>_test` of all *_test.cc in the current
-# folder; every test case is a separate ctest, so that they run in parallel.
+# romap_tests(folder [SHARDS count] [MAY_SKIP filter] [LIBS targets...]): one GoogleTest program
+# `<folder with _>_test` of all *_test.cc in the current folder. It runs as `count` processes, each with its share of the
+# test cases, so that they run in parallel. A process per test case would spend more time on loading libraries than on
+# testing. Cases that may be skipped (a GoogleTest filter) are tests of their own, so that CTest shows it.
 function(romap_tests name)
-  cmake_parse_arguments(ARG "" "" "LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "SHARDS;MAY_SKIP" "LIBS" ${ARGN})
+  if(NOT ARG_SHARDS)
+    set(ARG_SHARDS 1)
+  endif()
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cc)
   if(NOT sources)
     return()
@@ -131,5 +136,15 @@ function(romap_tests name)
   set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${ROMAP_UNITY} UNITY_BUILD_BATCH_SIZE ${ROMAP_UNITY_SIZE})
   target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
   target_compile_options(${name}_test PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
-  gtest_discover_tests(${name}_test DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s})
+  foreach(shard RANGE 1 ${ARG_SHARDS})
+    math(EXPR index "${shard} - 1")
+    set(test ${name}_test.${shard}_of_${ARG_SHARDS})
+    add_test(NAME ${test} COMMAND ${name}_test --gtest_brief=1 --gtest_filter=-${ARG_MAY_SKIP})
+    set_tests_properties(${test} PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s}
+                         ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
+  endforeach()
+  if(ARG_MAY_SKIP)
+    gtest_discover_tests(${name}_test TEST_FILTER "${ARG_MAY_SKIP}" DISCOVERY_TIMEOUT 60
+                         PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s})
+  endif()
 endfunction()
