@@ -86,24 +86,21 @@ void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId refere
                            const SE3<Camera, Camera>& T_reference_camera) {
   std::lock_guard lock(mutex_);
   if (ack.accepted && ack.T_world_camera) {
-    if (reference) references_.try_emplace(reference, ScaledPose{*ack.T_world_camera * T_reference_camera.Inverse()});
-    trajectory_.push_back({ack, timestamp_ns, reference, T_reference_camera});
+    trajectory_.Add(ack.frame_id, timestamp_ns, *ack.T_world_camera, reference, T_reference_camera);
+    tracked_.push_back({ack, timestamp_ns});
   }
   Send(ack);
 }
 
-void MapState::Correct(const MapCorrection& correction) {
+void MapState::SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
+                           const SE3<World, Camera>& T_world_camera) {
   std::lock_guard lock(mutex_);
-  for (const KeyframeCorrection& keyframe : correction.keyframes) {
-    ScaledPose& reference = references_[keyframe.id];
-    reference.T_world_camera = keyframe.T_world_camera;
-    reference.scale *= keyframe.S_new_old.scale();
-  }
+  trajectory_.SetKeyframe(frame_id, timestamp_ns, keyframe, T_world_camera);
 }
 
-SE3<World, Camera> MapState::CurrentPose(const TrajectoryEntry& entry) const {
-  if (!entry.reference) return *entry.ack.T_world_camera;
-  return references_.at(entry.reference).Compose(entry.T_reference_camera);
+void MapState::Correct(const MapCorrection& correction) {
+  std::lock_guard lock(mutex_);
+  trajectory_.Correct(correction);
 }
 
 void MapState::Acknowledge(MasksAck ack) {
@@ -152,10 +149,11 @@ MapSnapshot MapState::Snapshot() const {
       snapshot.objects.push_back({entry.object, entry.mesh});
     }
   }
-  for (const TrajectoryEntry& entry : trajectory_) {
-    snapshot.trajectory.push_back(entry.ack);
-    snapshot.trajectory.back().T_world_camera = CurrentPose(entry);
-    snapshot.timestamps_ns.push_back(entry.timestamp_ns);
+  const std::vector<SE3<World, Camera>> poses = trajectory_.Poses();
+  for (size_t i = 0; i < tracked_.size(); ++i) {
+    snapshot.trajectory.push_back(tracked_[i].ack);
+    snapshot.trajectory.back().T_world_camera = poses[i];
+    snapshot.timestamps_ns.push_back(tracked_[i].timestamp_ns);
   }
   return snapshot;
 }

@@ -11,10 +11,10 @@
 
 #include "common/map_events.h"
 #include "common/mapping_service.h"
-#include "common/scaled_pose.h"
 #include "common/stage_messages.h"
 #include "server/session/mesh_pose.h"
 #include "server/session/outbox.h"
+#include "server/session/trajectory.h"
 
 namespace romap::session {
 
@@ -39,7 +39,10 @@ class MapState {
   // `reference`.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
                    const SE3<Camera, Camera>& T_reference_camera = {});
-  // Moves the frames of the trajectory with their corrected reference keyframes.
+  // A frame became a keyframe, with this pose.
+  void SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
+                   const SE3<World, Camera>& T_world_camera);
+  // Moves the frames of the trajectory with their corrected keyframes.
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
@@ -60,24 +63,21 @@ class MapState {
     std::optional<MeshUpdate> mesh;
     Sim3<World, World> S_new_first;  // product of all corrections of its space
   };
-  struct TrajectoryEntry {
+  struct TrackedAck {
     FrameAck ack;
     int64_t timestamp_ns = 0;
-    KeyframeId reference;
-    SE3<Camera, Camera> T_reference_camera;
   };
 
   void Send(const MapEvent& event);
   void ApplyUpdate(ObjectUpdate update);
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
-  SE3<World, Camera> CurrentPose(const TrajectoryEntry& entry) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
   std::set<ObjectId> removed_;
-  std::vector<TrajectoryEntry> trajectory_;
-  std::map<KeyframeId, ScaledPose> references_;
+  std::vector<TrackedAck> tracked_;  // accepted frames with a pose
+  Trajectory trajectory_;            // of the same frames
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

@@ -68,7 +68,11 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
     if (mapped.correction) Correct(*mapped.correction);
     // Objects. Publish() sends them to the clients, and their new views to the fields.
     Publish(object_mapper_.ObserveFrame(mapped.tracked));
-    if (mapped.view) Publish(object_mapper_.ObserveKeyframe(*mapped.view));
+    if (mapped.view) {
+      const KeyframeView& view = *mapped.view;
+      map_->SetKeyframe(view.frame->frame_id, view.frame->timestamp_ns, view.id, view.T_world_camera);
+      Publish(object_mapper_.ObserveKeyframe(view));
+    }
     ledger_->SetWarnings(sparse_mapper_.Warnings());
     ledger_->CountMappedFrame(mapped.view.has_value(), sparse_mapper_.points());
   };

@@ -34,6 +34,7 @@
 #include "common/statistics.h"
 #include "common/status.h"
 #include "server/session/ingest.h"
+#include "server/session/trajectory.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 #include "tests/support/sparse_mapper_inspector.h"
@@ -172,7 +173,7 @@ class Run {
     queue_.Close();
     if (mapping.joinable()) mapping.join();
     const size_t keyframes_kept = Inspect().map().keyframes().size();
-    mapper_.Finish();
+    trajectory_.Correct(mapper_.Finish());
     Report(keyframes_kept);
     return 0;
   }
@@ -212,6 +213,8 @@ class Run {
     if (has_pose) {
       live_.push_back({1e-9 * static_cast<double>(frame->timestamp_ns), image.tracked});
       live_.back().tracked.frame = nullptr;
+      std::lock_guard lock(final_mutex_);
+      AddFinal(image.tracked);
     }
     if (options_.one_thread) return Map(image);
     const bool is_keyframe = image.tracked.is_keyframe;
@@ -224,6 +227,13 @@ class Run {
     }
   }
 
+  void AddFinal(const TrackedFrame& tracked) {
+    trajectory_.Add(tracked.frame->frame_id, tracked.frame->timestamp_ns, tracked.T_world_camera, tracked.reference,
+                    tracked.T_reference_camera);
+    final_.push_back({1e-9 * static_cast<double>(tracked.frame->timestamp_ns), tracked});
+    final_.back().tracked.frame = nullptr;
+  }
+
   void Map(const slam::TrackedImage& image) {
     if (image.tracked.is_keyframe) mapper_.SetKeyframesWait(--waiting_ > 0);
     const Clock::time_point begin = Clock::now();
@@ -231,18 +241,17 @@ class Run {
     if (mapped.was_reset) ++resets_;
     if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
     const TrackedFrame& tracked = mapped.tracked;
-    if (tracked.state == TrackingState::kTracking || tracked.state == TrackingState::kRelocalized) {
-      final_.push_back({1e-9 * static_cast<double>(tracked.frame->timestamp_ns), tracked});
-      final_.back().tracked.frame = nullptr;
-    }
+    std::lock_guard lock(final_mutex_);
+    if (mapped.correction) trajectory_.Correct(*mapped.correction);
+    if (image.initial_views && mapped.view) AddFinal(tracked);
+    if (!mapped.view) return;
+    trajectory_.SetKeyframe(tracked.frame->frame_id, tracked.frame->timestamp_ns, mapped.view->id,
+                            mapped.view->T_world_camera);
   }
 
   void Report(size_t keyframes_kept) {
-    for (TimedFrame& frame : final_) {
-      if (!frame.tracked.reference) continue;
-      const auto reference = Inspect().map().KeyframePose(frame.tracked.reference);
-      if (reference) frame.tracked.T_world_camera = reference->Compose(frame.tracked.T_reference_camera);
-    }
+    const std::vector<SE3<World, Camera>> poses = trajectory_.Poses();
+    for (size_t i = 0; i < final_.size(); ++i) final_[i].tracked.T_world_camera = poses[i];
     if (!options_.out.empty()) {
       std::filesystem::create_directories(options_.out);
       Write(std::filesystem::path(options_.out) / "trajectory.txt", final_);
@@ -316,7 +325,10 @@ class Run {
   slam::Tracker tracker_;
   BoundedQueue<slam::TrackedImage> queue_;
   std::atomic<int> waiting_ = 0;
-  std::vector<TimedFrame> live_, final_;
+  std::vector<TimedFrame> live_;
+  std::mutex final_mutex_;
+  std::vector<TimedFrame> final_;  // with the poses of `trajectory_`, after the end
+  session::Trajectory trajectory_;
   std::vector<double> orb_s_, track_s_, map_s_;
   size_t frames_ = 0, initializing_ = 0, lost_ = 0;
   int resets_ = 0;

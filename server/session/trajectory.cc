@@ -1,0 +1,79 @@
+#include "server/session/trajectory.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <iterator>
+
+namespace romap::session {
+
+void Trajectory::Add(uint64_t frame_id, int64_t timestamp_ns, const SE3<World, Camera>& T_world_camera,
+                     KeyframeId reference, const SE3<Camera, Camera>& T_reference_camera) {
+  if (reference) keyframes_.try_emplace(reference, ScaledPose{T_world_camera * T_reference_camera.Inverse()});
+  index_of_frame_[frame_id] = frames_.size();
+  frames_.push_back({timestamp_ns, T_world_camera, reference, T_reference_camera});
+}
+
+void Trajectory::SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
+                             const SE3<World, Camera>& T_world_camera) {
+  keyframes_[keyframe].T_world_camera = T_world_camera;
+  keyframe_timestamps_ns_[keyframe] = timestamp_ns;
+  const auto it = index_of_frame_.find(frame_id);
+  if (it != index_of_frame_.end()) frames_[it->second].keyframe = keyframe;
+}
+
+void Trajectory::Correct(const MapCorrection& correction) {
+  for (const KeyframeCorrection& keyframe : correction.keyframes) {
+    ScaledPose& pose = keyframes_[keyframe.id];
+    pose.T_world_camera = keyframe.T_world_camera;
+    pose.scale *= keyframe.S_new_old.scale();
+  }
+}
+
+std::vector<SE3<World, Camera>> Trajectory::Poses() const {
+  const RelativeCorrections corrections = CorrectionsOfKeyframes();
+  std::vector<SE3<World, Camera>> poses;
+  poses.reserve(frames_.size());
+  for (const TrajectoryFrame& frame : frames_) {
+    if (frame.keyframe) {
+      poses.push_back(keyframes_.at(frame.keyframe).T_world_camera);
+    } else if (frame.reference) {
+      const auto of_reference = corrections.find(frame.reference);
+      const SE3<Camera, Camera> correction = of_reference == corrections.end()
+                                                 ? SE3<Camera, Camera>()
+                                                 : Interpolate(of_reference->second, frame.timestamp_ns);
+      poses.push_back(keyframes_.at(frame.reference).Compose(frame.T_reference_camera * correction));
+    } else {
+      poses.push_back(frame.T_world_camera);
+    }
+  }
+  return poses;
+}
+
+Trajectory::RelativeCorrections Trajectory::CorrectionsOfKeyframes() const {
+  RelativeCorrections corrections;
+  // A keyframe needs no correction relative to itself.
+  for (const auto& [id, timestamp_ns] : keyframe_timestamps_ns_) corrections[id].push_back({timestamp_ns, {}});
+  for (const TrajectoryFrame& frame : frames_) {
+    if (!frame.keyframe || !frame.reference) continue;
+    const SE3<Camera, Camera> T_reference_camera =
+        keyframes_.at(frame.reference).Relative(keyframes_.at(frame.keyframe).T_world_camera);
+    corrections[frame.reference].push_back(
+        {frame.timestamp_ns, frame.T_reference_camera.Inverse() * T_reference_camera});
+  }
+  return corrections;
+}
+
+SE3<Camera, Camera> Trajectory::Interpolate(const std::vector<RelativeCorrection>& corrections, int64_t timestamp_ns) {
+  const auto after = std::upper_bound(corrections.begin(), corrections.end(), timestamp_ns,
+                                      [](int64_t time, const RelativeCorrection& c) { return time < c.timestamp_ns; });
+  if (after == corrections.end()) return corrections.back().T_camera_corrected;
+  if (after == corrections.begin()) return after->T_camera_corrected;
+  const RelativeCorrection& before = *std::prev(after);
+  const double share = static_cast<double>(timestamp_ns - before.timestamp_ns) /
+                       static_cast<double>(after->timestamp_ns - before.timestamp_ns);
+  const SE3<Camera, Camera>& a = before.T_camera_corrected;
+  const SE3<Camera, Camera>& b = after->T_camera_corrected;
+  return {a.rotation().slerp(share, b.rotation()), (1 - share) * a.translation() + share * b.translation()};
+}
+
+}  // namespace romap::session
