@@ -85,7 +85,6 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   } else if (image.tracked.state == TrackingState::kLost && is_of_current_map) {
     HandleLostFrame(image, mapped);
   }
-  current_->ignores_poses |= image.pose_ignored;
   ReportCorrections(was_adjusted, mapped);
   return mapped;
 }
@@ -126,12 +125,7 @@ std::vector<SessionWarning> SparseMapper::Warnings() const {
                             "the translation are not known; move the camera sideways, or send depth images",
                             parallax_rad / kRadPerDeg, kMinParallax_rad / kRadPerDeg)});
   }
-  if (current_->ignores_poses) {
-    warnings.push_back({.name = "poses_ignored",
-                        .text =
-                            "t_world_camera is ignored: the map was started from images before the first given pose, "
-                            "and has its own world; give poses from the first frame on"});
-  }
+  for (SessionWarning& warning : current_->given_world.Warnings()) warnings.push_back(std::move(warning));
   return warnings;
 }
 
@@ -246,6 +240,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   CompleteKeyframe(image, keyframe);
   if (!is_live) CheckNextLoop();
+  AlignWithGivenPoses(image, keyframe);
   AlignWithUp();
   PublishLocalMap(keyframe.id);
 
@@ -371,9 +366,23 @@ void SparseMapper::AlignWithUp(bool is_last) {
   if (current_->world_is_given) return;
   const std::optional<Eigen::Quaterniond> R_new_old = current_->up.ProposeRotation(current_->map, is_last);
   if (!R_new_old) return;
-  const Sim3<World, World> S_new_old(1.0, *R_new_old, Eigen::Vector3d::Zero());
-  current_->map.Transform(S_new_old);
+  MoveMap({1.0, *R_new_old, Eigen::Vector3d::Zero()});
   current_->up.Rotate(*R_new_old);
+}
+
+// Poses that began after the map, whose world is another one.
+void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe) {
+  CurrentMap& current = *current_;
+  if (!image.pose_ignored || current.world_is_given) return;
+  current.given_world.Observe(keyframe.id, *image.tracked.frame->T_world_camera);
+  const auto S_given_map = current.given_world.ProposeMotion(current.map, current.has_depth_scale);
+  if (!S_given_map) return;
+  MoveMap(*S_given_map);
+  current.world_is_given = true;
+}
+
+void SparseMapper::MoveMap(const Sim3<World, World>& S_new_old) {
+  current_->map.Transform(S_new_old);
   local_adjuster_.Move(S_new_old);
   global_adjuster_.Move(S_new_old);
   loop_trial_.Move(S_new_old);

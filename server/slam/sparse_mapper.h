@@ -10,6 +10,7 @@
 
 #include "common/stage_messages.h"
 #include "server/slam/correction_log.h"
+#include "server/slam/given_world.h"
 #include "server/slam/global_adjuster.h"
 #include "server/slam/keyframe_builder.h"
 #include "server/slam/local_adjuster.h"
@@ -79,6 +80,7 @@ class SparseMapper {
     LoopDetector loops;
     CorrectionLog corrections;
     WorldUp up;
+    GivenWorld given_world;
     MaskVoter mask_voter;
     ObservationRefiner refiner;
     KeyframeId newest;
@@ -88,7 +90,6 @@ class SparseMapper {
     std::deque<KeyframeId> unchecked = {};                                            // for loops
     std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
     bool world_is_given = false;      // the client's poses, given or as priors, define the world
-    bool ignores_poses = false;       // the client's poses began after the map
     bool has_depth_scale = false;     // depth images define the scale
     uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
     double parallax_rad = 0;          // see UpperParallax_rad(); as of the newest keyframe
@@ -122,7 +123,9 @@ class SparseMapper {
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
+  void AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe);
   void AlignWithUp(bool is_last = false);
+  void MoveMap(const Sim3<World, World>& S_new_old);
   void UpdatePose(TrackedFrame& tracked) const;
   void PublishLocalMap(KeyframeId reference);
   void LogSummary() const;
