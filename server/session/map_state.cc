@@ -83,11 +83,12 @@ void MapState::PublishMesh(MeshUpdate mesh, const MeshPose& pose) {
 }
 
 void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference,
-                           const SE3<Camera, Camera>& T_reference_camera) {
+                           const SE3<Camera, Camera>& T_reference_camera,
+                           const PoseUncertainty& reference_uncertainty) {
   std::lock_guard lock(mutex_);
   if (ack.accepted && ack.T_world_camera) {
     if (reference) references_.try_emplace(reference, ScaledPose{*ack.T_world_camera * T_reference_camera.Inverse()});
-    trajectory_.push_back({ack, timestamp_ns, reference, T_reference_camera});
+    trajectory_.push_back({ack, timestamp_ns, reference, T_reference_camera, reference_uncertainty});
   }
   Send(ack);
 }
@@ -99,11 +100,20 @@ void MapState::Correct(const MapCorrection& correction) {
     reference.T_world_camera = keyframe.T_world_camera;
     reference.scale *= keyframe.S_new_old.scale();
   }
+  for (const auto& [id, uncertainty] : correction.uncertainties) uncertainties_[id] = uncertainty;
 }
 
 SE3<World, Camera> MapState::CurrentPose(const TrajectoryEntry& entry) const {
   if (!entry.reference) return *entry.ack.T_world_camera;
   return references_.at(entry.reference).Compose(entry.T_reference_camera);
+}
+
+std::optional<PoseUncertainty> MapState::CurrentUncertainty(const TrajectoryEntry& entry) const {
+  const auto reference = uncertainties_.find(entry.reference);
+  if (!entry.ack.uncertainty || reference == uncertainties_.end()) return entry.ack.uncertainty;
+  PoseUncertainty relative = entry.reference_uncertainty;
+  relative.position_sigma_mu *= references_.at(entry.reference).scale;
+  return Combine(reference->second, relative);
 }
 
 void MapState::Acknowledge(MasksAck ack) {
@@ -155,6 +165,7 @@ MapSnapshot MapState::Snapshot() const {
   for (const TrajectoryEntry& entry : trajectory_) {
     snapshot.trajectory.push_back(entry.ack);
     snapshot.trajectory.back().T_world_camera = CurrentPose(entry);
+    snapshot.trajectory.back().uncertainty = CurrentUncertainty(entry);
     snapshot.timestamps_ns.push_back(entry.timestamp_ns);
   }
   return snapshot;

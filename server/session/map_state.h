@@ -36,10 +36,11 @@ class MapState {
   // Ignored if the object was removed.
   void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
   // Sends the acknowledgement, and adds an accepted frame with a pose to the trajectory. See TrackedFrame for
-  // `reference`.
+  // `reference`, `T_reference_camera` and its uncertainty.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
-                   const SE3<Camera, Camera>& T_reference_camera = {});
-  // Moves the frames of the trajectory with their corrected reference keyframes.
+                   const SE3<Camera, Camera>& T_reference_camera = {},
+                   const PoseUncertainty& reference_uncertainty = {});
+  // Moves the frames of the trajectory with their corrected reference keyframes, whose uncertainties they take over.
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
@@ -65,6 +66,7 @@ class MapState {
     int64_t timestamp_ns = 0;
     KeyframeId reference;
     SE3<Camera, Camera> T_reference_camera;
+    PoseUncertainty reference_uncertainty;
   };
 
   void Send(const MapEvent& event);
@@ -72,12 +74,14 @@ class MapState {
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
   SE3<World, Camera> CurrentPose(const TrajectoryEntry& entry) const;
+  std::optional<PoseUncertainty> CurrentUncertainty(const TrajectoryEntry& entry) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
   std::set<ObjectId> removed_;
   std::vector<TrajectoryEntry> trajectory_;
   std::map<KeyframeId, ScaledPose> references_;
+  std::map<KeyframeId, PoseUncertainty> uncertainties_;  // of the references, as of the newest correction
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

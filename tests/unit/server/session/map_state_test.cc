@@ -199,6 +199,32 @@ TEST(MapStateTest, FramesMoveWithTheirKeyframes) {
                                                                              1e-12));
 }
 
+TEST(MapStateTest, FramesTakeOverTheUncertaintyOfTheirKeyframes) {
+  MapState map;
+  FrameAck tracked, given;
+  tracked.frame_id = 1;
+  tracked.T_world_camera = CameraAt(10);
+  tracked.uncertainty = PoseUncertainty{5, 0.5};
+  given.frame_id = 2;
+  given.T_world_camera = CameraAt(12);
+  const PoseUncertainty relative{0.3, 0.03};
+  map.Acknowledge(tracked, 10, KeyframeId{1}, {}, relative);
+  map.Acknowledge(given, 20);
+  EXPECT_EQ(map.Snapshot().trajectory[0].uncertainty, tracked.uncertainty) << "no correction came";
+
+  // The map grows to twice its size around the keyframe.
+  const Sim3<World, World> S = Correction(2, 0, 0);
+  MapCorrection correction;
+  correction.keyframes = {{KeyframeId{1}, S.Moved(CameraAt(10)), S}};
+  correction.uncertainties = {{KeyframeId{1}, PoseUncertainty{0.8, 0.04}}};
+  map.Correct(correction);
+  const std::vector<FrameAck> corrected = map.Snapshot().trajectory;
+  ASSERT_TRUE(corrected[0].uncertainty.has_value());
+  EXPECT_NEAR(corrected[0].uncertainty->position_sigma_mu, 1.0, 1e-12) << "0.8 and twice 0.3";
+  EXPECT_NEAR(corrected[0].uncertainty->rotation_sigma_rad, 0.05, 1e-12);
+  EXPECT_FALSE(corrected[1].uncertainty.has_value());
+}
+
 TEST(MapStateTest, SubscriptionStartsWithTheCurrentObjects) {
   MapState map;
   map.Apply(Update(1));
