@@ -22,6 +22,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/tracker.h"
+#include "server/slam/uncertainty_estimator.h"
 #include "server/slam/world_up.h"
 
 namespace romap::slam {
@@ -81,6 +82,7 @@ class SparseMapper {
     WorldUp up;
     MaskVoter mask_voter;
     ObservationRefiner refiner;
+    UncertaintyEstimator uncertainty;
     KeyframeId newest;
     KeyframeId reference;  // of the published local map: the newest keyframe, or where the camera was relocalized
     std::optional<LocalMap::Relocalization> relocalized = {};  // the newest one
@@ -123,6 +125,8 @@ class SparseMapper {
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
   void AlignWithUp(bool is_last = false);
+  void UpdateUncertainties();
+  MapCorrection TakeCorrection();
   void UpdatePose(TrackedFrame& tracked) const;
   void PublishLocalMap(KeyframeId reference);
   void LogSummary() const;

@@ -24,6 +24,8 @@ constexpr int kFewInliers = 100;  // with fewer, the depth image would add many 
 // and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
 constexpr uint64_t kKeyframesToLeavePriors = 12;
+// The errors of the points are about as large as those of the features: they double the variance.
+constexpr double kPointErrorFactor = 1.4;
 
 }  // namespace
 
@@ -246,6 +248,7 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMapTracking& trackin
   image.tracked.state = status_.OnTracked();
   image.tracked.T_world_camera = pose.T_world_camera;
   AnchorToReference(image.tracked);
+  StateUncertainty(pose, image.tracked);
   motion_.Update(pose.T_world_camera, frame.T_world_camera, frame.timestamp_ns, /*is_continuous=*/!was_lost);
   last_points_.clear();
   for (const int point : pose.point_of_feature) {
@@ -288,6 +291,16 @@ void Tracker::AnchorToReference(TrackedFrame& tracked) const {
   if (reference == map_->keyframes.end()) return;
   tracked.reference = map_->reference;
   tracked.T_reference_camera = reference->second.Relative(tracked.T_world_camera);
+}
+
+void Tracker::StateUncertainty(const PoseFromPoints& pose, TrackedFrame& tracked) const {
+  const auto reference = map_->keyframes.find(map_->reference);
+  const bool is_known = pose.uncertainty.position_sigma_mu > 0 && pose.uncertainty.rotation_sigma_rad > 0;
+  if (reference == map_->keyframes.end() || !is_known) return;
+  tracked.reference_uncertainty = {kPointErrorFactor * pose.uncertainty.position_sigma_mu,
+                                   kPointErrorFactor * pose.uncertainty.rotation_sigma_rad};
+  tracked.uncertainty = Combine(map_->reference_uncertainty, tracked.reference_uncertainty);
+  tracked.reference_uncertainty.position_sigma_mu /= reference->second.scale;
 }
 
 }  // namespace romap::slam
