@@ -108,12 +108,26 @@ SE3<World, Camera> MapState::CurrentPose(const TrajectoryEntry& entry) const {
   return references_.at(entry.reference).Compose(entry.T_reference_camera);
 }
 
-std::optional<PoseUncertainty> MapState::CurrentUncertainty(const TrajectoryEntry& entry) const {
+// The frame must have an uncertainty.
+FrameUncertainty MapState::CurrentUncertainty(const TrajectoryEntry& entry) const {
   const auto reference = uncertainties_.find(entry.reference);
-  if (!entry.ack.uncertainty || reference == uncertainties_.end()) return entry.ack.uncertainty;
+  if (reference == uncertainties_.end()) return {.reference = *entry.ack.uncertainty, .relative = {}};
   PoseUncertainty relative = entry.reference_uncertainty;
   relative.position_sigma_mu *= references_.at(entry.reference).scale;
-  return Combine(reference->second, relative);
+  return {.reference = reference->second, .relative = relative};
+}
+
+// `trajectory` has the frames of trajectory_.
+void MapState::UpdateUncertainties(std::vector<FrameAck>* trajectory) const {
+  std::vector<size_t> indices;
+  std::vector<FrameUncertainty> sources;
+  for (size_t i = 0; i < trajectory_.size(); ++i) {
+    if (!trajectory_[i].ack.uncertainty) continue;
+    indices.push_back(i);
+    sources.push_back(CurrentUncertainty(trajectory_[i]));
+  }
+  const std::vector<PoseUncertainty> aligned = AlignedUncertainties(sources);
+  for (size_t k = 0; k < indices.size(); ++k) (*trajectory)[indices[k]].uncertainty = aligned[k];
 }
 
 void MapState::Acknowledge(MasksAck ack) {
@@ -165,9 +179,9 @@ MapSnapshot MapState::Snapshot() const {
   for (const TrajectoryEntry& entry : trajectory_) {
     snapshot.trajectory.push_back(entry.ack);
     snapshot.trajectory.back().T_world_camera = CurrentPose(entry);
-    snapshot.trajectory.back().uncertainty = CurrentUncertainty(entry);
     snapshot.timestamps_ns.push_back(entry.timestamp_ns);
   }
+  UpdateUncertainties(&snapshot.trajectory);
   return snapshot;
 }
 

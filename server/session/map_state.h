@@ -15,6 +15,7 @@
 #include "common/stage_messages.h"
 #include "server/session/mesh_pose.h"
 #include "server/session/outbox.h"
+#include "server/session/trajectory_uncertainty.h"
 
 namespace romap::session {
 
@@ -74,7 +75,8 @@ class MapState {
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
   SE3<World, Camera> CurrentPose(const TrajectoryEntry& entry) const;
-  std::optional<PoseUncertainty> CurrentUncertainty(const TrajectoryEntry& entry) const;
+  FrameUncertainty CurrentUncertainty(const TrajectoryEntry& entry) const;
+  void UpdateUncertainties(std::vector<FrameAck>* trajectory) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;

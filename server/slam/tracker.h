@@ -76,7 +76,7 @@ class Tracker {
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const PoseFromPoints& pose, const LocalMapTracking& tracking, const TrackedImage& image);
   void AnchorToReference(TrackedFrame& tracked) const;
-  void StateUncertainty(const PoseFromPoints& pose, TrackedFrame& tracked) const;
+  void StateUncertainty(const PoseFromPoints& pose, double depth_mu, TrackedFrame& tracked) const;
 
   const SlamConfig config_;
   const PoseUse pose_use_;

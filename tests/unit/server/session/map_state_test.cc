@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace romap::session::map_state_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
@@ -220,8 +222,9 @@ TEST(MapStateTest, FramesTakeOverTheUncertaintyOfTheirKeyframes) {
   map.Correct(correction);
   const std::vector<FrameAck> corrected = map.Snapshot().trajectory;
   ASSERT_TRUE(corrected[0].uncertainty.has_value());
-  EXPECT_NEAR(corrected[0].uncertainty->position_sigma_mu, 1.0, 1e-12) << "0.8 and twice 0.3";
-  EXPECT_NEAR(corrected[0].uncertainty->rotation_sigma_rad, 0.05, 1e-12);
+  // Half of the relative uncertainty is added again for the alignment.
+  EXPECT_NEAR(corrected[0].uncertainty->position_sigma_mu, std::hypot(0.8, 2 * 0.3, 0.3), 1e-12) << "twice the size";
+  EXPECT_NEAR(corrected[0].uncertainty->rotation_sigma_rad, std::hypot(0.04, 0.03, 0.015), 1e-12);
   EXPECT_FALSE(corrected[1].uncertainty.has_value());
 }
 
