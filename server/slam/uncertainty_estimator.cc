@@ -18,7 +18,7 @@ constexpr double kGrowth = 1.2;  // of the number of keyframes
 // The errors of a point's observations are nearly the same in neighboring keyframes, because its image is: they do not
 // average out like the independent errors that BundleCovariances() assumes. Ratio of actual and computed sigmas, from
 // rendered sequences of different kinds (tests/bench/uncertainty_quality.sh), where it is between 3 and 6.
-constexpr double kSigmaFactor = 5;
+constexpr double kSigmaFactor = 4.5;
 // Depth images have whole pixels, and features prefer edges: the depth at a feature is that of a point about this far
 // away, often in the same direction. This makes an error of the scale that does not average out.
 constexpr double kDepthShift_px = 0.4;

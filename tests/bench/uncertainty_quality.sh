@@ -5,9 +5,10 @@
 #
 #   tests/bench/uncertainty_quality.sh BUILD_DIR OUT_DIR [-- OPTION_OF_TRACK_BENCH...]
 #
-# Environment: SCENES (all; names of the list below), MODES (replay live depth). Sequences in OUT_DIR are not rendered again.
+# Environment: SCENES (all; names of the list below), MODES (replay live depth). Sequences in OUT_DIR are not rendered
+# again.
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
 shift 2
 [ $# -eq 0 ] || shift

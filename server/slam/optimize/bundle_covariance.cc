@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kMinNoiseFactor = 0.2;  // of the claimed sigmas
 constexpr double kMaxNoiseFactor = 3;
+constexpr double kMinFreeShare = 0.25;
 // The orientations take part in the alignment with this weight, relative to positions at the typical distance of the
 // points, so that it is determined for two cameras and for cameras on a line.
 constexpr double kOrientationWeight = 1e-3;
@@ -38,6 +39,18 @@ Matrix3 CrossMatrix(const Eigen::Vector3d& v) {
 
 // Every n-th index, so that at most `max` are selected.
 int StrideFor(size_t count, int max) { return std::max(1, static_cast<int>((count + max - 1) / max)); }
+
+// The share of the observations' variance that is left in the residuals: adjusted cameras and points follow the errors
+// of their observations.
+double FreeShare(const BundleProblem& problem) {
+  double errors = 0;
+  for (const BundleObservation& observation : problem.observations) {
+    if (!observation.outlier) errors += observation.depth_mu > 0 ? 3 : 2;
+  }
+  const double parameters =
+      6 * static_cast<double>(problem.cameras.size()) + 3 * static_cast<double>(problem.points.size());
+  return errors > 0 ? std::max(kMinFreeShare, 1 - parameters / errors) : 1;
+}
 
 // The information of the selected cameras (six parameters each, position first) and the lens (one, the last).
 // Lengths are in units of the typical distance of the points.
@@ -69,7 +82,7 @@ class CameraInformation {
 
 CameraInformation::CameraInformation(const BundleProblem& problem, const BundleCovarianceOptions& options)
     : problem_(problem) {
-  noise_ = std::clamp(MeasureNoise(problem), kMinNoiseFactor, kMaxNoiseFactor);
+  noise_ = std::clamp(MeasureNoise(problem) / std::sqrt(FreeShare(problem)), kMinNoiseFactor, kMaxNoiseFactor);
   Select(options);
   MeasureUnit();
   lens_ = 6 * static_cast<Eigen::Index>(cameras_.size());
