@@ -11,6 +11,7 @@
 #include "common/cuboid.h"
 #include "common/geometry.h"
 #include "common/ids.h"
+#include "common/pose_uncertainty.h"
 
 namespace romap {
 
@@ -27,6 +28,8 @@ struct FrameAck {
   bool is_keyframe = false;
   double latency_s = 0;           // from arrival at the server to this acknowledgement
   std::string state_reason = {};  // human-readable: why the state is not kTracking, e.g. "too little parallax"
+  // Of T_world_camera, as known when it was computed. nullopt: not tracked, or the pose was given by the client.
+  std::optional<PoseUncertainty> uncertainty = {};
 };
 
 // The result of one MasksInput.

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "common/geometry.h"
 #include "common/ids.h"
 #include "common/map_events.h"
+#include "common/pose_uncertainty.h"
 
 namespace romap {
 
@@ -78,6 +80,9 @@ struct TrackedFrame {
   KeyframeId reference = {};
   SE3<Camera, Camera> T_reference_camera = {};
   std::string reason = {};  // human-readable: why the frame is not tracked; empty while tracking
+  // Of T_world_camera at the time of tracking. nullopt: the frame is not tracked, or its pose was given.
+  std::optional<PoseUncertainty> uncertainty = {};
+  PoseUncertainty reference_uncertainty = {};  // of T_reference_camera, in its unit
 };
 
 // A keyframe with its part of the sparse map. `points` holds the current position of every point in `observations`;
@@ -106,6 +111,8 @@ struct MapCorrection {
   std::vector<KeyframeCorrection> keyframes;  // those that moved noticeably, by id
   std::vector<MapPoint> points;               // those that moved, with their new positions
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
+  // The uncertainties of all keyframes that were published; empty unless they were computed anew.
+  std::map<KeyframeId, PoseUncertainty> uncertainties = {};
 };
 
 // -------------------------------------------------------------------------------------------------- objects -> nerf

@@ -7,7 +7,7 @@
 #include "client/cli/command.h"
 #include "client/cli/map_files.h"
 #include "client/cli/service_options.h"
-#include "client/files/tum.h"
+#include "client/files/pose_uncertainty_file.h"
 
 namespace romap::cli {
 namespace {
@@ -27,7 +27,8 @@ absl::Status RunExport(const ExportOptions& options) {
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
 
   const std::vector<files::StampedPose> trajectory = TrajectoryOf(snapshot);
-  ROMAP_RETURN_IF_ERROR(files::WriteTum((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
+  ROMAP_RETURN_IF_ERROR(
+      files::WriteTrajectory((std::filesystem::path(options.out) / "trajectory.txt").string(), trajectory));
   fmt::print("{} objects and {} camera poses of session {} written to {}\n", objects.size(), trajectory.size(),
              snapshot.session_id, options.out);
   return absl::OkStatus();

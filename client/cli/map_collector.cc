@@ -44,7 +44,7 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
   if (!ack.T_world_camera) tracking_.last_reason = ack.state_reason;
   const auto sent = sent_.find(ack.frame_id);
   if (ack.T_world_camera && sent != sent_.end()) {
-    trajectory_.push_back({sent->second.timestamp_ns, *ack.T_world_camera});
+    trajectory_.push_back({sent->second.timestamp_ns, *ack.T_world_camera, ack.uncertainty});
   }
 }
 

@@ -74,7 +74,8 @@ std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
   std::vector<files::StampedPose> trajectory;
   for (size_t i = 0; i < snapshot.trajectory.size(); ++i) {
     if (snapshot.trajectory[i].T_world_camera) {
-      trajectory.push_back({snapshot.timestamps_ns[i], *snapshot.trajectory[i].T_world_camera});
+      const FrameAck& frame = snapshot.trajectory[i];
+      trajectory.push_back({snapshot.timestamps_ns[i], *frame.T_world_camera, frame.uncertainty});
     }
   }
   return trajectory;

@@ -12,8 +12,8 @@
 #include "client/cli/map_files.h"
 #include "client/cli/progress.h"
 #include "client/cli/service_options.h"
+#include "client/files/pose_uncertainty_file.h"
 #include "client/files/text_file.h"
-#include "client/files/tum.h"
 #include "common/status.h"
 #include "common/wire/recording.h"
 
@@ -88,7 +88,8 @@ absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& re
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
-  ROMAP_RETURN_IF_ERROR(files::WriteTum((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
+  ROMAP_RETURN_IF_ERROR(
+      files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
   const nlohmann::json summary = ToJson(recording, snapshot.statistics, objects, faults);
   ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), summary.dump(1) + "\n"));
   fmt::print("{} frames replayed ({} keyframes): {} objects and {} camera poses written to {}\n", recording.frames(),

@@ -14,6 +14,7 @@
 #include "client/cli/service_options.h"
 #include "client/eval/eval.h"
 #include "client/eval/run_record.h"
+#include "client/files/pose_uncertainty_file.h"
 #include "client/files/text_file.h"
 #include "common/status.h"
 
@@ -94,7 +95,7 @@ absl::Status RunSequence(const RunOptions& options) {
   const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
   const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
-  ROMAP_RETURN_IF_ERROR(files::WriteTum((fs::path(options.out) / "trajectory.txt").string(), trajectory));
+  ROMAP_RETURN_IF_ERROR(files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), trajectory));
   RunSummary summary = Summarize(sequence, result, collector, objects);
   summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
   if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));

@@ -1,26 +1,48 @@
 #include "client/eval/calibration.h"
 
-#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "common/angles.h"
+#include "common/statistics.h"
 
 namespace romap::eval {
 namespace {
 
-// The length of a vector of three independent normal errors is below this multiple of their standard deviation in 95 %
-// of the cases: the square root of the 95 % quantile of the chi-square distribution with 3 degrees of freedom.
-constexpr double kBound95 = 2.7955;
+// Errors with their 95 % bounds.
+struct BoundedErrors {
+  std::vector<double> errors;
+  std::vector<double> bounds;
+
+  void Add(double error, double sigma) {
+    errors.push_back(error);
+    bounds.push_back(kSigmasTo95 * sigma);
+  }
+  double Coverage() const {
+    size_t covered = 0;
+    for (size_t k = 0; k < errors.size(); ++k) covered += errors[k] <= bounds[k] ? 1 : 0;
+    return static_cast<double>(covered) / static_cast<double>(errors.size());
+  }
+  double BoundRatio() const { return Quantile(bounds, 0.5) / Quantile(errors, 0.5); }
+};
 
 }  // namespace
 
-std::optional<Calibration> MeasureCalibration(std::span<const PoseError> errors, std::span<const PoseSigma> sigmas,
+std::optional<Calibration> MeasureCalibration(std::span<const PoseError> errors,
+                                              std::span<const std::optional<PoseUncertainty>> uncertainties,
                                               double scale) {
-  if (errors.empty()) return std::nullopt;
-  size_t position = 0, rotation = 0;
+  BoundedErrors position, rotation;
   for (size_t k = 0; k < errors.size(); ++k) {
-    if (errors[k].position_m <= kBound95 * scale * sigmas[k].position) ++position;
-    if (errors[k].rotation_deg <= kBound95 * sigmas[k].rotation_deg) ++rotation;
+    if (!uncertainties[k]) continue;
+    position.Add(errors[k].position_m, scale * uncertainties[k]->position_sigma_mu);
+    rotation.Add(errors[k].rotation_deg, uncertainties[k]->rotation_sigma_rad * kDegPerRad);
   }
-  const double count = static_cast<double>(errors.size());
-  return Calibration{static_cast<double>(position) / count, static_cast<double>(rotation) / count};
+  if (position.errors.empty()) return std::nullopt;
+  return Calibration{.poses = position.errors.size(),
+                     .position_coverage = position.Coverage(),
+                     .rotation_coverage = rotation.Coverage(),
+                     .position_bound_ratio = position.BoundRatio(),
+                     .rotation_bound_ratio = rotation.BoundRatio()};
 }
 
 }  // namespace romap::eval

@@ -25,6 +25,14 @@ std::string CoverageLine(const FrameCoverage& coverage) {
                      coverage.inferred ? " (inferred from the pose period and the time of the ground truth)" : "");
 }
 
+std::string CalibrationLine(const Calibration& calibration) {
+  return fmt::format(
+      "uncertainty: {:.1f} % of position and {:.1f} % of rotation errors within their 95 % bound; median bound over "
+      "median error {:.1f} and {:.1f}; {} poses\n",
+      100 * calibration.position_coverage, 100 * calibration.rotation_coverage, calibration.position_bound_ratio,
+      calibration.rotation_bound_ratio, calibration.poses);
+}
+
 }  // namespace
 
 std::string FormatTable(const TrajectoryReport& report) {
@@ -47,8 +55,7 @@ std::string FormatTable(const TrajectoryReport& report) {
                   motion.jumps.position_m, motion.jumps.position_s, motion.jumps.rotation_deg, motion.jumps.rotation_s);
   text += CoverageLine(report.coverage);
   if (report.calibration) {
-    text += fmt::format("calibration: {:.1f} % of position and {:.1f} % of rotation errors within their 95 % bound\n",
-                        100 * report.calibration->position_coverage, 100 * report.calibration->rotation_coverage);
+    text += CalibrationLine(*report.calibration);
   }
   return text + FormatLine(report.verdict);
 }

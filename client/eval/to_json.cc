@@ -132,7 +132,10 @@ Json ToJson(const TrajectoryReport& report) {
   json["calibration"] = nullptr;
   if (report.calibration) {
     json["calibration"] = {{"position_95", report.calibration->position_coverage},
-                           {"rotation_95", report.calibration->rotation_coverage}};
+                           {"rotation_95", report.calibration->rotation_coverage},
+                           {"position_bound_ratio", report.calibration->position_bound_ratio},
+                           {"rotation_bound_ratio", report.calibration->rotation_bound_ratio},
+                           {"poses", report.calibration->poses}};
   }
   json["verdict"] = VerdictToJson(report.verdict);
   return json;

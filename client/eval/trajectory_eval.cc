@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
+#include "client/files/pose_uncertainty_file.h"
 #include "common/angles.h"
 #include "common/statistics.h"
 
@@ -103,11 +105,9 @@ absl::StatusOr<TrajectoryReport> CompareTrajectories(const TrajectoryInput& inpu
   report.coverage = input.frames_ns.empty() ? InferCoverage(poses_ns, input.ground_truth.front().timestamp_ns,
                                                             input.ground_truth.back().timestamp_ns)
                                             : CoverageOf(input.frames_ns, poses_ns);
-  if (input.sigmas) {
-    std::vector<PoseSigma> sigmas;
-    for (const auto& [i, j] : associated) sigmas.push_back((*input.sigmas)[i]);
-    report.calibration = MeasureCalibration(errors, sigmas, report.scale);
-  }
+  std::vector<std::optional<PoseUncertainty>> uncertainties;
+  for (const auto& [i, j] : associated) uncertainties.push_back(input.estimated[i].uncertainty);
+  report.calibration = MeasureCalibration(errors, uncertainties, report.scale);
   report.verdict = Judge(report);
   return report;
 }
@@ -115,6 +115,11 @@ absl::StatusOr<TrajectoryReport> CompareTrajectories(const TrajectoryInput& inpu
 absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options) {
   TrajectoryInput input{.frames_ns = options.frames_ns};
   ROMAP_ASSIGN_OR_RETURN(input.estimated, files::ReadTum(options.estimated));
+  const std::string uncertainties = files::UncertaintyPath(options.estimated);
+  std::error_code error;
+  if (std::filesystem::exists(uncertainties, error)) {
+    ROMAP_RETURN_IF_ERROR(files::ReadUncertainties(uncertainties, &input.estimated));
+  }
   ROMAP_ASSIGN_OR_RETURN(input.ground_truth, files::ReadTum(options.ground_truth));
   return CompareTrajectories(input, options.alignment, options.max_dt_s);
 }

@@ -17,7 +17,7 @@
 namespace romap::eval {
 
 struct TrajectoryEvalOptions {
-  std::string estimated;     // TUM file
+  std::string estimated;  // TUM file; the uncertainties beside it are compared with the errors (files::UncertaintyPath)
   std::string ground_truth;  // TUM file
   Alignment alignment = Alignment::kSim3;
   double max_dt_s = 0.02;  // maximal time difference of associated poses
@@ -27,11 +27,9 @@ struct TrajectoryEvalOptions {
 
 // A trajectory to compare.
 struct TrajectoryInput {
-  std::vector<files::StampedPose> estimated = {};     // sorted by time
+  std::vector<files::StampedPose> estimated = {};     // sorted by time; uncertainties enable the calibration figures
   std::vector<files::StampedPose> ground_truth = {};  // sorted by time
   std::vector<int64_t> frames_ns = {};                // as in TrajectoryEvalOptions
-  // Predicted standard deviations of the estimated poses, one per pose; enables the calibration figures.
-  std::optional<std::vector<PoseSigma>> sigmas = std::nullopt;
 };
 
 // Absolute trajectory error (Sturm et al., IROS 2012) and figures that no alignment can improve. Lengths are in the
@@ -65,7 +63,7 @@ struct TrajectoryReport {
 absl::StatusOr<TrajectoryReport> CompareTrajectories(const TrajectoryInput& input, Alignment alignment,
                                                      double max_dt_s);
 
-// Compares two trajectory files. Errors as ReadTum and CompareTrajectories.
+// Compares two trajectory files. Errors as ReadTum, ReadUncertainties and CompareTrajectories.
 absl::StatusOr<TrajectoryReport> EvaluateTrajectory(const TrajectoryEvalOptions& options);
 
 }  // namespace romap::eval

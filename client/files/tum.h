@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/geometry.h"
+#include "common/pose_uncertainty.h"
 #include "common/status.h"
 
 namespace romap::files {
@@ -15,6 +16,7 @@ namespace romap::files {
 struct StampedPose {
   int64_t timestamp_ns = 0;
   SE3<World, Camera> T_world_camera;
+  std::optional<PoseUncertainty> uncertainty = {};  // not in the TUM format; see pose_uncertainty_file.h
 };
 
 // Reads lines of `t tx ty tz qx qy qz qw` (t in seconds; camera to world; `#` starts a comment). Returns the poses in

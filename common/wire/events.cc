@@ -40,6 +40,15 @@ absl::StatusOr<Cuboid> FromProto(const v1::Cuboid& proto, const std::string& whe
   return cuboid;
 }
 
+absl::StatusOr<PoseUncertainty> FromProto(const v1::PoseUncertainty& proto, const std::string& where) {
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.position_sigma(), where + ".position_sigma"));
+  ROMAP_RETURN_IF_ERROR(CheckFinite(proto.rotation_sigma_rad(), where + ".rotation_sigma_rad"));
+  if (!(proto.position_sigma() > 0 && proto.rotation_sigma_rad() > 0)) {
+    return InvalidArgument("{}: the standard deviations must be positive", where);
+  }
+  return PoseUncertainty{proto.position_sigma(), proto.rotation_sigma_rad()};
+}
+
 v1::ObjectRemoved ToProto(ObjectRemoved removed) {
   v1::ObjectRemoved proto;
   proto.set_id(removed.id.value);
@@ -135,6 +144,10 @@ v1::FrameAck ToProto(FrameAck ack) {
   proto.set_is_keyframe(ack.is_keyframe);
   proto.set_latency_s(ack.latency_s);
   proto.set_state_reason(std::move(ack.state_reason));
+  if (ack.uncertainty) {
+    proto.mutable_uncertainty()->set_position_sigma(ack.uncertainty->position_sigma_mu);
+    proto.mutable_uncertainty()->set_rotation_sigma_rad(ack.uncertainty->rotation_sigma_rad);
+  }
   return proto;
 }
 
@@ -152,6 +165,9 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.latency_s(), where + ".latency_s"));
   ack.latency_s = proto.latency_s();
   ack.state_reason = std::move(*proto.mutable_state_reason());
+  if (proto.has_uncertainty()) {
+    ROMAP_ASSIGN_OR_RETURN(ack.uncertainty, FromProto(proto.uncertainty(), where + ".uncertainty"));
+  }
   return ack;
 }
 

@@ -34,7 +34,9 @@ void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& t
   ack.is_keyframe = tracked.is_keyframe;
   ack.latency_s = SecondsSince(arrival.time);
   ack.state_reason = tracked.reason;
-  map_->Acknowledge(std::move(ack), input.timestamp_ns, tracked.reference, tracked.T_reference_camera);
+  ack.uncertainty = tracked.uncertainty;
+  map_->Acknowledge(std::move(ack), input.timestamp_ns, tracked.reference, tracked.T_reference_camera,
+                    tracked.reference_uncertainty);
 }
 
 void FrameLedger::AcknowledgeMasks(const FrameMasks& masks) {

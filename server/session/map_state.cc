@@ -83,10 +83,17 @@ void MapState::PublishMesh(MeshUpdate mesh, const MeshPose& pose) {
 }
 
 void MapState::Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference,
-                           const SE3<Camera, Camera>& T_reference_camera) {
+                           const SE3<Camera, Camera>& T_reference_camera,
+                           const PoseUncertainty& reference_uncertainty) {
   std::lock_guard lock(mutex_);
   if (ack.accepted && ack.T_world_camera) {
-    trajectory_.Add(ack.frame_id, timestamp_ns, *ack.T_world_camera, reference, T_reference_camera);
+    trajectory_.Add({.frame_id = ack.frame_id,
+                     .timestamp_ns = timestamp_ns,
+                     .T_world_camera = *ack.T_world_camera,
+                     .reference = reference,
+                     .T_reference_camera = T_reference_camera,
+                     .uncertainty = ack.uncertainty,
+                     .reference_uncertainty = reference_uncertainty});
     tracked_.push_back({ack, timestamp_ns});
   }
   Send(ack);
@@ -150,9 +157,11 @@ MapSnapshot MapState::Snapshot() const {
     }
   }
   const std::vector<SE3<World, Camera>> poses = trajectory_.Poses();
+  const std::vector<std::optional<PoseUncertainty>> uncertainties = trajectory_.Uncertainties();
   for (size_t i = 0; i < tracked_.size(); ++i) {
     snapshot.trajectory.push_back(tracked_[i].ack);
     snapshot.trajectory.back().T_world_camera = poses[i];
+    snapshot.trajectory.back().uncertainty = uncertainties[i];
     snapshot.timestamps_ns.push_back(tracked_[i].timestamp_ns);
   }
   return snapshot;

@@ -36,13 +36,14 @@ class MapState {
   // Ignored if the object was removed.
   void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
   // Sends the acknowledgement, and adds an accepted frame with a pose to the trajectory. See TrackedFrame for
-  // `reference`.
+  // `reference`, `T_reference_camera` and its uncertainty.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
-                   const SE3<Camera, Camera>& T_reference_camera = {});
+                   const SE3<Camera, Camera>& T_reference_camera = {},
+                   const PoseUncertainty& reference_uncertainty = {});
   // A frame became a keyframe, with this pose.
   void SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
                    const SE3<World, Camera>& T_world_camera);
-  // Moves the frames of the trajectory with their corrected keyframes.
+  // Moves the frames of the trajectory with their corrected keyframes, whose uncertainties they take over.
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);

@@ -6,19 +6,19 @@
 
 namespace romap::session {
 
-void Trajectory::Add(uint64_t frame_id, int64_t timestamp_ns, const SE3<World, Camera>& T_world_camera,
-                     KeyframeId reference, const SE3<Camera, Camera>& T_reference_camera) {
-  if (reference) keyframes_.try_emplace(reference, ScaledPose{T_world_camera * T_reference_camera.Inverse()});
-  index_of_frame_[frame_id] = frames_.size();
-  frames_.push_back({timestamp_ns, T_world_camera, reference, T_reference_camera});
+void Trajectory::Add(const TrackedPose& tracked) {
+  if (tracked.reference) {
+    keyframes_.try_emplace(tracked.reference,
+                           ScaledPose{tracked.T_world_camera * tracked.T_reference_camera.Inverse()});
+  }
+  frames_.push_back(tracked);
 }
 
 void Trajectory::SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
                              const SE3<World, Camera>& T_world_camera) {
   keyframes_[keyframe].T_world_camera = T_world_camera;
   keyframe_timestamps_ns_[keyframe] = timestamp_ns;
-  const auto it = index_of_frame_.find(frame_id);
-  if (it != index_of_frame_.end()) frames_[it->second].keyframe = keyframe;
+  keyframe_of_frame_[frame_id] = keyframe;
 }
 
 void Trajectory::Correct(const MapCorrection& correction) {
@@ -27,15 +27,17 @@ void Trajectory::Correct(const MapCorrection& correction) {
     pose.T_world_camera = keyframe.T_world_camera;
     pose.scale *= keyframe.S_new_old.scale();
   }
+  for (const auto& [id, uncertainty] : correction.uncertainties) uncertainties_[id] = uncertainty;
 }
 
 std::vector<SE3<World, Camera>> Trajectory::Poses() const {
   const RelativeCorrections corrections = CorrectionsOfKeyframes();
   std::vector<SE3<World, Camera>> poses;
   poses.reserve(frames_.size());
-  for (const TrajectoryFrame& frame : frames_) {
-    if (frame.keyframe) {
-      poses.push_back(keyframes_.at(frame.keyframe).T_world_camera);
+  for (const TrackedPose& frame : frames_) {
+    const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
+    if (keyframe != keyframe_of_frame_.end()) {
+      poses.push_back(keyframes_.at(keyframe->second).T_world_camera);
     } else if (frame.reference) {
       const auto of_reference = corrections.find(frame.reference);
       const SE3<Camera, Camera> correction = of_reference == corrections.end()
@@ -53,14 +55,39 @@ Trajectory::RelativeCorrections Trajectory::CorrectionsOfKeyframes() const {
   RelativeCorrections corrections;
   // A keyframe needs no correction relative to itself.
   for (const auto& [id, timestamp_ns] : keyframe_timestamps_ns_) corrections[id].push_back({timestamp_ns, {}});
-  for (const TrajectoryFrame& frame : frames_) {
-    if (!frame.keyframe || !frame.reference) continue;
+  for (const TrackedPose& frame : frames_) {
+    const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
+    if (keyframe == keyframe_of_frame_.end() || !frame.reference) continue;
     const SE3<Camera, Camera> T_reference_camera =
-        keyframes_.at(frame.reference).Relative(keyframes_.at(frame.keyframe).T_world_camera);
+        keyframes_.at(frame.reference).Relative(keyframes_.at(keyframe->second).T_world_camera);
     corrections[frame.reference].push_back(
         {frame.timestamp_ns, frame.T_reference_camera.Inverse() * T_reference_camera});
   }
   return corrections;
+}
+
+// The frame must have an uncertainty.
+FrameUncertainty Trajectory::CurrentUncertainty(const TrackedPose& frame) const {
+  const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
+  const auto reference = uncertainties_.find(keyframe == keyframe_of_frame_.end() ? frame.reference : keyframe->second);
+  if (reference == uncertainties_.end()) return {.reference = *frame.uncertainty, .relative = {}};
+  PoseUncertainty relative = frame.reference_uncertainty;
+  relative.position_sigma_mu *= keyframes_.at(frame.reference).scale;
+  return {.reference = reference->second, .relative = relative};
+}
+
+std::vector<std::optional<PoseUncertainty>> Trajectory::Uncertainties() const {
+  std::vector<size_t> indices;
+  std::vector<FrameUncertainty> sources;
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    if (!frames_[i].uncertainty) continue;
+    indices.push_back(i);
+    sources.push_back(CurrentUncertainty(frames_[i]));
+  }
+  const std::vector<PoseUncertainty> aligned = AlignedUncertainties(sources);
+  std::vector<std::optional<PoseUncertainty>> uncertainties(frames_.size());
+  for (size_t k = 0; k < indices.size(); ++k) uncertainties[indices[k]] = aligned[k];
+  return uncertainties;
 }
 
 SE3<Camera, Camera> Trajectory::Interpolate(const std::vector<RelativeCorrection>& corrections, int64_t timestamp_ns) {

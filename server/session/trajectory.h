@@ -1,13 +1,15 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
+#include "common/pose_uncertainty.h"
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
+#include "server/session/trajectory_uncertainty.h"
 
 namespace romap::session {
 
@@ -17,9 +19,19 @@ namespace romap::session {
 // reference got. Not thread-safe.
 class Trajectory {
  public:
-  // Adds a tracked frame, in the order of time. `reference`, `T_reference_camera`: see TrackedFrame.
-  void Add(uint64_t frame_id, int64_t timestamp_ns, const SE3<World, Camera>& T_world_camera, KeyframeId reference,
-           const SE3<Camera, Camera>& T_reference_camera);
+  struct TrackedPose {
+    uint64_t frame_id = 0;
+    int64_t timestamp_ns = 0;
+    SE3<World, Camera> T_world_camera;
+    // See TrackedFrame.
+    KeyframeId reference = {};
+    SE3<Camera, Camera> T_reference_camera = {};
+    std::optional<PoseUncertainty> uncertainty = {};
+    PoseUncertainty reference_uncertainty = {};
+  };
+
+  // Adds a tracked frame, in the order of time.
+  void Add(const TrackedPose& tracked);
   // A frame, added or not, became a keyframe, with this pose. In the order of time.
   void SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
                    const SE3<World, Camera>& T_world_camera);
@@ -27,15 +39,10 @@ class Trajectory {
 
   // In the order of Add().
   std::vector<SE3<World, Camera>> Poses() const;
+  // In the same order. nullopt: the frame was added without.
+  std::vector<std::optional<PoseUncertainty>> Uncertainties() const;
 
  private:
-  struct TrajectoryFrame {
-    int64_t timestamp_ns = 0;
-    SE3<World, Camera> T_world_camera;  // as tracked
-    KeyframeId reference;
-    SE3<Camera, Camera> T_reference_camera;
-    KeyframeId keyframe = {};  // 0 = not a keyframe
-  };
   // The correction of a frame's pose relative to its reference: T_reference_camera * T_camera_corrected.
   struct RelativeCorrection {
     int64_t timestamp_ns = 0;
@@ -45,11 +52,13 @@ class Trajectory {
 
   RelativeCorrections CorrectionsOfKeyframes() const;
   static SE3<Camera, Camera> Interpolate(const std::vector<RelativeCorrection>& corrections, int64_t timestamp_ns);
+  FrameUncertainty CurrentUncertainty(const TrackedPose& frame) const;
 
-  std::vector<TrajectoryFrame> frames_;
-  std::unordered_map<uint64_t, size_t> index_of_frame_;
+  std::vector<TrackedPose> frames_;
+  std::unordered_map<uint64_t, KeyframeId> keyframe_of_frame_;
   std::map<KeyframeId, ScaledPose> keyframes_;
   std::map<KeyframeId, int64_t> keyframe_timestamps_ns_;
+  std::map<KeyframeId, PoseUncertainty> uncertainties_;  // of keyframes, as of the newest correction
 };
 
 }  // namespace romap::session

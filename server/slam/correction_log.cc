@@ -32,6 +32,14 @@ void CorrectionLog::Record(const KeyframeView& view, double scale) {
   for (const MapPointId removed : view.removed_points) points_.erase(removed);
 }
 
+std::map<KeyframeId, PoseUncertainty> CorrectionLog::Uncertainties(const SlamMap& map) const {
+  std::map<KeyframeId, PoseUncertainty> uncertainties;
+  for (const auto& [id, recorded] : keyframes_) {
+    if (const auto uncertainty = map.KeyframeUncertainty(id)) uncertainties[id] = *uncertainty;
+  }
+  return uncertainties;
+}
+
 MapCorrection CorrectionLog::TakeCorrection(const SlamMap& map) {
   MapCorrection correction;
   for (auto& [id, recorded] : keyframes_) {

@@ -17,6 +17,8 @@ class CorrectionLog {
   void Record(const KeyframeView& view, double scale);
   // Returns all keyframes and points that moved noticeably since they were recorded or last returned.
   MapCorrection TakeCorrection(const SlamMap& map);
+  // Of all recorded keyframes.
+  std::map<KeyframeId, PoseUncertainty> Uncertainties(const SlamMap& map) const;
 
  private:
   struct RecordedKeyframe {

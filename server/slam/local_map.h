@@ -12,6 +12,7 @@
 
 #include "common/geometry.h"
 #include "common/ids.h"
+#include "common/pose_uncertainty.h"
 #include "common/scaled_pose.h"
 #include "server/slam/features/feature.h"
 #include "server/slam/optimize/radial_correction.h"
@@ -32,11 +33,12 @@ struct LocalPoint {
 // A copy of the sparse map around the camera, made by the mapping thread for the tracking thread. Immutable, so that
 // neither thread waits for the other.
 struct LocalMap {
-  uint64_t keyframes_done = 0;                 // keyframes that are in the map
-  int generation = 0;                          // increases when the map is reset or initialized
-  RadialCorrection lens;                       // for the features of frames that are tracked against it
-  KeyframeId reference;                        // the newest keyframe
-  int reference_points = 0;                    // well-observed points that it observes
+  uint64_t keyframes_done = 0;  // keyframes that are in the map
+  int generation = 0;           // increases when the map is reset or initialized
+  RadialCorrection lens;        // for the features of frames that are tracked against it
+  KeyframeId reference;         // the newest keyframe
+  int reference_points = 0;     // well-observed points that it observes
+  PoseUncertainty reference_uncertainty;
   std::map<KeyframeId, ScaledPose> keyframes;  // the newest ones and those around `reference`
   std::vector<LocalPoint> points;
   std::unordered_map<MapPointId, int> index;  // into `points`

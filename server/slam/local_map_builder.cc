@@ -45,6 +45,7 @@ std::shared_ptr<const LocalMap> MakeLocalMap(const SlamMap& map, KeyframeId refe
     local->points.push_back(MakeLocalPoint(*map.FindPoint(id)));
   }
   local->reference_points = CountReferencePoints(map, *center);
+  local->reference_uncertainty = center->uncertainty;
 
   const uint64_t newest = map.keyframe_count();
   for (uint64_t id = newest > kNewestKeyframes ? newest - kNewestKeyframes : 1; id <= newest; ++id) {

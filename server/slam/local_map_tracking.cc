@@ -7,6 +7,7 @@
 
 #include "common/statistics.h"
 #include "server/slam/geometry/pnp.h"
+#include "server/slam/geometry/pose_covariance.h"
 #include "server/slam/geometry/pose_refiner.h"
 #include "server/slam/projection_search.h"
 
@@ -203,6 +204,10 @@ std::optional<PoseFromPoints> LocalMapTracking::Refine(const SE3<World, Camera>&
                         .point_of_feature = std::move(point_of_feature),
                         .inliers = pose.inliers,
                         .matches = static_cast<int>(observations.size())};
+  if (const auto covariance = PoseCovariance(frame_.camera, pose, observations)) {
+    result.uncertainty = {EquivalentSigma(covariance->topLeftCorner<3, 3>()),
+                          EquivalentSigma(covariance->bottomRightCorner<3, 3>())};
+  }
   for (size_t i = 0; i < feature_of.size(); ++i) {
     if (pose.inlier[i] == 0) result.point_of_feature[feature_of[i]] = -1;
   }

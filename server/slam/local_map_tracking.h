@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "common/pose_uncertainty.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/geometry/pose_refiner.h"
 #include "server/slam/local_map.h"
@@ -19,6 +20,8 @@ struct PoseFromPoints {
   std::vector<int> points_by_patch = {};  // indices of the points that were found by their patches, without outliers
   int inliers = 0;
   int matches = 0;  // inliers and outliers
+  // By the errors of the frame's features alone, as if the points were exact.
+  PoseUncertainty uncertainty = {};
 };
 
 // Estimates the pose of one frame from the points of a local map. All methods return nullopt if they match too few

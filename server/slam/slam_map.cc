@@ -132,6 +132,12 @@ std::optional<ScaledPose> SlamMap::KeyframePose(KeyframeId id) const {
   return ScaledPose{parent->Compose(removed->second.T_parent_this), parent->scale * removed->second.relative_scale};
 }
 
+std::optional<PoseUncertainty> SlamMap::KeyframeUncertainty(KeyframeId id) const {
+  if (const MapKeyframe* keyframe = FindKeyframe(id)) return keyframe->uncertainty;
+  const auto removed = removed_keyframes_.find(id);
+  return removed == removed_keyframes_.end() ? std::nullopt : KeyframeUncertainty(removed->second.parent);
+}
+
 std::vector<std::pair<KeyframeId, int>> SlamMap::Covisible(const MapKeyframe& keyframe, int min_shared) const {
   std::unordered_map<KeyframeId, int> shared;
   for (const MapPointId point : keyframe.points) {

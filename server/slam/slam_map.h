@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/pose_uncertainty.h"
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
 #include "server/slam/frame_features.h"
@@ -31,7 +32,8 @@ struct MapKeyframe {
   std::vector<MapPointId> points = {};  // one per feature, 0 = none
   KeyframeId parent = {};               // the keyframe it shared most points with when it was added; 0 for the first
   std::vector<std::pair<KeyframeId, Sim3<Camera, Camera>>> loops = {};  // S_this_other, by place recognition
-  double scale = 1;  // product of all scale corrections of the map around it
+  double scale = 1;                  // product of all scale corrections of the map around it
+  PoseUncertainty uncertainty = {};  // see UncertaintyEstimator; 0 for a given pose
 
   const std::vector<Feature>& features() const { return frame->features; }
   const CameraModel& camera() const { return frame->camera; }
@@ -104,6 +106,9 @@ class SlamMap {
 
   // The current pose of a keyframe. A removed keyframe moves with its parent. nullopt if unknown.
   std::optional<ScaledPose> KeyframePose(KeyframeId keyframe) const;
+
+  // The uncertainty of its current pose. nullopt if unknown.
+  std::optional<PoseUncertainty> KeyframeUncertainty(KeyframeId keyframe) const;
 
   // Keyframes that share at least `min_shared` points with this one, sorted by the number of shared points, then by
   // age, the newest first.

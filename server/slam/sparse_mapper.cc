@@ -55,6 +55,7 @@ SparseMapper::CurrentMap::CurrentMap(const SlamConfig& config, uint64_t keyframe
       up(keyframes_used),
       mask_voter(config),
       refiner(config),
+      uncertainty(config),
       next_global_adjustment(keyframes_used + kFirstGlobalAdjustment_keyframes) {}
 
 SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background)
@@ -108,9 +109,11 @@ MapCorrection SparseMapper::Finish() {
     StartGlobalAdjustment();
     ApplyGlobalAdjustment(/*wait=*/true);
     AlignWithUp(/*is_last=*/true);
+    current_->uncertainty.RequestUpdate();
+    UpdateUncertainties();
   }
   LogSummary();
-  return current_->corrections.TakeCorrection(current_->map);
+  return TakeCorrection();
 }
 
 std::vector<SessionWarning> SparseMapper::Warnings() const {
@@ -158,6 +161,7 @@ void SparseMapper::InitializeFrom(const TrackedImage& image, MappedFrame& mapped
     current_->newest = *newest;
     for (const auto& [id, keyframe] : current_->map.keyframes()) current_->places.Add(keyframe);
     AlignWithUp();
+    UpdateUncertainties();
     spdlog::info("slam: map initialized at frame {} with {} points", frame.frame_id, points());
     mapped.tracked.state = TrackingState::kTracking;
     mapped.tracked.is_keyframe = true;
@@ -208,13 +212,21 @@ void SparseMapper::HandleLostFrame(const TrackedImage& image, MappedFrame& mappe
 
 void SparseMapper::ReportCorrections(bool map_moved, MappedFrame& mapped) {
   if (map_moved || mapped.view) {
-    MapCorrection correction = current_->corrections.TakeCorrection(current_->map);
-    if (!correction.keyframes.empty() || !correction.points.empty()) mapped.correction = std::move(correction);
+    MapCorrection correction = TakeCorrection();
+    if (!correction.keyframes.empty() || !correction.points.empty() || !correction.uncertainties.empty()) {
+      mapped.correction = std::move(correction);
+    }
   }
   if (mapped.view) {
     current_->parallax_rad = UpperParallax_rad();
     current_->corrections.Record(*mapped.view, current_->map.FindKeyframe(mapped.view->id)->scale);
   }
+}
+
+MapCorrection SparseMapper::TakeCorrection() {
+  MapCorrection correction = current_->corrections.TakeCorrection(current_->map);
+  if (current_->uncertainty.TakeChange()) correction.uncertainties = current_->corrections.Uncertainties(current_->map);
+  return correction;
 }
 
 // ------------------------------------------------------------------------------------------------ keyframes
@@ -228,9 +240,11 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   MapKeyframe& keyframe =
       keyframe_builder_.Insert(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
+  keyframe.uncertainty = image.tracked.uncertainty.value_or(PoseUncertainty{});
   current_->newest = keyframe.id;
   mapped.tracked.reference = image.pose_given ? KeyframeId{} : keyframe.id;
   mapped.tracked.T_reference_camera = {};
+  mapped.tracked.reference_uncertainty = {};
   const bool is_live = background_ == Background::kAllAdjustment && !keyframe.pose_given;
   if (is_live) {
     // A fast camera needs the new points in the next frame.
@@ -242,6 +256,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   if (!is_live) CheckNextLoop();
   AlignWithGivenPoses(image, keyframe);
   AlignWithUp();
+  if (!is_live || !keyframes_wait_) UpdateUncertainties();
   PublishLocalMap(keyframe.id);
 
   mapped.view = MakeView(image.tracked, keyframe, map);
@@ -339,6 +354,7 @@ bool SparseMapper::ApplyGlobalAdjustment(bool wait) {
   if (!global_adjuster_.Apply(wait, current_->map)) return false;
   local_adjuster_.Discard();
   current_->up.RequestUpdate();
+  current_->uncertainty.RequestUpdate();
   if (current_->newest) PublishLocalMap(current_->reference);
   return true;
 }
@@ -353,6 +369,7 @@ bool SparseMapper::ConcludeLoopTrial(bool wait) {
     local_adjuster_.Discard();
     ++counts_.loops_corrected;
     current_->up.RequestUpdate();
+    current_->uncertainty.RequestUpdate();
     if (current_->newest) PublishLocalMap(current_->reference);
   } else {
     ++counts_.loops_rejected;
@@ -386,6 +403,12 @@ void SparseMapper::MoveMap(const Sim3<World, World>& S_new_old) {
   local_adjuster_.Move(S_new_old);
   global_adjuster_.Move(S_new_old);
   loop_trial_.Move(S_new_old);
+}
+
+void SparseMapper::UpdateUncertainties() {
+  if (!current_->map.keyframes().begin()->second.pose_given) {
+    current_->uncertainty.Update(CanEstimateLens(), current_->map);
+  }
 }
 
 void SparseMapper::UpdatePose(TrackedFrame& tracked) const {

@@ -23,6 +23,7 @@
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/tracker.h"
+#include "server/slam/uncertainty_estimator.h"
 #include "server/slam/world_up.h"
 
 namespace romap::slam {
@@ -83,6 +84,7 @@ class SparseMapper {
     GivenWorld given_world;
     MaskVoter mask_voter;
     ObservationRefiner refiner;
+    UncertaintyEstimator uncertainty;
     KeyframeId newest;
     KeyframeId reference;  // of the published local map: the newest keyframe, or where the camera was relocalized
     std::optional<LocalMap::Relocalization> relocalized = {};  // the newest one
@@ -126,6 +128,8 @@ class SparseMapper {
   void AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe);
   void AlignWithUp(bool is_last = false);
   void MoveMap(const Sim3<World, World>& S_new_old);
+  void UpdateUncertainties();
+  MapCorrection TakeCorrection();
   void UpdatePose(TrackedFrame& tracked) const;
   void PublishLocalMap(KeyframeId reference);
   void LogSummary() const;

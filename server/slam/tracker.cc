@@ -25,6 +25,11 @@ constexpr int kFewInliers = 100;  // with fewer, a pose may be wrong, and the de
 // and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
 constexpr uint64_t kKeyframesToLeavePriors = 12;
+// The errors of the points are about as large as those of the features: they double the variance.
+constexpr double kPointErrorFactor = 1.4;
+// Standard deviation of the angle by which points are wrong that were made beyond the reference keyframe, at a distance
+// of the scene's depth from it. From live runs, in which it is 0.05 to 0.3, depending on how late mapping is.
+constexpr double kNewPointsError = 0.15;
 
 }  // namespace
 
@@ -268,6 +273,7 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMap& local_map, cons
   image.tracked.state = status_.OnTracked();
   image.tracked.T_world_camera = pose.T_world_camera;
   AnchorToReference(image.tracked);
+  StateUncertainty(pose, tracking.MedianDepth_mu(pose), image.tracked);
   motion_.Update(pose.T_world_camera, frame.T_world_camera, frame.timestamp_ns, /*is_continuous=*/!was_lost);
   last_points_.clear();
   image.points.assign(image.features->size(), {});
@@ -313,6 +319,25 @@ void Tracker::AnchorToReference(TrackedFrame& tracked) const {
   if (reference == map_->keyframes.end()) return;
   tracked.reference = map_->reference;
   tracked.T_reference_camera = reference->second.Relative(tracked.T_world_camera);
+}
+
+// The uncertainty of the reference keyframe includes the errors that all points around it have in common. What is added
+// to it: errors of features and points that differ from point to point, and the errors of the points that the reference
+// observes badly. The latter's share grows with the distance from the reference, and so does the effect of their depths
+// on the pose. It dominates while mapping is late.
+void Tracker::StateUncertainty(const PoseFromPoints& pose, double depth_mu, TrackedFrame& tracked) const {
+  const auto reference = map_->keyframes.find(map_->reference);
+  const bool is_known = pose.uncertainty.position_sigma_mu > 0 && pose.uncertainty.rotation_sigma_rad > 0;
+  if (reference == map_->keyframes.end() || !is_known || !(depth_mu > 0)) return;
+  const ScaledPose& from = reference->second;
+  const double distance = (pose.T_world_camera.translation() - from.T_world_camera.translation()).norm() / depth_mu;
+  const double new_points_rad = kNewPointsError * distance * distance;
+  PoseUncertainty& relative = tracked.reference_uncertainty;
+  relative = Combine(
+      {kPointErrorFactor * pose.uncertainty.position_sigma_mu, kPointErrorFactor * pose.uncertainty.rotation_sigma_rad},
+      {new_points_rad * depth_mu, new_points_rad});
+  tracked.uncertainty = Combine(map_->reference_uncertainty, relative);
+  relative.position_sigma_mu /= from.scale;
 }
 
 }  // namespace romap::slam

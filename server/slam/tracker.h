@@ -80,6 +80,7 @@ class Tracker {
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
+  void StateUncertainty(const PoseFromPoints& pose, double depth_mu, TrackedFrame& tracked) const;
 
   const SlamConfig config_;
   const PoseUse pose_use_;

@@ -58,7 +58,7 @@ for kind in "$@"; do
         run=$(track "$scene")
         row=$(objects "$scene" --poses none)
         echo "| $scene | $(echo "$run" | centimeters) | $(echo "$run" | sed -n 's/^up direction error \(.*\)/\1/p')" \
-             "| $(echo "$run" | X) | $(echo "$row" | awk -F'|' '{ print $4 }')" \
+             "| $(echo "$run" | sed -n 's/^keyframes .*up confidence \(.*\)/\1/p') | $(echo "$row" | awk -F'|' '{ print $4 }')" \
              "| $(echo "$row" | field 5) | $(echo "$row" | field 6) |"
       done ;;
     black)

@@ -5,9 +5,11 @@
 //               [--until N] [--one-thread] [--fps RATE] [--verbose]
 //
 // Writes FOLDER/trajectory.txt with the final pose of every frame and FOLDER/live.txt with the poses as tracking first
-// estimated them (TUM format). Prints the numbers of tracked and lost frames, the times per frame and per bundle
-// adjustment, and the time of cv::ORB::detectAndCompute with the same number of features. --cut skips the frames
-// A..B-1. --one-thread maps between the frames instead of on a thread, so that the same input gives the same result.
+// estimated them (TUM format), both with their uncertainties (trajectory_uncertainty.txt, live_uncertainty.txt). Prints
+// how many errors of the final poses are within the bounds of their uncertainty, the numbers of tracked and lost
+// frames, the times per frame and per bundle adjustment, and the time of cv::ORB::detectAndCompute with the same number
+// of features. --cut skips the frames A..B-1. --one-thread maps between the frames instead of on a thread, so that the
+// same input gives the same result.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -27,6 +29,7 @@
 #include <vector>
 
 #include "client/eval/trajectory_eval.h"
+#include "client/files/pose_uncertainty_file.h"
 #include "client/files/sequence.h"
 #include "client/files/tum.h"
 #include "common/bounded_queue.h"
@@ -106,18 +109,17 @@ Options Parse(int argc, char** argv) {
 
 // A frame with a pose.
 struct TimedFrame {
-  double time_s = 0;
+  int64_t timestamp_ns = 0;
   TrackedFrame tracked;
 };
 
 void Write(const std::filesystem::path& path, const std::vector<TimedFrame>& frames) {
-  std::ofstream file(path);
+  std::vector<files::StampedPose> poses;
   for (const TimedFrame& frame : frames) {
-    const Eigen::Vector3d t = frame.tracked.T_world_camera.translation();
-    const Eigen::Quaterniond q = frame.tracked.T_world_camera.rotation();
-    file << fmt::format("{:.6f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f} {:.8f}\n", frame.time_s, t.x(), t.y(), t.z(),
-                        q.x(), q.y(), q.z(), q.w());
+    poses.push_back({frame.timestamp_ns, frame.tracked.T_world_camera, frame.tracked.uncertainty});
   }
+  const absl::Status status = files::WriteTrajectory(path.string(), poses);
+  if (!status.ok()) std::fprintf(stderr, "track_bench: %s\n", Message(status).c_str());
 }
 
 slam::SparseMapper::Background BackgroundWork(const Options& options) {
@@ -211,7 +213,7 @@ class Run {
     const bool has_pose = state == TrackingState::kTracking || state == TrackingState::kRelocalized;
     if (state == TrackingState::kRelocalized) relocalized_ += fmt::format(" {}", frame->frame_id);
     if (has_pose) {
-      live_.push_back({1e-9 * static_cast<double>(frame->timestamp_ns), image.tracked});
+      live_.push_back({frame->timestamp_ns, image.tracked});
       live_.back().tracked.frame = nullptr;
       std::lock_guard lock(final_mutex_);
       AddFinal(image.tracked);
@@ -228,9 +230,14 @@ class Run {
   }
 
   void AddFinal(const TrackedFrame& tracked) {
-    trajectory_.Add(tracked.frame->frame_id, tracked.frame->timestamp_ns, tracked.T_world_camera, tracked.reference,
-                    tracked.T_reference_camera);
-    final_.push_back({1e-9 * static_cast<double>(tracked.frame->timestamp_ns), tracked});
+    trajectory_.Add({.frame_id = tracked.frame->frame_id,
+                     .timestamp_ns = tracked.frame->timestamp_ns,
+                     .T_world_camera = tracked.T_world_camera,
+                     .reference = tracked.reference,
+                     .T_reference_camera = tracked.T_reference_camera,
+                     .uncertainty = tracked.uncertainty,
+                     .reference_uncertainty = tracked.reference_uncertainty});
+    final_.push_back({tracked.frame->timestamp_ns, tracked});
     final_.back().tracked.frame = nullptr;
   }
 
@@ -251,7 +258,11 @@ class Run {
 
   void Report(size_t keyframes_kept) {
     const std::vector<SE3<World, Camera>> poses = trajectory_.Poses();
-    for (size_t i = 0; i < final_.size(); ++i) final_[i].tracked.T_world_camera = poses[i];
+    const std::vector<std::optional<PoseUncertainty>> uncertainties = trajectory_.Uncertainties();
+    for (size_t i = 0; i < final_.size(); ++i) {
+      final_[i].tracked.T_world_camera = poses[i];
+      final_[i].tracked.uncertainty = uncertainties[i];
+    }
     if (!options_.out.empty()) {
       std::filesystem::create_directories(options_.out);
       Write(std::filesystem::path(options_.out) / "trajectory.txt", final_);
@@ -298,6 +309,14 @@ class Run {
     fmt::print("ATE rmse {:.3f} cm, {:.3f} % of the path of {:.2f} m, aligned by {}; scale {:.4f}; {} keyframes\n",
                100 * report->ate_rmse_m, 100 * report->ate_rmse_m / report->path_length_m, report->path_length_m,
                options_.depth ? "SE3" : "Sim3", report->scale, keyframes_kept);
+    if (const auto& calibration = report->calibration) {
+      fmt::print(
+          "uncertainty: {:.1f} % of position and {:.1f} % of rotation errors within their 95 % bound; median bound "
+          "over "
+          "median error {:.2f} and {:.2f}\n",
+          100 * calibration->position_coverage, 100 * calibration->rotation_coverage, calibration->position_bound_ratio,
+          calibration->rotation_bound_ratio);
+    }
     ReportUp(truth);
   }
 
@@ -308,7 +327,7 @@ class Run {
     Eigen::Vector3d up_sum = Eigen::Vector3d::Zero();
     for (const TimedFrame& frame : final_) {
       for (const files::StampedPose& pose : *truth) {
-        if (std::abs(1e-9 * static_cast<double>(pose.timestamp_ns) - frame.time_s) > 0.005) continue;
+        if (std::abs(pose.timestamp_ns - frame.timestamp_ns) > 5'000'000) continue;
         const Eigen::Quaterniond R_map_truth =
             frame.tracked.T_world_camera.rotation() * pose.T_world_camera.rotation().conjugate();
         up_sum += R_map_truth * Eigen::Vector3d::UnitZ();

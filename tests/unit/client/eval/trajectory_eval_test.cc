@@ -188,16 +188,15 @@ TEST(CompareTrajectoriesTest, APartlyTrackedSequenceIsDegraded) {
 }
 
 TEST(CompareTrajectoriesTest, MeasuresCalibrationIfSigmasAreGiven) {
-  const std::vector<files::StampedPose> estimated = Moved(eval_world::WithNoise(Orbit(), 0.02, 5), OtherWorld());
-  const TrajectoryInput input{.estimated = estimated,
-                              .ground_truth = Orbit(),
-                              .sigmas = std::vector<PoseSigma>(200, {.position = 0.37 * 0.02, .rotation_deg = 1})};
-  const auto report = CompareTrajectories(input, Alignment::kSim3, 0.02);
+  std::vector<files::StampedPose> estimated = Moved(eval_world::WithNoise(Orbit(), 0.02, 5), OtherWorld());
+  EXPECT_FALSE(CompareWithOrbit(estimated).calibration.has_value());
+  for (files::StampedPose& pose : estimated) pose.uncertainty = PoseUncertainty{0.37 * 0.02, 0.02};
+  const auto report = CompareTrajectories({.estimated = estimated, .ground_truth = Orbit()}, Alignment::kSim3, 0.02);
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_TRUE(report->calibration.has_value());
   EXPECT_NEAR(report->calibration->position_coverage, 0.95, 0.04);
+  EXPECT_NEAR(report->calibration->position_bound_ratio, 1.82, 0.15);
   EXPECT_EQ(report->calibration->rotation_coverage, 1);
-  EXPECT_FALSE(CompareWithOrbit(estimated).calibration.has_value());
 }
 
 }  // namespace romap::eval::trajectory_eval_test

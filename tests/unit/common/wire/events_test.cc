@@ -52,6 +52,22 @@ TEST(WireEvents, FrameAckRoundTrips) {
   EXPECT_EQ(got.T_world_camera->translation(), ack.T_world_camera->translation());
   EXPECT_EQ(got.is_keyframe, ack.is_keyframe);
   EXPECT_EQ(got.latency_s, ack.latency_s);
+  EXPECT_FALSE(got.uncertainty.has_value());
+}
+
+TEST(WireEvents, UncertaintyOfAFrameRoundTrips) {
+  FrameAck ack;
+  ack.uncertainty = PoseUncertainty{.position_sigma_mu = 0.25, .rotation_sigma_rad = 0.0625};
+  EXPECT_EQ(RoundTrip(ack).uncertainty, ack.uncertainty);
+}
+
+TEST(WireEvents, UncertaintyMustBePositive) {
+  for (const double sigma : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    FrameAck ack;
+    ack.uncertainty = PoseUncertainty{.position_sigma_mu = 0.25, .rotation_sigma_rad = sigma};
+    const auto got = FromProto(ToProto(ack), "ack");
+    EXPECT_THAT(std::string(got.status().message()), HasSubstr("ack.uncertainty")) << sigma;
+  }
 }
 
 TEST(WireEvents, MasksAckRoundTrips) {

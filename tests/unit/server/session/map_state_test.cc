@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace romap::session::map_state_test {
 
 constexpr std::chrono::milliseconds kNoWait{0};
@@ -197,6 +199,33 @@ TEST(MapStateTest, FramesMoveWithTheirKeyframes) {
   map.Acknowledge(follower, 40, KeyframeId{1}, T_reference_camera);
   EXPECT_TRUE(map.Snapshot().trajectory[3].T_world_camera->Matrix().isApprox(S.Moved(*follower.T_world_camera).Matrix(),
                                                                              1e-12));
+}
+
+TEST(MapStateTest, FramesTakeOverTheUncertaintyOfTheirKeyframes) {
+  MapState map;
+  FrameAck tracked, given;
+  tracked.frame_id = 1;
+  tracked.T_world_camera = CameraAt(10);
+  tracked.uncertainty = PoseUncertainty{5, 0.5};
+  given.frame_id = 2;
+  given.T_world_camera = CameraAt(12);
+  const PoseUncertainty relative{0.3, 0.03};
+  map.Acknowledge(tracked, 10, KeyframeId{1}, {}, relative);
+  map.Acknowledge(given, 20);
+  EXPECT_EQ(map.Snapshot().trajectory[0].uncertainty, tracked.uncertainty) << "no correction came";
+
+  // The map grows to twice its size around the keyframe.
+  const Sim3<World, World> S = Correction(2, 0, 0);
+  MapCorrection correction;
+  correction.keyframes = {{KeyframeId{1}, S.Moved(CameraAt(10)), S}};
+  correction.uncertainties = {{KeyframeId{1}, PoseUncertainty{0.8, 0.04}}};
+  map.Correct(correction);
+  const std::vector<FrameAck> corrected = map.Snapshot().trajectory;
+  ASSERT_TRUE(corrected[0].uncertainty.has_value());
+  // Half of the relative uncertainty is added again for the alignment.
+  EXPECT_NEAR(corrected[0].uncertainty->position_sigma_mu, std::hypot(0.8, 2 * 0.3, 0.3), 1e-12) << "twice the size";
+  EXPECT_NEAR(corrected[0].uncertainty->rotation_sigma_rad, std::hypot(0.04, 0.03, 0.015), 1e-12);
+  EXPECT_FALSE(corrected[1].uncertainty.has_value());
 }
 
 TEST(MapStateTest, SubscriptionStartsWithTheCurrentObjects) {

@@ -27,7 +27,7 @@ class TrajectoryTest : public ::testing::Test {
   // Keyframe 1 at 0, frames at 1, 2 and 3, all tracked against it.
   void SetUp() override {
     trajectory_.SetKeyframe(1, 0, kFirst, At(0));
-    for (int i = 1; i <= 3; ++i) trajectory_.Add(1 + static_cast<uint64_t>(i), 10 * i, At(i), kFirst, From0(i));
+    for (int i = 1; i <= 3; ++i) trajectory_.Add({1 + static_cast<uint64_t>(i), 10 * i, At(i), kFirst, From0(i)});
   }
 
   void Correct(const KeyframeCorrection& keyframe) {
@@ -62,25 +62,25 @@ TEST_F(TrajectoryTest, FramesBetweenKeyframesShareTheCorrectionByTime) {
   trajectory_.SetKeyframe(4, 30, kSecond, At(3.3));
   EXPECT_NEAR(Position(0).x(), 1.1, 1e-9);
   EXPECT_NEAR(Position(1).x(), 2.2, 1e-9);
-  trajectory_.Add(5, 40, At(4), kFirst, From0(4));
+  trajectory_.Add({5, 40, At(4), kFirst, From0(4)});
   EXPECT_NEAR(Position(3).x(), 4.3, 1e-9) << "after the last keyframe";
 }
 
 TEST_F(TrajectoryTest, FramesOfTheNextReferenceAreNotCorrectedByIt) {
   trajectory_.SetKeyframe(4, 30, kSecond, At(3.3));
-  trajectory_.Add(5, 40, At(4.3), kSecond, From0(1));
+  trajectory_.Add({5, 40, At(4.3), kSecond, From0(1)});
   EXPECT_NEAR(Position(3).x(), 4.3, 1e-9);
 }
 
 TEST_F(TrajectoryTest, GivenPosesStay) {
-  trajectory_.Add(5, 40, At(9), {}, {});
+  trajectory_.Add({5, 40, At(9), {}, {}});
   Correct(Moved(kFirst, At(5)));
   EXPECT_NEAR(Position(3).x(), 9, 1e-9);
 }
 
 TEST_F(TrajectoryTest, AKeyframeOfAnUnknownFrameIsKnownAsReference) {
   trajectory_.SetKeyframe(99, 5, kSecond, At(0.5));
-  trajectory_.Add(5, 40, At(9), kSecond, From0(1));
+  trajectory_.Add({5, 40, At(9), kSecond, From0(1)});
   EXPECT_NEAR(Position(3).x(), 1.5, 1e-9);
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/statistics.h"
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
@@ -87,11 +88,7 @@ class TrackingTest : public ::testing::Test {
   std::pair<double, double> Error() const {
     std::vector<Eigen::Vector3d> estimated, truth;
     for (const TrackedPose& frame : frames_) {
-      SE3<World, Camera> pose = frame.tracked.T_world_camera;
-      if (const auto reference = map().KeyframePose(frame.tracked.reference)) {
-        pose = reference->Compose(frame.tracked.T_reference_camera);
-      }
-      estimated.push_back(pose.translation());
+      estimated.push_back(CurrentPose(frame.tracked).translation());
       truth.push_back(frame.truth.translation());
     }
     const auto S = AlignPoints<World, World>(estimated, truth, false);
@@ -99,6 +96,41 @@ class TrackingTest : public ::testing::Test {
     double worst = 0;
     for (size_t i = 0; i < estimated.size(); ++i) worst = std::max(worst, (*S * estimated[i] - truth[i]).norm());
     return {worst, S->scale()};
+  }
+
+  // The shares of the tracked frames whose position and rotation errors are within the 95 % bounds of their current
+  // uncertainty, and the median of the bounds over the median of the position errors.
+  struct Coverage {
+    double position = 0, rotation = 0, bound_ratio = 0;
+  };
+  Coverage MeasureCoverage(bool fix_scale) const {
+    std::vector<Eigen::Vector3d> estimated, truth;
+    for (const TrackedPose& frame : frames_) {
+      estimated.push_back(CurrentPose(frame.tracked).translation());
+      truth.push_back(frame.truth.translation());
+    }
+    const auto S = AlignPoints<World, World>(estimated, truth, fix_scale);
+    Coverage coverage;
+    std::vector<double> errors, bounds;
+    for (const TrackedPose& frame : frames_) {
+      const auto reference = map().KeyframeUncertainty(frame.tracked.reference);
+      if (!frame.tracked.uncertainty || !reference) continue;
+      const PoseUncertainty uncertainty = Combine(*reference, frame.tracked.reference_uncertainty);
+      const SE3<World, Camera> pose = S->Moved(CurrentPose(frame.tracked));
+      errors.push_back((pose.translation() - frame.truth.translation()).norm());
+      bounds.push_back(kSigmasTo95 * S->scale() * uncertainty.position_sigma_mu);
+      const double share = 1.0 / static_cast<double>(frames_.size());
+      coverage.position += errors.back() <= bounds.back() ? share : 0;
+      const double rotation_rad = pose.rotation().angularDistance(frame.truth.rotation());
+      coverage.rotation += rotation_rad <= kSigmasTo95 * uncertainty.rotation_sigma_rad ? share : 0;
+    }
+    coverage.bound_ratio = errors.empty() ? 0 : Median(bounds) / Median(errors);
+    return coverage;
+  }
+
+  SE3<World, Camera> CurrentPose(const TrackedFrame& tracked) const {
+    const auto reference = map().KeyframePose(tracked.reference);
+    return reference ? reference->Compose(tracked.T_reference_camera) : tracked.T_world_camera;
   }
 
   // Angle between the true up direction and the map's, which is z.
@@ -261,6 +293,42 @@ TEST_F(LatePosesTest, AreRefusedIfTheyContradictTheImages) {
     EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
   }
   EXPECT_THAT(PosesIgnoredText(), HasSubstr("contradict the images"));
+}
+
+TEST_F(TrackingTest, ErrorsLieWithinTheBoundsOfTheirUncertainty) {
+  ProcessFrames(100);
+  mapper_->Finish();
+  const Coverage coverage = MeasureCoverage(/*fix_scale=*/false);
+  EXPECT_GE(coverage.position, 0.9);
+  EXPECT_GE(coverage.rotation, 0.9);
+  EXPECT_LT(coverage.bound_ratio, 6);
+}
+
+TEST_F(TrackingTest, ErrorsLieWithinTheBoundsOfTheirUncertaintyWithDepth) {
+  for (int i = 0; i < 60; ++i) {
+    auto frame = Render(i);
+    frame->depth_mu = world_.RenderDepth(*frame);
+    ProcessFrame(frame);
+  }
+  mapper_->Finish();
+  const Coverage coverage = MeasureCoverage(/*fix_scale=*/true);
+  EXPECT_GE(coverage.position, 0.9);
+  EXPECT_GE(coverage.rotation, 0.9);
+  EXPECT_LT(coverage.bound_ratio, 8) << "the depth is exact here";
+}
+
+TEST_F(TrackingTest, OnlyTrackedFramesHaveAnUncertainty) {
+  for (int i = 0; i < 40; ++i) {
+    const TrackedImage image = tracker_->Track(Render(i));
+    mapper_->Process(image);
+    const bool is_tracked = image.tracked.state == TrackingState::kTracking;
+    ASSERT_EQ(image.tracked.uncertainty.has_value(), is_tracked) << i;
+    if (!is_tracked) continue;
+    EXPECT_GT(image.tracked.uncertainty->position_sigma_mu, 0);
+    EXPECT_GE(image.tracked.uncertainty->position_sigma_mu, image.tracked.reference_uncertainty.position_sigma_mu);
+  }
+  Restart(PoseUse::kGiven);
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(tracker_->Track(Render(i)).tracked.uncertainty.has_value());
 }
 
 TEST_F(TrackingTest, StaticCameraReportsTooLittleParallax) {
