@@ -78,6 +78,7 @@ struct TrackedFrame {
   KeyframeId reference = {};
   SE3<Camera, Camera> T_reference_camera = {};
   std::string reason = {};  // human-readable: why the frame is not tracked; empty while tracking
+  SparseMapId map = {};     // the map that the pose refers to; 0: none
 };
 
 // A keyframe with its part of the sparse map. `points` holds the current position of every point in `observations`;
@@ -101,11 +102,21 @@ struct KeyframeCorrection {
   Sim3<World, World> S_new_old;
 };
 
-// A change of poses and points that were already published: bundle adjustment, loop closure, gravity or scale.
+// Two maps of a session were found to show a common place: everything in `from` belongs to `into` now, and was moved
+// into its world.
+struct MapMerge {
+  SparseMapId from;
+  SparseMapId into;
+};
+
+// A change of poses and points that were already published: bundle adjustment, loop closure, gravity, scale, or the
+// merge of two maps.
 struct MapCorrection {
   std::vector<KeyframeCorrection> keyframes;  // those that moved noticeably, by id
   std::vector<MapPoint> points;               // those that moved, with their new positions
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
+  std::vector<MapMerge> merged_maps =
+      {};  // in the order of the merges; the motion of their keyframes is in `keyframes`
 };
 
 // -------------------------------------------------------------------------------------------------- objects -> nerf

@@ -135,6 +135,7 @@ v1::FrameAck ToProto(FrameAck ack) {
   proto.set_is_keyframe(ack.is_keyframe);
   proto.set_latency_s(ack.latency_s);
   proto.set_state_reason(std::move(ack.state_reason));
+  proto.set_map_id(ack.map_id.value);
   return proto;
 }
 
@@ -152,6 +153,7 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.latency_s(), where + ".latency_s"));
   ack.latency_s = proto.latency_s();
   ack.state_reason = std::move(*proto.mutable_state_reason());
+  ack.map_id = SparseMapId{proto.map_id()};
   return ack;
 }
 
@@ -166,6 +168,7 @@ v1::ObjectUpdate ToProto(ObjectUpdate update) {
   proto.set_observations(update.observations);
   if (update.T_world_mesh) *proto.mutable_t_world_mesh() = ToProto(*update.T_world_mesh);
   proto.set_mesh_scale(update.mesh_scale);
+  proto.set_map_id(update.map_id.value);
   return proto;
 }
 
@@ -187,6 +190,7 @@ absl::StatusOr<ObjectUpdate> FromProto(v1::ObjectUpdate proto, const std::string
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.mesh_scale(), where + ".mesh_scale"));
   if (proto.mesh_scale() < 0) return InvalidArgument("{}.mesh_scale: must not be negative", where);
   if (proto.mesh_scale() > 0) update.mesh_scale = proto.mesh_scale();
+  update.map_id = SparseMapId{proto.map_id()};
   return update;
 }
 

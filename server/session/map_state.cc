@@ -99,6 +99,12 @@ void MapState::Correct(const MapCorrection& correction) {
     reference.T_world_camera = keyframe.T_world_camera;
     reference.scale *= keyframe.S_new_old.scale();
   }
+  for (const MapMerge& merge : correction.merged_maps) merged_maps_[merge.from] = merge.into;
+}
+
+SparseMapId MapState::CurrentMap(SparseMapId map) const {
+  for (auto it = merged_maps_.find(map); it != merged_maps_.end(); it = merged_maps_.find(map)) map = it->second;
+  return map;
 }
 
 SE3<World, Camera> MapState::CurrentPose(const TrajectoryEntry& entry) const {
@@ -155,6 +161,7 @@ MapSnapshot MapState::Snapshot() const {
   for (const TrajectoryEntry& entry : trajectory_) {
     snapshot.trajectory.push_back(entry.ack);
     snapshot.trajectory.back().T_world_camera = CurrentPose(entry);
+    snapshot.trajectory.back().map_id = CurrentMap(entry.ack.map_id);
     snapshot.timestamps_ns.push_back(entry.timestamp_ns);
   }
   return snapshot;

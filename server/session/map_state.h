@@ -39,7 +39,8 @@ class MapState {
   // `reference`.
   void Acknowledge(FrameAck ack, int64_t timestamp_ns, KeyframeId reference = {},
                    const SE3<Camera, Camera>& T_reference_camera = {});
-  // Moves the frames of the trajectory with their corrected reference keyframes.
+  // Moves the frames of the trajectory with their corrected reference keyframes, and to the maps that theirs were
+  // merged into.
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
@@ -72,12 +73,14 @@ class MapState {
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
   SE3<World, Camera> CurrentPose(const TrajectoryEntry& entry) const;
+  SparseMapId CurrentMap(SparseMapId map) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
   std::set<ObjectId> removed_;
   std::vector<TrajectoryEntry> trajectory_;
   std::map<KeyframeId, ScaledPose> references_;
+  std::map<SparseMapId, SparseMapId> merged_maps_;  // each into which one
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };
