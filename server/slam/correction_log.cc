@@ -32,6 +32,11 @@ void CorrectionLog::Record(const KeyframeView& view, double scale) {
   for (const MapPointId removed : view.removed_points) points_.erase(removed);
 }
 
+void CorrectionLog::Append(CorrectionLog other) {
+  keyframes_.merge(other.keyframes_);
+  points_.merge(other.points_);
+}
+
 MapCorrection CorrectionLog::TakeCorrection(const SlamMap& map) {
   MapCorrection correction;
   for (auto& [id, recorded] : keyframes_) {

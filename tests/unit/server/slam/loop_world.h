@@ -26,10 +26,11 @@ class LoopWorld {
     double shift_mu = 0;      // along x, per keyframe
   };
 
-  LoopWorld(int keyframes, Drift drift, bool opposite_walls_look_alike = false)
-      : drift_(drift), map_(SlamConfig{}), places_(SlamConfig{}, &map_) {
+  // `ids_used`: by other maps of the room. `first`: number of the first keyframe along the round.
+  LoopWorld(int keyframes, Drift drift, bool opposite_walls_look_alike = false, uint64_t ids_used = 0, int first = 0)
+      : drift_(drift), first_(first), map_(SlamConfig{}, ids_used, ids_used), places_(SlamConfig{}, &map_) {
     MakeWall(opposite_walls_look_alike);
-    for (int i = 0; i < keyframes; ++i) AddKeyframe(i);
+    for (int i = 0; i < keyframes; ++i) AddKeyframe(first + i);
   }
 
   SlamMap& map() { return map_; }
@@ -86,7 +87,7 @@ class LoopWorld {
     }
     const Sim3<World, World> drift = DriftAt(i);
     MapKeyframe& keyframe = map_.AddKeyframe(MakeFrameFeatures(frame, features), drift.Moved(TruePose(i)));
-    keyframe.parent = i == 0 ? KeyframeId{} : KeyframeId{keyframe.id.value - 1};
+    keyframe.parent = i == first_ ? KeyframeId{} : KeyframeId{keyframe.id.value - 1};
     for (size_t f = 0; f < wall_points.size(); ++f) Observe(i, wall_points[f], static_cast<int>(f), drift, keyframe);
     places_.Add(keyframe);
   }
@@ -109,6 +110,7 @@ class LoopWorld {
   };
 
   const Drift drift_;
+  const int first_;
   std::mt19937_64 random_{7};
   std::vector<WallPoint> wall_;
   SlamMap map_;
