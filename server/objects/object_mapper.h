@@ -34,8 +34,8 @@ class ObjectMapper {
   // Processes a keyframe. Call right after ObserveFrame for the same frame.
   ObjectOutput ObserveKeyframe(const KeyframeView& view);
   // Processes masks of an earlier frame that had none. Call in the order of the frames, but not between ObserveFrame
-  // and ObserveKeyframe of one frame. Masks are ignored when they are older than ObjectsConfig::max_mask_delay_s or the
-  // frame has no pose.
+  // and ObserveKeyframe of one frame. Masks are ignored when they are older than ObjectsConfig::max_mask_delay_s, the
+  // frame has no pose, or the camera has been in another map since.
   ObjectOutput ObserveLateMasks(const FrameMasks& masks);
   // Applies a map correction. Each object moves with the keyframes that observed it (MeanMotion). If two maps were
   // merged, the landmarks of both are compared again (MergeDuplicates). Noticeable changes are published: the cuboid in

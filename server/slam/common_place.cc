@@ -4,11 +4,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/place_recognizer.h"
+#include "server/slam/point_maker.h"
+#include "server/slam/projection_search.h"
 
 namespace romap::slam {
 namespace {
@@ -21,9 +25,47 @@ constexpr double kOtherPlaceShare = 0.6;
 constexpr double kMaxTurn_rad = 4 * std::numbers::pi / 180;
 constexpr double kMaxShiftShare = 0.1;  // of the depth
 constexpr double kMaxLogScale = 0.1;
+// The image is divided into cells. See MatchedArea().
+constexpr size_t kAreaColumns = 6;
+constexpr size_t kAreaRows = 4;
+constexpr int kMinPointsInCell = 4;
+constexpr double kMinFoundShare = 0.15;  // of the points in a cell
+constexpr double kMinMatchedArea = 0.5;
 
 bool FitsAsWell(const LocatedFrame& other, size_t points) {
   return static_cast<double>(other.points.size()) > kOtherPlaceShare * static_cast<double>(points);
+}
+
+// Share of the image, among the parts that should show points of the kept keyframe, where such points were found. A
+// thing that looks alike, for instance a poster, is found in its own part only.
+double MatchedArea(const MapKeyframe& keyframe, const LocatedFrame& located, const SlamMap& kept) {
+  struct Cell {
+    int expected = 0;
+    int found = 0;
+  };
+  std::array<Cell, kAreaColumns * kAreaRows> cells;
+  std::set<MapPointId> found;
+  for (const auto& [id, feature] : located.points) found.insert(id);
+  const CameraModel& camera = keyframe.camera();
+  const ProjectionMatcher matcher(*keyframe.frame, located.T_world_camera);
+  for (const MapPointId id : kept.FindKeyframe(located.keyframe)->points) {
+    if (!id) continue;
+    const auto seen = matcher.Predict(MakeLocalPoint(*kept.FindPoint(id)), ProjectionSearch{}.min_view_cosine);
+    if (!seen) continue;
+    const auto column = static_cast<size_t>(seen->pixel_px.x() * kAreaColumns / camera.width_px);
+    const auto row = static_cast<size_t>(seen->pixel_px.y() * kAreaRows / camera.height_px);
+    Cell& cell = cells[row * kAreaColumns + column];
+    ++cell.expected;
+    cell.found += found.contains(id) ? 1 : 0;
+  }
+  int expected = 0;
+  int matched = 0;
+  for (const Cell& cell : cells) {
+    if (cell.expected < kMinPointsInCell) continue;
+    ++expected;
+    matched += cell.found >= kMinFoundShare * cell.expected ? 1 : 0;
+  }
+  return expected > 0 ? static_cast<double>(matched) / expected : 0;
 }
 
 // The points that the keyframe observes, as the current map and as the kept map have them.
@@ -81,6 +123,12 @@ std::optional<CommonPlace> FindCommonPlace(const MapKeyframe& keyframe, const Se
                   best.keyframe.ToString(), place.keyframe.ToString(), kept.id.ToString());
     return std::nullopt;
   }
+  const double area = MatchedArea(keyframe, best, kept.map);
+  if (area < kMinMatchedArea) {
+    spdlog::debug("slam: {} shows only a part of what {} of {} shows: {:.0f} % of the image", keyframe.id.ToString(),
+                  best.keyframe.ToString(), kept.id.ToString(), 100 * area);
+    return std::nullopt;
+  }
   CommonPlace common{.kept = kept.id, .keyframe = keyframe.id, .kept_keyframe = best.keyframe};
   common.depth_mu = best.median_depth_mu;
   std::vector<std::pair<MapPointId, MapPointId>> ids;
@@ -89,8 +137,9 @@ std::optional<CommonPlace> FindCommonPlace(const MapKeyframe& keyframe, const Se
                                           {.fix_scale = HaveSameScale(current, kept),
                                            .min_inliers = kMinSamePoints,
                                            .seed = config.Seed(keyframe.id.value)});
-  spdlog::debug("slam: {} and {} of {}: {} of {} common points agree on a similarity", keyframe.id.ToString(),
-                best.keyframe.ToString(), kept.id.ToString(), similarity ? similarity->inliers : 0, matches.size());
+  spdlog::debug("slam: {} and {} of {}: {} of {} common points agree on a similarity, in {:.0f} % of the image",
+                keyframe.id.ToString(), best.keyframe.ToString(), kept.id.ToString(),
+                similarity ? similarity->inliers : 0, matches.size(), 100 * area);
   if (!similarity) return std::nullopt;
   common.S_kept_current = similarity->S_first_second;
   for (size_t i = 0; i < ids.size(); ++i) {

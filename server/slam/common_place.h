@@ -26,8 +26,8 @@ struct CommonPlace {
 bool HaveSameScale(const SessionMap& a, const SessionMap& b);
 
 // Searches a kept map for the place that a keyframe of the current map shows: by descriptors and P3P (PlaceRecognizer),
-// then the similarity between the two maps from the points that both have (SolveSimilarity). nullopt: there is none, or
-// different places of the kept map fit.
+// then the similarity between the two maps from the points that both have (SolveSimilarity). nullopt: there is none,
+// different places of the kept map fit, or only a part of the image fits.
 std::optional<CommonPlace> FindCommonPlace(const MapKeyframe& keyframe, const SessionMap& current,
                                            const SessionMap& kept, const SlamConfig& config);
 

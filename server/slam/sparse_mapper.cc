@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/slam/keyframe_view.h"
 #include "server/slam/local_map_builder.h"
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"
@@ -18,27 +19,11 @@ namespace {
 
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
+constexpr int kMaxMapsRefused = 3;    // during one loss
 constexpr size_t kMaxPostponed = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
   return tracked.state != TrackingState::kLost && tracked.state != TrackingState::kInitializing;
-}
-
-KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe, SlamMap& map) {
-  KeyframeView view;
-  view.id = keyframe.id;
-  view.frame = tracked.frame;
-  view.T_world_camera = keyframe.T_world_camera();
-  view.up_world = tracked.up_world;
-  for (size_t i = 0; i < keyframe.points.size(); ++i) {
-    if (!keyframe.points[i]) continue;
-    const Feature& feature = keyframe.features()[i];
-    view.observations.push_back(
-        {.point = keyframe.points[i], .pixel_px = keyframe.frame->image_px[i], .label = feature.label});
-    view.points.push_back(map.FindPoint(keyframe.points[i])->point);
-  }
-  view.removed_points = map.TakeRemovedPoints();
-  return view;
 }
 
 }  // namespace
@@ -134,7 +119,11 @@ void SparseMapper::InitializeFrom(const TrackedImage& image, MappedFrame& mapped
   const bool is_first = current().IsEmpty();
   if (!is_first && image.generation != generation_) return;  // the camera was found since
   ++generation_;
-  if (!is_first && Relocalize(*image.features)) return;  // a known place needs no new map
+  // A known place needs no new map. But it is not known if tracking has failed there before.
+  if (!is_first && maps_refused_ < kMaxMapsRefused && Relocalize(*image.features)) {
+    ++maps_refused_;
+    return;
+  }
   std::unique_ptr<SessionMap> made = atlas_.MakeMap();
   made->has_depth_scale = !views.second;
   const MapStart start = is_first ? FirstMapStart(views, frame) : WithGravity(current().StartOfNextMap(), views, frame);
@@ -158,11 +147,12 @@ void SparseMapper::InitializeFrom(const TrackedImage& image, MappedFrame& mapped
   mapped.tracked.T_reference_camera = {};
   UpdatePose(mapped.tracked);
   current().last_reference = *newest;
-  mapped.view = MakeView(mapped.tracked, *current().map.FindKeyframe(*newest), current().map);
+  mapped.view = MakeKeyframeView(mapped.tracked, *current().map.FindKeyframe(*newest), current().map);
   PublishLocalMap(*newest);
 }
 
 void SparseMapper::MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped) {
+  maps_refused_ = 0;
   if (!image.pose_given) UpdatePose(mapped.tracked);
   if (!current().world_is_given) {
     current().up.ObserveGravity(*image.tracked.frame, mapped.tracked.T_world_camera);
@@ -244,7 +234,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   AlignWithUp();
   PublishLocalMap(keyframe.id);
 
-  mapped.view = MakeView(image.tracked, keyframe, map);
+  mapped.view = MakeKeyframeView(image.tracked, keyframe, map);
   mapped.tracked.T_world_camera = mapped.view->T_world_camera;
   mapped.view->up_world = mapped.tracked.up_world;
 }

@@ -112,6 +112,7 @@ class SparseMapper {
   MapMerger merger_;
   std::vector<MapMerge> merges_;  // not reported yet
   int generation_ = 0;            // see LocalMap::generation
+  int maps_refused_ = 0;          // new ones, because the place of the camera was known, since it was tracked
   Counts counts_;
 };
 

@@ -26,11 +26,21 @@ class LoopWorld {
     double shift_mu = 0;      // along x, per keyframe
   };
 
-  // `ids_used`: by other maps of the room. `first`: number of the first keyframe along the round.
-  LoopWorld(int keyframes, Drift drift, bool opposite_walls_look_alike = false, uint64_t ids_used = 0, int first = 0)
-      : drift_(drift), first_(first), map_(SlamConfig{}, ids_used, ids_used), places_(SlamConfig{}, &map_) {
-    MakeWall(opposite_walls_look_alike);
-    for (int i = 0; i < keyframes; ++i) AddKeyframe(first + i);
+  struct Options {
+    bool opposite_walls_look_alike = false;
+    uint64_t ids_used = 0;              // by other maps of the room
+    int first = 0;                      // number of the first keyframe along the round
+    double alike_above_mu = -INFINITY;  // below this height, the walls look different than in other rooms
+  };
+
+  LoopWorld(int keyframes, Drift drift) : LoopWorld(keyframes, drift, Options{}) {}
+  LoopWorld(int keyframes, Drift drift, const Options& options)
+      : drift_(drift),
+        first_(options.first),
+        map_(SlamConfig{}, options.ids_used, options.ids_used),
+        places_(SlamConfig{}, &map_) {
+    MakeWall(options);
+    for (int i = 0; i < keyframes; ++i) AddKeyframe(first_ + i);
   }
 
   SlamMap& map() { return map_; }
@@ -57,14 +67,19 @@ class LoopWorld {
     Descriptor descriptor{};
   };
 
-  void MakeWall(bool opposite_walls_look_alike) {
+  void MakeWall(const Options& options) {
     std::uniform_real_distribution<double> angle(0, std::numbers::pi), height(-2, 2), radius(5, 7);
     for (int i = 0; i < 900; ++i) {
       const double angle_rad = angle(random_);
       const Eigen::Vector3d p(radius(random_) * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0));
       const Eigen::Vector3d up(0, 0, height(random_));
       wall_.push_back({p + up, RandomDescriptor(random_)});
-      wall_.push_back({-p + up, opposite_walls_look_alike ? wall_.back().descriptor : RandomDescriptor(random_)});
+      wall_.push_back(
+          {-p + up, options.opposite_walls_look_alike ? wall_.back().descriptor : RandomDescriptor(random_)});
+    }
+    std::mt19937_64 other_random(8);
+    for (WallPoint& point : wall_) {
+      if (point.p_world.z() < options.alike_above_mu) point.descriptor = RandomDescriptor(other_random);
     }
   }
 

@@ -16,7 +16,7 @@ class MapAtlasTest : public ::testing::Test {
   // Begins a map with keyframes [first, first + count) of the room.
   void Begin(int first, int count) {
     auto made = atlas_.MakeMap();
-    LoopWorld world(count, {}, false, made->map.point_count(), first);
+    LoopWorld world(count, {}, {.ids_used = made->map.point_count(), .first = first});
     made->map.Append(world.map());
     for (const auto& [id, keyframe] : made->map.keyframes()) made->places.Add(keyframe);
     atlas_.Begin(std::move(made));
@@ -107,7 +107,7 @@ TEST_F(MapAtlasTest, TheMergedMapIsCurrentIfOneOfThemWas) {
   EXPECT_EQ(atlas_.Find(SparseMapId{3}), nullptr);
   // Places of both parts are known.
   for (const int i : {2, 10}) {
-    LoopWorld world(1, {}, false, 0, i);
+    LoopWorld world(1, {}, {.first = i});
     const auto place = atlas_.Relocalize(*world.newest().frame);
     ASSERT_TRUE(place) << i;
     EXPECT_EQ(place->map, SparseMapId{1}) << i;

@@ -29,14 +29,16 @@ class MapMergerTest : public ::testing::Test {
     atlas_.Begin(std::move(made));
   }
 
-  // Begins a map with keyframes [first, first + count) of the round in a world of its own.
-  void BeginOther(int first, int count, bool look_alike = false, LoopWorld::Drift drift = kNoDrift) {
-    LoopWorld world(count, drift, look_alike, kIdsUsed, first);
-    Begin(world, S_other_a_);
-  }
+  // Begins a map of the whole room in world A.
   void BeginRoom(bool look_alike = false) {
-    LoopWorld world(LoopWorld::kKeyframesPerRound, kNoDrift, look_alike);
+    LoopWorld world(LoopWorld::kKeyframesPerRound, kNoDrift, {.opposite_walls_look_alike = look_alike});
     Begin(world);
+  }
+  // Begins a map with six keyframes of the round in a world of its own.
+  void BeginOther(LoopWorld::Options options, LoopWorld::Drift drift = kNoDrift) {
+    options.ids_used = kIdsUsed;
+    LoopWorld world(6, drift, options);
+    Begin(world, S_other_a_);
   }
 
   // Observes the first `keyframes` keyframes of the current map, and concludes the trial if there is one.
@@ -67,7 +69,7 @@ class MapMergerTest : public ::testing::Test {
 
 TEST_F(MapMergerTest, MergesTheSmallerMapIntoTheWorldOfTheLargerOne) {
   BeginRoom();
-  BeginOther(10, 6);
+  BeginOther({.first = 10});
   const size_t points = atlas_.points();
   const auto merge = Observe(6);
   ASSERT_TRUE(merge);
@@ -82,10 +84,8 @@ TEST_F(MapMergerTest, MergesTheSmallerMapIntoTheWorldOfTheLargerOne) {
 }
 
 TEST_F(MapMergerTest, TheCurrentMapStaysInItsWorldIfItIsLarger) {
-  LoopWorld part(6, kNoDrift, false, kIdsUsed, 10);
-  Begin(part, S_other_a_);
-  LoopWorld room(LoopWorld::kKeyframesPerRound, kNoDrift);
-  Begin(room);
+  BeginOther({.first = 10});
+  BeginRoom();
   const auto merge = Observe(LoopWorld::kKeyframesPerRound);
   ASSERT_TRUE(merge);
   EXPECT_EQ(merge->from, SparseMapId{1});
@@ -96,7 +96,7 @@ TEST_F(MapMergerTest, TheCurrentMapStaysInItsWorldIfItIsLarger) {
 
 TEST_F(MapMergerTest, TheKeyframesOfBothMapsBecomeOneTree) {
   BeginRoom();
-  BeginOther(10, 6);
+  BeginOther({.first = 10});
   ASSERT_TRUE(Observe(6));
   int roots = 0;
   for (const auto& [id, keyframe] : atlas_.current().map.keyframes()) {
@@ -108,7 +108,7 @@ TEST_F(MapMergerTest, TheKeyframesOfBothMapsBecomeOneTree) {
 
 TEST_F(MapMergerTest, TwoKeyframesAreNoProof) {
   BeginRoom();
-  BeginOther(10, 6);
+  BeginOther({.first = 10});
   EXPECT_FALSE(Observe(2));
   EXPECT_EQ(atlas_.maps(), 2U);
 }
@@ -116,38 +116,46 @@ TEST_F(MapMergerTest, TwoKeyframesAreNoProof) {
 // The keyframes find a wall, but each at another pose.
 TEST_F(MapMergerTest, KeyframesThatDisagreeAreNoProof) {
   BeginRoom();
-  BeginOther(10, 6, /*look_alike=*/false, {.rotation_deg = 8});
+  BeginOther({.first = 10}, {.rotation_deg = 8});
   EXPECT_FALSE(Observe(6));
   EXPECT_EQ(atlas_.maps(), 2U);
 }
 
 TEST_F(MapMergerTest, APlaceThatLooksLikeTwoPlacesOfTheKeptMapIsNoProof) {
   BeginRoom(/*look_alike=*/true);
-  BeginOther(10, 6, /*look_alike=*/true);
+  BeginOther({.opposite_walls_look_alike = true, .first = 10});
   EXPECT_FALSE(Observe(6));
   EXPECT_EQ(atlas_.maps(), 2U);
 }
 
 TEST_F(MapMergerTest, APlaceThatLooksLikeTwoPlacesOfTheCurrentMapIsNoProof) {
-  LoopWorld part(6, kNoDrift, /*opposite_walls_look_alike=*/true, kIdsUsed, 10);
-  Begin(part, S_other_a_);
-  LoopWorld room(LoopWorld::kKeyframesPerRound, kNoDrift, /*opposite_walls_look_alike=*/true);
-  Begin(room);
+  BeginOther({.opposite_walls_look_alike = true, .first = 10});
+  BeginRoom(/*look_alike=*/true);
   EXPECT_FALSE(Observe(LoopWorld::kKeyframesPerRound));
   EXPECT_EQ(atlas_.maps(), 2U);
   EXPECT_GT(merger_.rejected(), 0) << "the place was not recognized at all";
 }
 
+// Only the upper parts of the walls look alike.
+TEST_F(MapMergerTest, APlaceThatLooksAlikeInPartIsNoProof) {
+  BeginRoom();
+  BeginOther({.first = 10, .alike_above_mu = 0.9});
+  const MapKeyframe& keyframe = atlas_.current().map.keyframes().begin()->second;
+  ASSERT_TRUE(atlas_.kept()[0]->places.Locate(*keyframe.frame, *atlas_.kept()[0]->map.FindKeyframe(KeyframeId{11}), 1));
+  EXPECT_FALSE(Observe(6));
+  EXPECT_EQ(atlas_.maps(), 2U);
+}
+
 TEST_F(MapMergerTest, MapsOfDifferentPlacesAreNotMerged) {
   LoopWorld part(6, kNoDrift);
   Begin(part);
-  BeginOther(15, 6);
+  BeginOther({.first = 15});
   EXPECT_FALSE(Observe(6));
 }
 
 TEST_F(MapMergerTest, ForgetsThePlacesOfAnEarlierMap) {
   BeginRoom();
-  BeginOther(10, 6);
+  BeginOther({.first = 10});
   int observed = 0;
   for (const auto& [id, keyframe] : atlas_.current().map.keyframes()) {
     merger_.Observe(keyframe, atlas_);
