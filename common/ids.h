@@ -25,12 +25,17 @@ struct ObjectTag {
 struct KeyframeTag {
   static constexpr const char* kName = "keyframe";
 };
+// A sparse map of a session. 1 is the first map.
+struct SparseMapTag {
+  static constexpr const char* kName = "map";
+};
 struct MapPointTag {
   static constexpr const char* kName = "point";
 };
 
 using ObjectId = Id<ObjectTag>;
 using KeyframeId = Id<KeyframeTag>;
+using SparseMapId = Id<SparseMapTag>;
 using MapPointId = Id<MapPointTag>;
 
 }  // namespace romap

@@ -30,6 +30,8 @@ struct FrameAck {
   std::string state_reason = {};  // human-readable: why the state is not kTracking, e.g. "too little parallax"
   // Of T_world_camera, as known when it was computed. nullopt: not tracked, or the pose was given by the client.
   std::optional<PoseUncertainty> uncertainty = {};
+  // The map that T_world_camera refers to; 0: none. The worlds of two maps are not related to each other.
+  SparseMapId map_id = {};
 };
 
 // The result of one MasksInput.
@@ -52,6 +54,8 @@ struct ObjectUpdate {
   std::optional<SE3<World, Object>> T_world_mesh;
   // p_world = T_world_mesh * (mesh_scale * vertex). 1 until a correction changes the scale of a monocular map.
   double mesh_scale = 1;
+  // The map that the object belongs to. When two maps are merged, the objects of one of them are published again.
+  SparseMapId map_id = {};
 };
 
 struct MeshUpdate {

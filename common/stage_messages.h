@@ -80,6 +80,7 @@ struct TrackedFrame {
   KeyframeId reference = {};
   SE3<Camera, Camera> T_reference_camera = {};
   std::string reason = {};  // human-readable: why the frame is not tracked; empty while tracking
+  SparseMapId map = {};     // the map that the pose refers to; 0: none
   // Of T_world_camera at the time of tracking. nullopt: the frame is not tracked, or its pose was given.
   std::optional<PoseUncertainty> uncertainty = {};
   PoseUncertainty reference_uncertainty = {};  // of T_reference_camera, in its unit
@@ -106,13 +107,23 @@ struct KeyframeCorrection {
   Sim3<World, World> S_new_old;
 };
 
-// A change of poses and points that were already published: bundle adjustment, loop closure, gravity or scale.
+// Two maps of a session were found to show a common place: everything in `from` belongs to `into` now, and was moved
+// into its world.
+struct MapMerge {
+  SparseMapId from;
+  SparseMapId into;
+};
+
+// A change of poses and points that were already published: bundle adjustment, loop closure, gravity, scale, or the
+// merge of two maps.
 struct MapCorrection {
   std::vector<KeyframeCorrection> keyframes;  // those that moved noticeably, by id
   std::vector<MapPoint> points;               // those that moved, with their new positions
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
   // The uncertainties of all keyframes that were published; empty unless they were computed anew.
   std::map<KeyframeId, PoseUncertainty> uncertainties = {};
+  std::vector<MapMerge> merged_maps =
+      {};  // in the order of the merges; the motion of their keyframes is in `keyframes`
 };
 
 // -------------------------------------------------------------------------------------------------- objects -> nerf

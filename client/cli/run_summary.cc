@@ -58,6 +58,7 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
     object.center_world = entry.object.cuboid.T_world_object.translation();
     object.half_extents = entry.object.cuboid.half_extents;
     object.observations = entry.object.observations;
+    object.map_id = entry.object.map_id.value;
     object.steps = entry.steps;
     object.train_s = entry.train_seconds;
     object.vertices = entry.mesh_world.vertices.size();
@@ -81,6 +82,7 @@ nlohmann::json ToJson(const RunSummary& summary) {
                        {"center_world_mu", Vector(object.center_world)},
                        {"half_extents_mu", Vector(object.half_extents)},
                        {"observations", object.observations},
+                       {"map_id", object.map_id},
                        {"training_steps", object.steps},
                        {"training_s", object.train_s},
                        {"vertices", object.vertices},

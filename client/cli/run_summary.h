@@ -20,6 +20,7 @@ struct RunSummary {
     Eigen::Vector3d center_world = Eigen::Vector3d::Zero();  // map units
     Eigen::Vector3d half_extents = Eigen::Vector3d::Zero();  // map units
     uint64_t observations = 0;
+    uint64_t map_id = 0;  // see ObjectUpdate
     uint64_t steps = 0;
     double train_s = 0;
     size_t vertices = 0, triangles = 0;

@@ -148,6 +148,7 @@ v1::FrameAck ToProto(FrameAck ack) {
     proto.mutable_uncertainty()->set_position_sigma(ack.uncertainty->position_sigma_mu);
     proto.mutable_uncertainty()->set_rotation_sigma_rad(ack.uncertainty->rotation_sigma_rad);
   }
+  proto.set_map_id(ack.map_id.value);
   return proto;
 }
 
@@ -168,6 +169,7 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
   if (proto.has_uncertainty()) {
     ROMAP_ASSIGN_OR_RETURN(ack.uncertainty, FromProto(proto.uncertainty(), where + ".uncertainty"));
   }
+  ack.map_id = SparseMapId{proto.map_id()};
   return ack;
 }
 
@@ -182,6 +184,7 @@ v1::ObjectUpdate ToProto(ObjectUpdate update) {
   proto.set_observations(update.observations);
   if (update.T_world_mesh) *proto.mutable_t_world_mesh() = ToProto(*update.T_world_mesh);
   proto.set_mesh_scale(update.mesh_scale);
+  proto.set_map_id(update.map_id.value);
   return proto;
 }
 
@@ -203,6 +206,7 @@ absl::StatusOr<ObjectUpdate> FromProto(v1::ObjectUpdate proto, const std::string
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.mesh_scale(), where + ".mesh_scale"));
   if (proto.mesh_scale() < 0) return InvalidArgument("{}.mesh_scale: must not be negative", where);
   if (proto.mesh_scale() > 0) update.mesh_scale = proto.mesh_scale();
+  update.map_id = SparseMapId{proto.map_id()};
   return update;
 }
 

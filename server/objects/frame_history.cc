@@ -124,9 +124,4 @@ void FrameHistory::Correct(KeyframeCorrections* corrections) {
   }
 }
 
-void FrameHistory::Clear() {
-  entries_.clear();
-  stand_ins_.clear();
-}
-
 }  // namespace romap::objects

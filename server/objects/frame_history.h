@@ -40,7 +40,8 @@ class FrameHistory {
 
   // Applies a map correction to the stored frames. Adds the corrections of stand-ins to `corrections`.
   void Correct(KeyframeCorrections* corrections);
-  void Clear();
+  // Forgets the frames, but keeps the poses of stand-ins, which corrections still move.
+  void ForgetFrames() { entries_.clear(); }
 
  private:
   struct Entry {

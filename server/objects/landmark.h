@@ -17,6 +17,7 @@ namespace romap::objects {
 // Evidence of the detections for one landmark. Frames are counted by the mapper; client frame ids may have gaps.
 struct LandmarkEvidence {
   uint64_t last_frame = 0;        // index of the frame of the last observation
+  uint64_t dormant_frames = 0;    // frames since then during which its map was not the current one
   uint64_t observations = 0;      // frames with a mask of it
   int keyframe_observations = 0;  // keyframes with an unambiguous mask of it
   uint64_t expected = 0;          // frames with a mask of it, and frames that should have shown it
@@ -42,7 +43,7 @@ struct LandmarkEvidence {
   }
 };
 
-// Geometry of a landmark, in the world frame of the newest map correction.
+// Geometry of a landmark, in the world of its map after the newest correction.
 struct LandmarkGeometry {
   std::optional<Cuboid> cuboid;             // newest fit
   std::optional<Cuboid> training_box;       // of the same fit, see CuboidFit
@@ -56,6 +57,7 @@ struct Landmark {
   Landmark(LandmarkKey new_key, const ObjectsConfig& config) : key(new_key), shape(config) {}
 
   LandmarkKey key;
+  SparseMapId map = {};  // the map that it belongs to
   ObjectState state = ObjectState::kProvisional;
   LandmarkEvidence evidence;
   LandmarkGeometry geometry;

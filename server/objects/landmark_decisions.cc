@@ -127,7 +127,8 @@ Decision DecidePruning(ObjectState state, const LandmarkEvidence& evidence, bool
   // A landmark with a cuboid had many observations; it may be out of view and return into view later.
   constexpr uint64_t kMaxUnobservedFrames = 40;
   constexpr uint64_t kMaxUnobservedFramesWithCuboid = 400;
-  if (frame_index - evidence.last_frame > (has_cuboid ? kMaxUnobservedFramesWithCuboid : kMaxUnobservedFrames)) {
+  if (frame_index - evidence.last_frame - evidence.dormant_frames >
+      (has_cuboid ? kMaxUnobservedFramesWithCuboid : kMaxUnobservedFrames)) {
     return {true, "not observed again"};
   }
   return {false, "may still be confirmed"};

@@ -65,15 +65,71 @@ Landmark* LandmarkStore::Find(LandmarkKey key) const {
   return found == landmarks_.end() ? nullptr : found->get();
 }
 
-Landmark& LandmarkStore::Create() { return *landmarks_.emplace_back(std::make_unique<Landmark>(++last_key_, config_)); }
+Landmark& LandmarkStore::Create() {
+  Landmark& landmark = *landmarks_.emplace_back(std::make_unique<Landmark>(++last_key_, config_));
+  landmark.map = map_;
+  return landmark;
+}
 
 void LandmarkStore::RemoveIf(const std::function<bool(const Landmark&)>& condition) {
   std::erase_if(landmarks_, [&](const auto& landmark) { return condition(*landmark); });
 }
 
-void LandmarkStore::Clear() {
-  landmarks_.clear();
-  points_ = {};
+std::vector<SparseMapId> LandmarkStore::Maps() const {
+  std::vector<SparseMapId> maps;
+  for (const auto& [map, parts] : dormant_) maps.push_back(map);
+  maps.push_back(map_);
+  return maps;
+}
+
+void LandmarkStore::SetMap(SparseMapId map, uint64_t frame_index) {
+  if (map == map_) return;
+  if (!landmarks_.empty() || !points_.IsEmpty()) {
+    dormant_[map_] = {
+        .landmarks = std::exchange(landmarks_, {}), .points = std::exchange(points_, {}), .since_frame = frame_index};
+  }
+  map_ = map;
+  WakeUp(map, frame_index);
+}
+
+// Adds what belongs to a dormant map to the current one.
+void LandmarkStore::WakeUp(SparseMapId map, uint64_t frame_index) {
+  auto found = dormant_.extract(map);
+  if (found.empty()) return;
+  DormantMap& woken = found.mapped();
+  for (auto& landmark : woken.landmarks) {
+    landmark->evidence.dormant_frames += frame_index - woken.since_frame;
+    landmark->map = map_;
+    landmarks_.push_back(std::move(landmark));
+  }
+  points_.Append(std::move(woken.points));
+}
+
+void LandmarkStore::MergeMaps(const MapMerge& merge, uint64_t frame_index) {
+  if (merge.from == map_ || merge.into == map_) {
+    map_ = merge.into;
+    for (const auto& landmark : landmarks_) landmark->map = map_;
+    WakeUp(merge.from, frame_index);
+    WakeUp(merge.into, frame_index);
+    return;
+  }
+  const SparseMapId current = map_;
+  SetMap(merge.into, frame_index);
+  WakeUp(merge.from, frame_index);
+  SetMap(current, frame_index);
+}
+
+std::vector<Landmark*> LandmarkStore::DormantLandmarks() const {
+  std::vector<Landmark*> landmarks;
+  for (const auto& [map, parts] : dormant_) {
+    for (const auto& landmark : parts.landmarks) landmarks.push_back(landmark.get());
+  }
+  return landmarks;
+}
+
+void LandmarkStore::MovePoints(const std::vector<MapPoint>& points) {
+  points_.MovePoints(points);
+  for (auto& [map, parts] : dormant_) parts.points.MovePoints(points);
 }
 
 void LandmarkStore::CountPointVotes(const KeyframeView& view, const FrameDetections& frame) {
@@ -129,6 +185,7 @@ void LandmarkStore::Merge(Landmark& from, Landmark& into, bool adopt_silhouettes
   into.keyframes.insert(into.keyframes.end(), from.keyframes.begin(), from.keyframes.end());
   if (from.evidence.last_frame > into.evidence.last_frame) {
     into.evidence.last_frame = from.evidence.last_frame;
+    into.evidence.dormant_frames = from.evidence.dormant_frames;
     into.evidence.missed_in_view = from.evidence.missed_in_view;
     into.last_box_px = from.last_box_px;
     into.last_T_world_camera = from.last_T_world_camera;
@@ -165,6 +222,8 @@ std::optional<Sim3<World, World>> LandmarkStore::Correct(Landmark& landmark,
     for (Eigen::Vector3d& p : geometry.body_world) p = *S_new_old * p;
     landmark.last_T_world_camera = S_new_old->Moved(landmark.last_T_world_camera);
   }
+  const bool is_dormant = landmark.map != map_;
+  if (is_dormant && !S_new_old) return std::nullopt;
   // The up direction may change even if no keyframe of this landmark was corrected.
   if (geometry.cuboid) geometry.cuboid = Upright(*geometry.cuboid, up_world_);
   if (geometry.training_box) geometry.training_box = Upright(*geometry.training_box, up_world_);

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -16,13 +18,16 @@
 namespace romap::objects {
 
 // Owns the landmarks, their keys, the assignment of map points to landmarks, and the up direction of the cuboids.
+//
+// A session may have several maps whose relation is unknown. The landmarks of all maps but the current one are dormant:
+// nothing is observed of them, and all functions concern the others unless their comment says otherwise.
 class LandmarkStore {
  public:
   using Landmarks = std::vector<std::unique_ptr<Landmark>>;
 
   explicit LandmarkStore(const ObjectsConfig& config) : config_(config) {}
 
-  // All landmarks, in the order of their first observation.
+  // All landmarks that are not dormant, in the order of their first observation.
   const Landmarks& landmarks() const { return landmarks_; }
   std::vector<LandmarkKey> Keys() const;
   // Returns nullptr for a key that was removed and for kNoLandmark.
@@ -30,8 +35,16 @@ class LandmarkStore {
   // Creates a provisional landmark. Keys are never reused.
   Landmark& Create();
   void RemoveIf(const std::function<bool(const Landmark&)>& condition);
-  // Removes all landmarks and points.
-  void Clear();
+
+  // The current map; 0 before SetMap().
+  SparseMapId map() const { return map_; }
+  // All maps that have landmarks or points, the current one last.
+  std::vector<SparseMapId> Maps() const;
+  // Makes a map the current one: its landmarks wake up, those of the map before become dormant.
+  void SetMap(SparseMapId map, uint64_t frame_index);
+  // The landmarks and points of one map belong to another one now. If one of the two is current, the other wakes up.
+  void MergeMaps(const MapMerge& merge, uint64_t frame_index);
+  std::vector<Landmark*> DormantLandmarks() const;
 
   const PointRegistry& points() const { return points_; }
   void UpdatePoints(const KeyframeView& view) { points_.UpdatePositions(view); }
@@ -52,15 +65,27 @@ class LandmarkStore {
   // Removes `from`. If `from` precedes `into` in the list, `into` moves to the position of `from`.
   void RemoveMerged(LandmarkKey from, LandmarkKey into);
 
-  void MovePoints(const std::vector<MapPoint>& points) { points_.MovePoints(points); }
-  // Moves a landmark with the keyframes that observed it. Returns the motion of its space, or nullopt when none of
-  // these keyframes was corrected.
+  // Moves points of all maps.
+  void MovePoints(const std::vector<MapPoint>& points);
+  // Moves a landmark, dormant or not, with the keyframes that observed it. Returns the motion of its space, or nullopt
+  // when none of these keyframes was corrected.
   std::optional<Sim3<World, World>> Correct(Landmark& landmark, const KeyframeCorrections& keyframes) const;
 
  private:
+  // What belongs to a map that is not the current one.
+  struct DormantMap {
+    Landmarks landmarks;
+    PointRegistry points;
+    uint64_t since_frame = 0;
+  };
+
+  void WakeUp(SparseMapId map, uint64_t frame_index);
+
   ObjectsConfig config_;
+  SparseMapId map_;
   Landmarks landmarks_;
   PointRegistry points_;
+  std::map<SparseMapId, DormantMap> dormant_;
   Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
   LandmarkKey last_key_ = 0;
 };

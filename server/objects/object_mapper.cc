@@ -44,6 +44,7 @@ ObjectMapper::ObjectMapper(const ObjectsConfig& config)
 ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   current_ = {};
   if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return {};
+  SetMap(tracked.map);
   history_.Add(tracked);
   // If no detector ran on a frame, the frame is no evidence that objects are missing.
   if (!tracked.frame->has_masks) return {};
@@ -52,6 +53,13 @@ ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   const auto stand_in = history_.MakeStandIn(tracked, store_.points());
   if (stand_in) output.Append(ObserveMaskedKeyframe(*stand_in));
   return output;
+}
+
+void ObjectMapper::SetMap(SparseMapId map) {
+  if (map == store_.map()) return;
+  store_.SetMap(map, frame_index_);
+  history_.ForgetFrames();
+  scene_depth_ = {};
 }
 
 ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
@@ -79,45 +87,46 @@ ObjectOutput ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
 
 ObjectOutput ObjectMapper::Correct(const MapCorrection& correction) {
   ObjectOutput output;
+  for (const MapMerge& merge : correction.merged_maps) store_.MergeMaps(merge, frame_index_);
   store_.MovePoints(correction.points);
   store_.SetUp(correction.up_world);
   KeyframeCorrections keyframes = UsableCorrections(correction);
   history_.Correct(&keyframes);
   scene_depth_.Correct(keyframes);
-  for (const auto& landmark : store_.landmarks()) {
+  std::vector<Landmark*> corrected = store_.DormantLandmarks();
+  for (const auto& landmark : store_.landmarks()) corrected.push_back(landmark.get());
+  for (Landmark* landmark : corrected) {
     const auto S_new_old = store_.Correct(*landmark, keyframes);
     if (S_new_old) publisher_.Correct(landmark->key, *S_new_old, keyframes);
   }
   for (const auto& landmark : store_.landmarks()) {
     if (publisher_.IsPublished(landmark->key)) publisher_.Publish(*landmark, When::kChanged, store_, &output);
   }
-  return output;
-}
-
-ObjectOutput ObjectMapper::Reset() {
-  ObjectOutput output;
-  for (LandmarkKey key : store_.Keys()) publisher_.Remove(key, "map was reset", &output);
-  store_.Clear();
-  history_.Clear();
-  current_ = {};
-  scene_depth_ = {};
+  if (!correction.merged_maps.empty()) MergeDuplicates(&output);
   return output;
 }
 
 ObjectOutput ObjectMapper::Finish() {
   ObjectOutput output;
+  for (const SparseMapId map : store_.Maps()) {
+    store_.SetMap(map, frame_index_);
+    FinishMap(&output);
+  }
+  return output;
+}
+
+void ObjectMapper::FinishMap(ObjectOutput* output) {
   const std::vector<LandmarkKey> keys = store_.Keys();
   fitter_.FitAll(frame_index_, publisher_.ConfirmedCuboids(store_), &store_);
   Confirm(keys);
-  MergeDuplicates(&output);
-  Prune([](const Landmark& landmark) { return DecidePruningAtFinish(landmark.state); }, &output);
-  PublishChanges(keys, &output);
+  MergeDuplicates(output);
+  Prune([](const Landmark& landmark) { return DecidePruningAtFinish(landmark.state); }, output);
+  PublishChanges(keys, output);
   for (const auto& landmark : store_.landmarks()) {
     if (publisher_.HasUnpublishedCorrection(landmark->key)) {
-      publisher_.Publish(*landmark, When::kAlways, store_, &output);
+      publisher_.Publish(*landmark, When::kAlways, store_, output);
     }
   }
-  return output;
 }
 
 ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
@@ -184,6 +193,7 @@ void ObjectMapper::RecordObservation(const Match& match, const Detection& detect
     ++evidence.agreement_count;
   }
   evidence.last_frame = frame_index_;
+  evidence.dormant_frames = 0;
   evidence.missed_in_view = 0;
   ++evidence.observations;
   ++evidence.expected;

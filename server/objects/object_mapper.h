@@ -20,6 +20,9 @@ namespace romap::objects {
 // each, and selects the training views of its field. Source: section "Lightweight Object SLAM" of the RO-MAP paper;
 // differences are explained in association.h, cuboid_fitter.h and view_picker.h.
 //
+// The map that TrackedFrame::map names is the current one. Landmarks of other maps are dormant until the camera returns
+// to their map or the maps are merged: they stay as they are and remain published.
+//
 // Single-threaded and deterministic: equal input gives equal output. Frames without a reliable pose (initializing, lost
 // or not finite) and masks whose size differs from the image are ignored.
 class ObjectMapper {
@@ -31,19 +34,19 @@ class ObjectMapper {
   // Processes a keyframe. Call right after ObserveFrame for the same frame.
   ObjectOutput ObserveKeyframe(const KeyframeView& view);
   // Processes masks of an earlier frame that had none. Call in the order of the frames, but not between ObserveFrame
-  // and ObserveKeyframe of one frame. Masks are ignored when they are older than ObjectsConfig::max_mask_delay_s or the
-  // frame has no pose.
+  // and ObserveKeyframe of one frame. Masks are ignored when they are older than ObjectsConfig::max_mask_delay_s, the
+  // frame has no pose, or the camera has been in another map since.
   ObjectOutput ObserveLateMasks(const FrameMasks& masks);
-  // Applies a map correction. Each object moves with the keyframes that observed it (MeanMotion). Noticeable changes
-  // are published: the cuboid in an ObjectUpdate; in ObjectViews the motion of the object's space and the views that
-  // moved relative to the object.
+  // Applies a map correction. Each object moves with the keyframes that observed it (MeanMotion). If two maps were
+  // merged, the landmarks of both are compared again (MergeDuplicates). Noticeable changes are published: the cuboid in
+  // an ObjectUpdate; in ObjectViews the motion of the object's space and the views that moved relative to the object.
   ObjectOutput Correct(const MapCorrection& correction);
-  // Removes every object after a reset of the map, which invalidates all earlier poses. Ids are never reused.
-  ObjectOutput Reset();
   // Call after the last frame. Performs the last fits and publishes all pending views and corrections.
   ObjectOutput Finish();
 
  private:
+  void SetMap(SparseMapId map);
+
   // Steps that process a frame with masks.
   ObjectOutput ObserveMaskedFrame(const TrackedFrame& tracked);
   void UpdateMissed(const Association& association, ObjectOutput* output);
@@ -58,6 +61,8 @@ class ObjectMapper {
   void MergeDuplicates(ObjectOutput* output);
   void Merge(Landmark& from, Landmark& into, ObjectOutput* output);
   void PublishChanges(const std::vector<LandmarkKey>& keys, ObjectOutput* output);
+
+  void FinishMap(ObjectOutput* output);
 
   template <class DecisionFunction>
   void Prune(const DecisionFunction& decide, ObjectOutput* output);

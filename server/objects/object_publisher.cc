@@ -41,7 +41,7 @@ bool MovedNoticeably(const Cuboid& published, const Cuboid& now, const Sim3<Worl
 struct ObjectPublisher::Change {
   bool cuboid = false;  // a new fit, or nothing was published before
   bool moved = false;   // by corrections
-  bool text = false;    // class or state
+  bool text = false;    // class, state or map
   Cuboid newest;        // the cuboid to publish
 
   bool Any() const { return cuboid || moved || text; }
@@ -152,8 +152,8 @@ ObjectPublisher::Change ObjectPublisher::ChangeOf(const Landmark& landmark, cons
   Change change;
   change.cuboid = DiffersNoticeably(published_now, fitted);
   change.moved = MovedNoticeably(publication.last->cuboid, published_now, S_now_published);
-  change.text =
-      publication.last->class_name != landmark.evidence.BestClass().first || publication.last->state != landmark.state;
+  change.text = publication.last->class_name != landmark.evidence.BestClass().first ||
+                publication.last->state != landmark.state || publication.last->map_id != landmark.map;
   change.newest = change.cuboid ? fitted : published_now;
   return change;
 }
@@ -184,7 +184,8 @@ void ObjectPublisher::Publish(const Landmark& landmark, When when, const Landmar
                                     .class_score = class_score,
                                     .cuboid = change.newest,
                                     .observations = landmark.evidence.observations,
-                                    .T_world_mesh = {}};
+                                    .T_world_mesh = {},
+                                    .map_id = landmark.map};
     output->events.emplace_back(*publication.last);
   }
   if (is_provisional) return;  // training starts when the object is confirmed

@@ -1,7 +1,9 @@
 #include "server/objects/point_registry.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
+#include <utility>
 
 namespace romap::objects {
 
@@ -44,6 +46,13 @@ void PointRegistry::MovePoints(const std::vector<MapPoint>& points) {
       points_[index].position_world = point.position_world;
     }
   }
+}
+
+void PointRegistry::Append(PointRegistry other) {
+  const auto old_count = static_cast<std::ptrdiff_t>(points_.size());
+  std::move(other.points_.begin(), other.points_.end(), std::back_inserter(points_));
+  std::inplace_merge(points_.begin(), points_.begin() + old_count, points_.end(),
+                     [](const Entry& a, const Entry& b) { return a.id < b.id; });
 }
 
 // The owner has a clear majority of the votes; those for the background and for the outline count together. A point of

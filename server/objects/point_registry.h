@@ -32,6 +32,10 @@ class PointRegistry {
   // Moves all votes for `from` to `into`.
   void Merge(LandmarkKey from, LandmarkKey into);
 
+  // Adds the points of another registry, which has none of these.
+  void Append(PointRegistry other);
+
+  bool IsEmpty() const { return points_.empty(); }
   // Position of a point; nullptr if unknown.
   const Eigen::Vector3d* Find(MapPointId point) const;
 

@@ -30,7 +30,10 @@ void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& t
   FrameAck ack;
   ack.frame_id = input.frame_id;
   ack.state = tracked.state;
-  if (has_pose) ack.T_world_camera = tracked.T_world_camera;
+  if (has_pose) {
+    ack.T_world_camera = tracked.T_world_camera;
+    ack.map_id = tracked.map;
+  }
   ack.is_keyframe = tracked.is_keyframe;
   ack.latency_s = SecondsSince(arrival.time);
   ack.state_reason = tracked.reason;

@@ -105,6 +105,11 @@ void MapState::SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId k
   trajectory_.SetKeyframe(frame_id, timestamp_ns, keyframe, T_world_camera);
 }
 
+SparseMapId MapState::CurrentMap(SparseMapId map) const {
+  for (auto it = merged_maps_.find(map); it != merged_maps_.end(); it = merged_maps_.find(map)) map = it->second;
+  return map;
+}
+
 void MapState::Correct(const MapCorrection& correction) {
   std::lock_guard lock(mutex_);
   trajectory_.Correct(correction);
@@ -162,6 +167,7 @@ MapSnapshot MapState::Snapshot() const {
     snapshot.trajectory.push_back(tracked_[i].ack);
     snapshot.trajectory.back().T_world_camera = poses[i];
     snapshot.trajectory.back().uncertainty = uncertainties[i];
+    snapshot.trajectory.back().map_id = CurrentMap(tracked_[i].ack.map_id);
     snapshot.timestamps_ns.push_back(tracked_[i].timestamp_ns);
   }
   return snapshot;

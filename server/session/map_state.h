@@ -43,7 +43,8 @@ class MapState {
   // A frame became a keyframe, with this pose.
   void SetKeyframe(uint64_t frame_id, int64_t timestamp_ns, KeyframeId keyframe,
                    const SE3<World, Camera>& T_world_camera);
-  // Moves the frames of the trajectory with their corrected keyframes, whose uncertainties they take over.
+  // Moves the frames of the trajectory with their corrected keyframes, whose uncertainties they take over, and to the
+  // maps that theirs were merged into.
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
@@ -73,12 +74,14 @@ class MapState {
   void ApplyUpdate(ObjectUpdate update);
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
+  SparseMapId CurrentMap(SparseMapId map) const;
 
   mutable std::mutex mutex_;
   std::map<ObjectId, Object> objects_;
   std::set<ObjectId> removed_;
-  std::vector<TrackedAck> tracked_;  // accepted frames with a pose
-  Trajectory trajectory_;            // of the same frames
+  std::vector<TrackedAck> tracked_;                 // accepted frames with a pose
+  Trajectory trajectory_;                           // of the same frames
+  std::map<SparseMapId, SparseMapId> merged_maps_;  // each into which one
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

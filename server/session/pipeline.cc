@@ -58,13 +58,12 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
   MappingStep step;
   step.is_keyframe = image.tracked.is_keyframe;
   step.may_be_skipped = !image.tracked.is_keyframe && !image.initial_views;
-  step.relocalizes = is_lost;
+  step.relocalizes = is_lost && !image.initial_views;
   step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.initial_views || is_lost);
 
   step.run = [this, image = std::move(image)] {
     // Map.
     const slam::MappedFrame mapped = sparse_mapper_.Process(image);
-    if (mapped.was_reset) Publish(object_mapper_.Reset());
     if (mapped.correction) Correct(*mapped.correction);
     // Objects. Publish() sends them to the clients, and their new views to the fields.
     Publish(object_mapper_.ObserveFrame(mapped.tracked));

@@ -69,8 +69,10 @@ Trajectory::RelativeCorrections Trajectory::CorrectionsOfKeyframes() const {
 // The frame must have an uncertainty.
 FrameUncertainty Trajectory::CurrentUncertainty(const TrackedPose& frame) const {
   const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
-  const auto reference = uncertainties_.find(keyframe == keyframe_of_frame_.end() ? frame.reference : keyframe->second);
+  const bool is_keyframe = keyframe != keyframe_of_frame_.end();
+  const auto reference = uncertainties_.find(is_keyframe ? keyframe->second : frame.reference);
   if (reference == uncertainties_.end()) return {.reference = *frame.uncertainty, .relative = {}};
+  if (is_keyframe) return {.reference = reference->second, .relative = {}};
   PoseUncertainty relative = frame.reference_uncertainty;
   relative.position_sigma_mu *= keyframes_.at(frame.reference).scale;
   return {.reference = reference->second, .relative = relative};

@@ -40,6 +40,11 @@ std::map<KeyframeId, PoseUncertainty> CorrectionLog::Uncertainties(const SlamMap
   return uncertainties;
 }
 
+void CorrectionLog::Append(CorrectionLog other) {
+  keyframes_.merge(other.keyframes_);
+  points_.merge(other.points_);
+}
+
 MapCorrection CorrectionLog::TakeCorrection(const SlamMap& map) {
   MapCorrection correction;
   for (auto& [id, recorded] : keyframes_) {

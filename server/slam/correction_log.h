@@ -15,6 +15,8 @@ class CorrectionLog {
  public:
   // Records a keyframe that is passed to later stages. `scale`: see ScaledPose.
   void Record(const KeyframeView& view, double scale);
+  // Adds the records of another map that was merged into this one.
+  void Append(CorrectionLog other);
   // Returns all keyframes and points that moved noticeably since they were recorded or last returned.
   MapCorrection TakeCorrection(const SlamMap& map);
   // Of all recorded keyframes.

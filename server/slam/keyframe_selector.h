@@ -31,6 +31,9 @@ class KeyframeSelector {
   // in view. While earlier keyframes wait for mapping, only those that tracking needs are selected.
   bool IsKeyframe(const Frame& frame, const SE3<World, Camera>& T_world_camera, const TrackingQuality& quality);
 
+  // The camera is in another map now: its first frame is a keyframe.
+  void ForgetLastKeyframe() { last_keyframe_.reset(); }
+
  private:
   // Motion since the last keyframe, divided by the motion that makes the next one due.
   double Progress(const SE3<World, Camera>& T_world_camera) const;

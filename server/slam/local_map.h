@@ -34,7 +34,8 @@ struct LocalPoint {
 // neither thread waits for the other.
 struct LocalMap {
   uint64_t keyframes_done = 0;  // keyframes that are in the map
-  int generation = 0;           // increases when the map is reset or initialized
+  int generation = 0;           // increases when another map becomes current, or does not as proposed
+  SparseMapId map;              // see MapAtlas; meaningless without points
   RadialCorrection lens;        // for the features of frames that are tracked against it
   KeyframeId reference;         // the newest keyframe
   int reference_points = 0;     // well-observed points that it observes

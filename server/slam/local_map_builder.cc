@@ -27,14 +27,16 @@ int CountReferencePoints(const SlamMap& map, const MapKeyframe& reference) {
 
 }  // namespace
 
-std::shared_ptr<const LocalMap> MakeLocalMap(const SlamMap& map, KeyframeId reference, int generation,
-                                             const std::optional<LocalMap::Relocalization>& relocalized) {
+std::shared_ptr<const LocalMap> MakeLocalMap(const SessionMap& session_map, int generation) {
+  const SlamMap& map = session_map.map;
+  const KeyframeId reference = session_map.reference;
   auto local = std::make_shared<LocalMap>();
   local->keyframes_done = map.keyframe_count();
   local->generation = generation;
+  local->map = session_map.id;
   local->lens = map.lens();
   local->reference = reference;
-  local->relocalized = relocalized;
+  local->relocalized = session_map.relocalized;
   const MapKeyframe* center = map.FindKeyframe(reference);
   if (center == nullptr) return local;
 

@@ -106,24 +106,27 @@ std::vector<MapKeyframe*> WithNeighbors(MapKeyframe& keyframe, SlamMap& map) {
 bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, SlamMap& map) {
   MapKeyframe& newest = *map.FindKeyframe(loop.newest);
   MapKeyframe& old = *map.FindKeyframe(loop.old);
-  std::vector<MapKeyframe*> new_side = WithNeighbors(newest, map);
-  std::vector<MapKeyframe*> old_side = WithNeighbors(old, map);
   const bool drifted = loop.drift_px > kNoDrift_px;
   if (drifted) {
-    if (!CorrectDrift(loop, fix_scale, new_side, map)) return false;
+    if (!CorrectDrift(loop, fix_scale, WithNeighbors(newest, map), map)) return false;
     newest.loops.emplace_back(loop.old, loop.S_old_newest.Inverse());
     old.loops.emplace_back(loop.newest, loop.S_old_newest);
   } else {
     spdlog::debug("slam: loop from {} to {} without correction: drift {:.1f} px", loop.newest.ToString(),
                   loop.old.ToString(), loop.drift_px);
   }
+  FuseSides(loop, config, map);
+  return drifted;
+}
 
+void FuseSides(const LoopMatch& loop, const SlamConfig& config, SlamMap& map) {
+  std::vector<MapKeyframe*> new_side = WithNeighbors(*map.FindKeyframe(loop.newest), map);
+  std::vector<MapKeyframe*> old_side = WithNeighbors(*map.FindKeyframe(loop.old), map);
   for (const auto& [from, into] : loop.same_points) map.MergePoints(from, into);
   PointMaker maker(config, &map);
   if (old_side.size() > kFusedNeighbors) old_side.resize(kFusedNeighbors);
   if (new_side.size() > kFusedNeighbors) new_side.resize(kFusedNeighbors);
   for (MapKeyframe* keyframe : new_side) maker.FuseDuplicates(*keyframe, old_side);
-  return drifted;
 }
 
 }  // namespace romap::slam

@@ -12,4 +12,8 @@ namespace romap::slam {
 // (kNoDrift_px) it only merges points. Returns whether poses changed.
 bool CloseLoop(const LoopMatch& loop, bool fix_scale, const SlamConfig& config, SlamMap& map);
 
+// Merges the points that the newest keyframe and its neighbors have in common with the old one and its neighbors.
+// Requires that both sides are aligned.
+void FuseSides(const LoopMatch& loop, const SlamConfig& config, SlamMap& map);
+
 }  // namespace romap::slam

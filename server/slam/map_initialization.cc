@@ -14,12 +14,13 @@ namespace {
 constexpr size_t kMinFirstPoints = 40;
 constexpr double kMaxRms_px = 2;
 
-std::optional<KeyframeId> InitializeFromTwoViews(const InitialViews& views, const SE3<World, Camera>& T_world_first,
+std::optional<KeyframeId> InitializeFromTwoViews(const InitialViews& views, const MapStart& start,
                                                  const SlamConfig& config, SlamMap& map) {
+  const SE3<World, Camera>& T_world_first = start.T_world_first;
   if (views.points.size() < kMinFirstPoints) return std::nullopt;
   std::vector<double> depths;
   for (const InitialViews::Point& point : views.points) depths.push_back(point.p_first.z());
-  const double unit = 1 / Median(std::move(depths));
+  const double unit = start.depth_mu / Median(std::move(depths));
   MapKeyframe& first = map.AddKeyframe(views.first, T_world_first);
   MapKeyframe& second = map.AddKeyframe(views.second, T_world_first * ScaleTranslation(views.T_first_second, unit));
   second.parent = first.id;
@@ -39,14 +40,28 @@ std::optional<KeyframeId> InitializeFromTwoViews(const InitialViews& views, cons
 
 }  // namespace
 
-std::optional<KeyframeId> InitializeMap(const InitialViews& views, const Frame& frame, const SlamConfig& config,
-                                        SlamMap& map) {
+MapStart FirstMapStart(const InitialViews& views, const Frame& frame) {
   const bool has_depth = !views.second;
   Eigen::Vector3d up_camera = -Eigen::Vector3d::UnitY();
   if (frame.gravity_camera && has_depth) up_camera = -*frame.gravity_camera;
-  const SE3<World, Camera> T_world_first(RotationFromZTo(up_camera).conjugate(), Eigen::Vector3d::Zero());
-  if (!has_depth) return InitializeFromTwoViews(views, T_world_first, config, map);
-  MapKeyframe& first = map.AddKeyframe(views.first, T_world_first);
+  return {.T_world_first = {RotationFromZTo(up_camera).conjugate(), Eigen::Vector3d::Zero()}};
+}
+
+MapStart WithGravity(MapStart start, const InitialViews& views, const Frame& frame) {
+  const bool has_depth = !views.second;
+  if (!frame.gravity_camera || !has_depth) return start;
+  const SE3<World, Camera>& T = start.T_world_first;
+  const Eigen::Vector3d up_world = T.rotation() * Eigen::Vector3d(-*frame.gravity_camera);
+  const Eigen::Quaterniond upright = ShortestRotation(up_world, Eigen::Vector3d::UnitZ());
+  start.T_world_first = {upright * T.rotation(), T.translation()};
+  return start;
+}
+
+std::optional<KeyframeId> InitializeMap(const InitialViews& views, const MapStart& start, const SlamConfig& config,
+                                        SlamMap& map) {
+  const bool has_depth = !views.second;
+  if (!has_depth) return InitializeFromTwoViews(views, start, config, map);
+  MapKeyframe& first = map.AddKeyframe(views.first, start.T_world_first);
   PointMaker(config, &map).MakePointsByDepth(first);
   return first.id;
 }

@@ -45,7 +45,7 @@ class ObservationRefiner {
   void Align(const PointTrack& track, const FeatureRef& observation, SlamMap& map);
   void Apply(SlamMap& map);
 
-  const int mask_erosion_px_;
+  int mask_erosion_px_;
   std::map<KeyframeId, HalvedImages> images_;  // of recent keyframes
   std::map<KeyframeId, std::vector<NewPixel>> moved_;
   std::vector<std::pair<MapPointId, KeyframeId>> wrong_;

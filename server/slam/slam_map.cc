@@ -220,6 +220,21 @@ void SlamMap::CorrectLens(const RadialCorrection& lens) {
   for (auto& [id, keyframe] : keyframes_) keyframe.frame = WithLens(keyframe.frame, lens);
 }
 
+void SlamMap::Append(SlamMap other) {
+  for (auto& [id, keyframe] : other.keyframes_) keyframe.frame = WithLens(keyframe.frame, lens_);
+  keyframes_.merge(other.keyframes_);
+  points_.merge(other.points_);
+  merged_into_.merge(other.merged_into_);
+  removed_keyframes_.merge(other.removed_keyframes_);
+  removed_points_.insert(removed_points_.end(), other.removed_points_.begin(), other.removed_points_.end());
+  SkipIds(other.keyframe_count_, other.point_count_);
+}
+
+void SlamMap::SkipIds(uint64_t keyframes_used, uint64_t points_used) {
+  keyframe_count_ = std::max(keyframe_count_, keyframes_used);
+  point_count_ = std::max(point_count_, points_used);
+}
+
 void SlamMap::Transform(const Sim3<World, World>& S_new_old) {
   for (auto& [id, keyframe] : keyframes_) {
     keyframe.SetPose(S_new_old.Moved(keyframe.T_world_camera()));

@@ -74,7 +74,7 @@ struct PointTrack {
   bool IsObservedBy(KeyframeId keyframe) const;
 };
 
-// The keyframes and points of one session. Not thread-safe. Ids are never reused.
+// The keyframes and points of one map. Not thread-safe. Ids are never reused within a session.
 //
 // Invariant: keyframe k lists point p at feature f if and only if p lists the observation (k, f).
 class SlamMap {
@@ -124,6 +124,12 @@ class SlamMap {
   const RadialCorrection& lens() const { return lens_; }
   // Does not move points, because the adjustment that estimates the lens moves them.
   void CorrectLens(const RadialCorrection& lens);
+
+  // Adds the keyframes and points of another map of the session, which is in the same world. They get the lens
+  // correction of this map.
+  void Append(SlamMap other);
+  // Ids up to these are used by other maps of the session.
+  void SkipIds(uint64_t keyframes_used, uint64_t points_used);
 
   // Applies a similarity to all keyframes and points.
   void Transform(const Sim3<World, World>& S_new_old);

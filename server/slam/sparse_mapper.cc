@@ -4,10 +4,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <iterator>
+#include <memory>
 #include <utility>
 
-#include "common/angles.h"
-#include "common/statistics.h"
+#include "server/slam/keyframe_view.h"
 #include "server/slam/local_map_builder.h"
 #include "server/slam/loop_closer.h"
 #include "server/slam/map_culling.h"
@@ -16,47 +17,16 @@
 namespace romap::slam {
 namespace {
 
-// Tracking that is lost for this long in a map this small is unlikely to recover: the map is reset.
-constexpr int kResetAfterLost_frames = 45;
-constexpr size_t kMaxKeyframesToReset = 6;
-constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr uint64_t kGlobalPeriodWithPriors_keyframes = 5;
 constexpr size_t kMinKeyframesToFindLens = 20;
-constexpr double kMinParallax_rad = 3 * kRadPerDeg;
+constexpr int kMaxMapsRefused = 3;    // during one loss
 constexpr size_t kMaxPostponed = 60;  // keyframes, whose images are kept
 
 bool HasPose(const TrackedFrame& tracked) {
   return tracked.state != TrackingState::kLost && tracked.state != TrackingState::kInitializing;
 }
 
-KeyframeView MakeView(const TrackedFrame& tracked, const MapKeyframe& keyframe, SlamMap& map) {
-  KeyframeView view;
-  view.id = keyframe.id;
-  view.frame = tracked.frame;
-  view.T_world_camera = keyframe.T_world_camera();
-  view.up_world = tracked.up_world;
-  for (size_t i = 0; i < keyframe.points.size(); ++i) {
-    if (!keyframe.points[i]) continue;
-    const Feature& feature = keyframe.features()[i];
-    view.observations.push_back(
-        {.point = keyframe.points[i], .pixel_px = keyframe.frame->image_px[i], .label = feature.label});
-    view.points.push_back(map.FindPoint(keyframe.points[i])->point);
-  }
-  view.removed_points = map.TakeRemovedPoints();
-  return view;
-}
-
 }  // namespace
-
-SparseMapper::CurrentMap::CurrentMap(const SlamConfig& config, uint64_t keyframes_used, uint64_t points_used)
-    : map(config, keyframes_used, points_used),
-      places(config, &map),
-      loops(config, &map, &places),
-      up(keyframes_used),
-      mask_voter(config),
-      refiner(config),
-      uncertainty(config),
-      next_global_adjustment(keyframes_used + kFirstGlobalAdjustment_keyframes) {}
 
 SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background)
     : config_(config),
@@ -66,12 +36,15 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Ba
       local_adjuster_(config, /*run_inline=*/background != Background::kAllAdjustment),
       global_adjuster_(config, /*run_inline=*/background == Background::kNothing),
       loop_trial_(config, /*run_inline=*/background == Background::kNothing),
-      current_(std::make_unique<CurrentMap>(config, 0, 0)) {}
+      atlas_(config),
+      merger_(config, /*run_inline=*/background == Background::kNothing) {}
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
+  const int generation_before = generation_;
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
-  bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed;
+  const bool was_merged = ConcludeMerge(/*wait=*/false);
+  bool was_adjusted = ApplyGlobalAdjustment(/*wait=*/false) || loop_was_closed || was_merged;
   was_adjusted |= ApplyLocalAdjustment(/*wait=*/false);
   if (!image.tracked.is_keyframe) was_adjusted |= DoPostponedWork();
   const bool is_of_current_map = image.pose_given || image.generation == generation_;
@@ -80,168 +53,180 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   } else if (HasPose(image.tracked) && is_of_current_map) {
     MapTrackedFrame(image, mapped);
   } else if (HasPose(image.tracked)) {
-    // The frame was tracked against a map that has since been reset.
+    // The frame was tracked against a map that is not the current one any more.
     mapped.tracked.state = TrackingState::kLost;
     mapped.tracked.is_keyframe = false;
   } else if (image.tracked.state == TrackingState::kLost && is_of_current_map) {
-    HandleLostFrame(image, mapped);
+    if (!current().map.keyframes().empty()) Relocalize(*image.features);
   }
-  ReportCorrections(was_adjusted, mapped);
+  if (HasPose(mapped.tracked)) mapped.tracked.map = current().id;
+  if (was_adjusted || mapped.view) {
+    // A map that is not the current one any more may have changed before.
+    mapped.correction = TakeCorrection(/*of_all_maps=*/was_merged || generation_ != generation_before);
+  }
+  if (mapped.view) {
+    current().parallax_rad = UpperParallax_rad(current().map);
+    current().corrections.Record(*mapped.view, current().map.FindKeyframe(mapped.view->id)->scale);
+  }
   return mapped;
 }
 
 void SparseMapper::ObserveMasks(const FrameMasks& masks) {
-  if (!current_->world_is_given) current_->mask_voter.ObserveMasks(masks, current_->map);
+  if (!current().world_is_given) current().mask_voter.ObserveMasks(masks, current().map);
 }
 
 MapCorrection SparseMapper::Finish() {
+  FinishCurrentMap();
+  const SparseMapId last = current().id;
+  std::vector<SparseMapId> kept;
+  for (const auto& map : atlas_.kept()) kept.push_back(map->id);
+  for (const SparseMapId id : kept) {
+    if (atlas_.Find(id) == nullptr) continue;  // merged
+    SetAside();
+    atlas_.SwitchTo(id);
+    FinishCurrentMap();
+  }
+  atlas_.SwitchTo(last);
+  LogSummary();
+  return TakeCorrection(/*of_all_maps=*/true).value_or(MapCorrection{});
+}
+
+void SparseMapper::FinishCurrentMap() {
   ApplyLocalAdjustment(/*wait=*/true);
-  if (!current_->unsearched.empty()) {
+  if (!current().unsearched.empty()) {
     SearchPoints(0);
     StartGlobalAdjustment();
     ApplyGlobalAdjustment(/*wait=*/true);
   }
   do {
     ConcludeLoopTrial(/*wait=*/true);
+    ConcludeMerge(/*wait=*/true);
   } while (CheckNextLoop());
   ApplyGlobalAdjustment(/*wait=*/true);
-  if (!current_->world_is_given && current_->map.keyframes().size() > 2) {
+  if (!current().world_is_given && current().map.keyframes().size() > 2) {
     StartGlobalAdjustment();
     ApplyGlobalAdjustment(/*wait=*/true);
     AlignWithUp(/*is_last=*/true);
-    current_->uncertainty.RequestUpdate();
+    current().uncertainty.RequestUpdate();
     UpdateUncertainties();
   }
-  LogSummary();
-  return TakeCorrection();
-}
-
-std::vector<SessionWarning> SparseMapper::Warnings() const {
-  if (current_->world_is_given || current_->map.keyframes().empty()) return {};
-  std::vector<SessionWarning> warnings = current_->up.Warnings();
-  const double parallax_rad = current_->parallax_rad;
-  if (!current_->has_depth_scale && parallax_rad < kMinParallax_rad) {
-    warnings.push_back({.name = "translation_unobservable",
-                        .text = fmt::format(
-                            "the camera has rotated with hardly any translation: most of the map points were seen from "
-                            "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
-                            "the translation are not known; move the camera sideways, or send depth images",
-                            parallax_rad / kRadPerDeg, kMinParallax_rad / kRadPerDeg)});
-  }
-  for (SessionWarning& warning : current_->given_world.Warnings()) warnings.push_back(std::move(warning));
-  return warnings;
-}
-
-// The parallax that a quarter of the map points exceed. A camera that moves forward sees most points from similar
-// directions, but passes some at the side.
-double SparseMapper::UpperParallax_rad() const {
-  std::vector<double> parallaxes_rad;
-  for (const auto& [id, track] : current_->map.points()) parallaxes_rad.push_back(track.point.max_parallax_rad);
-  return parallaxes_rad.empty() ? 0 : Quantile(std::move(parallaxes_rad), 0.75);
 }
 
 // ------------------------------------------------------------------------------------------------ steps of Process
 
-void SparseMapper::ResetMap() {
-  local_adjuster_.Reset();
-  global_adjuster_.Cancel();
-  loop_trial_.Cancel();
-  // Ids are never reused within a session.
-  current_ = std::make_unique<CurrentMap>(config_, current_->map.keyframe_count(), current_->map.point_count());
-}
-
 void SparseMapper::InitializeFrom(const TrackedImage& image, MappedFrame& mapped) {
   const Frame& frame = *image.tracked.frame;
-  mapped.was_reset = !current_->map.keyframes().empty();
-  counts_.resets += mapped.was_reset ? 1 : 0;
-  ResetMap();
+  const InitialViews& views = *image.initial_views;
+  const bool is_first = current().IsEmpty();
+  if (!is_first && image.generation != generation_) return;  // the camera was found since
   ++generation_;
-  current_->has_depth_scale = !image.initial_views->second;
-  if (const auto newest = InitializeMap(*image.initial_views, frame, config_, current_->map)) {
-    current_->newest = *newest;
-    for (const auto& [id, keyframe] : current_->map.keyframes()) current_->places.Add(keyframe);
-    AlignWithUp();
-    UpdateUncertainties();
-    spdlog::info("slam: map initialized at frame {} with {} points", frame.frame_id, points());
-    mapped.tracked.state = TrackingState::kTracking;
-    mapped.tracked.is_keyframe = true;
-    mapped.tracked.reference = *newest;
-    mapped.tracked.T_reference_camera = {};
-    UpdatePose(mapped.tracked);
-    mapped.view = MakeView(mapped.tracked, *current_->map.FindKeyframe(*newest), current_->map);
-  } else {
-    ResetMap();
+  // A known place needs no new map. But it is not known if tracking has failed there before.
+  if (!is_first && maps_refused_ < kMaxMapsRefused && Relocalize(*image.features)) {
+    ++maps_refused_;
+    return;
   }
-  PublishLocalMap(current_->newest);
+  std::unique_ptr<SessionMap> made = atlas_.MakeMap();
+  made->has_depth_scale = !views.second;
+  const MapStart start = is_first ? FirstMapStart(views, frame) : WithGravity(current().StartOfNextMap(), views, frame);
+  const auto newest = InitializeMap(views, start, config_, made->map);
+  if (!newest) {
+    atlas_.Discard(std::move(made));
+    PublishLocalMap(current().reference);
+    return;
+  }
+  SetAside();
+  atlas_.Begin(std::move(made));
+  ++counts_.maps_begun;
+  current().newest = *newest;
+  for (const auto& [id, keyframe] : current().map.keyframes()) current().places.Add(keyframe);
+  AlignWithUp();
+  UpdateUncertainties();
+  spdlog::info("slam: {} initialized at frame {} with {} points", current().id.ToString(), frame.frame_id,
+               current().map.points().size());
+  mapped.tracked.state = TrackingState::kTracking;
+  mapped.tracked.is_keyframe = true;
+  mapped.tracked.reference = *newest;
+  mapped.tracked.T_reference_camera = {};
+  UpdatePose(mapped.tracked);
+  current().last_reference = *newest;
+  mapped.view = MakeKeyframeView(mapped.tracked, *current().map.FindKeyframe(*newest), current().map);
+  PublishLocalMap(*newest);
 }
 
 void SparseMapper::MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped) {
-  current_->frames_lost = 0;
+  maps_refused_ = 0;
   if (!image.pose_given) UpdatePose(mapped.tracked);
-  if (!current_->world_is_given) {
-    current_->up.ObserveGravity(*image.tracked.frame, mapped.tracked.T_world_camera);
+  if (!current().world_is_given) {
+    current().up.ObserveGravity(*image.tracked.frame, mapped.tracked.T_world_camera);
   }
   if (image.tracked.is_keyframe) {
     AddKeyframe(image, mapped);
-  } else if (!current_->world_is_given) {
-    current_->mask_voter.ObserveFrame(mapped.tracked, current_->map);
+  } else if (!current().world_is_given) {
+    current().mask_voter.ObserveFrame(mapped.tracked, current().map);
   }
+  current().last_reference = mapped.tracked.reference;
+  current().T_reference_last = mapped.tracked.T_reference_camera;
 }
 
-void SparseMapper::HandleLostFrame(const TrackedImage& image, MappedFrame& mapped) {
-  const size_t keyframes = current_->map.keyframes().size();
-  ++current_->frames_lost;
-  if (current_->frames_lost > kResetAfterLost_frames && keyframes <= kMaxKeyframesToReset &&
-      !current_->world_is_given) {
-    spdlog::info("slam: tracking lost with only {} keyframes; resetting the map", keyframes);
-    ResetMap();
-    ++counts_.resets;
-    ++generation_;
-    mapped.was_reset = true;
-    PublishLocalMap({});
-    return;
-  }
-  if (keyframes == 0) return;
-  const auto found = current_->places.Relocalize(*image.features);
-  if (!found) return;
+// Finds a lost camera in one of the maps, which becomes the current one.
+bool SparseMapper::Relocalize(const FrameFeatures& frame) {
+  const auto place = atlas_.Relocalize(frame);
+  if (!place) return false;
   ++counts_.relocalizations;
-  current_->relocalized =
-      LocalMap::Relocalization{.frame_id = image.features->frame_id, .T_world_camera = found->T_world_camera};
-  PublishLocalMap(found->keyframe);
+  if (place->map != current().id) {
+    spdlog::info("slam: the camera was found in {}; {} is kept aside", place->map.ToString(), current().id.ToString());
+    SetAside();
+    atlas_.SwitchTo(place->map);
+    ++generation_;
+  }
+  current().relocalized =
+      LocalMap::Relocalization{.frame_id = frame.frame_id, .T_world_camera = place->located.T_world_camera};
+  PublishLocalMap(place->located.keyframe);
+  return true;
 }
 
-void SparseMapper::ReportCorrections(bool map_moved, MappedFrame& mapped) {
-  if (map_moved || mapped.view) {
-    MapCorrection correction = TakeCorrection();
-    if (!correction.keyframes.empty() || !correction.points.empty() || !correction.uncertainties.empty()) {
-      mapped.correction = std::move(correction);
+// The current map will not be extended for now: ends the work on it.
+void SparseMapper::SetAside() {
+  ConcludeLoopTrial(/*wait=*/false);
+  SearchPoints(0);
+  local_adjuster_.Reset();
+  global_adjuster_.Cancel();
+  loop_trial_.Cancel();
+  merger_.Forget();
+}
+
+// What changed since the last call, in the current map or in all of them. nullopt: nothing.
+std::optional<MapCorrection> SparseMapper::TakeCorrection(bool of_all_maps) {
+  MapCorrection correction = current().corrections.TakeCorrection(current().map);
+  if (of_all_maps) {
+    for (const auto& kept : atlas_.kept()) {
+      MapCorrection other = kept->corrections.TakeCorrection(kept->map);
+      std::move(other.keyframes.begin(), other.keyframes.end(), std::back_inserter(correction.keyframes));
+      std::move(other.points.begin(), other.points.end(), std::back_inserter(correction.points));
     }
   }
-  if (mapped.view) {
-    current_->parallax_rad = UpperParallax_rad();
-    current_->corrections.Record(*mapped.view, current_->map.FindKeyframe(mapped.view->id)->scale);
+  if (current().uncertainty.TakeChange()) {
+    correction.uncertainties = current().corrections.Uncertainties(current().map);
   }
-}
-
-MapCorrection SparseMapper::TakeCorrection() {
-  MapCorrection correction = current_->corrections.TakeCorrection(current_->map);
-  if (current_->uncertainty.TakeChange()) correction.uncertainties = current_->corrections.Uncertainties(current_->map);
-  return correction;
+  correction.merged_maps = std::exchange(merges_, {});
+  const bool is_empty = correction.keyframes.empty() && correction.points.empty() && correction.merged_maps.empty() &&
+                        correction.uncertainties.empty();
+  return is_empty ? std::nullopt : std::optional(std::move(correction));
 }
 
 // ------------------------------------------------------------------------------------------------ keyframes
 
 void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
-  SlamMap& map = current_->map;
+  SlamMap& map = current().map;
   if (map.keyframes().empty()) {
     ++generation_;
     // Only a frame with a given pose can be the first keyframe without initial views.
-    current_->world_is_given = true;
+    current().world_is_given = true;
   }
   MapKeyframe& keyframe =
-      keyframe_builder_.Insert(image, mapped.tracked.T_world_camera, current_->newest, current_->world_is_given, map);
+      keyframe_builder_.Insert(image, mapped.tracked.T_world_camera, current().newest, current().world_is_given, map);
   keyframe.uncertainty = image.tracked.uncertainty.value_or(PoseUncertainty{});
-  current_->newest = keyframe.id;
+  current().newest = keyframe.id;
   mapped.tracked.reference = image.pose_given ? KeyframeId{} : keyframe.id;
   mapped.tracked.T_reference_camera = {};
   mapped.tracked.reference_uncertainty = {};
@@ -249,7 +234,7 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   if (is_live) {
     // A fast camera needs the new points in the next frame.
     keyframe_builder_.MakeFirstPoints(keyframe, map);
-    if (config_.refine_observations) current_->refiner.ReadPatches(*image.tracked.frame, keyframe, map);
+    if (config_.refine_observations) current().refiner.ReadPatches(*image.tracked.frame, keyframe, map);
     PublishLocalMap(keyframe.id);
   }
   CompleteKeyframe(image, keyframe);
@@ -259,66 +244,67 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   if (!is_live || !keyframes_wait_) UpdateUncertainties();
   PublishLocalMap(keyframe.id);
 
-  mapped.view = MakeView(image.tracked, keyframe, map);
+  mapped.view = MakeKeyframeView(image.tracked, keyframe, map);
   mapped.tracked.T_world_camera = mapped.view->T_world_camera;
   mapped.view->up_world = mapped.tracked.up_world;
 }
 
 void SparseMapper::CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyframe) {
-  SlamMap& map = current_->map;
+  SlamMap& map = current().map;
   keyframe_builder_.Complete(image, keyframe, map);
   if (!keyframe.pose_given && config_.refine_observations) {
-    current_->refiner.Refine(*image.tracked.frame, keyframe, map);
-    current_->unsearched.emplace_back(keyframe.id, image.tracked.frame);
+    current().refiner.Refine(*image.tracked.frame, keyframe, map);
+    current().unsearched.emplace_back(keyframe.id, image.tracked.frame);
     // The search takes as long as all other steps.
     SearchPoints(keyframes_wait_ ? kMaxPostponed : 0);
   }
   CullPoints(config_, map);
   if (!keyframe.pose_given) {
     local_adjuster_.Adjust(keyframe, map);
-    for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current_->places.Remove(removed);
+    for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current().places.Remove(removed);
   }
-  current_->places.Add(keyframe);
-  if (!keyframe.pose_given && !loop_trial_.IsPending()) current_->unchecked.push_back(keyframe.id);
+  current().places.Add(keyframe);
+  if (!keyframe.pose_given && !loop_trial_.IsPending()) current().unchecked.push_back(keyframe.id);
 }
 
 // Returns whether the map changed.
 bool SparseMapper::ApplyLocalAdjustment(bool wait) {
-  if (!local_adjuster_.Apply(wait, current_->map)) return false;
-  PublishLocalMap(current_->reference);
+  if (!local_adjuster_.Apply(wait, current().map)) return false;
+  PublishLocalMap(current().reference);
   return true;
 }
 
 // Searches more points in the keyframes where that was postponed, the oldest first, except the `keyframes_to_leave`
 // newest.
 void SparseMapper::SearchPoints(size_t keyframes_to_leave) {
-  auto& unsearched = current_->unsearched;
+  auto& unsearched = current().unsearched;
   for (; unsearched.size() > keyframes_to_leave; unsearched.pop_front()) {
-    MapKeyframe* keyframe = current_->map.FindKeyframe(unsearched.front().first);
-    if (keyframe != nullptr) current_->refiner.Search(*unsearched.front().second, *keyframe, current_->map);
+    MapKeyframe* keyframe = current().map.FindKeyframe(unsearched.front().first);
+    if (keyframe != nullptr) current().refiner.Search(*unsearched.front().second, *keyframe, current().map);
   }
 }
 
 // Live, while no keyframe waits: one piece of the work that was postponed. Returns whether the map changed.
 bool SparseMapper::DoPostponedWork() {
   if (keyframes_wait_) return false;
-  if (current_->unsearched.empty()) return CheckNextLoop();
-  SearchPoints(current_->unsearched.size() - 1);
+  if (current().unsearched.empty()) return CheckNextLoop();
+  SearchPoints(current().unsearched.size() - 1);
   return true;
 }
 
 // Checks the oldest keyframe that was not checked for loops. Returns whether there was one.
 bool SparseMapper::CheckNextLoop() {
-  if (current_->unchecked.empty() || loop_trial_.IsPending()) return false;
-  const MapKeyframe* keyframe = current_->map.FindKeyframe(current_->unchecked.front());
-  current_->unchecked.pop_front();
+  if (current().unchecked.empty() || loop_trial_.IsPending()) return false;
+  const MapKeyframe* keyframe = current().map.FindKeyframe(current().unchecked.front());
+  current().unchecked.pop_front();
   if (keyframe != nullptr) CloseLoopOrAdjust(*keyframe);  // null: it was redundant
   return true;
 }
 
 void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
-  CurrentMap& current = *current_;
-  const bool scale_is_known = current.has_depth_scale || current.world_is_given;
+  SessionMap& current = this->current();
+  const bool scale_is_known = current.ScaleIsKnown();
+  merger_.Observe(keyframe, atlas_);
   std::optional<LoopMatch> loop;
   if (config_.close_loops) loop = current.loops.Find(keyframe, scale_is_known);
   if (loop && loop->drift_px > kNoDrift_px) {
@@ -341,55 +327,68 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
 
 // ------------------------------------------------------------------------------------------------ the whole map
 
-void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current_->map, CanEstimateLens()); }
+void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current().map, CanEstimateLens()); }
 
 // From few views, lens distortion cannot be separated from the shape of the scene. The client computed its poses with
 // its own calibration.
 bool SparseMapper::CanEstimateLens() const {
-  return config_.refine_lens && !current_->world_is_given &&
-         current_->map.keyframes().size() >= kMinKeyframesToFindLens;
+  return config_.refine_lens && !current().world_is_given &&
+         current().map.keyframes().size() >= kMinKeyframesToFindLens;
 }
 
 bool SparseMapper::ApplyGlobalAdjustment(bool wait) {
-  if (!global_adjuster_.Apply(wait, current_->map)) return false;
+  if (!global_adjuster_.Apply(wait, current().map)) return false;
   local_adjuster_.Discard();
-  current_->up.RequestUpdate();
-  current_->uncertainty.RequestUpdate();
-  if (current_->newest) PublishLocalMap(current_->reference);
+  current().up.RequestUpdate();
+  current().uncertainty.RequestUpdate();
+  if (current().newest) PublishLocalMap(current().reference);
   return true;
 }
 
 // Closes the loop on trial if the map confirms it. Returns whether the map changed.
 bool SparseMapper::ConcludeLoopTrial(bool wait) {
   if (!loop_trial_.IsPending()) return false;
-  const LoopTrial::Verdict verdict = loop_trial_.Conclude(wait, current_->map);
+  const LoopTrial::Verdict verdict = loop_trial_.Conclude(wait, current().map);
   if (verdict == LoopTrial::Verdict::kPending) return false;
   const bool closed = verdict == LoopTrial::Verdict::kClosed;
   if (closed) {
     local_adjuster_.Discard();
     ++counts_.loops_corrected;
-    current_->up.RequestUpdate();
-    current_->uncertainty.RequestUpdate();
-    if (current_->newest) PublishLocalMap(current_->reference);
+    current().up.RequestUpdate();
+    current().uncertainty.RequestUpdate();
+    if (current().newest) PublishLocalMap(current().reference);
   } else {
     ++counts_.loops_rejected;
-    current_->loops.Reject(loop_trial_.loop());
+    current().loops.Reject(loop_trial_.loop());
   }
   loop_trial_.Cancel();
   return closed;
 }
 
+// Merges the current map with a kept one if the trial of the merge succeeds. Returns whether it was merged.
+bool SparseMapper::ConcludeMerge(bool wait) {
+  const std::optional<MapMerge> merge = merger_.Conclude(wait, atlas_);
+  if (!merge) return false;
+  merges_.push_back(*merge);
+  ++counts_.maps_merged;
+  local_adjuster_.Reset();
+  loop_trial_.Cancel();
+  StartGlobalAdjustment();
+  PublishLocalMap(current().reference);
+  return true;
+}
+
 void SparseMapper::AlignWithUp(bool is_last) {
-  if (current_->world_is_given) return;
-  const std::optional<Eigen::Quaterniond> R_new_old = current_->up.ProposeRotation(current_->map, is_last);
+  if (current().world_is_given) return;
+  const std::optional<Eigen::Quaterniond> R_new_old = current().up.ProposeRotation(current().map, is_last);
   if (!R_new_old) return;
   MoveMap({1.0, *R_new_old, Eigen::Vector3d::Zero()});
-  current_->up.Rotate(*R_new_old);
+  current().up.Rotate(*R_new_old);
 }
 
 // Poses that began after the map, whose world is another one.
 void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe) {
-  CurrentMap& current = *current_;
+  SessionMap& current = this->current();
   if (!image.pose_ignored || current.world_is_given) return;
   current.given_world.Observe(keyframe.id, *image.tracked.frame->T_world_camera);
   const auto S_given_map = current.given_world.ProposeMotion(current.map, current.has_depth_scale);
@@ -399,37 +398,37 @@ void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyfr
 }
 
 void SparseMapper::MoveMap(const Sim3<World, World>& S_new_old) {
-  current_->map.Transform(S_new_old);
+  current().map.Transform(S_new_old);
   local_adjuster_.Move(S_new_old);
   global_adjuster_.Move(S_new_old);
   loop_trial_.Move(S_new_old);
 }
 
 void SparseMapper::UpdateUncertainties() {
-  if (!current_->map.keyframes().begin()->second.pose_given) {
-    current_->uncertainty.Update(CanEstimateLens(), current_->map);
+  if (!current().map.keyframes().begin()->second.pose_given) {
+    current().uncertainty.Update(CanEstimateLens(), current().map);
   }
 }
 
 void SparseMapper::UpdatePose(TrackedFrame& tracked) const {
-  const auto reference = current_->map.KeyframePose(tracked.reference);
+  const auto reference = current().map.KeyframePose(tracked.reference);
   if (reference) tracked.T_world_camera = reference->Compose(tracked.T_reference_camera);
 }
 
 void SparseMapper::PublishLocalMap(KeyframeId reference) {
-  current_->reference = reference;
-  slot_->Put(MakeLocalMap(current_->map, reference, generation_, current_->relocalized));
+  current().reference = reference;
+  slot_->Put(MakeLocalMap(current(), generation_));
 }
 
 void SparseMapper::LogSummary() const {
   const LocalAdjuster::Times& times = local_adjuster_.times();
   spdlog::info(
       "slam: {} keyframes, {} points; loops: {} corrected, {} merged without correction, {} rejected; {} "
-      "relocalizations; {} map "
-      "resets; up confidence {:.2f}; local bundle adjustment: mean {:.0f} ms, longest {:.0f} ms",
-      current_->map.keyframes().size(), points(), counts_.loops_corrected, counts_.loops_merged, counts_.loops_rejected,
-      counts_.relocalizations, counts_.resets, current_->up.confidence(), 1e3 * times.total_s / std::max(1, times.runs),
-      1e3 * times.longest_s);
+      "relocalizations; maps: {} begun, {} merged, {} merges rejected; up confidence {:.2f}; local bundle adjustment: "
+      "mean {:.0f} ms, longest {:.0f} ms",
+      current().map.keyframes().size(), points(), counts_.loops_corrected, counts_.loops_merged, counts_.loops_rejected,
+      counts_.relocalizations, counts_.maps_begun, counts_.maps_merged, merger_.rejected(), current().up.confidence(),
+      1e3 * times.total_s / std::max(1, times.runs), 1e3 * times.longest_s);
 }
 
 }  // namespace romap::slam

@@ -2,43 +2,34 @@
 
 #include <atomic>
 #include <cstddef>
-#include <deque>
-#include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "common/stage_messages.h"
-#include "server/slam/correction_log.h"
-#include "server/slam/given_world.h"
 #include "server/slam/global_adjuster.h"
 #include "server/slam/keyframe_builder.h"
 #include "server/slam/local_adjuster.h"
 #include "server/slam/local_map.h"
-#include "server/slam/loop_detector.h"
 #include "server/slam/loop_trial.h"
-#include "server/slam/mask_voter.h"
-#include "server/slam/observation_refiner.h"
-#include "server/slam/place_recognizer.h"
+#include "server/slam/map_atlas.h"
+#include "server/slam/map_merger.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/tracker.h"
-#include "server/slam/uncertainty_estimator.h"
-#include "server/slam/world_up.h"
 
 namespace romap::slam {
 
 // The result of mapping one frame.
 struct MappedFrame {
-  TrackedFrame tracked;                          // with its pose in the current world
+  TrackedFrame tracked;                          // with its pose in the world of the current map
   std::optional<MapCorrection> correction = {};  // of earlier results; apply it before `view`
   std::optional<KeyframeView> view = {};         // only for a keyframe
-  bool was_reset = false;                        // all earlier results are invalid; apply it before the other fields
 };
 
 // The mapping half of slam: builds the sparse map from tracked frames, keeps it consistent (local and global bundle
 // adjustment, loop closing, gravity), relocalizes a lost camera, and publishes the part of the map around the camera
-// for tracking. Not thread-safe, except SetKeyframesWait().
+// for tracking. A camera that stays lost begins a new map (MapAtlas), which is merged with the earlier ones when they
+// show a common place (MapMerger). Not thread-safe, except SetKeyframesWait().
 //
 // The labels of a point's observations, one per keyframe that observes it, indicate which object it lies on. Single
 // labels are not reliable: a label is 0 near a mask's border (see SlamConfig::mask_erosion_px) and in keyframes without
@@ -65,38 +56,12 @@ class SparseMapper {
   // From any thread, live: whether keyframes wait to be mapped. Work that is not urgent is postponed meanwhile.
   void SetKeyframesWait(bool wait) { keyframes_wait_ = wait; }
 
-  size_t points() const { return current_->map.points().size(); }
+  size_t points() const { return atlas_.points(); }
   // What the client should know about the accuracy of the map. Empty while there is no map.
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<SessionWarning> Warnings() const { return atlas_.Warnings(); }
 
  private:
   friend class SparseMapperInspector;  // tests/support
-
-  // Everything that a reset discards.
-  struct CurrentMap {
-    CurrentMap(const SlamConfig& config, uint64_t keyframes_used, uint64_t points_used);
-
-    SlamMap map;
-    PlaceRecognizer places;
-    LoopDetector loops;
-    CorrectionLog corrections;
-    WorldUp up;
-    GivenWorld given_world;
-    MaskVoter mask_voter;
-    ObservationRefiner refiner;
-    UncertaintyEstimator uncertainty;
-    KeyframeId newest;
-    KeyframeId reference;  // of the published local map: the newest keyframe, or where the camera was relocalized
-    std::optional<LocalMap::Relocalization> relocalized = {};  // the newest one
-    // Work on keyframes that has time until no new ones wait.
-    std::deque<KeyframeId> unchecked = {};                                            // for loops
-    std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
-    bool world_is_given = false;      // the client's poses, given or as priors, define the world
-    bool has_depth_scale = false;     // depth images define the scale
-    uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
-    double parallax_rad = 0;          // see UpperParallax_rad(); as of the newest keyframe
-    int frames_lost = 0;              // in a row
-  };
 
   // Counts over the whole session, logged at its end.
   struct Counts {
@@ -104,15 +69,19 @@ class SparseMapper {
     int loops_rejected = 0;  // contradicted by the rest of the map
     int loops_merged = 0;    // closed without moving poses, because the map had not drifted
     int relocalizations = 0;
-    int resets = 0;
+    int maps_begun = 0;
+    int maps_merged = 0;
   };
 
-  double UpperParallax_rad() const;
-  void ResetMap();
+  SessionMap& current() { return atlas_.current(); }
+  const SessionMap& current() const { return atlas_.current(); }
+
   void InitializeFrom(const TrackedImage& image, MappedFrame& mapped);
   void MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped);
-  void HandleLostFrame(const TrackedImage& image, MappedFrame& mapped);
-  void ReportCorrections(bool map_moved, MappedFrame& mapped);
+  bool Relocalize(const FrameFeatures& frame);
+  void SetAside();
+  void FinishCurrentMap();
+  std::optional<MapCorrection> TakeCorrection(bool of_all_maps);
 
   void AddKeyframe(const TrackedImage& image, MappedFrame& mapped);
   void CloseLoopOrAdjust(const MapKeyframe& keyframe);
@@ -122,6 +91,7 @@ class SparseMapper {
   bool DoPostponedWork();
   bool ApplyLocalAdjustment(bool wait);
   bool ConcludeLoopTrial(bool wait);
+  bool ConcludeMerge(bool wait);
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
@@ -129,7 +99,6 @@ class SparseMapper {
   void AlignWithUp(bool is_last = false);
   void MoveMap(const Sim3<World, World>& S_new_old);
   void UpdateUncertainties();
-  MapCorrection TakeCorrection();
   void UpdatePose(TrackedFrame& tracked) const;
   void PublishLocalMap(KeyframeId reference);
   void LogSummary() const;
@@ -142,8 +111,11 @@ class SparseMapper {
   LocalAdjuster local_adjuster_;
   GlobalAdjuster global_adjuster_;
   LoopTrial loop_trial_;
-  std::unique_ptr<CurrentMap> current_;
-  int generation_ = 0;  // of the map; see LocalMap::generation
+  MapAtlas atlas_;
+  MapMerger merger_;
+  std::vector<MapMerge> merges_;  // not reported yet
+  int generation_ = 0;            // see LocalMap::generation
+  int maps_refused_ = 0;          // new ones, because the place of the camera was known, since it was tracked
   Counts counts_;
 };
 

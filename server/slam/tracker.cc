@@ -21,6 +21,7 @@ constexpr double kReferenceRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
 constexpr int kMinDepthsToInitialize = 150;
 constexpr int kFewInliers = 100;  // with fewer, a pose may be wrong, and the depth image would add many points
+constexpr double kNewMapAfterLost_s = 0.7;  // a camera that is lost for longer is probably in new territory
 // A map that is initialized with priors inherits their errors. Priors are used as poses until the map has enough points
 // and keyframes for these errors to average out.
 constexpr int kMapPointsToLeavePriors = 150;
@@ -77,8 +78,7 @@ std::vector<Feature> Tracker::RemoveFixed(const Frame& frame, std::vector<Featur
 void Tracker::TakeNewestMap() {
   const std::shared_ptr<const LocalMap> newest = slot_->Get();
   if (!newest || newest == map_) return;
-  const bool was_reset = !map_ || newest->generation != map_->generation;
-  if (was_reset) {
+  if (!map_ || newest->generation != map_->generation) {
     tentative_points_.Reset();
     AdoptNewMap(*newest);
   } else if (!world_is_given_) {
@@ -94,21 +94,35 @@ void Tracker::TakeNewestMap() {
 }
 
 void Tracker::AdoptNewMap(const LocalMap& newest) {
-  if (pending_map_ && newest.generation > pending_map_->generation) {
-    const PendingMap pending = *std::exchange(pending_map_, std::nullopt);
-    if (!newest.points.empty()) {
-      StartMotion(newest, pending);
-      status_.OnMapInitialized();
-    } else {
-      motion_.ResetMotion();
-      status_.OnMapReset();
-    }
+  const bool is_answer = pending_map_ && newest.generation > pending_map_->generation;
+  const auto pending = is_answer ? std::exchange(pending_map_, std::nullopt) : std::nullopt;
+  const bool is_known = !newest.points.empty() && newest.map <= newest_map_;
+  if (!newest.points.empty()) newest_map_ = std::max(newest_map_, newest.map);
+  if (is_known) return AdoptKnownMap(newest);
+  if (pending && !newest.points.empty()) {
+    motion_.Reset();
+    StartMotion(newest, *pending);
+    selector_.ForgetLastKeyframe();
+    status_.OnMapInitialized();
+  } else if (pending) {
+    motion_.ResetMotion();
+    status_.OnMapReset();
   } else if (newest.points.empty() && !world_is_given_) {
     motion_.Reset();
     status_.OnMapReset();
     monocular_initializer_.Reset();
   }
   keyframes_sent_ = std::max(keyframes_sent_, newest.keyframes_done);
+}
+
+// The camera was found in a map that it was in before, or no new map was initialized from the initial views. It stays
+// lost until a frame is tracked there.
+void Tracker::AdoptKnownMap(const LocalMap& newest) {
+  keyframes_sent_ = newest.keyframes_done;
+  if (newest.map == map_->map) return;
+  motion_.Reset();
+  last_points_.clear();
+  selector_.ForgetLastKeyframe();
 }
 
 // The initial views are the last known poses of the camera. A fast camera has moved on while the map was initialized,
@@ -139,6 +153,7 @@ bool Tracker::ShouldUseGivenPose(const Frame& frame) const {
 TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   TrackedImage image;
   image.tracked = given_.Track(frame);
+  image.tracked.map = SparseMapId{1};
   image.pose_given = pose_use_ == PoseUse::kGiven;
   image.generation = map_ ? map_->generation : 0;
   world_is_given_ = true;
@@ -163,27 +178,34 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   image.tracked.state = TrackingState::kInitializing;
   image.features = features;
   if (pending_map_) {
+    if (status_.IsLost()) image.tracked.state = TrackingState::kLost;
     image.tracked.reason = "map initialization in progress";
     return image;
   }
+  FindInitialViews(image, &image.tracked.reason);
+  if (!image.initial_views) return image;
+  world_is_given_ = false;
+  motion_.Reset();
+  return image;
+}
+
+void Tracker::FindInitialViews(TrackedImage& image, std::string* reason) {
+  const FrameFeatures& features = *image.features;
   const auto with_depth =
-      std::count_if(features->ranges_mu.begin(), features->ranges_mu.end(), [](double r) { return r > 0; });
+      std::count_if(features.ranges_mu.begin(), features.ranges_mu.end(), [](double r) { return r > 0; });
   if (with_depth >= kMinDepthsToInitialize) {
-    image.initial_views = InitialViews{.first = features};
-    image.tracked.reason = "view with depth found; initializing the map";
+    image.initial_views = InitialViews{.first = image.features};
+    *reason = "view with depth found; initializing the map";
     monocular_initializer_.Reset();
   } else {
-    image.initial_views = monocular_initializer_.AddFrame(features, &image.tracked.reason);
+    image.initial_views = monocular_initializer_.AddFrame(image.features, reason);
   }
-  if (!image.initial_views) return image;
-  const FrameFeatures& newest = image.initial_views->second ? *image.initial_views->second : *features;
+  if (!image.initial_views) return;
+  const FrameFeatures& newest = image.initial_views->second ? *image.initial_views->second : features;
   pending_map_ = PendingMap{.generation = image.generation,
                             .first_timestamp_ns = image.initial_views->first->timestamp_ns,
                             .newest_timestamp_ns = newest.timestamp_ns};
-  world_is_given_ = false;
   keyframes_sent_ += image.initial_views->second ? 2 : 1;
-  motion_.Reset();
-  return image;
 }
 
 // ------------------------------------------------------------------------------------------------ tracking
@@ -192,6 +214,7 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   TrackedImage image;
   image.tracked.frame = frame;
   image.tracked.up_world = map_->up_world;
+  image.tracked.map = map_->map;
   image.features = features;
   image.generation = map_->generation;
   if (features->size() < static_cast<size_t>(kMinFeatures)) {
@@ -294,11 +317,18 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMap& local_map, cons
 }
 
 void Tracker::MarkLost(const std::string& why, TrackedImage& image) {
-  status_.OnLost(image.tracked.frame->frame_id);
+  const int64_t timestamp_ns = image.tracked.frame->timestamp_ns;
+  if (!status_.IsLost()) monocular_initializer_.Reset();
+  status_.OnLost(image.tracked.frame->frame_id, timestamp_ns);
   image.tracked.state = TrackingState::kLost;
   image.tracked.reason = why;
   motion_.ResetMotion();
   tentative_points_.Reset();
+  const double lost_s = 1e-9 * static_cast<double>(timestamp_ns - status_.lost_since_ns());
+  if (world_is_given_ || lost_s < kNewMapAfterLost_s) return;
+  std::string no_views;
+  FindInitialViews(image, &no_views);
+  image.tracked.reason += "; new map: " + no_views;
 }
 
 bool Tracker::DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature) {

@@ -28,7 +28,7 @@ struct TrackedImage {
   std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is not a keyframe
   std::vector<Eigen::Vector2f> fixed_px = {};          // features that are fixed to the camera, not in `features`
   std::vector<MapPointId> points = {};                 // tracked: per feature of `features`, 0 = none
-  std::optional<InitialViews> initial_views = {};      // a map can be initialized with this frame
+  std::optional<InitialViews> initial_views = {};      // a new map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
@@ -41,7 +41,8 @@ struct TrackedImage {
 // Tracking from images: the motion of the last frames predicts the pose; the points of the last frame are searched
 // around their projections; if that fails, in a wider area and then by descriptors alone (P3P). Then all points of the
 // local map are searched around the refined pose, and the pose is refined by all of them (Mur-Artal et al. 2015,
-// section V).
+// section V). While the camera is lost for longer, it is still searched in the known maps, and at the same time its
+// frames are used to find initial views for a new map.
 class Tracker {
  public:
   // `local_map` outlives the tracker.
@@ -60,6 +61,7 @@ class Tracker {
 
   void TakeNewestMap();
   void AdoptNewMap(const LocalMap& newest);
+  void AdoptKnownMap(const LocalMap& newest);
   void StartMotion(const LocalMap& initial, const PendingMap& pending);
   bool HasMap() const { return map_ && !map_->points.empty(); }
   bool ShouldUseGivenPose(const Frame& frame) const;
@@ -67,6 +69,7 @@ class Tracker {
   std::vector<Feature> RemoveFixed(const Frame& frame, std::vector<Feature> features);
   TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
+  void FindInitialViews(TrackedImage& image, std::string* reason);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
   std::shared_ptr<const LocalMap> MapForNextFrame() const;
@@ -100,6 +103,7 @@ class Tracker {
   TentativePoints tentative_points_;
   bool world_is_given_ = false;  // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
+  SparseMapId newest_map_;  // of those that the camera was in
   std::optional<PendingMap> pending_map_;
 };
 

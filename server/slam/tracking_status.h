@@ -15,8 +15,9 @@ class TrackingStatus {
   bool NeedsConfirmation() const { return IsLost() || frames_since_recovery_ < kConfirmationFrames; }
   // Frames tracked since the map was initialized or the camera was relocalized.
   int frames_since_recovery() const { return frames_since_recovery_; }
-  // The first frame of the current loss; valid only while lost.
+  // The first frame of the current loss, and its time stamp; valid only while lost.
   uint64_t lost_since_frame() const { return lost_since_frame_; }
+  int64_t lost_since_ns() const { return lost_since_ns_; }
 
   void OnMapReset() { state_ = TrackingState::kInitializing; }
   void OnMapInitialized() {
@@ -31,8 +32,11 @@ class TrackingStatus {
     state_ = TrackingState::kTracking;
     return was_lost ? TrackingState::kRelocalized : TrackingState::kTracking;
   }
-  void OnLost(uint64_t frame_id) {
-    if (!IsLost()) lost_since_frame_ = frame_id;
+  void OnLost(uint64_t frame_id, int64_t timestamp_ns) {
+    if (!IsLost()) {
+      lost_since_frame_ = frame_id;
+      lost_since_ns_ = timestamp_ns;
+    }
     state_ = TrackingState::kLost;
   }
 
@@ -42,6 +46,7 @@ class TrackingStatus {
   TrackingState state_ = TrackingState::kInitializing;
   int frames_since_recovery_ = 0;
   uint64_t lost_since_frame_ = 0;
+  int64_t lost_since_ns_ = 0;
 };
 
 }  // namespace romap::slam

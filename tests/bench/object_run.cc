@@ -43,10 +43,6 @@ class Runner {
   absl::Status Process(const FrameInput& input) {
     ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<const Frame> frame, ingest_.Accept(input));
     const slam::MappedFrame mapped = sparse_mapper_.Process(tracker_.Track(damager_.Damage(*frame)));
-    if (mapped.was_reset) {
-      Record(object_mapper_.Reset());
-      tracked_.clear();
-    }
     if (mapped.correction) Record(object_mapper_.Correct(*mapped.correction));
     const double frame_start_s = UserSeconds();
     Record(object_mapper_.ObserveFrame(mapped.tracked));

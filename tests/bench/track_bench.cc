@@ -245,7 +245,6 @@ class Run {
     if (image.tracked.is_keyframe) mapper_.SetKeyframesWait(--waiting_ > 0);
     const Clock::time_point begin = Clock::now();
     const slam::MappedFrame mapped = mapper_.Process(image);
-    if (mapped.was_reset) ++resets_;
     if (mapped.view) map_s_.push_back(Seconds(Clock::now() - begin));
     const TrackedFrame& tracked = mapped.tracked;
     std::lock_guard lock(final_mutex_);
@@ -279,10 +278,10 @@ class Run {
     ReportError(keyframes_kept);
     const slam::SparseMapperInspector mapping = Inspect();
     fmt::print(
-        "keyframes {} made, {} kept; points {}; loops {} corrected, {} merged without correction; map resets {}; up "
-        "confidence {:.2f}\n",
+        "keyframes {} made, {} kept; points {}; loops {} corrected, {} merged without correction; maps {} begun, {} "
+        "merged; up confidence {:.2f}\n",
         mapping.keyframes_made(), keyframes_kept, mapper_.points(), mapping.loops_corrected(), mapping.loops_merged(),
-        resets_, mapping.up_confidence());
+        mapping.maps_begun(), mapping.maps_merged(), mapping.up_confidence());
     const double orb_ms = 1e3 * QuantileOrZero(orb_s_, 0.5);
     fmt::print("tracking: median {:.1f} ms, p99 {:.1f} ms, {:.2f} times cv::ORB ({:.1f} ms)\n",
                1e3 * QuantileOrZero(track_s_, 0.5), 1e3 * QuantileOrZero(track_s_, 0.99),
@@ -350,7 +349,6 @@ class Run {
   session::Trajectory trajectory_;
   std::vector<double> orb_s_, track_s_, map_s_;
   size_t frames_ = 0, initializing_ = 0, lost_ = 0;
-  int resets_ = 0;
   bool has_tracked_ = false;
   uint64_t first_tracked_ = 0;
   std::string lost_frames_, relocalized_, reason_;

@@ -9,11 +9,15 @@ class SparseMapperInspector {
  public:
   explicit SparseMapperInspector(const SparseMapper& mapper) : mapper_(mapper) {}
 
-  const SlamMap& map() const { return mapper_.current_->map; }
+  const SlamMap& map() const { return mapper_.current().map; }
+  const MapAtlas& atlas() const { return mapper_.atlas_; }
   size_t keyframes_made() const { return map().keyframe_count(); }
   int loops_corrected() const { return mapper_.counts_.loops_corrected; }
   int loops_merged() const { return mapper_.counts_.loops_merged; }
-  double up_confidence() const { return mapper_.current_->up.confidence(); }
+  int relocalizations() const { return mapper_.counts_.relocalizations; }
+  int maps_begun() const { return mapper_.counts_.maps_begun; }
+  int maps_merged() const { return mapper_.counts_.maps_merged; }
+  double up_confidence() const { return mapper_.current().up.confidence(); }
   const LocalAdjuster::Times& local_adjustment() const { return mapper_.local_adjuster_.times(); }
 
  private:

@@ -31,6 +31,7 @@ ObjectUpdate FullObject() {
   object.observations = 99;
   object.T_world_mesh.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(7, 8, 9));
   object.mesh_scale = 1.25;
+  object.map_id = SparseMapId{5};
   return object;
 }
 
@@ -43,6 +44,7 @@ TEST(WireEvents, FrameAckRoundTrips) {
   ack.T_world_camera.emplace(Eigen::Quaterniond::Identity(), Eigen::Vector3d(1, 2, 3));
   ack.is_keyframe = true;
   ack.latency_s = 0.125;
+  ack.map_id = SparseMapId{4};
   const FrameAck got = RoundTrip(ack);
   EXPECT_EQ(got.frame_id, ack.frame_id);
   EXPECT_EQ(got.accepted, ack.accepted);
@@ -52,6 +54,7 @@ TEST(WireEvents, FrameAckRoundTrips) {
   EXPECT_EQ(got.T_world_camera->translation(), ack.T_world_camera->translation());
   EXPECT_EQ(got.is_keyframe, ack.is_keyframe);
   EXPECT_EQ(got.latency_s, ack.latency_s);
+  EXPECT_EQ(got.map_id, ack.map_id);
   EXPECT_FALSE(got.uncertainty.has_value());
 }
 
@@ -92,6 +95,7 @@ TEST(WireEvents, ObjectUpdateRoundTrips) {
   ASSERT_TRUE(got.T_world_mesh.has_value());
   EXPECT_EQ(got.T_world_mesh->translation(), object.T_world_mesh->translation());
   EXPECT_EQ(got.mesh_scale, object.mesh_scale);
+  EXPECT_EQ(got.map_id, object.map_id);
 }
 
 TEST(WireEvents, AbsentMeshScaleMeansOne) {

@@ -55,15 +55,62 @@ TEST_F(LandmarkStoreTest, NewLandmarksAreProvisionalAndHaveNewKeys) {
   EXPECT_GT(store_.Create().key, second) << "keys are never reused";
 }
 
-TEST_F(LandmarkStoreTest, ClearRemovesLandmarksAndPoints) {
-  AddLandmark();
+TEST_F(LandmarkStoreTest, LandmarksAndPointsOfOtherMapsAreDormant) {
+  const SparseMapId first{1}, second{2};
+  const MapPointId point{3};
+  store_.SetMap(first, 1);
+  const LandmarkKey key = AddLandmark().key;
   KeyframeView view;
-  view.points = {{.id = MapPointId{3}, .position_world = {1, 2, 3}}};
+  view.points = {{.id = point, .position_world = {1, 2, 3}}};
   store_.UpdatePoints(view);
-  ASSERT_NE(store_.points().Find(MapPointId{3}), nullptr);
-  store_.Clear();
+
+  store_.SetMap(second, 10);
   EXPECT_TRUE(store_.landmarks().empty());
-  EXPECT_EQ(store_.points().Find(MapPointId{3}), nullptr);
+  EXPECT_EQ(store_.Find(key), nullptr);
+  EXPECT_EQ(store_.points().Find(point), nullptr);
+  ASSERT_EQ(store_.DormantLandmarks().size(), 1U);
+  EXPECT_EQ(store_.DormantLandmarks()[0]->key, key);
+  const LandmarkKey other = AddLandmark().key;
+  EXPECT_EQ(store_.Find(other)->map, second);
+  EXPECT_THAT(store_.Maps(), ElementsAre(first, second));
+
+  store_.SetMap(first, 60);
+  EXPECT_THAT(store_.Keys(), ElementsAre(key));
+  EXPECT_NE(store_.points().Find(point), nullptr);
+  EXPECT_EQ(store_.Find(key)->evidence.dormant_frames, 50U);
+  EXPECT_THAT(store_.Maps(), ElementsAre(second, first));
+}
+
+TEST_F(LandmarkStoreTest, ADormantLandmarkMovesOnlyWithItsKeyframes) {
+  store_.SetMap(SparseMapId{1}, 1);
+  Landmark& landmark = AddLandmark();
+  store_.SetMap(SparseMapId{2}, 2);
+  store_.SetUp({0, 1, 0});
+  const Cuboid before = *landmark.geometry.cuboid;
+  EXPECT_FALSE(store_.Correct(landmark, {}));
+  EXPECT_EQ(landmark.geometry.cuboid->T_world_object.Matrix(), before.T_world_object.Matrix());
+  const Sim3<World, World> S(2, Eigen::Quaterniond::Identity(), {1, 0, 0});
+  EXPECT_TRUE(store_.Correct(landmark, {{kKeyframe, {kKeyframe, {}, S}}}));
+  EXPECT_EQ(landmark.geometry.cuboid->T_world_object.translation(), Eigen::Vector3d(1, 0, 0));
+}
+
+TEST_F(LandmarkStoreTest, MergedMapsShareTheirLandmarks) {
+  const SparseMapId first{1}, second{2}, third{3};
+  store_.SetMap(first, 1);
+  const LandmarkKey a = AddLandmark().key;
+  store_.SetMap(second, 2);
+  const LandmarkKey b = AddLandmark().key;
+  store_.SetMap(third, 3);
+  const LandmarkKey c = AddLandmark().key;
+  store_.MergeMaps({.from = second, .into = first}, 4);
+  EXPECT_EQ(store_.map(), third);
+  EXPECT_THAT(store_.Keys(), ElementsAre(c));
+  for (const Landmark* landmark : store_.DormantLandmarks()) EXPECT_EQ(landmark->map, first);
+  store_.MergeMaps({.from = third, .into = first}, 5);
+  EXPECT_EQ(store_.map(), first);
+  EXPECT_THAT(store_.Keys(), UnorderedElementsAre(a, b, c));
+  for (const auto& landmark : store_.landmarks()) EXPECT_EQ(landmark->map, first);
+  EXPECT_TRUE(store_.DormantLandmarks().empty());
 }
 
 TEST_F(LandmarkStoreTest, PointsBelongToTheLandmarkOfTheirMaskOrToTheBackground) {

@@ -273,4 +273,21 @@ TEST(MapStateTest, CloseEndsCurrentAndLaterSubscriptions) {
   }
 }
 
+TEST(MapStateTest, FramesOfAMergedMapBelongToTheMapItWasMergedInto) {
+  MapState map;
+  for (uint64_t id = 1; id <= 3; ++id) {
+    FrameAck ack;
+    ack.frame_id = id;
+    ack.T_world_camera.emplace();
+    ack.map_id = SparseMapId{id};
+    map.Acknowledge(ack, static_cast<int64_t>(id));
+  }
+  MapCorrection correction;
+  correction.merged_maps = {{.from = SparseMapId{3}, .into = SparseMapId{2}}};
+  map.Correct(correction);
+  correction.merged_maps = {{.from = SparseMapId{2}, .into = SparseMapId{1}}};
+  map.Correct(correction);
+  for (const FrameAck& ack : map.Snapshot().trajectory) EXPECT_EQ(ack.map_id, SparseMapId{1}) << ack.frame_id;
+}
+
 }  // namespace romap::session::map_state_test

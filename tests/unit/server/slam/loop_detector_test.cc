@@ -44,7 +44,7 @@ TEST(LoopDetectorTest, FindsNothingBeforeTheReturn) {
 
 // Half a round after the start, the camera sees a wall that looks exactly like the first one.
 TEST(LoopDetectorTest, WallsThatLookAlikeAreNoLoop) {
-  LoopWorld world(LoopWorld::kKeyframesPerRound / 2 + 4, kDrift, /*opposite_walls_look_alike=*/true);
+  LoopWorld world(LoopWorld::kKeyframesPerRound / 2 + 4, kDrift, {.opposite_walls_look_alike = true});
   // The descriptors and the geometry alone would be convincing.
   const MapKeyframe& opposite = *world.map().FindKeyframe(KeyframeId{4});
   ASSERT_TRUE(world.places().Locate(*world.newest().frame, opposite, 1));

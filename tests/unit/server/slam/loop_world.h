@@ -26,10 +26,21 @@ class LoopWorld {
     double shift_mu = 0;      // along x, per keyframe
   };
 
-  LoopWorld(int keyframes, Drift drift, bool opposite_walls_look_alike = false)
-      : drift_(drift), map_(SlamConfig{}), places_(SlamConfig{}, &map_) {
-    MakeWall(opposite_walls_look_alike);
-    for (int i = 0; i < keyframes; ++i) AddKeyframe(i);
+  struct Options {
+    bool opposite_walls_look_alike = false;
+    uint64_t ids_used = 0;              // by other maps of the room
+    int first = 0;                      // number of the first keyframe along the round
+    double alike_above_mu = -INFINITY;  // below this height, the walls look different than in other rooms
+  };
+
+  LoopWorld(int keyframes, Drift drift) : LoopWorld(keyframes, drift, Options{}) {}
+  LoopWorld(int keyframes, Drift drift, const Options& options)
+      : drift_(drift),
+        first_(options.first),
+        map_(SlamConfig{}, options.ids_used, options.ids_used),
+        places_(SlamConfig{}, &map_) {
+    MakeWall(options);
+    for (int i = 0; i < keyframes; ++i) AddKeyframe(first_ + i);
   }
 
   SlamMap& map() { return map_; }
@@ -56,14 +67,19 @@ class LoopWorld {
     Descriptor descriptor{};
   };
 
-  void MakeWall(bool opposite_walls_look_alike) {
+  void MakeWall(const Options& options) {
     std::uniform_real_distribution<double> angle(0, std::numbers::pi), height(-2, 2), radius(5, 7);
     for (int i = 0; i < 900; ++i) {
       const double angle_rad = angle(random_);
       const Eigen::Vector3d p(radius(random_) * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0));
       const Eigen::Vector3d up(0, 0, height(random_));
       wall_.push_back({p + up, RandomDescriptor(random_)});
-      wall_.push_back({-p + up, opposite_walls_look_alike ? wall_.back().descriptor : RandomDescriptor(random_)});
+      wall_.push_back(
+          {-p + up, options.opposite_walls_look_alike ? wall_.back().descriptor : RandomDescriptor(random_)});
+    }
+    std::mt19937_64 other_random(8);
+    for (WallPoint& point : wall_) {
+      if (point.p_world.z() < options.alike_above_mu) point.descriptor = RandomDescriptor(other_random);
     }
   }
 
@@ -86,7 +102,7 @@ class LoopWorld {
     }
     const Sim3<World, World> drift = DriftAt(i);
     MapKeyframe& keyframe = map_.AddKeyframe(MakeFrameFeatures(frame, features), drift.Moved(TruePose(i)));
-    keyframe.parent = i == 0 ? KeyframeId{} : KeyframeId{keyframe.id.value - 1};
+    keyframe.parent = i == first_ ? KeyframeId{} : KeyframeId{keyframe.id.value - 1};
     for (size_t f = 0; f < wall_points.size(); ++f) Observe(i, wall_points[f], static_cast<int>(f), drift, keyframe);
     places_.Add(keyframe);
   }
@@ -109,6 +125,7 @@ class LoopWorld {
   };
 
   const Drift drift_;
+  const int first_;
   std::mt19937_64 random_{7};
   std::vector<WallPoint> wall_;
   SlamMap map_;

@@ -15,7 +15,7 @@ TEST(PlaceRecognizerTest, RelocalizesAFrameOfTheMap) {
 }
 
 TEST(PlaceRecognizerTest, DoesNotChooseBetweenPlacesThatLookAlike) {
-  LoopWorld world(LoopWorld::kKeyframesPerRound, {}, /*opposite_walls_look_alike=*/true);
+  LoopWorld world(LoopWorld::kKeyframesPerRound, {}, {.opposite_walls_look_alike = true});
   EXPECT_FALSE(world.places().Relocalize(*world.map().FindKeyframe(KeyframeId{9})->frame));
 }
 

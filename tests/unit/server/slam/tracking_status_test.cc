@@ -8,7 +8,7 @@ TEST(TrackingStatus, ReportsRelocalizationOnceAfterALoss) {
   TrackingStatus status;
   status.OnMapInitialized();
   EXPECT_EQ(status.OnTracked(), TrackingState::kTracking);
-  status.OnLost(7);
+  status.OnLost(7, 700);
   EXPECT_TRUE(status.IsLost());
   EXPECT_EQ(status.OnTracked(), TrackingState::kRelocalized);
   EXPECT_EQ(status.OnTracked(), TrackingState::kTracking);
@@ -17,18 +17,20 @@ TEST(TrackingStatus, ReportsRelocalizationOnceAfterALoss) {
 TEST(TrackingStatus, KeepsTheFirstFrameOfALoss) {
   TrackingStatus status;
   status.OnMapInitialized();
-  status.OnLost(7);
-  status.OnLost(8);
+  status.OnLost(7, 700);
+  status.OnLost(8, 800);
   EXPECT_EQ(status.lost_since_frame(), 7u);
+  EXPECT_EQ(status.lost_since_ns(), 700);
   status.OnTracked();
-  status.OnLost(12);
+  status.OnLost(12, 1200);
   EXPECT_EQ(status.lost_since_frame(), 12u);
+  EXPECT_EQ(status.lost_since_ns(), 1200);
 }
 
 TEST(TrackingStatus, RequiresConfirmationForSomeFramesAfterALoss) {
   TrackingStatus status;
   status.OnMapInitialized();
-  status.OnLost(1);
+  status.OnLost(1, 100);
   EXPECT_TRUE(status.NeedsConfirmation());
   int frames = 0;
   while (status.NeedsConfirmation() && frames < 100) {
