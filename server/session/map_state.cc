@@ -125,6 +125,7 @@ void MapState::UpdateUncertainties(std::vector<FrameAck>* trajectory) const {
     if (!trajectory_[i].ack.uncertainty) continue;
     indices.push_back(i);
     sources.push_back(CurrentUncertainty(trajectory_[i]));
+    sources.back().position_world = (*trajectory)[i].T_world_camera->translation();
   }
   const std::vector<PoseUncertainty> aligned = AlignedUncertainties(sources);
   for (size_t k = 0; k < indices.size(); ++k) (*trajectory)[indices[k]].uncertainty = aligned[k];

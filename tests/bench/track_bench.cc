@@ -253,7 +253,8 @@ class Run {
       PoseUncertainty relative = tracked.reference_uncertainty;
       relative.position_sigma_mu *= reference->scale;
       uncertain.push_back(&tracked);
-      uncertainties.push_back({*Inspect().map().KeyframeUncertainty(tracked.reference), relative});
+      uncertainties.push_back(
+          {*Inspect().map().KeyframeUncertainty(tracked.reference), relative, tracked.T_world_camera.translation()});
     }
     const std::vector<PoseUncertainty> aligned = session::AlignedUncertainties(uncertainties);
     for (size_t i = 0; i < uncertain.size(); ++i) uncertain[i]->uncertainty = aligned[i];
