@@ -25,8 +25,8 @@ struct BundleCovarianceOptions {
 // and 9). It includes what cameras and points share, e.g. the error of a baseline or a slow drift along a chain of
 // cameras. The errors are those that remain after the positions of the cameras are aligned with the true ones by the
 // best similarity, or by the best rigid motion if depth was observed: inner constraints, restricted to the positions.
-// `fixed` is ignored. The claimed sigmas of the observations are corrected by MeasureNoise() and the degrees of freedom.
-// One per camera; empty if the observations do not determine the cameras.
+// `fixed` is ignored. The claimed sigmas of the observations are corrected by MeasureNoise() and the degrees of
+// freedom. One per camera; empty if the observations do not determine the cameras.
 std::vector<CameraCovariance> BundleCovariances(const BundleProblem& problem,
                                                 const BundleCovarianceOptions& options = {});
 
