@@ -35,7 +35,7 @@ struct LocalPoint {
 struct LocalMap {
   uint64_t keyframes_done = 0;  // keyframes that are in the map
   int generation = 0;           // increases when another map becomes current, or does not as proposed
-  SparseMapId map;              // see MapAtlas; meaningless without points
+  SparseMapId map;              // see MapAtlas
   RadialCorrection lens;        // for the features of frames that are tracked against it
   KeyframeId reference;         // the newest keyframe
   int reference_points = 0;     // well-observed points that it observes

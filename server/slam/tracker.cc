@@ -153,7 +153,7 @@ bool Tracker::ShouldUseGivenPose(const Frame& frame) const {
 TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   TrackedImage image;
   image.tracked = given_.Track(frame);
-  image.tracked.map = SparseMapId{1};
+  image.tracked.map = map_ ? map_->map : SparseMapId{1};
   image.pose_given = pose_use_ == PoseUse::kGiven;
   image.generation = map_ ? map_->generation : 0;
   world_is_given_ = true;

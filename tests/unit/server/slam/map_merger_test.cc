@@ -94,6 +94,27 @@ TEST_F(MapMergerTest, TheCurrentMapStaysInItsWorldIfItIsLarger) {
   EXPECT_LT(LargestError_mu(10), 0.05);
 }
 
+TEST_F(MapMergerTest, TheMotionOfTheMovedMapIsReported) {
+  BeginRoom();
+  BeginOther({.first = 10});
+  SessionMap& other = atlas_.current();
+  for (const auto& [id, keyframe] : other.map.keyframes()) {
+    KeyframeView view;
+    view.id = id;
+    view.T_world_camera = keyframe.T_world_camera();
+    other.corrections.Record(view, keyframe.scale);
+  }
+  ASSERT_TRUE(Observe(6));
+  SessionMap& merged = atlas_.current();
+  const MapCorrection correction = merged.corrections.TakeCorrection(merged.map);
+  ASSERT_EQ(correction.keyframes.size(), 6U);
+  for (const KeyframeCorrection& keyframe : correction.keyframes) {
+    EXPECT_NEAR(keyframe.S_new_old.scale(), 1 / S_other_a_.scale(), 0.02);
+    const auto expected = S_other_a_.Inverse().rotation();
+    EXPECT_LT(keyframe.S_new_old.rotation().angularDistance(expected), 0.01);
+  }
+}
+
 TEST_F(MapMergerTest, TheKeyframesOfBothMapsBecomeOneTree) {
   BeginRoom();
   BeginOther({.first = 10});

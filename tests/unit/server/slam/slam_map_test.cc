@@ -173,4 +173,41 @@ TEST_F(SlamMapTest, LensCorrectionAppliesToOldAndNewKeyframes) {
   EXPECT_LT((before.features()[0].pixel_px - image_px).norm(), 1e-3);
 }
 
+// A removed keyframe and a merged point of the other map are known after it was added, and its frames get the lens
+// correction of this map.
+TEST_F(SlamMapTest, AppendsAnotherMapOfTheSession) {
+  const RadialCorrection lens{-0.05};
+  SlamMap other = [&] {
+    MapKeyframe& first = AddKeyframe(0);
+    MapKeyframe& second = AddKeyframe(1);
+    second.parent = first.id;
+    MapKeyframe& third = AddKeyframe(2);
+    third.parent = second.id;
+    for (int i = 0; i < 5; ++i) AddPoint(i, {&first, &second, &third});
+    PointTrack& duplicate = AddPoint(6, {&first, &third});
+    PointTrack& original = AddPoint(7, {&first, &third});
+    map_.MergePoints(duplicate.point.id, original.point.id);
+    map_.RemoveKeyframe(second.id);
+    return map_;
+  }();
+  const MapPointId merged{6}, original{7};
+  SlamMap map(SlamConfig{}, other.keyframe_count(), other.point_count());
+  map.CorrectLens(lens);
+  map.AddKeyframe(other.keyframes().begin()->second.frame, {});
+  other.Transform(Sim3<World, World>(2.0, Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 1, 0)));
+  map.Append(other);
+  EXPECT_EQ(map.keyframes().size(), 3U);
+  EXPECT_EQ(map.points().size(), 6U);
+  ASSERT_NE(map.FindPoint(merged), nullptr);
+  EXPECT_EQ(map.FindPoint(merged)->point.id, original);
+  const auto removed = map.KeyframePose(KeyframeId{2});
+  ASSERT_TRUE(removed);
+  EXPECT_LT((removed->T_world_camera.translation() - Eigen::Vector3d(2, 1, 0)).norm(), 1e-9);
+  EXPECT_EQ(removed->scale, 2);
+  for (const auto& [id, keyframe] : map.keyframes()) EXPECT_EQ(keyframe.frame->lens.k1, lens.k1) << id;
+  map.SkipIds(100, 200);
+  EXPECT_EQ(map.AddPoint({0, 0, 1}).point.id, MapPointId{201});
+  EXPECT_EQ(map.AddKeyframe(other.keyframes().begin()->second.frame, {}).id, KeyframeId{101});
+}
+
 }  // namespace romap::slam::slam_map_test
