@@ -113,6 +113,7 @@ SparseMapId MapState::CurrentMap(SparseMapId map) const {
 void MapState::Correct(const MapCorrection& correction) {
   std::lock_guard lock(mutex_);
   trajectory_.Correct(correction);
+  for (const MapMerge& merge : correction.merged_maps) merged_maps_[merge.from] = merge.into;
 }
 
 void MapState::Acknowledge(MasksAck ack) {

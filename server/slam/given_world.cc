@@ -27,7 +27,7 @@ void GivenWorld::Observe(KeyframeId keyframe, const SE3<World, Camera>& T_world_
 
 std::optional<Sim3<World, World>> GivenWorld::ProposeMotion(const SlamMap& map, bool scale_is_known) {
   if (!std::exchange(has_new_, false)) return std::nullopt;
-  std::vector<PosePair> pairs;
+  std::vector<TwoWorldPose> pairs;
   for (const auto& [keyframe, given] : poses_) {
     if (const auto pose = map.KeyframePose(keyframe)) pairs.push_back({pose->T_world_camera, given});
   }

@@ -14,17 +14,18 @@ constexpr double kSigmasToAgree = 3;
 // Of the length of a vector with three independent normal components: standard deviation of one over the median length.
 constexpr double kSigmaPerMedianLength = 1 / 1.538;
 
-Eigen::Quaterniond RotationOf(const PosePair& pair) {
+Eigen::Quaterniond RotationOf(const TwoWorldPose& pair) {
   return pair.T_given_camera.rotation() * pair.T_map_camera.rotation().conjugate();
 }
 
 // The rotation of the pair that differs least from all others, by the median of the angles.
-Eigen::Quaterniond MedianRotation(std::span<const PosePair> pairs) {
+Eigen::Quaterniond MedianRotation(std::span<const TwoWorldPose> pairs) {
   Eigen::Quaterniond best = Eigen::Quaterniond::Identity();
   double least_rad = 1e9;
-  for (const PosePair& candidate : pairs) {
+  for (const TwoWorldPose& candidate : pairs) {
     std::vector<double> angles_rad;
-    for (const PosePair& pair : pairs) angles_rad.push_back(RotationOf(candidate).angularDistance(RotationOf(pair)));
+    for (const TwoWorldPose& pair : pairs)
+      angles_rad.push_back(RotationOf(candidate).angularDistance(RotationOf(pair)));
     const double median_rad = Median(std::move(angles_rad));
     if (median_rad >= least_rad) continue;
     least_rad = median_rad;
@@ -34,10 +35,11 @@ Eigen::Quaterniond MedianRotation(std::span<const PosePair> pairs) {
 }
 
 // Mean of the rotations within `bound_rad` of `start`, by their differences from it.
-Eigen::Quaterniond MeanRotation(std::span<const PosePair> pairs, const Eigen::Quaterniond& start, double bound_rad) {
+Eigen::Quaterniond MeanRotation(std::span<const TwoWorldPose> pairs, const Eigen::Quaterniond& start,
+                                double bound_rad) {
   Eigen::Vector3d sum_rad = Eigen::Vector3d::Zero();
   int count = 0;
-  for (const PosePair& pair : pairs) {
+  for (const TwoWorldPose& pair : pairs) {
     const Eigen::AngleAxisd difference(start.conjugate() * RotationOf(pair));
     if (difference.angle() > bound_rad) continue;
     sum_rad += difference.angle() * difference.axis();
@@ -61,7 +63,7 @@ Eigen::Vector3d MedianVector(const std::vector<Eigen::Vector3d>& vectors) {
 
 // Median of the ratios of distances between two cameras, along the direction between them, of all pairs of cameras that
 // are at least as far apart as half of them. nullopt: they do not move.
-std::optional<double> MedianScale(std::span<const PosePair> pairs, const Eigen::Quaterniond& R_given_map) {
+std::optional<double> MedianScale(std::span<const TwoWorldPose> pairs, const Eigen::Quaterniond& R_given_map) {
   struct Ratio {
     double distance_mu;
     double scale;
@@ -89,25 +91,25 @@ std::optional<double> MedianScale(std::span<const PosePair> pairs, const Eigen::
 
 }  // namespace
 
-std::optional<WorldAlignment> AlignWorlds(std::span<const PosePair> pairs, bool fix_scale) {
-  if (pairs.size() < kMinPosePairs) return std::nullopt;
+std::optional<WorldAlignment> AlignWorlds(std::span<const TwoWorldPose> pairs, bool fix_scale) {
+  if (pairs.size() < kMinTwoWorldPoses) return std::nullopt;
   const Eigen::Quaterniond start = MedianRotation(pairs);
   std::vector<double> angles_rad;
-  for (const PosePair& pair : pairs) angles_rad.push_back(start.angularDistance(RotationOf(pair)));
+  for (const TwoWorldPose& pair : pairs) angles_rad.push_back(start.angularDistance(RotationOf(pair)));
   const double bound_rad = kSigmasToAgree * std::sqrt(3.0) * kSigmaPerMedianLength * Median(angles_rad) + 1e-9;
   const Eigen::Quaterniond R_given_map = MeanRotation(pairs, start, bound_rad);
 
   const std::optional<double> scale = fix_scale ? 1.0 : MedianScale(pairs, R_given_map);
   if (!scale || !(*scale > 0)) return std::nullopt;
   std::vector<Eigen::Vector3d> offsets, given_centers;
-  for (const PosePair& pair : pairs) {
+  for (const TwoWorldPose& pair : pairs) {
     given_centers.push_back(pair.T_given_camera.translation());
     offsets.push_back(given_centers.back() - *scale * (R_given_map * pair.T_map_camera.translation()));
   }
   WorldAlignment alignment{.S_given_map = {*scale, R_given_map, MedianVector(offsets)}};
 
   std::vector<double> residuals_mu, residuals_rad;
-  for (const PosePair& pair : pairs) {
+  for (const TwoWorldPose& pair : pairs) {
     const SE3<World, Camera> expected = alignment.S_given_map.Moved(pair.T_map_camera);
     residuals_mu.push_back((expected.translation() - pair.T_given_camera.translation()).norm());
     residuals_rad.push_back(expected.rotation().angularDistance(pair.T_given_camera.rotation()));

@@ -8,7 +8,7 @@
 namespace romap::slam {
 
 // A camera whose pose is known in two worlds.
-struct PosePair {
+struct TwoWorldPose {
   SE3<World, Camera> T_map_camera;    // in the map
   SE3<World, Camera> T_given_camera;  // in the client's world
 };
@@ -26,8 +26,8 @@ struct WorldAlignment {
 
 // Robust alignment: the rotation is the median of the rotations that single pairs give, so that the cameras may be on a
 // line; scale and translation are medians too. Up to half of the pairs may be wrong. `fix_scale`: both worlds are in
-// meters. nullopt: fewer than `kMinPosePairs` pairs, or the cameras do not move in both worlds.
-inline constexpr size_t kMinPosePairs = 6;
-std::optional<WorldAlignment> AlignWorlds(std::span<const PosePair> pairs, bool fix_scale);
+// meters. nullopt: fewer than `kMinTwoWorldPoses` pairs, or the cameras do not move in both worlds.
+inline constexpr size_t kMinTwoWorldPoses = 6;
+std::optional<WorldAlignment> AlignWorlds(std::span<const TwoWorldPose> pairs, bool fix_scale);
 
 }  // namespace romap::slam

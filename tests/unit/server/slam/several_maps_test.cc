@@ -144,7 +144,7 @@ TEST_F(SeveralMapsTest, ACameraInNewTerritoryBeginsASecondMapAndKeepsTheFirst) {
   EXPECT_LT((frames_.back().tracked.T_world_camera.translation() - last.translation()).norm(), 0.6);
 
   EXPECT_GT(ProcessFrames(AtSecond, 40), 30) << image_.tracked.reason;
-  EXPECT_LT(Error().first, 0.02);
+  EXPECT_LT(Error().first, 0.03);
 }
 
 TEST_F(SeveralMapsTest, TheReturnMergesBothMapsIntoOneWorld) {

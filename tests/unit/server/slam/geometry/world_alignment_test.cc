@@ -20,13 +20,13 @@ struct PathNoise {
 };
 
 // Cameras on an arc, or on a line along x, with one meter from end to end in the map.
-std::vector<PosePair> MakePairs(int count, bool is_line, const PathNoise& path_noise, uint64_t seed) {
+std::vector<TwoWorldPose> MakePairs(int count, bool is_line, const PathNoise& path_noise, uint64_t seed) {
   Noise noise(seed);
-  std::vector<PosePair> pairs;
+  std::vector<TwoWorldPose> pairs;
   for (int i = 0; i < count; ++i) {
     const double share = static_cast<double>(i) / (count - 1);
     const Eigen::Vector3d center(share, is_line ? 0 : std::sin(2 * share), 0);
-    PosePair pair;
+    TwoWorldPose pair;
     pair.T_map_camera = {RotationXyz(90, 40 * share, 0), center};
     pair.T_given_camera = kGivenFromMap.Moved(pair.T_map_camera);
     const Eigen::Vector3d turn_rad = noise.Normal3(path_noise.rotation_rad);
@@ -83,9 +83,9 @@ TEST(AlignWorlds, StatesItsUncertainty) {
 }
 
 TEST(AlignWorlds, UnrelatedPathsDoNotAgree) {
-  std::vector<PosePair> pairs = MakePairs(20, false, {}, 3);
+  std::vector<TwoWorldPose> pairs = MakePairs(20, false, {}, 3);
   Noise noise(4);
-  for (PosePair& pair : pairs) {
+  for (TwoWorldPose& pair : pairs) {
     pair.T_given_camera = {RotationXyz(noise.Uniform(0, 360), noise.Uniform(0, 90), noise.Uniform(0, 90)),
                            noise.Normal3(1)};
   }
@@ -102,8 +102,8 @@ TEST(AlignWorlds, KeepsTheScaleOfMetricMaps) {
 
 TEST(AlignWorlds, NeedsSeveralPosesAndMotion) {
   EXPECT_FALSE(AlignWorlds(MakePairs(5, false, {}, 1), false));
-  std::vector<PosePair> pairs = MakePairs(12, false, {}, 1);
-  for (PosePair& pair : pairs) pair.T_map_camera = pairs[0].T_map_camera;
+  std::vector<TwoWorldPose> pairs = MakePairs(12, false, {}, 1);
+  for (TwoWorldPose& pair : pairs) pair.T_map_camera = pairs[0].T_map_camera;
   EXPECT_FALSE(AlignWorlds(pairs, false));
 }
 
