@@ -69,10 +69,9 @@ Trajectory::RelativeCorrections Trajectory::CorrectionsOfKeyframes() const {
 // The frame must have an uncertainty.
 FrameUncertainty Trajectory::CurrentUncertainty(const TrackedPose& frame) const {
   const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
-  const bool is_keyframe = keyframe != keyframe_of_frame_.end();
-  const auto reference = uncertainties_.find(is_keyframe ? keyframe->second : frame.reference);
+  const auto reference = uncertainties_.find(keyframe == keyframe_of_frame_.end() ? frame.reference : keyframe->second);
   if (reference == uncertainties_.end()) return {.reference = *frame.uncertainty, .relative = {}};
-  if (is_keyframe) return {.reference = reference->second, .relative = {}};
+  // Also for a keyframe: errors of its own features, which the adjustment of the map shares with its neighbors.
   PoseUncertainty relative = frame.reference_uncertainty;
   relative.position_sigma_mu *= keyframes_.at(frame.reference).scale;
   return {.reference = reference->second, .relative = relative};

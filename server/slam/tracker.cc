@@ -14,8 +14,8 @@ constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
 constexpr int kInliersWithoutPatches = 150;
 constexpr size_t kFewLastPoints = 150;
-constexpr size_t kManyLastPoints = 200;   // tracking needs no other points
-constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
+constexpr size_t kEnoughLastPoints = 100;  // tracking needs no tentative points
+constexpr int kMinInliersToConfirm = 40;   // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
@@ -234,7 +234,7 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
 // The newest local map, with tentative points while few points were matched or keyframes wait to be mapped.
 std::shared_ptr<const LocalMap> Tracker::MapForNextFrame() const {
   const bool keyframes_wait = keyframes_sent_ > map_->keyframes_done;
-  if (last_points_.size() >= kManyLastPoints && !keyframes_wait) return map_;
+  if (last_points_.size() >= kEnoughLastPoints && !keyframes_wait) return map_;
   const std::vector<LocalPoint> tentative = tentative_points_.Make();
   if (tentative.empty()) return map_;
   auto extended = std::make_shared<LocalMap>(*map_);
