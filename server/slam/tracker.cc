@@ -14,8 +14,7 @@ constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
 constexpr int kInliersWithoutPatches = 150;
 constexpr size_t kFewLastPoints = 150;
-constexpr size_t kEnoughLastPoints = 100;  // tracking needs no tentative points
-constexpr int kMinInliersToConfirm = 40;   // see TrackingStatus::NeedsConfirmation
+constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
 constexpr double kMaxStepShare = 0.5;  // of the scene's depth: no camera moves farther between two frames
@@ -231,10 +230,10 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   return image;
 }
 
-// The newest local map, with tentative points while few points were matched or keyframes wait to be mapped.
+// The newest local map, with tentative points while keyframes wait to be mapped. Without need they do harm: they make
+// the scale of a weak map drift.
 std::shared_ptr<const LocalMap> Tracker::MapForNextFrame() const {
-  const bool keyframes_wait = keyframes_sent_ > map_->keyframes_done;
-  if (last_points_.size() >= kEnoughLastPoints && !keyframes_wait) return map_;
+  if (keyframes_sent_ <= map_->keyframes_done) return map_;
   const std::vector<LocalPoint> tentative = tentative_points_.Make();
   if (tentative.empty()) return map_;
   auto extended = std::make_shared<LocalMap>(*map_);
