@@ -14,6 +14,7 @@ constexpr int kMinInliers = 25;
 constexpr int kMinInliersBeforePatches = 10;
 constexpr int kInliersWithoutPatches = 150;
 constexpr size_t kFewLastPoints = 150;
+constexpr size_t kEnoughLastPoints = 100;
 constexpr int kMinInliersToConfirm = 40;  // see TrackingStatus::NeedsConfirmation
 constexpr double kFollowRadius_px = 12;
 constexpr double kReferenceRadius_px = 36;
@@ -230,10 +231,12 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   return image;
 }
 
-// The newest local map, with tentative points while keyframes wait to be mapped. Without need they do harm: they make
-// the scale of a weak map drift.
-std::shared_ptr<const LocalMap> Tracker::MapForNextFrame() const {
-  if (keyframes_sent_ <= map_->keyframes_done) return map_;
+// The newest local map, with tentative points while keyframes wait to be mapped, and afterward until enough map points
+// are matched again. Without need they do harm: they make the scale of a weak map drift.
+std::shared_ptr<const LocalMap> Tracker::MapForNextFrame() {
+  const bool keyframes_wait = keyframes_sent_ > map_->keyframes_done;
+  needs_tentative_points_ = keyframes_wait || (needs_tentative_points_ && last_points_.size() < kEnoughLastPoints);
+  if (!needs_tentative_points_) return map_;
   const std::vector<LocalPoint> tentative = tentative_points_.Make();
   if (tentative.empty()) return map_;
   auto extended = std::make_shared<LocalMap>(*map_);

@@ -72,7 +72,7 @@ class Tracker {
   void FindInitialViews(TrackedImage& image, std::string* reason);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
 
-  std::shared_ptr<const LocalMap> MapForNextFrame() const;
+  std::shared_ptr<const LocalMap> MapForNextFrame();
   std::optional<PoseFromPoints> FindPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> FindFirstPose(const Frame& frame, const LocalMapTracking& tracking) const;
   std::optional<PoseFromPoints> ConfirmByAllPoints(const Frame& frame, const PoseFromPoints& first,
@@ -101,6 +101,7 @@ class Tracker {
   MotionModel motion_;
   std::vector<MapPointId> last_points_;  // matched in the last tracked frame
   TentativePoints tentative_points_;
+  bool needs_tentative_points_ = false;
   bool world_is_given_ = false;  // the client's poses define the world
   uint64_t keyframes_sent_ = 0;
   SparseMapId newest_map_;  // of those that the camera was in
