@@ -120,7 +120,7 @@ struct MapCorrection {
   std::vector<KeyframeCorrection> keyframes;  // those that moved noticeably, by id
   std::vector<MapPoint> points;               // those that moved, with their new positions
   Eigen::Vector3d up_world = Eigen::Vector3d::UnitZ();
-  // The uncertainties of all keyframes that were published; empty unless they were computed anew.
+  // The uncertainties of all keyframes that were published; empty unless they changed.
   std::map<KeyframeId, PoseUncertainty> uncertainties = {};
   std::vector<MapMerge> merged_maps =
       {};  // in the order of the merges; the motion of their keyframes is in `keyframes`

@@ -37,7 +37,7 @@ bool FitsAsWell(const LocatedFrame& other, size_t points) {
 }
 
 // Share of the image, among the parts that should show points of the kept keyframe, where such points were found. A
-// thing that looks alike, for instance a poster, is found in its own part only.
+// object that exists twice, for instance a poster, is found in its own part only.
 double MatchedArea(const MapKeyframe& keyframe, const LocatedFrame& located, const SlamMap& kept) {
   struct Cell {
     int expected = 0;
@@ -79,15 +79,9 @@ std::vector<SimilarityMatch> SharedPoints(const MapKeyframe& keyframe, const Loc
     if (!observed) continue;
     const Eigen::Vector3d p_kept = T_kept_world * kept.FindPoint(id)->point.position_world;
     if (p_kept.z() <= 0) continue;
-    const Feature& feature = keyframe.features()[static_cast<size_t>(feature_index)];
-    const double sigma_px = config.pixel_sigma_px * feature.octave_scale;
     ids.emplace_back(observed, id);
-    matches.push_back({.p_first = p_kept,
-                       .p_second = keyframe.T_camera_world() * current.FindPoint(observed)->point.position_world,
-                       .first_px = keyframe.camera().Project(p_kept),
-                       .second_px = feature.pixel_px.cast<double>(),
-                       .first_sigma_px = sigma_px,
-                       .second_sigma_px = sigma_px});
+    const Eigen::Vector3d& p_current = current.FindPoint(observed)->point.position_world;
+    matches.push_back(MatchAtPlace(keyframe, feature_index, p_kept, keyframe.T_camera_world() * p_current, config));
   }
   return matches;
 }

@@ -9,7 +9,7 @@ namespace romap::slam {
 namespace {
 
 constexpr size_t kMaxGivenPoses = 60;
-constexpr size_t kPosesToJudge = 15;  // so many must agree, or the client's poses are inconsistent with the images
+constexpr size_t kPosesToJudge = 15;  // if this number does not agree, the poses contradict the images
 constexpr double kMinAgreeingShare = 0.7;
 constexpr double kMaxScaleSigma = 0.02;
 constexpr double kMaxAlignmentSigma_rad = 0.5 * kRadPerDeg;

@@ -20,10 +20,9 @@ constexpr int kMinCommonPoints = 15;
 constexpr uint64_t kMinLoopKeyframes = 10;  // between the old and the newest keyframe
 // Another explanation with this share of the points makes a loop ambiguous.
 constexpr double kLoopRivalShare = 0.6;
-constexpr size_t kEarlierKeyframes = 6;             // before the newest, asked whether they observe the old place too
-constexpr int kMinSupportingKeyframes = 2;          // of those
-constexpr double kMaxDisagreement_px = 8;           // between the old points in an earlier keyframe and the correction
-constexpr uint64_t kRejectedRadius_keyframes = 15;  // around a rejected pair
+constexpr size_t kEarlierKeyframes = 6;     // before the newest, asked whether they observe the old place too
+constexpr int kMinSupportingKeyframes = 2;  // of those
+constexpr double kMaxDisagreement_px = 8;   // between the old points in an earlier keyframe and the correction
 
 double MedianDistance_px(const MapKeyframe& keyframe, const SE3<World, Camera>& T_world_camera, const SlamMap& map,
                          const LocatedFrame& located) {
@@ -36,10 +35,6 @@ double MedianDistance_px(const MapKeyframe& keyframe, const SE3<World, Camera>& 
                                             : keyframe.camera().width_px);
   }
   return Median(std::move(distances_px));
-}
-
-bool IsNear(KeyframeId a, KeyframeId b) {
-  return std::max(a.value, b.value) - std::min(a.value, b.value) <= kRejectedRadius_keyframes;
 }
 
 }  // namespace
@@ -59,7 +54,7 @@ std::optional<LoopMatch> LoopDetector::Find(const MapKeyframe& keyframe, bool sc
        places_->SimilarKeyframes(*keyframe.frame, kMaxLoopCandidates + static_cast<int>(connected.size()))) {
     if (connected.contains(id) || id.value + kMinLoopKeyframes > keyframe.id.value) continue;
     const MapKeyframe* old = map_->FindKeyframe(id);
-    if (old == nullptr || IsRejected(keyframe.id, id)) continue;
+    if (old == nullptr || rejected_.Contains(keyframe.id, id)) continue;
     if (++tried > kTriedCandidates) break;
     if (auto located = places_->Locate(*keyframe.frame, *old, keyframe.id.value)) places.push_back(*std::move(located));
   }
@@ -71,13 +66,6 @@ std::optional<LoopMatch> LoopDetector::Find(const MapKeyframe& keyframe, bool sc
     if (loop && IsVerified(keyframe, located, *loop, places, scale_is_known)) return loop;
   }
   return std::nullopt;
-}
-
-void LoopDetector::Reject(const LoopMatch& loop) { rejected_.emplace_back(loop.newest, loop.old); }
-
-bool LoopDetector::IsRejected(KeyframeId newest, KeyframeId old) const {
-  return std::any_of(rejected_.begin(), rejected_.end(),
-                     [&](const auto& pair) { return IsNear(pair.first, newest) && IsNear(pair.second, old); });
 }
 
 bool LoopDetector::IsVerified(const MapKeyframe& keyframe, const LocatedFrame& located, const LoopMatch& loop,
@@ -152,15 +140,9 @@ std::optional<LoopMatch> LoopDetector::MakeLoop(const MapKeyframe& keyframe, con
     const MapPointId observed = keyframe.points[static_cast<size_t>(feature_index)];
     if (!observed) continue;
     if (observed != id) loop.same_points.emplace_back(observed, id);
-    const Feature& feature = keyframe.features()[static_cast<size_t>(feature_index)];
     const Eigen::Vector3d p_old = T_old_world * map_->FindPoint(id)->point.position_world;
-    const double sigma_px = config_.pixel_sigma_px * feature.octave_scale;
-    common.push_back({.p_first = p_old,
-                      .p_second = keyframe.T_camera_world() * map_->FindPoint(observed)->point.position_world,
-                      .first_px = keyframe.camera().Project(p_old),
-                      .second_px = feature.pixel_px.cast<double>(),
-                      .first_sigma_px = sigma_px,
-                      .second_sigma_px = sigma_px});
+    const Eigen::Vector3d& p_newest = map_->FindPoint(observed)->point.position_world;
+    common.push_back(MatchAtPlace(keyframe, feature_index, p_old, keyframe.T_camera_world() * p_newest, config_));
   }
   loop.drift_px = MedianDistance_px(keyframe, keyframe.T_world_camera(), *map_, located);
   loop.S_old_newest = Sim3<Camera, Camera>(T_old_world * located.T_world_camera);

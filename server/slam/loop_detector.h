@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/slam/place_recognizer.h"
+#include "server/slam/rejected_pairs.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 
@@ -42,21 +43,20 @@ class LoopDetector {
   std::optional<LoopMatch> Find(const MapKeyframe& keyframe, bool scale_is_known) const;
 
   // A loop turned out to be wrong: it is not proposed again.
-  void Reject(const LoopMatch& loop);
+  void Reject(const LoopMatch& loop) { rejected_.Add(loop.newest, loop.old); }
 
  private:
   bool IsVerified(const MapKeyframe& keyframe, const LocatedFrame& located, const LoopMatch& loop,
                   const std::vector<LocatedFrame>& places, bool scale_is_known) const;
   bool IsExplainedByCurrentPose(const MapKeyframe& keyframe, const LocatedFrame& located) const;
   int CountSupportingKeyframes(const MapKeyframe& keyframe, const LoopMatch& loop) const;
-  bool IsRejected(KeyframeId newest, KeyframeId old) const;
   std::optional<LoopMatch> MakeLoop(const MapKeyframe& keyframe, const LocatedFrame& located,
                                     bool scale_is_known) const;
 
   const SlamConfig config_;
   const SlamMap* const map_;
   const PlaceRecognizer* const places_;
-  std::vector<std::pair<KeyframeId, KeyframeId>> rejected_;  // (newest, old)
+  RejectedPairs rejected_;
 };
 
 }  // namespace romap::slam

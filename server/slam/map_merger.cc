@@ -10,12 +10,7 @@
 namespace romap::slam {
 namespace {
 
-constexpr size_t kMinAgreeingKeyframes = 3;              // consecutive ones
-constexpr uint64_t kRejectedMergeRadius_keyframes = 15;  // around a rejected pair of keyframes
-
-bool AreNear(KeyframeId a, KeyframeId b) {
-  return std::max(a.value, b.value) - std::min(a.value, b.value) <= kRejectedMergeRadius_keyframes;
-}
+constexpr size_t kMinAgreeingKeyframes = 3;  // consecutive ones
 
 }  // namespace
 
@@ -24,15 +19,8 @@ void MapMerger::Forget() {
   agreeing_.clear();
 }
 
-bool MapMerger::IsRejected(const CommonPlace& place) const {
-  return std::any_of(rejected_.begin(), rejected_.end(), [&](const CommonPlace& rejected) {
-    return rejected.kept == place.kept && AreNear(rejected.keyframe, place.keyframe) &&
-           AreNear(rejected.kept_keyframe, place.kept_keyframe);
-  });
-}
-
 void MapMerger::Reject(const CommonPlace& place) {
-  rejected_.push_back(place);
+  rejected_[place.kept].Add(place.keyframe, place.kept_keyframe);
   ++rejections_;
   Forget();
 }
@@ -42,7 +30,7 @@ void MapMerger::Observe(const MapKeyframe& keyframe, const MapAtlas& atlas) {
   std::optional<CommonPlace> best;
   for (const auto& kept : atlas.kept()) {
     auto place = FindCommonPlace(keyframe, atlas.current(), *kept, config_);
-    if (!place || IsRejected(*place)) continue;
+    if (!place || rejected_[place->kept].Contains(place->keyframe, place->kept_keyframe)) continue;
     if (!best || place->same_points.size() > best->same_points.size()) best = std::move(place);
   }
   if (!best) {

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
 #include "server/slam/common_place.h"
 #include "server/slam/map_atlas.h"
 #include "server/slam/merge_trial.h"
+#include "server/slam/rejected_pairs.h"
 #include "server/slam/slam_config.h"
 
 namespace romap::slam {
@@ -33,13 +35,12 @@ class MapMerger {
   int rejected() const { return rejections_; }
 
  private:
-  bool IsRejected(const CommonPlace& place) const;
   void Reject(const CommonPlace& place);
   void StartTrial(const MapAtlas& atlas);
 
   const SlamConfig config_;
-  std::vector<CommonPlace> agreeing_;  // of consecutive keyframes, with one kept map
-  std::vector<CommonPlace> rejected_;
+  std::vector<CommonPlace> agreeing_;              // of consecutive keyframes, with one kept map
+  std::map<SparseMapId, RejectedPairs> rejected_;  // by kept map
   MergeTrial trial_;
   CommonPlace tried_;  // while the trial is pending
   int rejections_ = 0;

@@ -45,6 +45,18 @@ PoseObservation MakeObservation(const FrameFeatures& frame, int feature, const E
 
 }  // namespace
 
+SimilarityMatch MatchAtPlace(const MapKeyframe& keyframe, int feature, const Eigen::Vector3d& p_place,
+                             const Eigen::Vector3d& p_camera, const SlamConfig& config) {
+  const Feature& observed = keyframe.features()[static_cast<size_t>(feature)];
+  const double sigma_px = config.pixel_sigma_px * observed.octave_scale;
+  return {.p_first = p_place,
+          .p_second = p_camera,
+          .first_px = keyframe.camera().Project(p_place),
+          .second_px = observed.pixel_px.cast<double>(),
+          .first_sigma_px = sigma_px,
+          .second_sigma_px = sigma_px};
+}
+
 bool AreRivals(const LocatedFrame& a, const LocatedFrame& b) {
   const double rotation_rad = a.T_world_camera.rotation().angularDistance(b.T_world_camera.rotation());
   const double distance_mu = (a.T_world_camera.translation() - b.T_world_camera.translation()).norm();

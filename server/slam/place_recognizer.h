@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/slam/geometry/pnp.h"
+#include "server/slam/geometry/similarity.h"
 #include "server/slam/places/place_index.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
@@ -18,6 +19,12 @@ struct LocatedFrame {
   std::vector<std::pair<MapPointId, int>> points = {};  // with the feature that observes each
   double median_depth_mu = 0;                           // of the points
 };
+
+// The match of a point that a keyframe observes at `feature` with the same point at another place, for the similarity
+// from this camera to the one there. `p_place`, `p_camera`: the point in the frame of the camera there, and of this
+// one.
+SimilarityMatch MatchAtPlace(const MapKeyframe& keyframe, int feature, const Eigen::Vector3d& p_place,
+                             const Eigen::Vector3d& p_camera, const SlamConfig& config);
 
 // Whether two poses of the same frame exclude each other: they differ by more than drift inside one place could
 // explain, 10 degrees or a fifth of the scene depth.

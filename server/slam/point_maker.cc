@@ -135,14 +135,8 @@ void PointMaker::MakePointsByDepth(MapKeyframe& keyframe) {
 }
 
 std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyframe) const {
-  std::vector<double> depths_mu;
-  for (const MapPointId id : keyframe.points) {
-    if (id) depths_mu.push_back((keyframe.T_camera_world() * map_->FindPoint(id)->point.position_world).z());
-  }
-  double min_baseline_mu = 0;
-  if (!depths_mu.empty()) {
-    min_baseline_mu = Median(std::move(depths_mu)) * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
-  }
+  const double min_baseline_mu =
+      map_->MedianDepth_mu(keyframe).value_or(0) * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
   const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
   // Keyframes that share points, and the newest ones, which may not share any yet.
   std::vector<KeyframeId> candidates;

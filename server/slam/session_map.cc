@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "common/angles.h"
@@ -13,16 +12,6 @@ namespace {
 
 constexpr uint64_t kFirstGlobalAdjustment_keyframes = 10;
 constexpr double kMinParallax_rad = 3 * kRadPerDeg;
-
-// Median depth of the points that the keyframe observes; nullopt if it observes none.
-std::optional<double> ObservedDepth_mu(const SlamMap& map, const MapKeyframe& keyframe) {
-  std::vector<double> depths_mu;
-  for (const MapPointId id : keyframe.points) {
-    if (id) depths_mu.push_back((keyframe.T_camera_world() * map.FindPoint(id)->point.position_world).z());
-  }
-  if (depths_mu.empty()) return std::nullopt;
-  return Median(std::move(depths_mu));
-}
 
 }  // namespace
 
@@ -47,7 +36,7 @@ MapStart SessionMap::StartOfNextMap() const {
   } else if (keyframe != nullptr) {
     start.T_world_first = keyframe->T_world_camera();
   }
-  if (keyframe != nullptr) start.depth_mu = ObservedDepth_mu(map, *keyframe).value_or(1);
+  if (keyframe != nullptr) start.depth_mu = map.MedianDepth_mu(*keyframe).value_or(1);
   return start;
 }
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
+#include <utility>
+
+#include "common/statistics.h"
 
 namespace romap::slam {
 namespace {
@@ -152,6 +155,15 @@ std::vector<std::pair<KeyframeId, int>> SlamMap::Covisible(const MapKeyframe& ke
   std::sort(neighbors.begin(), neighbors.end(),
             [](const auto& a, const auto& b) { return std::pair(a.second, a.first) > std::pair(b.second, b.first); });
   return neighbors;
+}
+
+std::optional<double> SlamMap::MedianDepth_mu(const MapKeyframe& keyframe) const {
+  std::vector<double> depths_mu;
+  for (const MapPointId id : keyframe.points) {
+    if (id) depths_mu.push_back((keyframe.T_camera_world() * FindPoint(id)->point.position_world).z());
+  }
+  if (depths_mu.empty()) return std::nullopt;
+  return Median(std::move(depths_mu));
 }
 
 ObservedRay SlamMap::RayOf(const MapKeyframe& keyframe, int feature) const {

@@ -114,6 +114,9 @@ class SlamMap {
   // age, the newest first.
   std::vector<std::pair<KeyframeId, int>> Covisible(const MapKeyframe& keyframe, int min_shared) const;
 
+  // Median depth of the points that the keyframe observes; nullopt if it observes none.
+  std::optional<double> MedianDepth_mu(const MapKeyframe& keyframe) const;
+
   ObservedRay RayOf(const MapKeyframe& keyframe, int feature) const;
   // At most `max_rays` of the rays to the point, evenly spread over its observations.
   std::vector<ObservedRay> RaysOf(const PointTrack& track, size_t max_rays = 16) const;

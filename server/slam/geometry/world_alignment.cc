@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/statistics.h"
+#include "server/slam/geometry/rotation.h"
 
 namespace romap::slam {
 namespace {
@@ -45,10 +46,7 @@ Eigen::Quaterniond MeanRotation(std::span<const TwoWorldPose> pairs, const Eigen
     sum_rad += difference.angle() * difference.axis();
     ++count;
   }
-  const Eigen::Vector3d mean_rad = sum_rad / std::max(1, count);
-  const double angle_rad = mean_rad.norm();
-  if (angle_rad < 1e-12) return start;
-  return start * Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, mean_rad / angle_rad));
+  return start * Eigen::Quaterniond(ExpRotationMatrix(sum_rad / std::max(1, count)));
 }
 
 Eigen::Vector3d MedianVector(const std::vector<Eigen::Vector3d>& vectors) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/statistics.h"
+#include "server/slam/optimize/lie.h"
 
 namespace romap::slam {
 namespace {
@@ -30,12 +31,6 @@ struct Derivatives {
   Matrix3 by_point = Matrix3::Zero();
   Eigen::Vector3d by_lens = Eigen::Vector3d::Zero();
 };
-
-Matrix3 CrossMatrix(const Eigen::Vector3d& v) {
-  Matrix3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 // Every n-th index, so that at most `max` are selected.
 int StrideFor(size_t count, int max) { return std::max(1, static_cast<int>((count + max - 1) / max)); }
@@ -158,7 +153,7 @@ bool CameraInformation::Differentiate(const BundleObservation& observation, Deri
   derivatives.camera = selected_of_[static_cast<size_t>(observation.camera)];
   derivatives.by_point = projection * R_camera_world;
   derivatives.by_camera.leftCols<3>() = -derivatives.by_point;
-  derivatives.by_camera.rightCols<3>() = derivatives.by_point * CrossMatrix(offset);
+  derivatives.by_camera.rightCols<3>() = derivatives.by_point * Hat(offset);
   if (problem_.lens) derivatives.by_lens.head<2>() = weight.cwiseProduct(pinhole) * pinhole.squaredNorm();
   return true;
 }
@@ -222,7 +217,7 @@ Eigen::MatrixXd CameraInformation::GaugeMotions() const {
         problem_.cameras[static_cast<size_t>(cameras_[i])].T_world_camera.translation() / unit_mu_ - mean;
     const Eigen::Index row = 6 * static_cast<Eigen::Index>(i);
     motions.block<3, 3>(row, 0).setIdentity();
-    motions.block<3, 3>(row, 3) = -CrossMatrix(center);
+    motions.block<3, 3>(row, 3) = -Hat(center);
     motions.block<3, 3>(row + 3, 3).setIdentity();
     if (!has_depth_) motions.block<3, 1>(row, 6) = center;
   }

@@ -13,22 +13,12 @@
 #include "server/objects/object_mapper.h"
 #include "server/objects/projection.h"
 #include "tests/support/synthetic_world.h"
+#include "tests/unit/server/objects/small_world.h"
 
 namespace romap::objects::correction_test {
 
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-
-SyntheticWorldOptions SmallWorld() {
-  SyntheticWorldOptions options;
-  options.width_px = 240;
-  options.height_px = 180;
-  options.focal_px = 225;
-  options.frames = 60;
-  options.keyframe_every = 2;
-  options.points_on_table = 100;
-  return options;
-}
 
 // A mapper with its input and its published output.
 class CorrectedMapping {

@@ -10,6 +10,7 @@
 #include "common/map_motion.h"
 #include "server/objects/object_mapper.h"
 #include "tests/support/synthetic_world.h"
+#include "tests/unit/server/objects/small_world.h"
 
 namespace romap::objects::several_maps_test {
 
@@ -19,17 +20,6 @@ using ::testing::SizeIs;
 constexpr SparseMapId kFirst{1};
 constexpr SparseMapId kSecond{2};
 constexpr uint64_t kIdOffset = 100'000;  // between the ids of keyframes and points of two maps
-
-SyntheticWorldOptions TableWithFourObjects() {
-  SyntheticWorldOptions options;
-  options.width_px = 240;
-  options.height_px = 180;
-  options.focal_px = 225;
-  options.frames = 60;
-  options.keyframe_every = 2;
-  options.points_on_table = 100;
-  return options;
-}
 
 // Maps the same table in several maps with unrelated worlds.
 class SeveralMapsObjectsTest : public ::testing::Test {
@@ -103,7 +93,7 @@ class SeveralMapsObjectsTest : public ::testing::Test {
     return objects;
   }
 
-  const SyntheticWorld world_{TableWithFourObjects()};
+  const SyntheticWorld world_{SmallWorld()};
   ObjectMapper mapper_{ObjectsConfig{}};
   std::map<KeyframeId, SE3<World, Camera>> poses_;  // of the second map
   std::map<MapPointId, MapPoint> points_;

@@ -9,25 +9,22 @@
 #include <utility>
 #include <vector>
 
-#include "server/slam/geometry/similarity.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
 #include "tests/support/sparse_mapper_inspector.h"
 #include "tests/unit/server/slam/textured_world.h"
+#include "tests/unit/server/slam/tracking_fixture.h"
 
 namespace romap::slam::several_maps_test {
 
 constexpr int kFramesPerSecond = 30;
 
-class SeveralMapsTest : public ::testing::Test {
+class SeveralMapsTest : public TrackingTest {
  protected:
-  SeveralMapsTest() { Restart(PoseUse::kIgnore); }
+  SeveralMapsTest() : TrackingTest(PoseUse::kIgnore, 400, 300) {}
 
   void Restart(PoseUse pose_use, SparseMapper::Background background = SparseMapper::Background::kNothing) {
-    slot_ = std::make_unique<LocalMapSlot>();
-    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), background);
-    tracker_ = std::make_unique<Tracker>(SlamConfig{}, pose_use, slot_.get());
-    frames_.clear();
+    TrackingTest::Restart(pose_use, background);
     next_frame_ = 1;
   }
 
@@ -62,15 +59,9 @@ class SeveralMapsTest : public ::testing::Test {
 
   TrackingState Process(std::shared_ptr<const Frame> frame) {
     ++next_frame_;
-    image_ = tracker_->Track(frame);
-    const MappedFrame mapped = mapper_->Process(image_);
-    if (mapped.correction) {
-      for (const MapMerge& merge : mapped.correction->merged_maps) merges_.push_back(merge);
-    }
-    const TrackingState state = image_.tracked.state;
-    if (state == TrackingState::kTracking || state == TrackingState::kRelocalized) {
-      frames_.push_back({mapped.tracked, *frame->T_world_camera});
-      frames_.back().tracked.frame = nullptr;
+    const TrackingState state = ProcessFrame(frame);
+    if (mapped_.correction) {
+      for (const MapMerge& merge : mapped_.correction->merged_maps) merges_.push_back(merge);
     }
     return state;
   }
@@ -91,11 +82,7 @@ class SeveralMapsTest : public ::testing::Test {
       estimated.push_back(reference->Compose(frame.tracked.T_reference_camera).translation());
       truth.push_back(frame.truth.translation());
     }
-    const auto S = AlignPoints<World, World>(estimated, truth, false);
-    if (!S) return {1e9, 0};
-    double worst = 0;
-    for (size_t i = 0; i < estimated.size(); ++i) worst = std::max(worst, (*S * estimated[i] - truth[i]).norm());
-    return {worst, S->scale()};
+    return WorstDistance(estimated, truth);
   }
 
   size_t FramesInCurrentMap() const {
@@ -104,37 +91,22 @@ class SeveralMapsTest : public ::testing::Test {
     }));
   }
 
-  bool WarnsOfSeveralMaps() const {
-    const auto warnings = mapper_->Warnings();
-    return std::any_of(warnings.begin(), warnings.end(),
-                       [](const SessionWarning& warning) { return warning.name == "maps_unconnected"; });
-  }
+  bool WarnsOfSeveralMaps() const { return HasWarning("maps_unconnected"); }
 
-  struct TrackedPose {
-    TrackedFrame tracked;
-    SE3<World, Camera> truth;
-  };
-
-  const TexturedWorld world_{400, 300};
   bool with_depth_ = false;
-  std::unique_ptr<LocalMapSlot> slot_;
-  std::unique_ptr<SparseMapper> mapper_;
-  std::unique_ptr<Tracker> tracker_;
-  std::vector<TrackedPose> frames_;
   std::vector<MapMerge> merges_;
-  TrackedImage image_;
   uint64_t next_frame_ = 1;
 };
 
 TEST_F(SeveralMapsTest, ACameraInNewTerritoryBeginsASecondMapAndKeepsTheFirst) {
-  ASSERT_GT(ProcessFrames(AtFirst, 40), 20) << image_.tracked.reason;
+  ASSERT_GT(ProcessFrames(AtFirst, 40), 20) << reason();
   const size_t keyframes = Inspect().map().keyframes().size();
   const SE3<World, Camera> last = frames_.back().tracked.T_world_camera;
   EXPECT_FALSE(WarnsOfSeveralMaps());
   int lost = 0;
   while (lost < 60 && Process(Render(AtSecond(lost))) == TrackingState::kLost) ++lost;
   EXPECT_GT(lost, 0.7 * kFramesPerSecond);
-  EXPECT_LE(lost, 1.2 * kFramesPerSecond) << image_.tracked.reason;
+  EXPECT_LE(lost, 1.2 * kFramesPerSecond) << reason();
   EXPECT_EQ(image_.tracked.map, SparseMapId{2});
   EXPECT_TRUE(WarnsOfSeveralMaps());
   ASSERT_NE(atlas().Find(SparseMapId{1}), nullptr);
@@ -143,17 +115,17 @@ TEST_F(SeveralMapsTest, ACameraInNewTerritoryBeginsASecondMapAndKeepsTheFirst) {
   EXPECT_LT(frames_.back().tracked.T_world_camera.rotation().angularDistance(last.rotation()), 0.6);
   EXPECT_LT((frames_.back().tracked.T_world_camera.translation() - last.translation()).norm(), 0.6);
 
-  EXPECT_GT(ProcessFrames(AtSecond, 40), 30) << image_.tracked.reason;
+  EXPECT_GT(ProcessFrames(AtSecond, 40), 30) << reason();
   EXPECT_LT(Error().first, 0.03);
 }
 
 TEST_F(SeveralMapsTest, TheReturnMergesBothMapsIntoOneWorld) {
   ProcessFrames(AtFirst, 40);
   ProcessFrames(AtSecond, 41);
-  ASSERT_EQ(atlas().maps(), 2U) << image_.tracked.reason;
+  ASSERT_EQ(atlas().maps(), 2U) << reason();
   ProcessFrames(OnReturn, kReturnFrames);
   ProcessFrames([](int i) { return AtFirst(20 + i); }, 20);
-  EXPECT_EQ(atlas().maps(), 1U) << image_.tracked.reason;
+  EXPECT_EQ(atlas().maps(), 1U) << reason();
   EXPECT_EQ(Inspect().maps_merged(), 1);
   EXPECT_EQ(merges_.size(), 1U);
   EXPECT_FALSE(WarnsOfSeveralMaps());
@@ -169,12 +141,12 @@ TEST_F(SeveralMapsTest, ACameraThatIsBackAtAKeptMapContinuesThere) {
   ASSERT_EQ(atlas().current().id, SparseMapId{2});
   int lost = 0;
   while (lost < 20 && Process(Render(AtFirst(lost))) == TrackingState::kLost) ++lost;
-  EXPECT_LE(lost, 5) << image_.tracked.reason;
+  EXPECT_LE(lost, 5) << reason();
   EXPECT_EQ(image_.tracked.map, SparseMapId{1});
   EXPECT_EQ(atlas().current().id, SparseMapId{1});
   EXPECT_EQ(atlas().maps(), 2U) << "this does not connect the two maps";
   EXPECT_TRUE(merges_.empty());
-  EXPECT_GT(ProcessFrames([](int i) { return AtFirst(6 + i); }, 50), 45) << image_.tracked.reason;
+  EXPECT_GT(ProcessFrames([](int i) { return AtFirst(6 + i); }, 50), 45) << reason();
   EXPECT_LT(Error().first, 0.03);
 }
 
@@ -192,11 +164,11 @@ TEST_F(SeveralMapsTest, WithDepthTheSecondMapBeginsAtOnceAndTheScaleIsKept) {
   ASSERT_EQ(ProcessFrames(AtFirst, 30), 29);
   int lost = 0;
   while (lost < 60 && Process(Render(AtSecond(lost))) == TrackingState::kLost) ++lost;
-  EXPECT_LE(lost, 0.9 * kFramesPerSecond) << image_.tracked.reason;
+  EXPECT_LE(lost, 0.9 * kFramesPerSecond) << reason();
   EXPECT_EQ(image_.tracked.map, SparseMapId{2});
   ProcessFrames([](int i) { return AtSecond(30 + i); }, 11);
   ProcessFrames(OnFastReturn, kReturnFrames / 2);
-  EXPECT_EQ(atlas().maps(), 1U) << image_.tracked.reason;
+  EXPECT_EQ(atlas().maps(), 1U) << reason();
   const auto [worst, scale] = Error();
   EXPECT_LT(worst, 0.05);
   EXPECT_NEAR(scale, 1, 0.01);
@@ -238,7 +210,7 @@ TEST_F(SeveralMapsTest, MergesInTheBackground) {
   Restart(PoseUse::kIgnore, SparseMapper::Background::kAllAdjustment);
   ProcessFrames(AtFirst, 40);
   ProcessFrames(AtSecond, 41);
-  ASSERT_EQ(atlas().maps(), 2U) << image_.tracked.reason;
+  ASSERT_EQ(atlas().maps(), 2U) << reason();
   ProcessFrames(OnReturn, kReturnFrames);
   mapper_->Finish();
   EXPECT_EQ(atlas().maps(), 1U);

@@ -22,12 +22,16 @@ namespace romap::slam {
 // Tracker and SparseMapper together, frame by frame on one thread, in a synthetic world.
 class TrackingTest : public ::testing::Test {
  protected:
-  explicit TrackingTest(PoseUse pose_use = PoseUse::kIgnore) { Restart(pose_use); }
+  explicit TrackingTest(PoseUse pose_use = PoseUse::kIgnore, int width_px = 480, int height_px = 360)
+      : world_(width_px, height_px) {
+    Restart(pose_use);
+  }
 
-  void Restart(PoseUse pose_use) {
+  void Restart(PoseUse pose_use, SparseMapper::Background background = SparseMapper::Background::kNothing) {
     slot_ = std::make_unique<LocalMapSlot>();
-    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing);
+    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), background);
     tracker_ = std::make_unique<Tracker>(SlamConfig{}, pose_use, slot_.get());
+    frames_.clear();
   }
 
   const SlamMap& map() const { return SparseMapperInspector(*mapper_).map(); }
@@ -41,11 +45,10 @@ class TrackingTest : public ::testing::Test {
 
   std::shared_ptr<Frame> Render(int i) const { return world_.Render(static_cast<uint64_t>(i + 1), Pose(i)); }
 
-  TrackingState ProcessFrame(std::shared_ptr<Frame> frame) {
-    const TrackedImage image = tracker_->Track(frame);
-    reason_ = image.tracked.reason;
-    mapped_ = mapper_->Process(image);
-    const TrackingState state = image.tracked.state;
+  TrackingState ProcessFrame(std::shared_ptr<const Frame> frame) {
+    image_ = tracker_->Track(frame);
+    mapped_ = mapper_->Process(image_);
+    const TrackingState state = image_.tracked.state;
     if (state == TrackingState::kTracking || state == TrackingState::kRelocalized) {
       frames_.push_back({mapped_.tracked, *frame->T_world_camera});
       frames_.back().tracked.frame = nullptr;
@@ -62,11 +65,14 @@ class TrackingTest : public ::testing::Test {
       if (state == TrackingState::kInitializing && initializing == i) {
         ++initializing;
       } else {
-        EXPECT_EQ(state, TrackingState::kTracking) << i << ": " << reason_;
+        EXPECT_EQ(state, TrackingState::kTracking) << i << ": " << reason();
       }
     }
     return initializing;
   }
+
+  // Why the newest frame is not tracked.
+  const std::string& reason() const { return image_.tracked.reason; }
 
   bool HasWarning(const std::string& name) const {
     const std::vector<SessionWarning> warnings = mapper_->Warnings();
@@ -87,6 +93,12 @@ class TrackingTest : public ::testing::Test {
       estimated.push_back(CurrentPose(frame.tracked).translation());
       truth.push_back(frame.truth.translation());
     }
+    return WorstDistance(estimated, truth);
+  }
+
+  // Largest distance between corresponding points after alignment by the best similarity, and its scale.
+  static std::pair<double, double> WorstDistance(const std::vector<Eigen::Vector3d>& estimated,
+                                                 const std::vector<Eigen::Vector3d>& truth) {
     const auto S = AlignPoints<World, World>(estimated, truth, false);
     if (!S) return {1e9, 0};
     double worst = 0;
@@ -159,13 +171,13 @@ class TrackingTest : public ::testing::Test {
     return masks;
   }
 
-  const TexturedWorld world_{480, 360};
+  const TexturedWorld world_;
   std::unique_ptr<LocalMapSlot> slot_;
   std::unique_ptr<SparseMapper> mapper_;
   std::unique_ptr<Tracker> tracker_;
   std::vector<TrackedPose> frames_;
+  TrackedImage image_;  // the newest one, and what became of it
   MappedFrame mapped_;
-  std::string reason_;
 };
 
 }  // namespace romap::slam
