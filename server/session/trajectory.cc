@@ -26,6 +26,8 @@ void Trajectory::Correct(const MapCorrection& correction) {
     ScaledPose& pose = keyframes_[keyframe.id];
     pose.T_world_camera = keyframe.T_world_camera;
     pose.scale *= keyframe.S_new_old.scale();
+    const auto uncertainty = uncertainties_.find(keyframe.id);
+    if (uncertainty != uncertainties_.end()) uncertainty->second.position_sigma_mu *= keyframe.S_new_old.scale();
   }
   for (const auto& [id, uncertainty] : correction.uncertainties) uncertainties_[id] = uncertainty;
 }
@@ -70,10 +72,15 @@ Trajectory::RelativeCorrections Trajectory::CorrectionsOfKeyframes() const {
 FrameUncertainty Trajectory::CurrentUncertainty(const TrackedPose& frame) const {
   const auto keyframe = keyframe_of_frame_.find(frame.frame_id);
   const auto reference = uncertainties_.find(keyframe == keyframe_of_frame_.end() ? frame.reference : keyframe->second);
-  if (reference == uncertainties_.end()) return {.reference = *frame.uncertainty, .relative = {}};
+  const double scale = keyframes_.at(frame.reference).scale;
+  if (reference == uncertainties_.end()) {
+    PoseUncertainty tracked = *frame.uncertainty;
+    tracked.position_sigma_mu *= scale;
+    return {.reference = tracked, .relative = {}};
+  }
   // Also for a keyframe: errors of its own features, which the adjustment of the map shares with its neighbors.
   PoseUncertainty relative = frame.reference_uncertainty;
-  relative.position_sigma_mu *= keyframes_.at(frame.reference).scale;
+  relative.position_sigma_mu *= scale;
   return {.reference = reference->second, .relative = relative};
 }
 

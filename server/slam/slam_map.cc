@@ -251,6 +251,7 @@ void SlamMap::Transform(const Sim3<World, World>& S_new_old) {
   for (auto& [id, keyframe] : keyframes_) {
     keyframe.SetPose(S_new_old.Moved(keyframe.T_world_camera()));
     keyframe.scale *= S_new_old.scale();
+    keyframe.uncertainty.position_sigma_mu *= S_new_old.scale();
   }
   for (auto& [id, track] : points_) {
     track.point.position_world = S_new_old * track.point.position_world;

@@ -395,6 +395,7 @@ void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyfr
   if (!S_given_map) return;
   MoveMap(*S_given_map);
   current.world_is_given = true;
+  current.uncertainty.RequestUpdate();
 }
 
 void SparseMapper::MoveMap(const Sim3<World, World>& S_new_old) {

@@ -72,6 +72,20 @@ TEST_F(TrajectoryTest, FramesOfTheNextReferenceAreNotCorrectedByIt) {
   EXPECT_NEAR(Position(3).x(), 4.3, 1e-9);
 }
 
+TEST_F(TrajectoryTest, UncertaintiesHaveTheUnitOfTheCorrectedMap) {
+  trajectory_.Add({5, 40, At(4), kFirst, From0(4), PoseUncertainty{0.5, 0.1}, PoseUncertainty{0, 0.01}});
+  Correct(Moved(kFirst, At(0), 2));
+  EXPECT_NEAR(trajectory_.Uncertainties().at(3)->position_sigma_mu, 1, 1e-9) << "as tracked, in the new unit";
+
+  MapCorrection adjusted;
+  adjusted.uncertainties = {{kFirst, PoseUncertainty{0.3, 0.1}}};
+  trajectory_.Correct(adjusted);
+  EXPECT_NEAR(trajectory_.Uncertainties().at(3)->position_sigma_mu, 0.3, 1e-9);
+  Correct(Moved(kFirst, At(0), 3));
+  EXPECT_NEAR(trajectory_.Uncertainties().at(3)->position_sigma_mu, 0.9, 1e-9);
+  EXPECT_FALSE(trajectory_.Uncertainties().at(0)) << "added without";
+}
+
 TEST_F(TrajectoryTest, GivenPosesStay) {
   trajectory_.Add({5, 40, At(9), {}, {}});
   Correct(Moved(kFirst, At(5)));

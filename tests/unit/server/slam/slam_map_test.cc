@@ -113,8 +113,10 @@ TEST_F(SlamMapTest, RemovedKeyframeMovesWithItsParent) {
   map_.RemoveKeyframe(removed);
   EXPECT_EQ(map_.FindKeyframe(removed), nullptr);
   // Scale the map by two and rotate it by 90 degrees around z.
+  map_.keyframes().begin()->second.uncertainty = {.position_sigma_mu = 0.25, .rotation_sigma_rad = 0.5};
   map_.Transform({2, Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ())),
                   Eigen::Vector3d(0, 0, 1)});
+  EXPECT_EQ(map_.keyframes().begin()->second.uncertainty, (PoseUncertainty{0.5, 0.5}));
   const auto pose = map_.KeyframePose(removed);
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->T_world_camera.translation() - Eigen::Vector3d(0, 2, 1)).norm(), 1e-9);
