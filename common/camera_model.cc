@@ -29,6 +29,9 @@ absl::Status ValidateCameraModel(const CameraModel& camera) {
   if (fisheye && camera.distortion[4] != 0) {
     return InvalidArgument("camera: a fisheye lens must have 4 distortion coefficients ({}), has 5", names);
   }
+  if (!(camera.readout_s >= 0 && camera.readout_s <= 1)) {  // NaN fails the comparisons
+    return InvalidArgument("camera: readout time must be in 0..1 s, is {} s", camera.readout_s);
+  }
   return absl::OkStatus();
 }
 

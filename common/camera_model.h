@@ -23,6 +23,9 @@ struct CameraModel {
   double cy_px = 0;
   std::array<double, 5> distortion{};  // coefficients of `lens`; the fifth of a fisheye is 0
   LensModel lens = LensModel::kRadialTangential;
+  // Rolling shutter: the time from the first to the last row of the image, 0..1 s; 0 for a global shutter. The pose of
+  // a frame is that of its middle row.
+  double readout_s = 0;
 
   // Pinhole projection of a point in the camera frame (z > 0) to pixels, without distortion.
   Eigen::Vector2d Project(const Eigen::Vector3d& p_camera) const {
@@ -40,7 +43,7 @@ struct CameraModel {
     }
     return false;
   }
-  // The same camera without distortion.
+  // The same camera without distortion. The rows of the pinhole image are read at about the same times.
   CameraModel Pinhole() const {
     CameraModel pinhole = *this;
     pinhole.lens = LensModel::kRadialTangential;
@@ -55,7 +58,7 @@ inline int CoefficientCount(LensModel lens) { return lens == LensModel::kFisheye
 
 // INVALID_ARGUMENT, with the first invalid field in the message: size outside 16..8192 px, focal length not positive or
 // not finite, principal point more than one image size outside the image, distortion not finite, or more coefficients
-// than the lens has.
+// than the lens has; readout time outside 0..1 s.
 absl::Status ValidateCameraModel(const CameraModel& camera);
 
 }  // namespace romap

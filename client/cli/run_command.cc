@@ -35,6 +35,7 @@ struct RunOptions {
   ServiceOptions service;
   bool no_pictures = false;
   int64_t permute_labels_seed = -1;
+  double readout_ms = -1;
 };
 
 absl::Status PrepareOutput(const std::string& out) {
@@ -45,6 +46,7 @@ absl::Status PrepareOutput(const std::string& out) {
 files::SequenceOptions ToSequenceOptions(const RunOptions& options) {
   files::SequenceOptions sequence = options.sequence;
   if (options.poses == PoseUse::kIgnore) sequence.poses.clear();
+  if (options.readout_ms >= 0) sequence.readout_s = 1e-3 * options.readout_ms;
   if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
   return sequence;
 }
@@ -131,6 +133,11 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
       ->add_option("--pose-file", options->sequence.poses,
                    "File with the camera poses in the sequence folder (TUM format)")
       ->capture_default_str();
+  command
+      ->add_option("--readout-ms", options->readout_ms,
+                   "Rolling shutter: the time from the first to the last row of an image [ms]; 0 = global shutter")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->option_text("MS [readout_s of camera.yaml]");
   command->add_option("--masks", options->sequence.masks, "File with the list of mask images in the sequence folder")
       ->capture_default_str();
   command

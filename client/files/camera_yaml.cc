@@ -67,6 +67,9 @@ absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(camera.cx_px, YamlNumber(root, "cx", path));
   ROMAP_ASSIGN_OR_RETURN(camera.cy_px, YamlNumber(root, "cy", path));
   ROMAP_RETURN_IF_ERROR(ReadLens(root, path, &camera));
+  if (root["readout_s"]) {
+    ROMAP_ASSIGN_OR_RETURN(camera.readout_s, YamlNumber(root, "readout_s", path));
+  }
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "fps", path, &result.fps));
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "depth_scale", path, &result.depth_scale));
   if (absl::Status status = ValidateCameraModel(camera); !status.ok()) {
@@ -84,6 +87,9 @@ absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& value) {
       camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, lens.name,
       fmt::join(camera.distortion.begin(), camera.distortion.begin() + CoefficientCount(camera.lens), ", "),
       lens.coefficients, value.fps);
+  if (camera.readout_s > 0) {
+    text += fmt::format("readout_s: {}  # rolling shutter: from the first to the last row\n", camera.readout_s);
+  }
   if (value.depth_scale > 0) {
     text += fmt::format("depth_scale: {}  # z = value * depth_scale; z depth, not ray length\n", value.depth_scale);
   }

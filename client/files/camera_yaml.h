@@ -15,8 +15,9 @@ struct CameraYaml {
 };
 
 // Reads camera.yaml: width, height, fx, fy, cx, cy [px; pixel centers are at integer coordinates]; optional lens
-// (radial-tangential or fisheye), distortion (k1 k2 p1 p2 k3, or k1 k2 k3 k4 for a fisheye), fps and depth_scale.
-// INVALID_ARGUMENT names the file, the line and the missing or invalid value. Otherwise as ReadFile.
+// (radial-tangential or fisheye), distortion (k1 k2 p1 p2 k3, or k1 k2 k3 k4 for a fisheye), readout_s (see
+// CameraModel), fps and depth_scale. INVALID_ARGUMENT names the file, the line and the missing or invalid value.
+// Otherwise as ReadFile.
 absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path);
 
 // Writes the format of ReadCameraYaml. Errors as WriteFile.

@@ -124,6 +124,7 @@ absl::StatusOr<Sequence> Sequence::Open(const std::string& dir, const SequenceOp
   sequence.dir_ = dir;
   sequence.permute_labels_seed_ = options.permute_labels_seed;
   ROMAP_ASSIGN_OR_RETURN(sequence.camera_, ReadCameraYaml(sequence.Path("camera.yaml")));
+  if (options.readout_s) sequence.camera_.camera.readout_s = *options.readout_s;
   ROMAP_ASSIGN_OR_RETURN(const std::vector<ListedFile> images, ReadFileList(dir, "rgb.txt"));
   if (images.empty()) return InvalidArgument("{}/rgb.txt: no frames listed", dir);
   for (const ListedFile& image : images) sequence.frames_.push_back({image.timestamp_ns, image.path, {}, {}, {}});

@@ -22,6 +22,7 @@ struct SequenceOptions {
   std::string detections = "detections.csv";  // class and score per label; empty = labels are the ids of objects.yaml
   std::string poses = "groundtruth.txt";      // camera poses to send with the frames; empty = none
   bool use_depth = false;                     // load the depth images of depth.txt
+  std::optional<double> readout_s = std::nullopt;  // replaces CameraModel::readout_s of camera.yaml
   // Permutes the labels at random in each frame, like the output of a detector without a tracker.
   std::optional<uint64_t> permute_labels_seed = std::nullopt;
 };

@@ -24,6 +24,7 @@ CameraModel UncroppedCamera(const SynthOptions& options) {
   camera.fy_px = options.fy_px > 0 ? options.fy_px : camera.fx_px;
   camera.cx_px = 0.5 * (options.width_px - 1);
   camera.cy_px = 0.5 * (options.height_px - 1);
+  camera.readout_s = options.readout / options.fps;
   return camera;
 }
 

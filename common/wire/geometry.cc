@@ -40,6 +40,7 @@ v1::Camera ToProto(const CameraModel& camera) {
   proto.set_cx_px(camera.cx_px);
   proto.set_cy_px(camera.cy_px);
   proto.set_lens(EnumToProto(kLensModels, camera.lens));
+  proto.set_readout_s(camera.readout_s);
   if (camera.HasDistortion()) {
     proto.mutable_distortion()->Add(camera.distortion.begin(),
                                     camera.distortion.begin() + CoefficientCount(camera.lens));
@@ -77,6 +78,7 @@ absl::StatusOr<CameraModel> CameraFromProto(const v1::Camera& proto, const std::
   camera.fy_px = proto.fy_px();
   camera.cx_px = proto.cx_px();
   camera.cy_px = proto.cy_px();
+  camera.readout_s = proto.readout_s();
   ROMAP_ASSIGN_OR_RETURN(camera.lens, EnumFromProto(kLensModels, proto.lens(), where + ".lens"));
   if (proto.distortion_size() != 0 && proto.distortion_size() != CoefficientCount(camera.lens)) {
     return InvalidArgument("{}.distortion: must have no coefficients or {}, has {}", where,

@@ -83,9 +83,9 @@ void Pipeline::ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& 
   ledger_->AcknowledgeMasks(masks);
 
   MappingStep step;
-  step.run = [this, masks] {
-    sparse_mapper_.ObserveMasks(masks);
-    Publish(object_mapper_.ObserveLateMasks(masks));
+  step.run = [this, converted = tracker_.ConvertMasks(masks)] {
+    sparse_mapper_.ObserveMasks(converted);
+    Publish(object_mapper_.ObserveLateMasks(converted));
     ledger_->CountMappedMasks();
   };
   execute(std::move(step));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/label_image.h"
+#include "server/slam/rolling_shutter.h"
 
 namespace romap::slam {
 namespace {
@@ -27,13 +28,17 @@ double DepthAt(const cv::Mat& depth_mu, const Feature& feature) {
   return center_mu;
 }
 
-// Computes everything that depends on `image_px` and `lens`.
+// Computes everything that depends on `image_px`, `lens` and `shutter_depths_mu`.
 void UpdatePositions(FrameFeatures& frame) {
   const CameraModel& camera = frame.camera;
   for (size_t i = 0; i < frame.size(); ++i) {
-    const Eigen::Vector2d pixel_px = frame.lens.Undistort(camera, frame.image_px[i].cast<double>());
-    const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
     const double depth_mu = frame.ranges_mu[i] * frame.bearings_camera[i].z();
+    Eigen::Vector2d pixel_px = frame.lens.Undistort(camera, frame.image_px[i].cast<double>());
+    if (frame.shutter) {
+      const double shutter_depth_mu = frame.shutter_depths_mu[i] > 0 ? frame.shutter_depths_mu[i] : depth_mu;
+      if (shutter_depth_mu > 0) pixel_px = frame.shutter->FromConverted(pixel_px, shutter_depth_mu);
+    }
+    const Eigen::Vector3d ray = camera.Unproject(pixel_px.x(), pixel_px.y());
     frame.features[i].pixel_px = pixel_px.cast<float>();
     frame.bearings_camera[i] = ray.normalized();
     frame.ranges_mu[i] = depth_mu * ray.norm();
@@ -80,7 +85,8 @@ bool FrameFeatures::HasDepth() const {
 }
 
 std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::vector<Feature> features,
-                                                       const RadialCorrection& lens) {
+                                                       const RadialCorrection& lens,
+                                                       std::shared_ptr<const RollingShutter> shutter) {
   auto result = std::make_shared<FrameFeatures>();
   result->frame_id = frame.frame_id;
   result->timestamp_ns = frame.timestamp_ns;
@@ -99,7 +105,12 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
     result->mask_zones.push_back(zones.At(feature.pixel_px, feature.octave_scale, feature.label));
   }
   result->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, result->features);
-  return WithLens(std::move(result), lens);
+  result->shutter = std::move(shutter);
+  if (!result->shutter) return WithLens(std::move(result), lens);
+  result->shutter_depths_mu.assign(count, 0);
+  result->lens = lens;
+  UpdatePositions(*result);
+  return result;
 }
 
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame,
@@ -115,6 +126,23 @@ std::shared_ptr<const FrameFeatures> WithImagePixels(const FrameFeatures& frame,
                                                      std::vector<Eigen::Vector2f> image_px) {
   auto moved = std::make_shared<FrameFeatures>(frame);
   moved->image_px = std::move(image_px);
+  UpdatePositions(*moved);
+  return moved;
+}
+
+std::shared_ptr<const FrameFeatures> WithShutter(const FrameFeatures& rolling,
+                                                 std::shared_ptr<const RollingShutter> shutter) {
+  auto converted = std::make_shared<FrameFeatures>(rolling);
+  for (Eigen::Vector2f& px : converted->image_px) px = shutter->ToGlobal(px.cast<double>(), 0).cast<float>();
+  converted->shutter = std::move(shutter);
+  converted->shutter_depths_mu.assign(rolling.size(), 0);
+  UpdatePositions(*converted);
+  return converted;
+}
+
+std::shared_ptr<const FrameFeatures> WithShutterDepths(const FrameFeatures& frame, std::vector<double> depths_mu) {
+  auto moved = std::make_shared<FrameFeatures>(frame);
+  moved->shutter_depths_mu = std::move(depths_mu);
   UpdatePositions(*moved);
   return moved;
 }

@@ -75,7 +75,7 @@ void KeyframeBuilder::AddObjectFeatures(const TrackedImage& image, MapKeyframe& 
   });
   if (object_features.empty()) return;
   features.insert(features.end(), object_features.begin(), object_features.end());
-  keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens);
+  keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens, keyframe.frame->shutter);
   keyframe.points.resize(keyframe.frame->size());
 }
 

@@ -116,6 +116,13 @@ std::optional<PoseFromPoints> LocalMapTracking::TrackAllPoints(const PoseFromPoi
   return pose;
 }
 
+std::optional<PoseFromPoints> LocalMapTracking::RefineMatches(const PoseFromPoints& pose,
+                                                              const cv::Mat& image_bgr) const {
+  auto refined = Refine(pose.T_world_camera, pose.point_of_feature, kMinLooseInliers);
+  if (refined && !pose.points_by_patch.empty()) refined = AddPatches(*refined, HalvedImages(image_bgr));
+  return refined;
+}
+
 double LocalMapTracking::MedianDepth_mu(const PoseFromPoints& pose) const {
   const SE3<Camera, World> T_camera_world = pose.T_world_camera.Inverse();
   std::vector<double> depths_mu;
@@ -125,6 +132,16 @@ double LocalMapTracking::MedianDepth_mu(const PoseFromPoints& pose) const {
   for (const int point : pose.point_of_feature) add(point);
   for (const int point : pose.points_by_patch) add(point);
   return depths_mu.empty() ? 0 : Median(std::move(depths_mu));
+}
+
+std::vector<double> LocalMapTracking::DepthsOfFeatures(const PoseFromPoints& pose) const {
+  const SE3<Camera, World> T_camera_world = pose.T_world_camera.Inverse();
+  std::vector<double> depths_mu(frame_.size(), 0);
+  for (size_t i = 0; i < depths_mu.size(); ++i) {
+    const int point = pose.point_of_feature[i];
+    if (point >= 0) depths_mu[i] = (T_camera_world * map_.points[static_cast<size_t>(point)].position_world).z();
+  }
+  return depths_mu;
 }
 
 std::vector<int> LocalMapTracking::IndicesOrAll(const std::vector<MapPointId>& ids) const {
@@ -150,7 +167,8 @@ std::optional<PoseFromPoints> LocalMapTracking::AddPatches(const PoseFromPoints&
                            .lens = frame_.lens,
                            .image = image,
                            .T_camera_world = pose.T_world_camera.Inverse(),
-                           .center_world = pose.T_world_camera.translation()};
+                           .center_world = pose.T_world_camera.translation(),
+                           .shutter = frame_.shutter.get()};
   std::vector<PatchMatch> patches;
   // The points are in the order of their keyframes' features, so neighbors in it are neighbors in the image: a large
   // stride spreads the patches.
@@ -181,8 +199,10 @@ PoseObservation LocalMapTracking::Observe(int feature, int point) const {
 }
 
 PoseObservation LocalMapTracking::Observe(const PatchMatch& match) const {
+  Eigen::Vector2d pixel_px = frame_.lens.Undistort(frame_.camera, match.found.image_px);
+  if (frame_.shutter) pixel_px = frame_.shutter->FromConverted(pixel_px, match.found.depth_mu);
   return {.p_world = map_.points[static_cast<size_t>(match.point)].position_world,
-          .pixel_px = frame_.lens.Undistort(frame_.camera, match.found.image_px),
+          .pixel_px = pixel_px,
           .sigma_px = config_.pixel_sigma_px * std::max(1.0, match.found.octave_scale)};
 }
 

@@ -46,11 +46,19 @@ class LocalMapTracking {
   std::optional<PoseFromPoints> TrackAllPoints(const PoseFromPoints& first, int min_inliers) const;
 
   // Adds points that no feature matches, found by their patches close to their projections, and refines the pose.
-  // `image`: of the frame.
+  // `image`: of the frame, as recorded.
   std::optional<PoseFromPoints> AddPatches(const PoseFromPoints& pose, const HalvedImages& image) const;
+
+  // Refines the pose of a frame whose features have moved since, by the same matches. `image_bgr`: as for AddPatches().
+  std::optional<PoseFromPoints> RefineMatches(const PoseFromPoints& pose, const cv::Mat& image_bgr) const;
 
   // Median depth of the matched points [mu]; 0 if there are none.
   double MedianDepth_mu(const PoseFromPoints& pose) const;
+  // z depth per feature [mu]; 0 if it has no point.
+  std::vector<double> DepthsOfFeatures(const PoseFromPoints& pose) const;
+
+  // The observation of map_.points[point] by a feature of the frame.
+  PoseObservation Observe(int feature, int point) const;
 
  private:
   // Indices into map_.points: of the points `ids`, or of all points if too few of those are in the map.
@@ -60,7 +68,6 @@ class LocalMapTracking {
     int point = 0;
     FoundPatch found;
   };
-  PoseObservation Observe(int feature, int point) const;
   PoseObservation Observe(const PatchMatch& match) const;
   std::optional<PoseFromPoints> TrackAround(const std::vector<int>& indices, const SE3<World, Camera>& start,
                                             double radius_px, int min_inliers) const;

@@ -51,10 +51,13 @@ class ProblemBuilder {
   BundleObservation MakeObservation(int camera, int point, const FeatureRef& ref) const {
     const FrameFeatures& frame = *map_.FindKeyframe(ref.keyframe)->frame;
     const auto i = static_cast<size_t>(ref.feature);
-    const Eigen::Vector2f& pixel_px = problem_.bundle.lens ? frame.image_px[i] : frame.features[i].pixel_px;
+    Eigen::Vector2d pixel_px = frame.features[i].pixel_px.cast<double>();
+    if (problem_.bundle.lens) {
+      pixel_px = frame.shutter ? frame.lens.Distort(frame.camera, pixel_px) : frame.image_px[i].cast<double>();
+    }
     BundleObservation observation{.camera = camera,
                                   .point = point,
-                                  .pixel_px = pixel_px.cast<double>(),
+                                  .pixel_px = pixel_px,
                                   .sigma_px = config_.pixel_sigma_px * frame.features[i].octave_scale};
     if (frame.ranges_mu[i] > 0) {
       observation.depth_mu = frame.ranges_mu[i] * frame.bearings_camera[i].z();

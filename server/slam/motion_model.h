@@ -5,6 +5,7 @@
 
 #include "common/scaled_pose.h"
 #include "common/stage_messages.h"
+#include "server/slam/rolling_shutter.h"
 
 namespace romap::slam {
 
@@ -27,6 +28,12 @@ class MotionModel {
   // The pose of `frame`, assuming constant velocity; the last pose if the motion is unknown. `use_prior`: the motion
   // between the client's poses takes precedence. Requires a last pose.
   SE3<World, Camera> Predict(const Frame& frame, bool use_prior) const;
+
+  // The motion while a frame is read, for a rolling shutter: predicted from the last motion, or from the last pose and
+  // that of the frame. It has no `depth_mu`. nullopt if the motion is unknown or the last frame is too old.
+  std::optional<ReadoutMotion> PredictReadout(double readout_s, int64_t timestamp_ns) const;
+  std::optional<ReadoutMotion> ReadoutTo(const SE3<World, Camera>& T_world_camera, double readout_s,
+                                         int64_t timestamp_ns) const;
 
  private:
   std::optional<SE3<World, Camera>> last_pose_;

@@ -66,7 +66,9 @@ void ObservationRefiner::Search(const Frame& frame, MapKeyframe& keyframe, SlamM
                            .lens = keyframe.frame->lens,
                            .image = image,
                            .T_camera_world = keyframe.T_camera_world(),
-                           .center_world = keyframe.center_world()};
+                           .center_world = keyframe.center_world(),
+                           .shutter = keyframe.frame->shutter.get(),
+                           .is_converted = true};
   std::vector<Feature> features = UncorrectedFeatures(*keyframe.frame);
   std::vector<MapPointId> found;
   for (const MapPointId id : PointsOf(map, Neighborhood(map, keyframe, kRefinedNeighbors, 0))) {
@@ -92,7 +94,7 @@ void ObservationRefiner::Search(const Frame& frame, MapKeyframe& keyframe, SlamM
                 counts_.not_aligned, counts_.removed, counts_.added);
   if (found.empty()) return;
   const auto first = static_cast<int>(keyframe.points.size());
-  keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens);
+  keyframe.frame = MakeFrameFeatures(frame, std::move(features), keyframe.frame->lens, keyframe.frame->shutter);
   keyframe.points.resize(keyframe.frame->size());
   for (size_t i = 0; i < found.size(); ++i) {
     map.AddObservation(*map.FindPoint(found[i]), keyframe, first + static_cast<int>(i));

@@ -47,7 +47,11 @@ std::optional<FoundPatch> FindPatch(const ReferencePatch& patch, const SE3<World
   if (ray.dot(reference_ray) < kMinPatchCosine * ray.norm() * reference_ray.norm()) return std::nullopt;
   const Eigen::Vector3d p_camera = target.T_camera_world * p_world;
   if (!(p_camera.z() > 0)) return std::nullopt;
-  const Eigen::Vector2d image_px = target.lens.Distort(target.camera, target.camera.Project(p_camera));
+  Eigen::Vector2d image_px = target.lens.Distort(target.camera, target.camera.Project(p_camera));
+  if (target.shutter != nullptr) {
+    image_px = target.is_converted ? target.shutter->ToConverted(image_px, p_camera.z())
+                                   : target.shutter->ToRolling(image_px, p_camera.z());
+  }
   const auto by_reference_pixels =
       PixelsByReferencePixels(target.camera, target.T_camera_world, T_world_reference, p_world);
   if (!by_reference_pixels) return std::nullopt;
@@ -55,7 +59,10 @@ std::optional<FoundPatch> FindPatch(const ReferencePatch& patch, const SE3<World
   if (octave_scale < kMinOctaveScale || octave_scale > 1.2 * kMaxOctaveScale) return std::nullopt;
   const auto aligned = AlignPatch(patch.patch, target.image, patch.octave_scale * *by_reference_pixels, image_px);
   if (!aligned || aligned->correlation < kMinFoundCorrelation) return std::nullopt;
-  return FoundPatch{aligned->pixel_px, octave_scale};
+  const bool is_recorded = target.shutter != nullptr && !target.is_converted;
+  return FoundPatch{.image_px = is_recorded ? target.shutter->ToGlobal(aligned->pixel_px, 0) : aligned->pixel_px,
+                    .depth_mu = p_camera.z(),
+                    .octave_scale = octave_scale};
 }
 
 }  // namespace romap::slam

@@ -8,6 +8,7 @@
 #include "common/ids.h"
 #include "server/slam/features/patch.h"
 #include "server/slam/optimize/radial_correction.h"
+#include "server/slam/rolling_shutter.h"
 
 namespace romap::slam {
 
@@ -32,11 +33,14 @@ struct PatchTarget {
   const HalvedImages& image;
   SE3<Camera, World> T_camera_world;
   Eigen::Vector3d center_world;
+  const RollingShutter* shutter = nullptr;  // null: a global shutter
+  bool is_converted = false;                // `image` was converted by `shutter`
 };
 
 // A point that was found by its patch.
 struct FoundPatch {
-  Eigen::Vector2d image_px = Eigen::Vector2d::Zero();  // before the lens correction
+  Eigen::Vector2d image_px = Eigen::Vector2d::Zero();  // see FrameFeatures
+  double depth_mu = 0;                                 // z depth of the point
   double octave_scale = 1;
 };
 

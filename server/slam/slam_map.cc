@@ -227,6 +227,17 @@ void SlamMap::Refresh(PointTrack& track) const {
   }
 }
 
+void SlamMap::ConvertByDepth(MapKeyframe& keyframe) const {
+  if (!keyframe.frame->shutter) return;
+  std::vector<double> depths_mu(keyframe.points.size(), 0);
+  for (size_t i = 0; i < depths_mu.size(); ++i) {
+    if (!keyframe.points[i]) continue;
+    const double depth_mu = (keyframe.T_camera_world() * FindPoint(keyframe.points[i])->point.position_world).z();
+    depths_mu[i] = std::max(0.0, depth_mu / keyframe.scale);
+  }
+  keyframe.frame = WithShutterDepths(*keyframe.frame, std::move(depths_mu));
+}
+
 void SlamMap::CorrectLens(const RadialCorrection& lens) {
   lens_ = lens;
   for (auto& [id, keyframe] : keyframes_) keyframe.frame = WithLens(keyframe.frame, lens);

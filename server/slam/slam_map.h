@@ -120,6 +120,8 @@ class SlamMap {
   ObservedRay RayOf(const MapKeyframe& keyframe, int feature) const;
   // At most `max_rays` of the rays to the point, evenly spread over its observations.
   std::vector<ObservedRay> RaysOf(const PointTrack& track, size_t max_rays = 16) const;
+  // Moves the features of a keyframe that has a rolling shutter to where a global shutter would show their points.
+  void ConvertByDepth(MapKeyframe& keyframe) const;
   // Recomputes descriptor, direction, size and parallax, after observations or poses changed.
   void Refresh(PointTrack& track) const;
 

@@ -41,6 +41,7 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Ba
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
+  tracking_warning_ = image.warning;
   const int generation_before = generation_;
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
   const bool was_merged = ConcludeMerge(/*wait=*/false);
@@ -69,6 +70,12 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
     current().corrections.Record(*mapped.view, current().map.FindKeyframe(mapped.view->id)->scale);
   }
   return mapped;
+}
+
+std::vector<SessionWarning> SparseMapper::Warnings() const {
+  std::vector<SessionWarning> warnings = atlas_.Warnings();
+  if (tracking_warning_) warnings.push_back(*tracking_warning_);
+  return warnings;
 }
 
 void SparseMapper::ObserveMasks(const FrameMasks& masks) {
@@ -259,6 +266,11 @@ void SparseMapper::CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyf
     SearchPoints(keyframes_wait_ ? kMaxPostponed : 0);
   }
   CullPoints(config_, map);
+  map.ConvertByDepth(keyframe);
+  if (keyframe.frame->shutter) {
+    for (const auto& [id, shared] : map.Covisible(keyframe, kMinSharedPoints))
+      map.ConvertByDepth(*map.FindKeyframe(id));
+  }
   if (!keyframe.pose_given) {
     local_adjuster_.Adjust(keyframe, map);
     for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current().places.Remove(removed);
@@ -327,7 +339,11 @@ void SparseMapper::CloseLoopOrAdjust(const MapKeyframe& keyframe) {
 
 // ------------------------------------------------------------------------------------------------ the whole map
 
-void SparseMapper::StartGlobalAdjustment() { global_adjuster_.Start(current().map, CanEstimateLens()); }
+void SparseMapper::StartGlobalAdjustment() {
+  SlamMap& map = current().map;
+  for (auto& [id, keyframe] : map.keyframes()) map.ConvertByDepth(keyframe);
+  global_adjuster_.Start(map, CanEstimateLens());
+}
 
 // From few views, lens distortion cannot be separated from the shape of the scene. The client computed its poses with
 // its own calibration.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,8 @@
 #include "server/slam/local_map_tracking.h"
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
+#include "server/slam/readout_estimator.h"
+#include "server/slam/rolling_shutter.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/tentative_points.h"
 #include "server/slam/tracking_status.h"
@@ -24,7 +27,7 @@ namespace romap::slam {
 
 // The result of tracking one frame, for the mapping thread.
 struct TrackedImage {
-  TrackedFrame tracked;
+  TrackedFrame tracked;  // its frame is as if a global shutter had taken it, if its motion is known
   std::shared_ptr<const FrameFeatures> features = {};  // null: the pose was given and the frame is not a keyframe
   std::vector<Eigen::Vector2f> fixed_px = {};          // features that are fixed to the camera, not in `features`
   std::vector<MapPointId> points = {};                 // tracked: per feature of `features`, 0 = none
@@ -32,6 +35,7 @@ struct TrackedImage {
   bool pose_given = false;                             // by the client; must not be corrected
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
+  std::optional<SessionWarning> warning = {};          // about the camera, while it lasts
 };
 
 // Finds the camera pose of each frame: uses the given pose, or tracks the camera from the image against the local map.
@@ -43,6 +47,9 @@ struct TrackedImage {
 // local map are searched around the refined pose, and the pose is refined by all of them (Mur-Artal et al. 2015,
 // section V). While the camera is lost for longer, it is still searched in the known maps, and at the same time its
 // frames are used to find initial views for a new map.
+//
+// A frame of a rolling shutter is converted by the motion of the camera during its readout: its features before they
+// are matched, again when its pose is known, and then the frame itself, for all later stages.
 class Tracker {
  public:
   // `local_map` outlives the tracker.
@@ -50,6 +57,8 @@ class Tracker {
 
   // If no pose is found, `tracked.reason` is a text for users that explains why.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
+  // The masks of a frame that was tracked without masks, as they belong to the frame in its TrackedImage.
+  FrameMasks ConvertMasks(const FrameMasks& masks) const;
 
  private:
   // Initial views that were sent to mapping, while the initialized map is pending.
@@ -83,6 +92,12 @@ class Tracker {
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
+  std::shared_ptr<const RollingShutter> ShutterOf(const Frame& frame, std::optional<ReadoutMotion> motion,
+                                                  double depth_mu) const;
+  void ConvertFrame(const RollingShutter& shutter, TrackedFrame& tracked);
+  void EstimateReadout(const Frame& frame, const FrameFeatures& rolling, const PoseFromPoints& pose,
+                       const LocalMapTracking& tracking);
+  std::optional<SessionWarning> ReadoutWarning(double readout_s) const;
   void StateUncertainty(const PoseFromPoints& pose, double depth_mu, TrackedFrame& tracked) const;
 
   const SlamConfig config_;
@@ -106,6 +121,13 @@ class Tracker {
   uint64_t keyframes_sent_ = 0;
   SparseMapId newest_map_;  // of those that the camera was in
   std::optional<PendingMap> pending_map_;
+  ReadoutEstimator readout_estimator_;
+  double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
+  struct FrameShutter {
+    uint64_t frame_id = 0;
+    RollingShutter shutter;
+  };
+  std::deque<FrameShutter> shutters_;  // of the last frames without masks
 };
 
 }  // namespace romap::slam

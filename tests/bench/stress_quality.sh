@@ -2,17 +2,19 @@
 # Renders scenes that mislead camera tracking, maps them from images alone, and prints Markdown tables against ground
 # truth. Rendered scenes in OUT_DIR are used again.
 #
-#   tests/bench/stress_quality.sh BUILD_DIR OUT_DIR [repeated|rounds|plain|black]...
+#   tests/bench/stress_quality.sh BUILD_DIR OUT_DIR [repeated|rounds|plain|black|rolling]...
 #
 #   repeated  ten scenes without a place seen twice, with repeated texture and four equal walls: no loop may be closed
 #   rounds    five scenes with two rounds: the drift that true loops remove
 #   plain     five scenes on a plain light table: up and cuboids
+#   rolling   five scenes with fast hand motion and a rolling shutter (72 % of the frame interval): its readout time
+#             ignored, known, and the same scenes with a global shutter
 #   black     eight single objects on a black background with given poses: cuboids
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,10s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '2,12s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
 shift 2
-[ $# -gt 0 ] || set -- repeated rounds plain black
+[ $# -gt 0 ] || set -- repeated rounds plain black rolling
 mkdir -p "$out"
 # Messages of the programs, for errors.
 log=$out/log.txt
@@ -48,6 +50,21 @@ for kind in "$@"; do
         with=$(track "$scene")
         echo "| $scene | $(track "$scene" --set slam.close_loops=false | centimeters) | $(echo "$with" | centimeters)" \
              "| $(echo "$with" | sed -n 's/.*loops \([0-9]*\) corrected.*/\1/p') |"
+      done ;;
+    rolling)
+      echo '| scene | ATE rmse, readout time ignored [cm] | known [cm] | global shutter [cm] | time per frame, known and global: median [ms] |'
+      echo '| --- | --- | --- | --- | --- |'
+      for seed in 1 2 3 4 5; do
+        scene=rolling.$seed
+        options=(--path handheld --hand-motion 4 --frames 200 --objects 4 --seed "$seed")
+        render "$scene" "${options[@]}" --rolling-shutter 0.72
+        render "global.$seed" "${options[@]}"
+        known=$(track "$scene")
+        ignored=$(track "$scene" --readout-ms 0)
+        global=$(track "global.$seed")
+        milliseconds() { sed -n 's/^tracking: median \([0-9.]*\) ms.*/\1/p'; }
+        echo "| $scene | $(echo "$ignored" | centimeters) | $(echo "$known" | centimeters)" \
+             "| $(echo "$global" | centimeters) | $(echo "$known" | milliseconds), $(echo "$global" | milliseconds) |"
       done ;;
     plain)
       echo '| scene | ATE rmse [cm] | up direction error | confidence | objects found | extra | mean IoU |'

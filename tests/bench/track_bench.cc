@@ -2,7 +2,7 @@
 // objects, and writes the trajectories.
 //
 //   track_bench DIR --out FOLDER [--set slam.FIELD=VALUE]... [--depth] [--poses given|prior|ignore] [--cut A:B]
-//               [--until N] [--one-thread] [--fps RATE] [--verbose]
+//               [--until N] [--one-thread] [--fps RATE] [--readout-ms MS] [--verbose]
 //
 // Writes FOLDER/trajectory.txt with the final pose of every frame and FOLDER/live.txt with the poses as tracking first
 // estimated them (TUM format), both with their uncertainties (trajectory_uncertainty.txt, live_uncertainty.txt). Prints
@@ -65,6 +65,7 @@ struct Options {
   bool one_thread = false;
   bool verbose = false;
   double fps = 0;
+  std::optional<double> readout_s;
 };
 
 Options Parse(int argc, char** argv) {
@@ -94,6 +95,8 @@ Options Parse(int argc, char** argv) {
     } else if (arg == "--verbose") {
       options.verbose = true;
       spdlog::set_level(spdlog::level::debug);
+    } else if (arg == "--readout-ms") {
+      options.readout_s = 1e-3 * std::stod(value());
     } else if (arg == "--fps") {
       options.fps = std::stod(value());
     } else {
@@ -137,7 +140,8 @@ class Run {
         queue_(8) {}
 
   int operator()() {
-    auto sequence = files::Sequence::Open(options_.sequence, {.use_depth = options_.depth});
+    auto sequence =
+        files::Sequence::Open(options_.sequence, {.use_depth = options_.depth, .readout_s = options_.readout_s});
     if (!sequence.ok()) {
       std::fprintf(stderr, "track_bench: %s\n", Message(sequence.status()).c_str());
       return 2;

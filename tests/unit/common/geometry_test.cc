@@ -68,6 +68,11 @@ TEST(CameraModelTest, ErrorsNameTheField) {
   bad = good;
   bad.distortion[2] = INFINITY;
   EXPECT_NE(Message(ValidateCameraModel(bad)).find("distortion"), std::string::npos);
+  for (const double readout_s : {-0.01, 1.5, std::nan("")}) {
+    bad = good;
+    bad.readout_s = readout_s;
+    EXPECT_NE(Message(ValidateCameraModel(bad)).find("readout time must be in 0..1 s"), std::string::npos);
+  }
 }
 
 }  // namespace romap::geometry_test

@@ -20,6 +20,7 @@ TEST(CameraYamlTest, RoundTrip) {
   const std::string path = TempPath("camera.yaml");
   CameraYaml camera;
   camera.camera = {640, 480, 888.888916015625, 525.7, 319.5, 239.5, {-0.1, 0.02, 1e-4, -2e-4, 3e-3}};
+  camera.camera.readout_s = 0.0237;
   camera.fps = 29.97;
   camera.depth_scale = 4.5777065690089265e-05;
   ASSERT_TRUE(WriteCameraYaml(path, camera).ok());
@@ -55,6 +56,7 @@ TEST(CameraYamlTest, NamesTheError) {
            {good + "lens: fisheye\ndistortion: [0, 0, 0, 0, 0]\n",
             "camera.yaml:8: expected 'distortion' to be a list of 4 numbers"},
            {good + "lens: wide\n", "camera.yaml:7: 'lens' is 'wide'; expected radial-tangential or fisheye"},
+           {good + "readout_s: 23.7\n", "readout time must be in 0..1 s, is 23.7 s"},
            {good + "fps: 0\n", "'fps' is 0; expected a positive number"}}) {
     std::ofstream(path) << text;
     EXPECT_THAT(ErrorOf(ReadCameraYaml(path).status()), HasSubstr(message));

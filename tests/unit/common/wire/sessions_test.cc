@@ -20,6 +20,7 @@ CameraModel SomeCamera() {
   camera.cx_px = 320;
   camera.cy_px = 240;
   camera.distortion = {0.1, 0.2, 0.3, 0.4, 0.5};
+  camera.readout_s = 0.02;
   return camera;
 }
 
