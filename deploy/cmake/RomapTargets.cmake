@@ -18,6 +18,8 @@ if(ROMAP_CCACHE)
 endif()
 
 add_compile_options(-Wall -Wextra -pthread)
+# GoogleTest's macros contain __FILE__, which would be different in every clone.
+add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>)
 if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
