@@ -1,8 +1,8 @@
 #include "client/eval/map_alignment.h"
 
-#include <numbers>
 #include <vector>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 
 namespace romap::eval {
@@ -10,7 +10,7 @@ namespace {
 
 // The world of an estimated trajectory has an arbitrary origin, so it agrees to this degree only by chance.
 constexpr double kSameWorldPosition_m = 0.01;
-constexpr double kSameWorldRotation_rad = 1 * std::numbers::pi / 180;
+constexpr double kSameWorldRotation_rad = 1 * kRadPerDeg;
 constexpr double kMaxDt_s = 0.02;
 
 }  // namespace

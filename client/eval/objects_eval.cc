@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <random>
 
@@ -11,6 +10,7 @@
 #include "client/eval/seen_frames.h"
 #include "client/files/mesh_file.h"
 #include "client/files/tum.h"
+#include "common/angles.h"
 #include "common/assignment.h"
 #include "common/statistics.h"
 
@@ -163,7 +163,7 @@ IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, s
   *predicted = Transform(fit->S_target_source, *predicted);
   return {.failed = false,
           .scale = fit->S_target_source.scale(),
-          .rotation_deg = Eigen::AngleAxisd(fit->S_target_source.rotation()).angle() * 180 / std::numbers::pi,
+          .rotation_deg = Eigen::AngleAxisd(fit->S_target_source.rotation()).angle() * kDegPerRad,
           .rms_cm = kCmPerM * fit->rms,
           .iterations = fit->iterations};
 }

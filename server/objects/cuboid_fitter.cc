@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/objects/box_search.h"
 #include "server/objects/footprint.h"
@@ -67,7 +68,7 @@ std::optional<Eigen::Vector3d> UnboundedDirection(const CuboidEvidence& evidence
     gap = azimuths[i] - azimuths[i - 1];
     gap_middle = azimuths[i - 1] + gap / 2;
   }
-  constexpr double kMaxGap_rad = 60 * std::numbers::pi / 180;  // between view directions that bound the hull
+  constexpr double kMaxGap_rad = 60 * kRadPerDeg;  // between view directions that bound the hull
   if (gap < kMaxGap_rad) return std::nullopt;
   const double direction = gap_middle + std::numbers::pi / 2;
   return Eigen::Vector3d(std::cos(direction), std::sin(direction), 0);

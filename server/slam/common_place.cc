@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <set>
 
+#include "common/angles.h"
 #include "server/slam/geometry/similarity.h"
 #include "server/slam/place_recognizer.h"
 #include "server/slam/point_maker.h"
@@ -22,7 +22,7 @@ constexpr int kMinSamePoints = 25;  // that the similarity explains
 // Another place with this share of the points makes the place ambiguous.
 constexpr double kOtherPlaceShare = 0.6;
 // Largest difference between the alignments by two keyframes: at the camera and at the depth of the scene.
-constexpr double kMaxTurn_rad = 4 * std::numbers::pi / 180;
+constexpr double kMaxTurn_rad = 4 * kRadPerDeg;
 constexpr double kMaxShiftShare = 0.1;  // of the depth
 constexpr double kMaxLogScale = 0.1;
 // The image is divided into cells. See MatchedArea().

@@ -3,15 +3,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
+
+#include "common/angles.h"
 
 namespace romap::slam {
 namespace {
 
 constexpr double kDriftSigmas = 3;
 // Standard deviations. The systematic part of the rotation is what a focal length that is wrong by 2 % causes.
-constexpr double kRotationPerKeyframe_rad = 0.1 * std::numbers::pi / 180;
+constexpr double kRotationPerKeyframe_rad = 0.1 * kRadPerDeg;
 constexpr double kRotationPerTurn = 0.02;
 constexpr double kTranslationPerPath = 0.01;
 constexpr double kLogScalePerKeyframe = 0.004;

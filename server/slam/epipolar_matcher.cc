@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "common/angles.h"
+
 namespace romap::slam {
 namespace {
 
@@ -105,7 +107,7 @@ std::vector<FeatureMatch> MatchAlongEpipolarPlanes(const MapKeyframe& first, con
   for (const EpipolarRay& ray : second_rays)
     max_azimuth_sigma_rad = std::max(max_azimuth_sigma_rad, ray.azimuth_sigma_rad);
 
-  const double min_parallax_rad = config.min_parallax_deg * std::numbers::pi / 180;
+  const double min_parallax_rad = config.min_parallax_deg * kRadPerDeg;
   std::vector<BestFeature> best_of_first(first.features().size());
   std::vector<BestFeature> best_of_second(second.features().size());
   for (const EpipolarRay& ray : first_rays) {

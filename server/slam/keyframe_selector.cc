@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 #include <vector>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 
 namespace romap::slam {
@@ -90,7 +90,7 @@ bool KeyframeSelector::IsDue(const DepthView& view) {
 
 double KeyframeSelector::Progress(const SE3<World, Camera>& T_world_camera) const {
   const SE3<World, Camera>& last = last_keyframe_->T_world_camera;
-  const double rotation_deg = last.rotation().angularDistance(T_world_camera.rotation()) * 180 / std::numbers::pi;
+  const double rotation_deg = last.rotation().angularDistance(T_world_camera.rotation()) * kDegPerRad;
   double progress = rotation_deg / config_.keyframe_rotation_deg;
   if (scene_depth_mu_) {
     const double distance_mu = (last.translation() - T_world_camera.translation()).norm();

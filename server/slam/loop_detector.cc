@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/drift_bound.h"
 #include "server/slam/geometry/similarity.h"
@@ -82,13 +82,13 @@ bool LoopDetector::IsVerified(const MapKeyframe& keyframe, const LocatedFrame& l
   }
   const Sim3<World, World> S_new_old = loop.Correction(*map_);
   const DriftBound bound = DriftBetween(*map_, loop.old, keyframe.id, scale_is_known);
-  const double turn_deg = Eigen::AngleAxisd(S_new_old.rotation()).angle() * 180 / std::numbers::pi;
+  const double turn_deg = Eigen::AngleAxisd(S_new_old.rotation()).angle() * kDegPerRad;
   const double distance_mu = (S_new_old * keyframe.center_world() - keyframe.center_world()).norm();
   const std::string drift = fmt::format(
       "correction {:.1f} deg, {:.3f} map units, scale {:.3f}; drift bound {:.1f} deg, {:.3f}, {:.3f} over "
       "{} keyframes, {:.2f} map units and {:.0f} deg",
-      turn_deg, distance_mu, S_new_old.scale(), bound.rotation_rad * 180 / std::numbers::pi, bound.translation_mu,
-      std::exp(bound.log_scale), bound.path_keyframes, bound.path_mu, bound.turn_rad * 180 / std::numbers::pi);
+      turn_deg, distance_mu, S_new_old.scale(), bound.rotation_rad * kDegPerRad, bound.translation_mu,
+      std::exp(bound.log_scale), bound.path_keyframes, bound.path_mu, bound.turn_rad * kDegPerRad);
   if (!IsWithin(bound, S_new_old, keyframe)) {
     spdlog::debug("slam: loop {} rejected: more than the map can have drifted: {}", name, drift);
     return false;

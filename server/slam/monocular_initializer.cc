@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/descriptor_matching.h"
 
@@ -113,7 +113,7 @@ std::optional<InitialViews> MonocularInitializer::TryToInitialize(const Followed
   const TwoViewResult result = SolveTwoView(frame->camera, two_view_matches, options);
   if (result.outcome != TwoViewOutcome::kOk) {
     *reason = fmt::format("{}: {} matches, {} points, parallax {:.2f} deg", Describe(result.outcome),
-                          two_view_matches.size(), result.points, result.parallax_rad * 180 / std::numbers::pi);
+                          two_view_matches.size(), result.points, result.parallax_rad * kDegPerRad);
     return std::nullopt;
   }
   InitialViews initial_views{.first = view.frame, .second = frame, .T_first_second = result.T_first_second};

@@ -3,10 +3,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <numbers>
 #include <set>
 #include <utility>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/point_maker.h"
 #include "server/slam/projection_search.h"
@@ -24,7 +24,7 @@ constexpr double kPlaceRadius_px = 10;
 constexpr double kNarrowRadius_px = 4;
 constexpr size_t kFewNeighbors = 3;
 constexpr size_t kPlaceNeighbors = 8;
-constexpr double kRivalRotation_rad = 10 * std::numbers::pi / 180;
+constexpr double kRivalRotation_rad = 10 * kRadPerDeg;
 constexpr double kRivalDistanceShare = 0.2;  // of the scene depth
 // A second place with this share of the best place's points fits the frame as well: descriptors and visibility
 // alone change the number of points of the true place by a third from one keyframe to the next.

@@ -3,11 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <tuple>
 #include <utility>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/epipolar_matcher.h"
 #include "server/slam/projection_search.h"
@@ -112,7 +112,7 @@ PointTrack* PointMaker::MakePoint(MapKeyframe& keyframe, int feature, MapKeyfram
   if (!start) return nullptr;
   const Eigen::Vector3d p_world = RefinePoint({ray, other_ray}, *start);
   if (!Agrees(ray, p_world) || !Agrees(other_ray, p_world)) return nullptr;
-  if (Parallax_rad(ray, other_ray, p_world) < config_.min_parallax_deg * std::numbers::pi / 180) return nullptr;
+  if (Parallax_rad(ray, other_ray, p_world) < config_.min_parallax_deg * kRadPerDeg) return nullptr;
   const double size_mu = ray.bearing_sigma_rad * (p_world - ray.center_world).norm();
   const double other_size_mu = other_ray.bearing_sigma_rad * (p_world - other_ray.center_world).norm();
   if (std::max(size_mu, other_size_mu) > kMaxPointSizeRatio * std::min(size_mu, other_size_mu)) return nullptr;
@@ -136,7 +136,7 @@ void PointMaker::MakePointsByDepth(MapKeyframe& keyframe) {
 
 std::vector<MapKeyframe*> PointMaker::KeyframesToMatch(const MapKeyframe& keyframe) const {
   const double min_baseline_mu =
-      map_->MedianDepth_mu(keyframe).value_or(0) * std::tan(config_.min_parallax_deg * std::numbers::pi / 180);
+      map_->MedianDepth_mu(keyframe).value_or(0) * std::tan(config_.min_parallax_deg * kRadPerDeg);
   const Eigen::Vector3d axis = keyframe.T_world_camera().rotation() * Eigen::Vector3d::UnitZ();
   // Keyframes that share points, and the newest ones, which may not share any yet.
   std::vector<KeyframeId> candidates;

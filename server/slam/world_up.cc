@@ -19,21 +19,21 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kMinRotation_rad = 0.3 * std::numbers::pi / 180;
-constexpr double kGravitySigma_rad = 0.5 * std::numbers::pi / 180;
+constexpr double kMinRotation_rad = 0.3 * kRadPerDeg;
+constexpr double kGravitySigma_rad = 0.5 * kRadPerDeg;
 // Prior probability that a person holds the camera. A camera on a mount may have any constant roll.
 constexpr double kLevelReliability = 0.8;
 // Prior probabilities that a large plane of a scene is horizontal or vertical.
 constexpr double kHorizontalReliability = 0.4;
 constexpr double kVerticalReliability = 0.4;
-constexpr double kSamePlane_rad = 20 * std::numbers::pi / 180;
+constexpr double kSamePlane_rad = 20 * kRadPerDeg;
 constexpr double kMinConfidence = 0.3;  // to turn the world
 // An estimate may be less confident than the one before by this factor if it is about the same direction.
 constexpr double kMaxLoss = 0.7;
-constexpr double kSmallTurn_rad = 5 * std::numbers::pi / 180;
+constexpr double kSmallTurn_rad = 5 * kRadPerDeg;
 // Up is known if it is right with this probability and within this standard deviation.
 constexpr double kKnownConfidence = 0.7;
-constexpr double kKnownSigma_rad = 0.7 * std::numbers::pi / 180;  // per axis: about 1 degree in total
+constexpr double kKnownSigma_rad = 0.7 * kRadPerDeg;  // per axis: about 1 degree in total
 constexpr uint64_t kPeriod_keyframes = 5;
 constexpr uint64_t kLongPeriod_keyframes = 20;  // once the confidence is high
 constexpr double kHighConfidence = 0.8;
@@ -187,7 +187,7 @@ std::vector<SessionWarning> WorldUp::Warnings() const {
   const std::string guess =
       confidence_ > 0
           ? fmt::format("the best guess is right with a probability of {:.0f} % and a standard deviation of {:.1f} deg",
-                        100 * confidence_, sigma_rad_ * 180 / std::numbers::pi)
+                        100 * confidence_, sigma_rad_ * kDegPerRad)
           : "the first camera is assumed to be level";
   return {{.name = "up_unknown",
            .text = fmt::format("the images do not show clearly where up is, so cuboids may be tilted: {}; send "

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <random>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 
 namespace romap::slam {
@@ -21,11 +21,11 @@ constexpr int kPlaneRefinements = 6;
 // A plane through a cloud of points has as many points beside it as on it.
 constexpr double kBesideWidths = 3;  // of the slab that is compared with the inliers, in terms of their slab
 constexpr double kMinContrast = 2;   // ratio of the densities
-constexpr double kMaxDirectionSigma_rad = 3 * std::numbers::pi / 180;
+constexpr double kMaxDirectionSigma_rad = 3 * kRadPerDeg;
 // Maps from images are bent, most of all far from the cameras.
-constexpr double kPlaneSigmaFloor_rad = 2 * std::numbers::pi / 180;
+constexpr double kPlaneSigmaFloor_rad = 2 * kRadPerDeg;
 // Nearly parallel planes are one surface or opposite walls: the second one adds nothing about the direction of up.
-constexpr double kParallel_rad = 20 * std::numbers::pi / 180;
+constexpr double kParallel_rad = 20 * kRadPerDeg;
 
 struct Cloud {
   std::vector<Eigen::Vector3d> points;

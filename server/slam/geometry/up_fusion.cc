@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
 #include "common/angles.h"
@@ -12,13 +11,13 @@
 namespace romap::slam {
 namespace {
 
-constexpr double kGuessSigma_rad = 45 * std::numbers::pi / 180;
-constexpr double kMaxUpTilt_rad = 75 * std::numbers::pi / 180;
-constexpr double kMaxSigma_rad = 5 * std::numbers::pi / 180;
+constexpr double kGuessSigma_rad = 45 * kRadPerDeg;
+constexpr double kMaxUpTilt_rad = 75 * kRadPerDeg;
+constexpr double kMaxSigma_rad = 5 * kRadPerDeg;
 constexpr size_t kMaxClues = 10;
 constexpr int kIterations = 6;
 constexpr double kSameSigmas = 3;  // directions are about the same within this many standard deviations
-constexpr double kMinSame_rad = 1 * std::numbers::pi / 180;
+constexpr double kMinSame_rad = 1 * kRadPerDeg;
 
 // A set of clues that may be the right ones.
 struct ClueSet {
