@@ -30,6 +30,8 @@ struct FrameAck {
   std::string state_reason = {};  // human-readable: why the state is not kTracking, e.g. "too little parallax"
   // Of T_world_camera, as known when it was computed. nullopt: not tracked, or the pose was given by the client.
   std::optional<PoseUncertainty> uncertainty = {};
+  // The rotation of T_world_camera where only the translation is unknown, see the proto.
+  std::optional<Eigen::Quaterniond> R_world_camera = {};
   // The map that T_world_camera refers to; 0: none. The worlds of two maps are not related to each other.
   SparseMapId map_id = {};
 };

@@ -84,6 +84,9 @@ struct TrackedFrame {
   // Of T_world_camera at the time of tracking. nullopt: the frame is not tracked, or its pose was given.
   std::optional<PoseUncertainty> uncertainty = {};
   PoseUncertainty reference_uncertainty = {};  // of T_reference_camera, in its unit
+  // While the frame is not tracked: its rotation, if the camera rotates in place. In the world of the last map, or in a
+  // provisional one before there is a map.
+  std::optional<Eigen::Quaterniond> R_world_camera = {};
 };
 
 // A keyframe with its part of the sparse map. `points` holds the current position of every point in `observations`;

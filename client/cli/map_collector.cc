@@ -41,6 +41,7 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
   tracking_.lost += ack.state == TrackingState::kLost ? 1 : 0;
   tracking_.relocalized += ack.state == TrackingState::kRelocalized ? 1 : 0;
   tracking_.tracked += ack.T_world_camera ? 1 : 0;
+  tracking_.rotation_only += ack.R_world_camera ? 1 : 0;
   if (!ack.T_world_camera) tracking_.last_reason = ack.state_reason;
   const auto sent = sent_.find(ack.frame_id);
   if (ack.T_world_camera && sent != sent_.end()) {

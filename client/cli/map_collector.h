@@ -41,6 +41,7 @@ class MapCollector {
   // Tracking states of the accepted frames.
   struct Tracking {
     size_t initializing = 0, tracked = 0, lost = 0, relocalized = 0;  // relocalized frames also count as tracked
+    size_t rotation_only = 0;                                         // of those that are not tracked
     std::string last_reason;  // why tracking failed most recently; empty = never
   };
   const Tracking& tracking() const { return tracking_; }

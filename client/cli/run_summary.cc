@@ -109,7 +109,8 @@ nlohmann::json ToJson(const RunSummary& summary) {
            {{"initializing", summary.tracking.initializing},
             {"tracked", summary.tracking.tracked},
             {"lost", summary.tracking.lost},
-            {"relocalized", summary.tracking.relocalized}}},
+            {"relocalized", summary.tracking.relocalized},
+            {"rotation_only", summary.tracking.rotation_only}}},
           {"map_points", summary.map_points},
           {"mapping_s", summary.mapping_s},
           {"training_after_last_frame_s", summary.training_s},
@@ -137,6 +138,7 @@ std::string FormatSummary(const RunSummary& summary) {
   if (tracking.initializing + tracking.lost > 0) {
     text += fmt::format("camera: {} frames to initialize, {} tracked, {} lost, {} relocalizations",
                         tracking.initializing, tracking.tracked, tracking.lost, tracking.relocalized);
+    if (tracking.rotation_only > 0) text += fmt::format("; {} have only a rotation", tracking.rotation_only);
     text += tracking.tracked == 0 ? fmt::format("; never tracked: {}\n", tracking.last_reason) : "\n";
   }
   if (summary.frames_with_masks < summary.frames_sent) {

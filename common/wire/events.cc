@@ -149,6 +149,7 @@ v1::FrameAck ToProto(FrameAck ack) {
     proto.mutable_uncertainty()->set_rotation_sigma_rad(ack.uncertainty->rotation_sigma_rad);
   }
   proto.set_map_id(ack.map_id.value);
+  if (ack.R_world_camera) *proto.mutable_rotation_world_camera() = ToProto(*ack.R_world_camera);
   return proto;
 }
 
@@ -170,6 +171,10 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
     ROMAP_ASSIGN_OR_RETURN(ack.uncertainty, FromProto(proto.uncertainty(), where + ".uncertainty"));
   }
   ack.map_id = SparseMapId{proto.map_id()};
+  if (proto.has_rotation_world_camera()) {
+    ROMAP_ASSIGN_OR_RETURN(ack.R_world_camera,
+                           QuaternionFromProto(proto.rotation_world_camera(), where + ".rotation_world_camera"));
+  }
   return ack;
 }
 

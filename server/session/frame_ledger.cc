@@ -34,6 +34,7 @@ void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& t
     ack.T_world_camera = tracked.T_world_camera;
     ack.map_id = tracked.map;
   }
+  if (!has_pose) ack.R_world_camera = tracked.R_world_camera;
   ack.is_keyframe = tracked.is_keyframe;
   ack.latency_s = SecondsSince(arrival.time);
   ack.state_reason = tracked.reason;

@@ -58,7 +58,8 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       given_(config),
       monocular_initializer_(config),
       selector_(config),
-      tentative_points_(config) {}
+      tentative_points_(config),
+      rotation_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
@@ -118,6 +119,7 @@ void Tracker::AdoptNewMap(const LocalMap& newest) {
   if (is_known) return AdoptKnownMap(newest);
   if (pending && !newest.points.empty()) {
     motion_.Reset();
+    rotation_.Reset();  // its world was provisional
     StartMotion(newest, *pending);
     selector_.ForgetLastKeyframe();
     status_.OnMapInitialized();
@@ -138,6 +140,7 @@ void Tracker::AdoptKnownMap(const LocalMap& newest) {
   keyframes_sent_ = newest.keyframes_done;
   if (newest.map == map_->map) return;
   motion_.Reset();
+  rotation_.Reset();
   last_points_.clear();
   selector_.ForgetLastKeyframe();
 }
@@ -177,6 +180,7 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   image.pose_given = pose_use_ == PoseUse::kGiven;
   image.generation = map_ ? map_->generation : 0;
   world_is_given_ = true;
+  rotation_.Reset();
   status_.OnGivenPose();
   motion_.Update(pose, pose, frame->timestamp_ns, /*is_continuous=*/true);
   last_points_.clear();
@@ -199,6 +203,7 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   image.tracked.frame = frame;
   image.tracked.state = TrackingState::kInitializing;
   image.features = features;
+  TrackRotation(image);
   if (pending_map_) {
     if (status_.IsLost()) image.tracked.state = TrackingState::kLost;
     image.tracked.reason = "map initialization in progress";
@@ -209,6 +214,14 @@ TrackedImage Tracker::Initialize(std::shared_ptr<const Frame> frame, std::shared
   world_is_given_ = false;
   motion_.Reset();
   return image;
+}
+
+void Tracker::TrackRotation(TrackedImage& image) {
+  image.tracked.R_world_camera = rotation_.Track(image.features);
+  if (rotation_.HasStarted() || status_.IsLost()) return;
+  const Eigen::Vector3d down = image.tracked.frame->gravity_camera.value_or(Eigen::Vector3d::UnitY());
+  image.tracked.R_world_camera = RotationFromZTo(-down).conjugate();
+  rotation_.Start(image.features, *image.tracked.R_world_camera);
 }
 
 void Tracker::FindInitialViews(TrackedImage& image, std::string* reason) {
@@ -355,6 +368,7 @@ void Tracker::Accept(const PoseFromPoints& pose, const LocalMap& local_map, cons
   for (const int point : pose.points_by_patch) {
     last_points_.push_back(local_map.points[static_cast<size_t>(point)].id);
   }
+  rotation_.Start(image.features, pose.T_world_camera.rotation());
   const double depth_mu = tracking.MedianDepth_mu(pose);
   scene_depth_mu_ = depth_mu;
   tentative_points_.Record(image.features, pose.T_world_camera, image.points, depth_mu);
@@ -368,6 +382,7 @@ void Tracker::MarkLost(const std::string& why, TrackedImage& image) {
   status_.OnLost(image.tracked.frame->frame_id, timestamp_ns);
   image.tracked.state = TrackingState::kLost;
   image.tracked.reason = why;
+  image.tracked.R_world_camera = rotation_.Track(image.features);
   motion_.ResetMotion();
   tentative_points_.Reset();
   const double lost_s = 1e-9 * static_cast<double>(timestamp_ns - status_.lost_since_ns());

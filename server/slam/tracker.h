@@ -19,6 +19,7 @@
 #include "server/slam/motion_model.h"
 #include "server/slam/readout_estimator.h"
 #include "server/slam/rolling_shutter.h"
+#include "server/slam/rotation_tracker.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/tentative_points.h"
 #include "server/slam/tracking_status.h"
@@ -89,6 +90,7 @@ class Tracker {
   // `local_map`: that `pose` refers to.
   void Accept(const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
               TrackedImage& image);
+  void TrackRotation(TrackedImage& image);
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
@@ -116,6 +118,7 @@ class Tracker {
   MotionModel motion_;
   std::vector<MapPointId> last_points_;  // matched in the last tracked frame
   TentativePoints tentative_points_;
+  RotationTracker rotation_;  // while there is no pose
   bool needs_tentative_points_ = false;
   bool world_is_given_ = false;  // the client's poses define the world
   uint64_t keyframes_sent_ = 0;

@@ -64,6 +64,14 @@ TEST(WireEvents, UncertaintyOfAFrameRoundTrips) {
   EXPECT_EQ(RoundTrip(ack).uncertainty, ack.uncertainty);
 }
 
+TEST(WireEvents, RotationOfAFrameRoundTrips) {
+  FrameAck ack;
+  EXPECT_FALSE(RoundTrip(ack).R_world_camera.has_value());
+  ack.R_world_camera = Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5);
+  ASSERT_TRUE(RoundTrip(ack).R_world_camera.has_value());
+  EXPECT_EQ(RoundTrip(ack).R_world_camera->coeffs(), ack.R_world_camera->coeffs());
+}
+
 TEST(WireEvents, UncertaintyMustBePositive) {
   for (const double sigma : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     FrameAck ack;
