@@ -19,7 +19,9 @@ class PatchSearchTest : public ::testing::Test {
       for (int j = -6; j <= 6; ++j) {
         const Eigen::Vector3d p_world(0.35 + 0.04 * i, 0.05 * j, 0);
         const Eigen::Vector2d pixel_px = world_.camera().Project(T_camera_world * p_world);
-        if (reference_->labels.at<uint16_t>(cv::Point(cvRound(pixel_px.x()), cvRound(pixel_px.y()))) != 0) continue;
+        const cv::Point pixel(cvRound(pixel_px.x()), cvRound(pixel_px.y()));
+        const bool is_inside = cv::Rect({}, reference_->labels.size()).contains(pixel);
+        if (!is_inside || reference_->labels.at<uint16_t>(pixel) != 0) continue;
         const auto patch = Patch::Read(image, pixel_px, 1);
         if (patch) points_.push_back({p_world, {.patch = *patch, .keyframe = KeyframeId{1}}});
       }
