@@ -18,8 +18,6 @@ if(ROMAP_CCACHE)
 endif()
 
 add_compile_options(-Wall -Wextra -pthread)
-# GoogleTest's macros contain __FILE__, which would be different in every clone.
-add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>)
 if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
@@ -137,6 +135,9 @@ function(romap_tests name)
   target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main fmt::fmt)
   set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${ROMAP_UNITY} UNITY_BUILD_BATCH_SIZE ${ROMAP_UNITY_SIZE})
   target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
+  # GoogleTest's macros contain __FILE__, which would be different in every clone. The precompiled header does not get
+  # this option, because it would contain the path itself.
+  target_compile_options(${name}_test PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>)
   target_compile_options(${name}_test PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
   foreach(shard RANGE 1 ${ARG_SHARDS})
     math(EXPR index "${shard} - 1")
