@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/cuboid.h"
+#include "common/diagnostic.h"
 #include "common/geometry.h"
 #include "common/ids.h"
 #include "common/pose_uncertainty.h"
@@ -84,13 +85,7 @@ struct ObjectMerged {
   uint64_t revision = 0;  // new revision of `into`
 };
 
-// A condition that makes the map of a session less accurate while it lasts.
-struct SessionWarning {
-  std::string name;  // stable identifier for programs, e.g. "up_unknown"
-  std::string text;  // human-readable
-};
-
-// Counters of one session since it was created, and its present warnings.
+// Counters of one session since it was created, and what is wrong with its input and map.
 struct Statistics {
   uint64_t frames_received = 0;
   uint64_t frames_processed = 0;
@@ -103,9 +98,10 @@ struct Statistics {
   uint64_t training_steps = 0;
   double training_progress = 0;  // 0..1 over all objects
   uint64_t resident_bytes = 0;   // of the server process
-  std::vector<SessionWarning> warnings = {};
+  std::vector<Diagnostic> diagnostics = {};
 };
 
-using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck>;
+using MapEvent =
+    std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck, Diagnostic>;
 
 }  // namespace romap

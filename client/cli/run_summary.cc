@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/trackable.h"
+#include "client/files/format_diagnostic.h"
 #include "common/statistics.h"
 
 namespace romap::cli {
@@ -46,7 +47,7 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   if (collector.statistics()) {
     summary.frames_dropped = collector.statistics()->frames_dropped;
     summary.map_points = collector.statistics()->map_points;
-    summary.warnings = collector.statistics()->warnings;
+    summary.diagnostics = collector.statistics()->diagnostics;
   }
   summary.faults = collector.faults();
 
@@ -90,9 +91,14 @@ nlohmann::json ToJson(const RunSummary& summary) {
                        {"first_cuboid_s", object.first_cuboid_s},
                        {"first_mesh_s", object.first_mesh_s}});
   }
-  nlohmann::json warnings = nlohmann::json::array();
-  for (const SessionWarning& warning : summary.warnings) {
-    warnings.push_back({{"name", warning.name}, {"text", warning.text}});
+  nlohmann::json diagnostics = nlohmann::json::array();
+  for (const Diagnostic& diagnostic : summary.diagnostics) {
+    diagnostics.push_back({{"code", diagnostic.code},
+                           {"severity", files::SeverityName(diagnostic.severity)},
+                           {"first_frame_id", diagnostic.first_frame_id},
+                           {"count", diagnostic.count},
+                           {"text", diagnostic.text},
+                           {"advice", diagnostic.advice}});
   }
   return {{"sequence", summary.sequence},
           {"frames",
@@ -121,7 +127,7 @@ nlohmann::json ToJson(const RunSummary& summary) {
           {"server_peak_bytes", summary.server_peak_bytes},
           {"client_peak_bytes", summary.client_peak_bytes},
           {"objects", objects},
-          {"warnings", warnings},
+          {"diagnostics", diagnostics},
           {"faults", summary.faults}};
 }
 
@@ -138,7 +144,7 @@ std::string FormatSummary(const RunSummary& summary) {
   if (tracking.initializing + tracking.lost > 0) {
     text += fmt::format("camera: {} frames to initialize, {} tracked, {} lost, {} relocalizations",
                         tracking.initializing, tracking.tracked, tracking.lost, tracking.relocalized);
-    if (tracking.rotation_only > 0) text += fmt::format("; {} have only a rotation", tracking.rotation_only);
+    if (tracking.rotation_only > 0) text += fmt::format(" (rotation alone: {})", tracking.rotation_only);
     text += tracking.tracked == 0 ? fmt::format("; never tracked: {}\n", tracking.last_reason) : "\n";
   }
   if (summary.frames_with_masks < summary.frames_sent) {
@@ -159,9 +165,7 @@ std::string FormatSummary(const RunSummary& summary) {
                         SecondsText(object.first_mesh_s));
   }
   if (summary.objects.empty()) text += "(no objects mapped)\n";
-  for (const SessionWarning& warning : summary.warnings) {
-    text += fmt::format("warning: {}: {}\n", warning.name, warning.text);
-  }
+  for (const Diagnostic& diagnostic : summary.diagnostics) text += files::FormatDiagnostic(diagnostic) + "\n";
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;
 }

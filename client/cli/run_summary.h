@@ -40,7 +40,7 @@ struct RunSummary {
   bool interrupted = false, training_complete = false;
   uint64_t server_peak_bytes = 0, client_peak_bytes = 0;
   std::vector<Object> objects;
-  std::vector<SessionWarning> warnings;  // at the end of the session
+  std::vector<Diagnostic> diagnostics;  // at the end of the session
   std::vector<std::string> faults;
 };
 

@@ -76,6 +76,14 @@ inline constexpr std::array<EnumPair<ObjectState, v1::ObjectState>, 3> kObjectSt
     {ObjectState::kLost, v1::OBJECT_STATE_LOST},
 }};
 
+// SEVERITY_UNSPECIFIED is accepted as a warning, the only one of older servers.
+inline constexpr std::array<EnumPair<Severity, v1::Severity>, 4> kSeverities{{
+    {Severity::kInfo, v1::SEVERITY_INFO},
+    {Severity::kWarning, v1::SEVERITY_WARNING},
+    {Severity::kWarning, v1::SEVERITY_UNSPECIFIED},
+    {Severity::kError, v1::SEVERITY_ERROR},
+}};
+
 // The wire value; 0 (unspecified) for a value that is not in the table.
 template <class Plain, class Wire, size_t N>
 Wire EnumToProto(const std::array<EnumPair<Plain, Wire>, N>& table, Plain plain) {

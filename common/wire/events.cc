@@ -93,6 +93,28 @@ MasksAck FromProto(v1::MasksAck proto) {
   return {.frame_id = proto.frame_id(), .accepted = proto.accepted(), .error = std::move(*proto.mutable_error())};
 }
 
+v1::Diagnostic ToProto(const Diagnostic& diagnostic) {
+  v1::Diagnostic proto;
+  proto.set_code(diagnostic.code);
+  proto.set_text(diagnostic.text);
+  proto.set_severity(EnumToProto(kSeverities, diagnostic.severity));
+  proto.set_first_frame_id(diagnostic.first_frame_id);
+  proto.set_count(diagnostic.count);
+  proto.set_advice(diagnostic.advice);
+  return proto;
+}
+
+// An unknown severity is read as a warning, the only one of older servers.
+Diagnostic FromProto(const v1::Diagnostic& proto) {
+  const auto severity = EnumFromProto(kSeverities, proto.severity(), "severity");
+  return {.code = proto.code(),
+          .severity = severity.ok() ? *severity : Severity::kWarning,
+          .first_frame_id = proto.first_frame_id(),
+          .count = proto.count(),
+          .text = proto.text(),
+          .advice = proto.advice()};
+}
+
 // Sets the member of the oneof for each kind of event.
 struct EventWriter {
   v1::MapEvent& proto;
@@ -103,6 +125,7 @@ struct EventWriter {
   void operator()(ObjectMerged&& merged) const { *proto.mutable_merged() = ToProto(merged); }
   void operator()(Statistics&& statistics) const { *proto.mutable_statistics() = ToProto(statistics); }
   void operator()(MasksAck&& ack) const { *proto.mutable_masks_ack() = ToProto(std::move(ack)); }
+  void operator()(Diagnostic&& diagnostic) const { *proto.mutable_diagnostic() = ToProto(diagnostic); }
 };
 
 }  // namespace
@@ -129,6 +152,8 @@ absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where)
       return FromProto(proto.statistics(), where + ".statistics");
     case v1::MapEvent::kMasksAck:
       return FromProto(std::move(*proto.mutable_masks_ack()));
+    case v1::MapEvent::kDiagnostic:
+      return FromProto(proto.diagnostic());
     default:
       return InvalidArgument("{}: unknown kind of event", where);
   }
@@ -255,20 +280,14 @@ v1::Statistics ToProto(const Statistics& statistics) {
   proto.set_training_steps(statistics.training_steps);
   proto.set_training_progress(statistics.training_progress);
   proto.set_resident_bytes(statistics.resident_bytes);
-  for (const SessionWarning& warning : statistics.warnings) {
-    v1::SessionWarning& added = *proto.add_warnings();
-    added.set_name(warning.name);
-    added.set_text(warning.text);
-  }
+  for (const Diagnostic& diagnostic : statistics.diagnostics) *proto.add_diagnostics() = ToProto(diagnostic);
   return proto;
 }
 
 absl::StatusOr<Statistics> FromProto(const v1::Statistics& proto, const std::string& where) {
   ROMAP_RETURN_IF_ERROR(CheckFinite(proto.training_progress(), where + ".training_progress"));
-  std::vector<SessionWarning> warnings;
-  for (const v1::SessionWarning& warning : proto.warnings()) {
-    warnings.push_back({.name = warning.name(), .text = warning.text()});
-  }
+  std::vector<Diagnostic> diagnostics;
+  for (const v1::Diagnostic& diagnostic : proto.diagnostics()) diagnostics.push_back(FromProto(diagnostic));
   return Statistics{.frames_received = proto.frames_received(),
                     .frames_processed = proto.frames_processed(),
                     .frames_dropped = proto.frames_dropped(),
@@ -280,7 +299,7 @@ absl::StatusOr<Statistics> FromProto(const v1::Statistics& proto, const std::str
                     .training_steps = proto.training_steps(),
                     .training_progress = proto.training_progress(),
                     .resident_bytes = proto.resident_bytes(),
-                    .warnings = std::move(warnings)};
+                    .diagnostics = std::move(diagnostics)};
 }
 
 }  // namespace romap::wire

@@ -120,11 +120,6 @@ void FrameLedger::WhenSettled(std::function<void()> done) {
   done();
 }
 
-void FrameLedger::SetWarnings(std::vector<SessionWarning> warnings) {
-  std::lock_guard lock(mutex_);
-  warnings_ = std::move(warnings);
-}
-
 void FrameLedger::FillIn(Statistics* statistics) const {
   statistics->frames_received = frames_received_;
   statistics->frames_processed = frames_processed_;
@@ -132,8 +127,6 @@ void FrameLedger::FillIn(Statistics* statistics) const {
   statistics->frames_rejected = frames_rejected_;
   statistics->keyframes = keyframes_;
   statistics->map_points = map_points_;
-  std::lock_guard lock(mutex_);
-  statistics->warnings = warnings_;
 }
 
 }  // namespace romap::session

@@ -45,10 +45,7 @@ class FrameLedger {
   // settles the last of them.
   void WhenSettled(std::function<void()> done);
 
-  // Replaces the warnings of the session.
-  void SetWarnings(std::vector<SessionWarning> warnings);
-
-  // Sets the counters of frames, keyframes and map points, and the warnings.
+  // Sets the counters of frames, keyframes and map points.
   void FillIn(Statistics* statistics) const;
 
  private:
@@ -63,7 +60,6 @@ class FrameLedger {
   std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
 
   mutable std::mutex mutex_;
-  std::vector<SessionWarning> warnings_;
   uint64_t inputs_settled_ = 0;
   bool all_settled_ = false;
   std::multimap<uint64_t, std::function<void()>> waiters_;  // by the number of inputs that must be settled

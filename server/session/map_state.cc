@@ -126,6 +126,11 @@ void MapState::Publish(const Statistics& statistics) {
   Send(statistics);
 }
 
+void MapState::Publish(const Diagnostic& diagnostic) {
+  std::lock_guard lock(mutex_);
+  Send(diagnostic);
+}
+
 std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks) {
   auto outbox = std::make_shared<Outbox>(acks, max_acks);
   std::lock_guard lock(mutex_);

@@ -48,6 +48,7 @@ class MapState {
   void Correct(const MapCorrection& correction);
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
+  void Publish(const Diagnostic& diagnostic);
 
   // The outbox starts with the current objects. It is closed if the map is closed.
   std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks);

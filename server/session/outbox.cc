@@ -21,6 +21,8 @@ struct Outbox::Putter {
   void operator()(MeshUpdate&& mesh) const { outbox.PutMesh(std::move(mesh)); }
   void operator()(ObjectRemoved&& removed) const { outbox.PutRemoved(std::move(removed)); }
   void operator()(ObjectMerged&& merged) const { outbox.PutMerged(merged); }
+  // Few: a session sends each code at most once per severity.
+  void operator()(Diagnostic&& diagnostic) const { outbox.Append(std::move(diagnostic)); }
   void operator()(Statistics&& statistics) const { outbox.Replace(outbox.statistics_, statistics); }
 };
 

@@ -31,22 +31,44 @@ CheckedInput Pipeline::Check(Arrival arrival) {
     checked.content = *std::move(result);
     Record(input);
   };
-  if (const auto* frame = std::get_if<FrameInput>(&input)) {
-    set_content(ingest_.Accept(*frame));
-  } else {
-    set_content(ingest_.AcceptMasks(std::get<MasksInput>(input)));
+  try {
+    if (const auto* frame = std::get_if<FrameInput>(&input)) {
+      set_content(ingest_.Accept(*frame));
+    } else {
+      set_content(ingest_.AcceptMasks(std::get<MasksInput>(input)));
+    }
+  } catch (const std::exception& e) {
+    // A decoder failed. Ingest changes its state only after everything is decoded, so only this input is lost.
+    checked.content = Internal("cannot be decoded: {}", e.what());
   }
   return checked;
 }
 
 void Pipeline::Process(const CheckedInput& input, const MappingExecutor& execute) {
   if (const auto* error = std::get_if<absl::Status>(&input.content)) {
-    ledger_->Reject(input.arrival, *error);
+    Reject(input.arrival, *error);
   } else if (const auto* frame = std::get_if<std::shared_ptr<const Frame>>(&input.content)) {
     ProcessFrame(input.arrival, *frame, execute);
   } else {
     ProcessLateMasks(std::get<FrameMasks>(input.content), execute);
   }
+}
+
+void Pipeline::Reject(const Arrival& arrival, const absl::Status& reason) {
+  ledger_->Reject(arrival, reason);
+  Diagnostic diagnostic;
+  diagnostic.advice = "correct the client, or repair the file";
+  if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
+    diagnostic.code = "frames_rejected";
+    diagnostic.first_frame_id = frame->frame_id;
+    diagnostic.text = fmt::format("frame {} was rejected: {}", frame->frame_id, Message(reason));
+  } else {
+    const uint64_t frame_id = std::get<MasksInput>(arrival.input).frame_id;
+    diagnostic.code = "masks_rejected";
+    diagnostic.first_frame_id = frame_id;
+    diagnostic.text = fmt::format("the late masks of frame {} were rejected: {}", frame_id, Message(reason));
+  }
+  diagnostics_->Report(std::move(diagnostic));
 }
 
 void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame,
@@ -72,7 +94,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
       map_->SetKeyframe(view.frame->frame_id, view.frame->timestamp_ns, view.id, view.T_world_camera);
       Publish(object_mapper_.ObserveKeyframe(view));
     }
-    ledger_->SetWarnings(sparse_mapper_.Warnings());
+    diagnostics_->SetConditions("slam", sparse_mapper_.Diagnostics());
     ledger_->CountMappedFrame(mapped.view.has_value(), sparse_mapper_.points());
   };
   execute(std::move(step));
@@ -126,7 +148,7 @@ void Pipeline::PublishMesh(MeshUpdate mesh, const MeshPose& pose) { map_->Publis
 
 void Pipeline::FinishMapping() {
   Correct(sparse_mapper_.Finish());
-  ledger_->SetWarnings(sparse_mapper_.Warnings());
+  diagnostics_->SetConditions("slam", sparse_mapper_.Diagnostics());
   Publish(object_mapper_.Finish());
   pool_->Finish(pool_session_);
 }
@@ -135,12 +157,13 @@ void Pipeline::FinishMapping() {
 
 Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config,
                    nerf::TrainingPool* pool, Mesher* mesher, MapState* map, FrameLedger* ledger,
-                   std::unique_ptr<wire::RecordingWriter> recorder)
+                   DiagnosticLog* diagnostics, std::unique_ptr<wire::RecordingWriter> recorder)
     : session_id_(std::move(session_id)),
       pool_(pool),
       mesher_(mesher),
       map_(map),
       ledger_(ledger),
+      diagnostics_(diagnostics),
       ingest_(options.camera, config.objects.max_mask_delay_s),
       recorder_(std::move(recorder)),
       tracker_(config.slam, options.pose_use, &local_map_),

@@ -13,6 +13,7 @@
 #include "server/nerf/training_pool.h"
 #include "server/objects/object_mapper.h"
 #include "server/session/arrival.h"
+#include "server/session/diagnostic_log.h"
 #include "server/session/frame_ledger.h"
 #include "server/session/ingest.h"
 #include "server/session/map_state.h"
@@ -52,9 +53,11 @@ class Pipeline {
   // Runs the step, or queues it for the mapping thread.
   using MappingExecutor = std::function<void(MappingStep)>;
 
-  // `pool`, `mesher`, `map` and `ledger` outlive the pipeline. `recorder` gets every accepted input; may be null.
+  // `pool`, `mesher`, `map`, `ledger` and `diagnostics` outlive the pipeline. `recorder` gets every accepted input; may
+  // be null.
   Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
-           Mesher* mesher, MapState* map, FrameLedger* ledger, std::unique_ptr<wire::RecordingWriter> recorder);
+           Mesher* mesher, MapState* map, FrameLedger* ledger, DiagnosticLog* diagnostics,
+           std::unique_ptr<wire::RecordingWriter> recorder);
   ~Pipeline();  // the pool and the mesher make no more calls
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
@@ -80,6 +83,7 @@ class Pipeline {
  private:
   void ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame, const MappingExecutor& execute);
   void ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& execute);
+  void Reject(const Arrival& arrival, const absl::Status& reason);
   void Record(const SessionInput& input);
   void Correct(const MapCorrection& correction);
   void Publish(objects::ObjectOutput output);
@@ -92,6 +96,7 @@ class Pipeline {
   Mesher* const mesher_;
   MapState* const map_;
   FrameLedger* const ledger_;
+  DiagnosticLog* const diagnostics_;
 
   slam::LocalMapSlot local_map_;  // from the mapper to the tracker
   // Used by Check().

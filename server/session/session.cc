@@ -33,7 +33,8 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       config_(config.session),
       created_unix_ns_(UnixNow_ns()),
       ledger_(id_, &map_),
-      pipeline_(id_, options, config, pool, mesher, &map_, &ledger_, std::move(recorder)),
+      diagnostics_(id_, &map_),
+      pipeline_(id_, options, config, pool, mesher, &map_, &ledger_, &diagnostics_, std::move(recorder)),
       scheduler_(config.session, options.mode, &pipeline_, &ledger_, SchedulerCallbacks()) {}
 
 Session::~Session() { Stop(absl::CancelledError("the session was closed")); }
@@ -47,8 +48,11 @@ Scheduler::Callbacks Session::SchedulerCallbacks() {
 absl::Status Session::CheckOpen() const {
   const SessionState state = state_;
   if (state == SessionState::kOpen) return absl::OkStatus();
-  return FailedPrecondition("session '{}' {} and accepts no more frames", id_,
-                            state == SessionState::kFailed ? "has failed" : "was finished");
+  if (state != SessionState::kFailed) {
+    return FailedPrecondition("session '{}' was finished and accepts no more frames", id_);
+  }
+  std::lock_guard lock(failure_mutex_);
+  return FailedPrecondition("session '{}' accepts no more frames, because {}", id_, failure_);
 }
 
 absl::Status Session::Offer(SessionInput input) {
@@ -70,9 +74,16 @@ void Session::OnFinished() {
 }
 
 void Session::OnFailed(const char* stage, const std::string& what) {
-  spdlog::error("session {}: {} failed; session ended: {}", id_, stage, what);
+  {
+    std::lock_guard lock(failure_mutex_);
+    if (failure_.empty()) failure_ = fmt::format("{} failed: {}", stage, what);
+  }
+  diagnostics_.Report({.code = "session_failed",
+                       .severity = Severity::kError,
+                       .text = fmt::format("{} failed: {}", stage, what),
+                       .advice = "export the map as it is, and start a new session"});
   state_ = SessionState::kFailed;
-  map_.Close(Internal("session '{}' failed in {}: {}", id_, stage, what));
+  map_.Close(Internal("session '{}': {} failed: {}", id_, stage, what));
 }
 
 void Session::Stop(const absl::Status& status) {
@@ -95,6 +106,7 @@ Statistics Session::CurrentStatistics() const {
   const nerf::TrainingPool::Progress training = pipeline_.TrainingProgress();
   Statistics statistics;
   ledger_.FillIn(&statistics);
+  statistics.diagnostics = diagnostics_.Current();
   statistics.objects = map_.ConfirmedObjects();
   statistics.objects_training = static_cast<uint64_t>(std::max(0, training.objects_training));
   statistics.training_steps = training.steps;

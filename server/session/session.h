@@ -70,10 +70,13 @@ class Session {
 
   std::atomic<SessionState> state_ = SessionState::kOpen;
   std::atomic<bool> sender_attached_ = false;
+  mutable std::mutex failure_mutex_;
+  std::string failure_;  // the stage that failed, and how; set before state_ becomes kFailed
   Clock::time_point next_statistics_ = Clock::now();  // the scheduler's mapping thread
 
   MapState map_;
   FrameLedger ledger_;
+  DiagnosticLog diagnostics_;
   Pipeline pipeline_;
   Scheduler scheduler_;  // last: its threads use all of the above
 };

@@ -106,10 +106,9 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
   }
   result->grid = FeatureGrid(frame.camera.width_px, frame.camera.height_px, result->features);
   result->shutter = std::move(shutter);
-  if (!result->shutter) return WithLens(std::move(result), lens);
   result->shutter_depths_mu.assign(count, 0);
   result->lens = lens;
-  UpdatePositions(*result);
+  if (result->shutter || lens != RadialCorrection{}) UpdatePositions(*result);
   return result;
 }
 
@@ -131,11 +130,13 @@ std::shared_ptr<const FrameFeatures> WithImagePixels(const FrameFeatures& frame,
 }
 
 std::shared_ptr<const FrameFeatures> WithShutter(const FrameFeatures& rolling,
-                                                 std::shared_ptr<const RollingShutter> shutter) {
+                                                 std::shared_ptr<const RollingShutter> shutter,
+                                                 std::vector<double> depths_mu) {
   auto converted = std::make_shared<FrameFeatures>(rolling);
   for (Eigen::Vector2f& px : converted->image_px) px = shutter->ToGlobal(px.cast<double>(), 0).cast<float>();
   converted->shutter = std::move(shutter);
-  converted->shutter_depths_mu.assign(rolling.size(), 0);
+  converted->shutter_depths_mu = std::move(depths_mu);
+  converted->shutter_depths_mu.resize(rolling.size(), 0);
   UpdatePositions(*converted);
   return converted;
 }

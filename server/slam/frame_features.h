@@ -62,10 +62,12 @@ std::shared_ptr<const FrameFeatures> MakeFrameFeatures(const Frame& frame, std::
 std::shared_ptr<const FrameFeatures> WithLens(std::shared_ptr<const FrameFeatures> frame, const RadialCorrection& lens);
 // The same frame with its features at other pixels of the image, before the lens correction.
 std::shared_ptr<const FrameFeatures> WithImagePixels(const FrameFeatures& frame, std::vector<Eigen::Vector2f> image_px);
-// The features of an image of a rolling shutter, as those of the converted image.
+// The features of an image of a rolling shutter, as those of the converted image. `depths_mu`: see
+// FrameFeatures::shutter_depths_mu; empty: all unknown.
 std::shared_ptr<const FrameFeatures> WithShutter(const FrameFeatures& rolling,
-                                                 std::shared_ptr<const RollingShutter> shutter);
-// The same frame with known depths of features (see FrameFeatures::shutter_depths_mu). Requires a shutter.
+                                                 std::shared_ptr<const RollingShutter> shutter,
+                                                 std::vector<double> depths_mu = {});
+// The same frame with other shutter_depths_mu. Requires a shutter.
 std::shared_ptr<const FrameFeatures> WithShutterDepths(const FrameFeatures& frame, std::vector<double> depths_mu);
 // The same frame with its features labeled by masks that arrived after it, as FeatureExtractor does.
 // `labels`: CV_16UC1 of the frame's size.

@@ -57,10 +57,10 @@ std::optional<Sim3<World, World>> GivenWorld::ProposeMotion(const SlamMap& map, 
   return alignment->S_given_map;
 }
 
-std::vector<SessionWarning> GivenWorld::Warnings() const {
+std::vector<Diagnostic> GivenWorld::Diagnostics() const {
   if (reason_.empty()) return {};
   return {
-      {.name = "poses_ignored",
+      {.code = "poses_ignored",
        .text = "t_world_camera is ignored, because the map was started from images before the first given pose, and "
                "cannot be aligned with the poses yet: " +
                reason_}};

@@ -23,7 +23,7 @@ class GivenWorld {
   // Call it after Observe(); not again after it returned a motion. `scale_is_known`: the map is in meters.
   std::optional<Sim3<World, World>> ProposeMotion(const SlamMap& map, bool scale_is_known);
   // Why given poses are ignored; empty if there are none.
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<Diagnostic> Diagnostics() const;
 
  private:
   std::deque<std::pair<KeyframeId, SE3<World, Camera>>> poses_;  // the newest ones

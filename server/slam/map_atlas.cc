@@ -22,17 +22,17 @@ size_t MapAtlas::points() const {
   return points;
 }
 
-std::vector<SessionWarning> MapAtlas::Warnings() const {
-  std::vector<SessionWarning> warnings = current_->Warnings();
+std::vector<Diagnostic> MapAtlas::Diagnostics() const {
+  std::vector<Diagnostic> diagnostics = current_->Diagnostics();
   if (maps() > 1) {
-    warnings.push_back(
-        {.name = "maps_unconnected",
+    diagnostics.push_back(
+        {.code = "maps_unconnected",
          .text = fmt::format("{} maps with unknown relation, because the camera was lost and did not recognize the "
                              "place: position, direction and scale of each relative to the others are a guess; show "
                              "the camera a place that it has seen before",
                              maps())});
   }
-  return warnings;
+  return diagnostics;
 }
 
 std::pair<uint64_t, uint64_t> MapAtlas::UsedIds() const {

@@ -30,7 +30,7 @@ class MapAtlas {
   SessionMap* Find(SparseMapId id) const;
   size_t maps() const { return kept_.size() + (current_->IsEmpty() ? 0 : 1); }
   size_t points() const;  // of all maps
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<Diagnostic> Diagnostics() const;
 
   // An empty map outside of the atlas. Call Begin() or Discard() with it before the other maps change.
   std::unique_ptr<SessionMap> MakeMap() const;

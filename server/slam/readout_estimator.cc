@@ -3,8 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "server/slam/geometry/reprojection.h"
-#include "server/slam/optimize/lie.h"
+#include "server/slam/geometry/levenberg_marquardt.h"
+#include "server/slam/geometry/rotation.h"
 
 namespace romap::slam {
 namespace {
@@ -23,37 +23,32 @@ void ReadoutEstimator::AddFrame(const CameraModel& camera, const SE3<World, Came
   if (observations.size() < kMinObservations) return;
   if (blocks_.size() == kMaxBlocks && blocks_.back().frames == kFramesPerBlock) return;
   const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();
-  const CameraFromWorld pose{T_camera_world.RotationMatrix(), T_camera_world.translation()};
-  // Least squares of | pixel + by_readout * x - projection - by_pose * d |, over the readout error x and the pose d.
-  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> coupling = Eigen::Matrix<double, 6, 1>::Zero();
-  Eigen::Matrix<double, 6, 1> pose_side = Eigen::Matrix<double, 6, 1>::Zero();
-  double readout_information = 0, readout_side = 0, motion_px_per_s = 0;
+  // Parameters: translation and rotation of the camera's frame (see ApplyStep in reprojection.h), then the readout
+  // error.
+  NormalEquations<7> equations;
+  double motion_px_per_s = 0;
   for (const Observation& observed : observations) {
     const PoseObservation& observation = observed.observation;
-    const Eigen::Vector3d p = pose.rotation * observation.p_world + pose.translation;
+    const Eigen::Vector3d p = T_camera_world * observation.p_world;
     if (!(p.z() > 0)) continue;
     Eigen::Matrix<double, 2, 3> projection;
     projection << camera.fx_px / p.z(), 0, -camera.fx_px * p.x() / (p.z() * p.z()),  //
         0, camera.fy_px / p.z(), -camera.fy_px * p.y() / (p.z() * p.z());
-    Eigen::Matrix<double, 2, 6> by_pose;
-    by_pose << projection, -projection * Hat(p);
-    const Eigen::Vector2d flow_px = projection * (motion.rotation_rad.cross(p) + motion.translation_mu);
-    const Eigen::Vector2d by_readout = observed.read_at * flow_px;
-    const Eigen::Vector2d error_px = observation.pixel_px - camera.Project(p);
-    const double weight = 1 / (observation.sigma_px * observation.sigma_px);
-    H += weight * by_pose.transpose() * by_pose;
-    coupling += weight * by_pose.transpose() * by_readout;
-    pose_side += weight * by_pose.transpose() * error_px;
-    readout_information += weight * by_readout.squaredNorm();
-    readout_side -= weight * by_readout.dot(error_px);
-    motion_px_per_s += flow_px.norm() / static_cast<double>(observations.size());
+    const Eigen::Vector2d flow_px_per_s = projection * (motion.rotation_rad.cross(p) + motion.translation_mu);
+    Eigen::Matrix<double, 2, 7> derivative;
+    derivative << projection, -projection * Skew(p), -observed.read_at * flow_px_per_s;
+    const Eigen::Vector2d error_px = camera.Project(p) - observation.pixel_px;
+    for (int axis = 0; axis < 2; ++axis) {
+      equations.Add(derivative.row(axis).transpose() / observation.sigma_px, error_px[axis] / observation.sigma_px, 1);
+    }
+    motion_px_per_s += flow_px_per_s.norm() / static_cast<double>(observations.size());
   }
   if (motion_px_per_s < kMinMotion_px_per_s) return;
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(H);
-  const Eigen::Matrix<double, 6, 1> absorbed = solver.solve(coupling);
-  const double information = readout_information - coupling.dot(absorbed);
-  const double weighted_s = readout_side + absorbed.dot(pose_side);
+  // Eliminates the pose.
+  const Eigen::Matrix<double, 6, 1> coupling = equations.hessian.block<6, 1>(0, 6);
+  const Eigen::Matrix<double, 6, 1> absorbed = equations.hessian.topLeftCorner<6, 6>().ldlt().solve(coupling);
+  const double information = equations.hessian(6, 6) - coupling.dot(absorbed);
+  const double weighted_s = absorbed.dot(equations.gradient.head<6>()) - equations.gradient[6];
   if (!(information > 0) || !std::isfinite(information) || !std::isfinite(weighted_s)) return;
   if (blocks_.empty() || blocks_.back().frames == kFramesPerBlock) blocks_.emplace_back();
   Block& block = blocks_.back();

@@ -13,6 +13,12 @@ namespace {
 
 constexpr int kMapCell_px = 8;  // the pixel map is smooth: it is interpolated between points at this distance
 
+cv::Mat Remap(const cv::Mat& image, const cv::Mat& map, int interpolation, int border) {
+  cv::Mat converted;
+  if (!image.empty()) cv::remap(image, converted, map, {}, interpolation, border);
+  return converted;
+}
+
 }  // namespace
 
 RollingShutter::RollingShutter(const Frame& frame, const ReadoutMotion& motion)
@@ -61,26 +67,16 @@ std::shared_ptr<const Frame> RollingShutter::Convert(const Frame& frame, bool wi
     return converted;
   }
   const cv::Mat map = PixelMap();
-  converted->image_bgr = cv::Mat();
-  cv::remap(frame.image_bgr, converted->image_bgr, map, {}, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  converted->image_bgr = Remap(frame.image_bgr, map, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   converted->source_gray = cv::Mat();
   converted->source_camera = frame.camera;
-  if (!frame.labels.empty()) {
-    converted->labels = cv::Mat();
-    cv::remap(frame.labels, converted->labels, map, {}, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
-  }
-  if (!frame.depth_mu.empty()) {
-    converted->depth_mu = cv::Mat();
-    cv::remap(DepthAtMiddleRow(frame.depth_mu), converted->depth_mu, map, {}, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
-  }
+  converted->labels = Remap(frame.labels, map, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
+  converted->depth_mu = Remap(DepthAtMiddleRow(frame.depth_mu), map, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
   return converted;
 }
 
 cv::Mat RollingShutter::ConvertLabels(const cv::Mat& labels) const {
-  if (labels.empty()) return labels;
-  cv::Mat converted;
-  cv::remap(labels, converted, PixelMap(), {}, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
-  return converted;
+  return labels.empty() ? labels : Remap(labels, PixelMap(), cv::INTER_NEAREST, cv::BORDER_CONSTANT);
 }
 
 cv::Mat RollingShutter::PixelMap() const {
@@ -119,6 +115,13 @@ cv::Mat RollingShutter::DepthAtMiddleRow(const cv::Mat& depth_mu) const {
     }
   }
   return moved;
+}
+
+std::shared_ptr<const RollingShutter> ShutterOf(const Frame& frame, std::optional<ReadoutMotion> motion,
+                                                double depth_mu) {
+  if (!(frame.camera.readout_s > 0) || !motion) return nullptr;
+  motion->depth_mu = depth_mu;
+  return std::make_shared<const RollingShutter>(frame, *motion);
 }
 
 }  // namespace romap::slam

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 
 #include "common/stage_messages.h"
 
@@ -56,5 +57,10 @@ class RollingShutter {
   CameraModel source_camera_;  // with the distortion of the image that was read
   ReadoutMotion motion_;
 };
+
+// The shutter of a frame that was read during `motion`, whose depth_mu is replaced. null: a global shutter, or the
+// motion is unknown.
+std::shared_ptr<const RollingShutter> ShutterOf(const Frame& frame, std::optional<ReadoutMotion> motion,
+                                                double depth_mu);
 
 }  // namespace romap::slam

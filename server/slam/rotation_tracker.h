@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "server/slam/frame_features.h"
 #include "server/slam/slam_config.h"
@@ -26,21 +25,9 @@ class RotationTracker {
   std::optional<Eigen::Quaterniond> Track(const std::shared_ptr<const FrameFeatures>& frame);
 
  private:
-  struct RayPair {
-    Eigen::Vector3d reference;  // unit length
-    Eigen::Vector3d frame;      // unit length
-    double max_error = 0;       // distance of the two after the rotation
-  };
-
-  std::vector<RayPair> MatchReference(const FrameFeatures& frame) const;
-  // R_reference_frame that most pairs agree with, and their indices.
-  std::pair<Eigen::Quaterniond, std::vector<size_t>> FindRotation(const std::vector<RayPair>& pairs,
-                                                                  uint64_t seed) const;
-
   const SlamConfig config_;
   std::shared_ptr<const FrameFeatures> reference_;
   Eigen::Quaterniond R_world_reference_ = Eigen::Quaterniond::Identity();
-  Eigen::Quaterniond R_reference_last_ = Eigen::Quaterniond::Identity();
 };
 
 }  // namespace romap::slam

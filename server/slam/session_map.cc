@@ -61,19 +61,20 @@ void SessionMap::Absorb(SessionMap& from, bool has_camera) {
   parallax_rad = from.parallax_rad;
 }
 
-std::vector<SessionWarning> SessionMap::Warnings() const {
+std::vector<Diagnostic> SessionMap::Diagnostics() const {
   if (world_is_given || map.keyframes().empty()) return {};
-  std::vector<SessionWarning> warnings = up.Warnings();
+  std::vector<Diagnostic> diagnostics = up.Diagnostics();
   if (!has_depth_scale && parallax_rad < kMinParallax_rad) {
-    warnings.push_back({.name = "translation_unobservable",
-                        .text = fmt::format(
-                            "the camera has rotated with hardly any translation: most of the map points were seen from "
-                            "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
-                            "the translation are not known; move the camera sideways, or send depth images",
-                            parallax_rad / kRadPerDeg, kMinParallax_rad / kRadPerDeg)});
+    diagnostics.push_back(
+        {.code = "translation_unobservable",
+         .text =
+             fmt::format("the camera has rotated with hardly any translation: most of the map points were seen from "
+                         "directions less than {:.1f} deg apart ({:.0f} deg needed), so distances and the scale of "
+                         "the translation are not known; move the camera sideways, or send depth images",
+                         parallax_rad / kRadPerDeg, kMinParallax_rad / kRadPerDeg)});
   }
-  for (SessionWarning& warning : given_world.Warnings()) warnings.push_back(std::move(warning));
-  return warnings;
+  for (Diagnostic& diagnostic : given_world.Diagnostics()) diagnostics.push_back(std::move(diagnostic));
+  return diagnostics;
 }
 
 double UpperParallax_rad(const SlamMap& map) {

@@ -40,7 +40,7 @@ struct SessionMap {
   // camera. `has_camera`: the camera is in `from`, and that is taken over too.
   void Absorb(SessionMap& from, bool has_camera);
   // What the client should know about the accuracy of this map. Empty if the client's poses define the world.
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<Diagnostic> Diagnostics() const;
 
   const SparseMapId id;
   SlamMap map;

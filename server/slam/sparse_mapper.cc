@@ -41,7 +41,7 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Ba
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
-  tracking_warning_ = image.warning;
+  tracking_diagnostic_ = image.diagnostic;
   const int generation_before = generation_;
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
   const bool was_merged = ConcludeMerge(/*wait=*/false);
@@ -72,10 +72,10 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
   return mapped;
 }
 
-std::vector<SessionWarning> SparseMapper::Warnings() const {
-  std::vector<SessionWarning> warnings = atlas_.Warnings();
-  if (tracking_warning_) warnings.push_back(*tracking_warning_);
-  return warnings;
+std::vector<Diagnostic> SparseMapper::Diagnostics() const {
+  std::vector<Diagnostic> diagnostics = atlas_.Diagnostics();
+  if (tracking_diagnostic_) diagnostics.push_back(*tracking_diagnostic_);
+  return diagnostics;
 }
 
 void SparseMapper::ObserveMasks(const FrameMasks& masks) {

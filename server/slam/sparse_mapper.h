@@ -58,7 +58,7 @@ class SparseMapper {
 
   size_t points() const { return atlas_.points(); }
   // What the client should know about the accuracy of the map. Empty while there is no map.
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<Diagnostic> Diagnostics() const;
 
  private:
   friend class SparseMapperInspector;  // tests/support
@@ -113,7 +113,7 @@ class SparseMapper {
   LoopTrial loop_trial_;
   MapAtlas atlas_;
   MapMerger merger_;
-  std::optional<SessionWarning> tracking_warning_;
+  std::optional<Diagnostic> tracking_diagnostic_;
   std::vector<MapMerge> merges_;  // not reported yet
   int generation_ = 0;            // see LocalMap::generation
   int maps_refused_ = 0;          // new ones, because the place of the camera was known, since it was tracked

@@ -30,9 +30,6 @@ constexpr int kMapPointsToLeavePriors = 150;
 constexpr uint64_t kKeyframesToLeavePriors = 12;
 // The errors of the points are about as large as those of the features: they double the variance.
 constexpr double kPointErrorFactor = 1.4;
-constexpr double kMinReadoutError_s = 0.004;
-constexpr double kReadoutErrorSigmas = 4;
-constexpr size_t kMaxFramesWithoutMasks = 512;  // 17 s at 30 frames/s, longer than any detector takes
 // Standard deviation of the angle by which points are wrong that were made beyond the reference keyframe, at a distance
 // of the scene's depth from it. From live runs, in which it is 0.05 to 0.3, depending on how late mapping is.
 constexpr double kNewPointsError = 0.15;
@@ -71,7 +68,7 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TrackedImage image =
       has_map ? TrackByImage(std::move(frame), std::move(features)) : Initialize(std::move(frame), std::move(features));
   image.fixed_px = fixed_px_;
-  image.warning = ReadoutWarning(image.tracked.frame->camera.readout_s);
+  image.diagnostic = readout_check_.Check(image.tracked.frame->camera.readout_s);
   image.pose_ignored = has_pose && pose_use_ != PoseUse::kIgnore && has_map && !world_is_given_;
   return image;
 }
@@ -184,7 +181,7 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   status_.OnGivenPose();
   motion_.Update(pose, pose, frame->timestamp_ns, /*is_continuous=*/true);
   last_points_.clear();
-  if (shutter) ConvertFrame(*shutter, image.tracked);
+  if (shutter) converter_.Convert(*shutter, image.tracked);
   if (!image.pose_given) AnchorToReference(image.tracked);
   if (!image.tracked.is_keyframe) return image;
   const Frame& converted = *image.tracked.frame;
@@ -258,33 +255,47 @@ TrackedImage Tracker::TrackByImage(std::shared_ptr<const Frame> frame, std::shar
   }
   const std::shared_ptr<const LocalMap> local_map = MapForNextFrame();
   const auto predicted = motion_.PredictReadout(frame->camera.readout_s, frame->timestamp_ns);
-  if (auto shutter = ShutterOf(*frame, predicted, scene_depth_mu_)) image.features = WithShutter(*features, shutter);
+  const auto expected = ShutterOf(*frame, predicted, scene_depth_mu_);
+  if (expected) image.features = WithShutter(*features, expected);
   const LocalMapTracking tracking(*local_map, *image.features, config_);
   const std::optional<PoseFromPoints> pose = FindPose(*frame, tracking);
   if (!pose) {
     MarkLost("too few map points matched", image);
     return image;
   }
-  const double depth_mu = tracking.MedianDepth_mu(*pose);
   const auto readout = motion_.ReadoutTo(pose->T_world_camera, frame->camera.readout_s, frame->timestamp_ns);
-  const auto known = status_.IsLost() ? nullptr : ShutterOf(*frame, readout, depth_mu);
-  if (!known) {
-    EstimateReadout(*frame, *features, *pose, tracking);
-    Accept(*pose, *local_map, tracking, image);
-    return image;
-  }
-  // The pose determines the motion that led to it, which is more accurate than the predicted one.
-  const auto converted = WithShutterDepths(*WithShutter(*features, known), tracking.DepthsOfFeatures(*pose));
-  const LocalMapTracking again(*local_map, *converted, config_);
-  if (const auto refined = again.RefineMatches(*pose, frame->image_bgr)) {
-    image.features = converted;
-    EstimateReadout(*frame, *features, *refined, again);
-    Accept(*refined, *local_map, again, image);
+  const auto shutter = status_.IsLost() ? nullptr : ShutterOf(*frame, readout, tracking.MedianDepth_mu(*pose));
+  if (shutter) {
+    AcceptConverted(shutter, *features, *pose, *local_map, tracking, image);
   } else {
+    CheckReadout(*features, *pose, tracking, image);
     Accept(*pose, *local_map, tracking, image);
   }
-  ConvertFrame(*known, image.tracked);
   return image;
+}
+
+// The pose determines the motion that led to it, which is more accurate than the predicted one.
+void Tracker::AcceptConverted(const std::shared_ptr<const RollingShutter>& shutter, const FrameFeatures& rolling,
+                              const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
+                              TrackedImage& image) {
+  const auto converted = WithShutter(rolling, shutter, tracking.DepthsOfFeatures(pose));
+  const LocalMapTracking again(local_map, *converted, config_);
+  if (const auto refined = again.RefineMatches(pose, image.tracked.frame->image_bgr)) {
+    image.features = converted;
+    CheckReadout(rolling, *refined, again, image);
+    Accept(*refined, local_map, again, image);
+  } else {
+    Accept(pose, local_map, tracking, image);
+  }
+  converter_.Convert(*shutter, image.tracked);
+}
+
+void Tracker::CheckReadout(const FrameFeatures& rolling, const PoseFromPoints& pose, const LocalMapTracking& tracking,
+                           const TrackedImage& image) {
+  if (status_.IsLost()) return;
+  const Frame& frame = *image.tracked.frame;
+  const auto per_second = motion_.ReadoutTo(pose.T_world_camera, 1, frame.timestamp_ns);
+  if (per_second) readout_check_.AddFrame(frame, rolling, pose, tracking, *per_second);
 }
 
 // The newest local map, with tentative points while keyframes wait to be mapped, and afterward until enough map points
@@ -402,62 +413,6 @@ bool Tracker::DecideKeyframe(const TrackedImage& image, double depth_mu, int poi
   quality.keyframes_waiting = static_cast<int>(waiting);
   quality.has_new_depth = image.features->HasDepth() && last_points_.size() < kFewInliers;
   return selector_.IsKeyframe(*image.tracked.frame, image.tracked.T_world_camera, quality);
-}
-
-// null: a global shutter, or the motion is unknown.
-std::shared_ptr<const RollingShutter> Tracker::ShutterOf(const Frame& frame, std::optional<ReadoutMotion> motion,
-                                                         double depth_mu) const {
-  if (!(frame.camera.readout_s > 0) || !motion) return nullptr;
-  motion->depth_mu = depth_mu;
-  return std::make_shared<const RollingShutter>(frame, *motion);
-}
-
-void Tracker::ConvertFrame(const RollingShutter& shutter, TrackedFrame& tracked) {
-  const Frame& frame = *tracked.frame;
-  if (!frame.has_masks) {
-    shutters_.push_back({frame.frame_id, shutter});
-    if (shutters_.size() > kMaxFramesWithoutMasks) shutters_.pop_front();
-  }
-  tracked.frame = shutter.Convert(frame, /*with_image=*/tracked.is_keyframe);
-}
-
-// `rolling`: the features at their pixels in the image.
-void Tracker::EstimateReadout(const Frame& frame, const FrameFeatures& rolling, const PoseFromPoints& pose,
-                              const LocalMapTracking& tracking) {
-  if (status_.IsLost()) return;
-  const auto per_second = motion_.ReadoutTo(pose.T_world_camera, 1, frame.timestamp_ns);
-  if (!per_second) return;
-  const RollingShutter rows(frame, {});
-  std::vector<ReadoutEstimator::Observation> observations;
-  for (size_t i = 0; i < rolling.size(); ++i) {
-    const int point = pose.point_of_feature[i];
-    if (point < 0) continue;
-    observations.push_back({.observation = tracking.Observe(static_cast<int>(i), point),
-                            .read_at = rows.ReadAt(rolling.image_px[i].cast<double>())});
-  }
-  readout_estimator_.AddFrame(frame.camera, pose.T_world_camera, observations, *per_second);
-}
-
-std::optional<SessionWarning> Tracker::ReadoutWarning(double readout_s) const {
-  const std::optional<ReadoutError> error = readout_estimator_.Estimate();
-  if (!error || std::abs(error->value_s) < std::max(kMinReadoutError_s, kReadoutErrorSigmas * error->sigma_s)) {
-    return std::nullopt;
-  }
-  // The map absorbs a part of the error.
-  return SessionWarning{
-      .name = "readout_time",
-      .text =
-          fmt::format("the images fit a rolling shutter whose readout time is at least {:.0f} ms {} than the camera "
-                      "states ({:.0f} ms): poses and objects are less accurate; set readout_s of the camera",
-                      1e3 * std::abs(error->value_s), error->value_s > 0 ? "longer" : "shorter", 1e3 * readout_s)};
-}
-
-FrameMasks Tracker::ConvertMasks(const FrameMasks& masks) const {
-  FrameMasks converted = masks;
-  for (const FrameShutter& frame : shutters_) {
-    if (frame.frame_id == masks.frame_id) converted.labels = frame.shutter.ConvertLabels(masks.labels);
-  }
-  return converted;
 }
 
 void Tracker::AnchorToReference(TrackedFrame& tracked) const {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include "common/stage_messages.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/fixed_features.h"
+#include "server/slam/frame_converter.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/given_pose_tracker.h"
 #include "server/slam/keyframe_selector.h"
@@ -17,7 +17,7 @@
 #include "server/slam/local_map_tracking.h"
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
-#include "server/slam/readout_estimator.h"
+#include "server/slam/readout_check.h"
 #include "server/slam/rolling_shutter.h"
 #include "server/slam/rotation_tracker.h"
 #include "server/slam/slam_config.h"
@@ -36,7 +36,7 @@ struct TrackedImage {
   bool pose_given = false;                             // by the client; must not be corrected
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
-  std::optional<SessionWarning> warning = {};          // about the camera, while it lasts
+  std::optional<Diagnostic> diagnostic = {};           // about the camera, while it lasts
 };
 
 // Finds the camera pose of each frame: uses the given pose, or tracks the camera from the image against the local map.
@@ -59,7 +59,7 @@ class Tracker {
   // If no pose is found, `tracked.reason` is a text for users that explains why.
   TrackedImage Track(std::shared_ptr<const Frame> frame);
   // The masks of a frame that was tracked without masks, as they belong to the frame in its TrackedImage.
-  FrameMasks ConvertMasks(const FrameMasks& masks) const;
+  FrameMasks ConvertMasks(const FrameMasks& masks) const { return converter_.ConvertMasks(masks); }
 
  private:
   // Initial views that were sent to mapping, while the initialized map is pending.
@@ -90,16 +90,16 @@ class Tracker {
   // `local_map`: that `pose` refers to.
   void Accept(const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
               TrackedImage& image);
+  // `rolling`: the features at their pixels in the image.
+  void AcceptConverted(const std::shared_ptr<const RollingShutter>& shutter, const FrameFeatures& rolling,
+                       const PoseFromPoints& pose, const LocalMap& local_map, const LocalMapTracking& tracking,
+                       TrackedImage& image);
+  void CheckReadout(const FrameFeatures& rolling, const PoseFromPoints& pose, const LocalMapTracking& tracking,
+                    const TrackedImage& image);
   void TrackRotation(TrackedImage& image);
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
-  std::shared_ptr<const RollingShutter> ShutterOf(const Frame& frame, std::optional<ReadoutMotion> motion,
-                                                  double depth_mu) const;
-  void ConvertFrame(const RollingShutter& shutter, TrackedFrame& tracked);
-  void EstimateReadout(const Frame& frame, const FrameFeatures& rolling, const PoseFromPoints& pose,
-                       const LocalMapTracking& tracking);
-  std::optional<SessionWarning> ReadoutWarning(double readout_s) const;
   void StateUncertainty(const PoseFromPoints& pose, double depth_mu, TrackedFrame& tracked) const;
 
   const SlamConfig config_;
@@ -124,13 +124,9 @@ class Tracker {
   uint64_t keyframes_sent_ = 0;
   SparseMapId newest_map_;  // of those that the camera was in
   std::optional<PendingMap> pending_map_;
-  ReadoutEstimator readout_estimator_;
+  ReadoutCheck readout_check_;
+  FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
-  struct FrameShutter {
-    uint64_t frame_id = 0;
-    RollingShutter shutter;
-  };
-  std::deque<FrameShutter> shutters_;  // of the last frames without masks
 };
 
 }  // namespace romap::slam

@@ -182,14 +182,14 @@ void WorldUp::Rotate(const Eigen::Quaterniond& R_new_old) {
 
 bool WorldUp::is_known() const { return confidence_ >= kKnownConfidence && sigma_rad_ <= kKnownSigma_rad; }
 
-std::vector<SessionWarning> WorldUp::Warnings() const {
+std::vector<Diagnostic> WorldUp::Diagnostics() const {
   if (is_known()) return {};
   const std::string guess =
       confidence_ > 0
           ? fmt::format("the best guess is right with a probability of {:.0f} % and a standard deviation of {:.1f} deg",
                         100 * confidence_, sigma_rad_ * kDegPerRad)
           : "the first camera is assumed to be level";
-  return {{.name = "up_unknown",
+  return {{.code = "up_unknown",
            .text = fmt::format("the images do not show clearly where up is, so cuboids may be tilted: {}; send "
                                "gravity_camera with the frames, or show the surface around the objects",
                                guess)}};

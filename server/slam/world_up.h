@@ -35,9 +35,9 @@ class WorldUp {
   double confidence() const { return confidence_; }  // 0..1
   // Standard deviation of the up direction.
   double sigma_rad() const { return sigma_rad_; }
-  // Whether the evidence determines up. If not, Warnings() says so.
+  // Whether the evidence determines up. If not, Diagnostics() says so.
   bool is_known() const;
-  std::vector<SessionWarning> Warnings() const;
+  std::vector<Diagnostic> Diagnostics() const;
 
  private:
   bool UpdateFromMap(const SlamMap& map, bool is_last);

@@ -160,7 +160,12 @@ TEST(WireEvents, StatisticsRoundTrip) {
                               .training_steps = 9,
                               .training_progress = 0.5,
                               .resident_bytes = 1ull << 40,
-                              .warnings = {{.name = "up_unknown", .text = "no evidence"}}};
+                              .diagnostics = {{.code = "up_unknown",
+                                               .severity = Severity::kError,
+                                               .first_frame_id = 7,
+                                               .count = 3,
+                                               .text = "no evidence",
+                                               .advice = "send gravity"}}};
   const Statistics got = RoundTrip(statistics);
   EXPECT_EQ(got.frames_received, 1u);
   EXPECT_EQ(got.frames_processed, 2u);
@@ -173,9 +178,13 @@ TEST(WireEvents, StatisticsRoundTrip) {
   EXPECT_EQ(got.training_steps, 9u);
   EXPECT_EQ(got.training_progress, 0.5);
   EXPECT_EQ(got.resident_bytes, 1ull << 40);
-  ASSERT_EQ(got.warnings.size(), 1u);
-  EXPECT_EQ(got.warnings[0].name, "up_unknown");
-  EXPECT_EQ(got.warnings[0].text, "no evidence");
+  ASSERT_EQ(got.diagnostics.size(), 1u);
+  EXPECT_EQ(got.diagnostics[0].code, "up_unknown");
+  EXPECT_EQ(got.diagnostics[0].severity, Severity::kError);
+  EXPECT_EQ(got.diagnostics[0].first_frame_id, 7u);
+  EXPECT_EQ(got.diagnostics[0].count, 3u);
+  EXPECT_EQ(got.diagnostics[0].text, "no evidence");
+  EXPECT_EQ(got.diagnostics[0].advice, "send gravity");
 }
 
 void ExpectError(const v1::MapEvent& proto, const char* message) {

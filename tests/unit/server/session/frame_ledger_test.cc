@@ -54,14 +54,6 @@ TEST_F(FrameLedgerTest, AcknowledgesAFrameWithItsTrackingResult) {
   EXPECT_EQ(map_.Snapshot().trajectory.size(), 1u);
 }
 
-TEST_F(FrameLedgerTest, ReportsThePresentWarnings) {
-  ledger_.SetWarnings({{.name = "up_unknown", .text = "no evidence"}});
-  ASSERT_EQ(Counters().warnings.size(), 1u);
-  EXPECT_EQ(Counters().warnings[0].name, "up_unknown");
-  ledger_.SetWarnings({});
-  EXPECT_TRUE(Counters().warnings.empty());
-}
-
 TEST_F(FrameLedgerTest, AcknowledgesALostFrameWithoutPose) {
   TrackedFrame tracked;
   tracked.state = TrackingState::kLost;

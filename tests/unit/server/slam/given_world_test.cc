@@ -28,8 +28,8 @@ class LatePosesTest : public TrackingTest {
   }
 
   std::string PosesIgnoredText() const {
-    for (const SessionWarning& warning : mapper_->Warnings()) {
-      if (warning.name == "poses_ignored") return warning.text;
+    for (const Diagnostic& diagnostic : mapper_->Diagnostics()) {
+      if (diagnostic.code == "poses_ignored") return diagnostic.text;
     }
     return "";
   }

@@ -24,7 +24,7 @@ class MapAtlasTest : public ::testing::Test {
 
   std::vector<std::string> WarningNames() const {
     std::vector<std::string> names;
-    for (const SessionWarning& warning : atlas_.Warnings()) names.push_back(warning.name);
+    for (const Diagnostic& diagnostic : atlas_.Diagnostics()) names.push_back(diagnostic.code);
     return names;
   }
 

@@ -147,6 +147,18 @@ TEST_F(RollingShutterTrackingTest, KnownReadoutTimeRemovesTheDistortion) {
   EXPECT_LT(known.late_mask_px, 0.75 * ignored.late_mask_px) << ignored.late_mask_px;
 }
 
+TEST_F(RollingShutterTrackingTest, AGlobalShutterContradictsAReadoutTime) {
+  for (const double stated_s : {0.0, kReadout * kInterval_s}) {
+    Restart(PoseUse::kIgnore);
+    for (int i = 0; i < 110; ++i) {
+      const auto frame = world_.Render(static_cast<uint64_t>(i + 1), PoseAt(i));
+      frame->camera.readout_s = stated_s;
+      ProcessFrame(frame);
+    }
+    EXPECT_EQ(HasWarning("readout_time"), stated_s > 0);
+  }
+}
+
 // With given poses, keyframes and masks are those of a global shutter too.
 TEST_F(RollingShutterTrackingTest, GivenPosesDetermineTheMotion) {
   double differences[2] = {};

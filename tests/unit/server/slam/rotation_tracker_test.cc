@@ -54,6 +54,24 @@ TEST_F(RotationTrackerTest, ParallaxIsNotARotation) {
   EXPECT_FALSE(tracker.Track(Extract(*moved)).has_value());
 }
 
+// The image of a plane moves almost as if the camera rotated. What passes for a rotation must remain small.
+TEST_F(RotationTrackerTest, ATranslationAlongAPlaneIsNoRotationForLong) {
+  RotationTracker tracker{SlamConfig{}};
+  double worst_deg = 0;
+  int refused = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d eye(1.3 + 0.01 * i, 1.3, 1.5);
+    const auto features = Extract(
+        *world_.Render(static_cast<uint64_t>(i + 1), TexturedWorld::LookAt(eye, eye - Eigen::Vector3d(0, 0, 1))));
+    if (i == 0) tracker.Start(features, Eigen::Quaterniond::Identity());
+    const auto rotation = tracker.Track(features);
+    refused += rotation ? 0 : 1;
+    if (rotation) worst_deg = std::max(worst_deg, kDegPerRad * Eigen::AngleAxisd(*rotation).angle());
+  }
+  EXPECT_LT(worst_deg, 1);
+  EXPECT_GT(refused, 10);
+}
+
 // A tracked camera that turns away from its map is lost, but keeps its rotation in the world of the map.
 TEST_F(RotationTrackerTest, ALostCameraKeepsItsRotation) {
   ProcessFrames(30);

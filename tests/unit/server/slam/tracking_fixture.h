@@ -75,9 +75,9 @@ class TrackingTest : public ::testing::Test {
   const std::string& reason() const { return image_.tracked.reason; }
 
   bool HasWarning(const std::string& name) const {
-    const std::vector<SessionWarning> warnings = mapper_->Warnings();
-    return std::any_of(warnings.begin(), warnings.end(),
-                       [&](const SessionWarning& warning) { return warning.name == name; });
+    const std::vector<Diagnostic> diagnostics = mapper_->Diagnostics();
+    return std::any_of(diagnostics.begin(), diagnostics.end(),
+                       [&](const Diagnostic& diagnostic) { return diagnostic.code == name; });
   }
 
   struct TrackedPose {

@@ -100,7 +100,7 @@ TEST_F(WorldUpTest, EdgesOfFlatObjectsDoNotTiltTheWorld) {
   WorldUp up;
   EXPECT_LT(UpErrorAfterTilt_rad(&up), 0.2 * kDegree);
   EXPECT_TRUE(up.is_known());
-  EXPECT_TRUE(up.Warnings().empty());
+  EXPECT_TRUE(up.Diagnostics().empty());
 }
 
 // Points without masks may lie on the objects, so only the cameras show up: all of them are level in this world.
@@ -119,8 +119,8 @@ TEST_F(WorldUpTest, UpIsUnknownWithoutEvidence) {
   WorldUp up;
   EXPECT_FALSE(up.ProposeRotation(map_, /*is_last=*/true));
   EXPECT_FALSE(up.is_known());
-  ASSERT_EQ(up.Warnings().size(), 1u);
-  EXPECT_EQ(up.Warnings()[0].name, "up_unknown");
+  ASSERT_EQ(up.Diagnostics().size(), 1u);
+  EXPECT_EQ(up.Diagnostics()[0].code, "up_unknown");
 }
 
 TEST_F(WorldUpTest, GravityShowsUpWithoutOtherEvidence) {
@@ -135,7 +135,7 @@ TEST_F(WorldUpTest, GravityShowsUpWithoutOtherEvidence) {
   ASSERT_TRUE(R_new_old);
   EXPECT_NEAR((*R_new_old * Eigen::Vector3d::UnitZ()).z(), 1, 1e-6);
   EXPECT_TRUE(up.is_known());
-  EXPECT_TRUE(up.Warnings().empty());
+  EXPECT_TRUE(up.Diagnostics().empty());
 }
 
 TEST_F(WorldUpTest, SmallRotationsAreProposedOnlyAtTheEnd) {

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "common/diagnostic.h"
+
+namespace romap::files {
+
+// "info", "warning" or "error".
+std::string SeverityName(Severity severity);
+
+// One line: "warning: frames_rejected (3 times, first in frame 17): <text>; <advice>".
+std::string FormatDiagnostic(const Diagnostic& diagnostic);
+
+}  // namespace romap::files
