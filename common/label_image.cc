@@ -17,7 +17,7 @@ uint16_t LabelAt(const cv::Mat& labels, const Eigen::Vector2f& pixel_px, int ero
       if (labels.at<uint16_t>(y, x) != label) return 0;
     }
   }
-  return label;
+  return label == kIgnoreLabel ? 0 : label;
 }
 
 }  // namespace romap

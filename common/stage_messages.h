@@ -24,6 +24,13 @@ namespace romap {
 
 // --------------------------------------------------------------------------------------------------- ingest -> slam
 
+// A mask that shows no object, with what the detector called it. Its pixels have label 0 or kIgnoreLabel.
+struct NonObjectMask {
+  cv::Rect box_px;
+  std::string class_name;
+  const char* reason = "";  // why it shows no object, as text for clients
+};
+
 // A decoded and validated frame.
 struct Frame {
   uint64_t frame_id = 0;
@@ -35,8 +42,9 @@ struct Frame {
   cv::Mat source_gray;        // CV_8UC1
   CameraModel source_camera;  // of source_gray, with its distortion
   bool has_masks = false;     // false: no detector ran on this frame (as opposed to a detector that found nothing)
-  cv::Mat labels;             // CV_16UC1, 0 = no instance; empty if !has_masks
+  cv::Mat labels;             // CV_16UC1, 0 = no instance, kIgnoreLabel = unknown; empty if !has_masks
   std::vector<Instance> instances;
+  std::vector<NonObjectMask> non_objects = {};
   cv::Mat depth_mu;  // CV_32FC1, z depth in map units, 0 = unknown; empty if the frame has no depth
   std::optional<SE3<World, Camera>> T_world_camera;
   std::optional<Eigen::Vector3d> gravity_camera;  // unit length
@@ -45,8 +53,9 @@ struct Frame {
 // The masks of a frame that was passed on without masks, for detectors that are slower than the camera.
 struct FrameMasks {
   uint64_t frame_id = 0;
-  cv::Mat labels;  // CV_16UC1, size of the frame, 0 = no instance
+  cv::Mat labels;  // CV_16UC1, size of the frame, 0 = no instance, kIgnoreLabel = unknown
   std::vector<Instance> instances;
+  std::vector<NonObjectMask> non_objects = {};
 };
 
 // -------------------------------------------------------------------------------------------------- slam -> objects

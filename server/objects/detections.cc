@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "common/label_image.h"
+
 namespace romap::objects {
 namespace {
 
@@ -27,7 +29,7 @@ std::map<uint16_t, Extent> MeasureLabels(const cv::Mat& labels) {
       const uint16_t label = row[u];
       const int start = u;
       while (u < labels.cols && row[u] == label) ++u;
-      if (label == 0) continue;
+      if (label == 0 || label == kIgnoreLabel) continue;
       Extent& extent = extents[label];
       extent.left = std::min(extent.left, start);
       extent.right = std::max(extent.right, u - 1);

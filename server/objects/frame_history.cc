@@ -46,6 +46,7 @@ std::optional<FrameHistory::Masked> FrameHistory::AddLateMasks(const FrameMasks&
   frame->has_masks = true;
   frame->labels = masks.labels;
   frame->instances = masks.instances;
+  frame->non_objects = masks.non_objects;
   entry->has_masks = true;
   Masked masked{.tracked = entry->tracked, .view = {}};
   entry->tracked.frame = nullptr;

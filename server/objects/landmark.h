@@ -20,6 +20,7 @@ struct LandmarkEvidence {
   uint64_t dormant_frames = 0;    // frames since then during which its map was not the current one
   uint64_t observations = 0;      // frames with a mask of it
   int keyframe_observations = 0;  // keyframes with an unambiguous mask of it
+  int whole_observations = 0;     // of these: the border of the image does not cut it off
   uint64_t expected = 0;          // frames with a mask of it, and frames that should have shown it
   int missed_in_view = 0;         // frames since the last observation that should have shown it
   double agreement_sum = 0;       // of Match::agreement, over `agreement_count` observations

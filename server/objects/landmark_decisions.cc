@@ -83,6 +83,7 @@ Decision DecideConfirmation(const LandmarkEvidence& evidence, const LandmarkGeom
   if (is_part) return {false, "covered by the mask of another object too often"};
   if (evidence.observations < static_cast<uint64_t>(config.confirm_frames)) return {false, "too few observations"};
   if (evidence.keyframe_observations < config.confirm_keyframes) return {false, "too few keyframes"};
+  if (evidence.whole_observations == 0) return {false, "always cut off by the border of the image"};
   // Without map points the masks alone determine the position, which requires a wider baseline.
   constexpr double kParallaxFactorWithoutPoints = 1.5;
   const bool has_points = geometry.points.size() >= static_cast<size_t>(config.min_object_points);

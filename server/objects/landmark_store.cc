@@ -29,6 +29,7 @@ void AddEvidence(const LandmarkEvidence& from, LandmarkKey into_key, LandmarkEvi
   into->observations += from.observations;
   into->expected += from.observations;
   into->keyframe_observations += from.keyframe_observations;
+  into->whole_observations += from.whole_observations;
 }
 
 // Whether a corner of the object's outline may be detected at this pixel. Corners of the coarsest octave are displaced

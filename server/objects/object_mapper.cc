@@ -135,6 +135,7 @@ ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
   current_.frame_id = tracked.frame->frame_id;
   current_.detections = ExtractDetections(*tracked.frame, config_);
   ++frame_index_;
+  RemoveNonObjects(tracked.frame->non_objects, &output);
   const Association association =
       Associate(tracked, current_.detections, store_.landmarks(), frame_index_, scene_depth_.value_mu(), config_);
   UpdateMissed(association, &output);
@@ -142,6 +143,23 @@ ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {
   store_.CountCoVisibility(current_, association.covered_by);
   PruneFalseLandmarks(&output);
   return output;
+}
+
+// Removes the landmarks that were born from masks that turned out to show no object.
+void ObjectMapper::RemoveNonObjects(const std::vector<NonObjectMask>& masks, ObjectOutput* output) {
+  constexpr double kSameMaskIou = 0.6;  // of its box and that of the landmark's last observation
+  constexpr uint64_t kMaxAge = 15;      // frames since that observation
+  for (const NonObjectMask& mask : masks) {
+    Prune(
+        [&](const Landmark& landmark) -> Decision {
+          const double both = (landmark.last_box_px & mask.box_px).area();
+          const double either = landmark.last_box_px.area() + mask.box_px.area() - both;
+          const bool is_same = frame_index_ - landmark.evidence.last_frame <= kMaxAge && both > kSameMaskIou * either &&
+                               landmark.evidence.BestClass().first == mask.class_name;
+          return {is_same, is_same ? mask.reason : "another mask"};
+        },
+        output);
+  }
 }
 
 void ObjectMapper::UpdateMissed(const Association& association, ObjectOutput* output) {

@@ -49,6 +49,7 @@ class ObjectMapper {
 
   // Steps that process a frame with masks.
   ObjectOutput ObserveMaskedFrame(const TrackedFrame& tracked);
+  void RemoveNonObjects(const std::vector<NonObjectMask>& masks, ObjectOutput* output);
   void UpdateMissed(const Association& association, ObjectOutput* output);
   void RecordObservations(const Association& association, const TrackedFrame& tracked, ObjectOutput* output);
   void RecordObservation(const Match& match, const Detection& detection, const TrackedFrame& tracked,

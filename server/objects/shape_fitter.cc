@@ -84,6 +84,7 @@ void ShapeFitter::AddSilhouettes(const KeyframeView& view, const FrameDetections
     const Detection& detection = frame.detections[d];
     Landmark& landmark = *store->Find(frame.keys[d]);
     ++landmark.evidence.keyframe_observations;
+    if (!detection.CutByBorder()) ++landmark.evidence.whole_observations;
     landmark.keyframes.push_back(view.id);
     Silhouette silhouette = MakeSilhouette(view, masks, detection, d);
     if (landmark.shape.IsRedundant(silhouette)) continue;

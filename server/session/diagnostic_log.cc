@@ -30,11 +30,9 @@ void DiagnosticLog::Announce(const Diagnostic& diagnostic) {
   const auto [it, is_new] = announced_.try_emplace(diagnostic.code, diagnostic.severity);
   if (!is_new && it->second >= diagnostic.severity) return;
   it->second = diagnostic.severity;
-  spdlog::log(diagnostic.severity == Severity::kInfo      ? spdlog::level::info
-              : diagnostic.severity == Severity::kWarning ? spdlog::level::warn
-                                                          : spdlog::level::err,
-              "session {}: {}: {}{}{}", session_id_, diagnostic.code, diagnostic.text,
-              diagnostic.advice.empty() ? "" : "; ", diagnostic.advice);
+  // The same severity for all, because a program that maps in its own process shows them at the end.
+  spdlog::info("session {}: {}: {}{}{}", session_id_, diagnostic.code, diagnostic.text,
+               diagnostic.advice.empty() ? "" : "; ", diagnostic.advice);
   map_->Publish(diagnostic);
 }
 

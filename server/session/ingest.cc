@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "common/label_image.h"
 #include "common/status.h"
 #include "common/utf8.h"
 #include "server/session/encoded_image.h"
@@ -36,8 +37,8 @@ absl::Status CheckPose(const FrameInput& input) {
 absl::Status CheckInstances(const std::vector<Instance>& instances) {
   std::set<uint32_t> seen;
   for (const Instance& instance : instances) {
-    if (instance.label == 0 || instance.label > 65535) {
-      return InvalidArgument("masks: instance label must be in 1..65535, is {}", instance.label);
+    if (instance.label == 0 || instance.label >= kIgnoreLabel) {
+      return InvalidArgument("masks: instance label must be in 1..65534, is {}", instance.label);
     }
     if (!seen.insert(instance.label).second) {
       return InvalidArgument("masks: instance label {} is listed twice", instance.label);
@@ -53,10 +54,15 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
   return absl::OkStatus();
 }
 
+// Whether the masks are an image with at most 8 bits per pixel: byte 24 of a PNG file is its bit depth.
+bool HasEightBits(const EncodedMasks& masks) {
+  return masks.mask_encoding == MaskEncoding::kLabelPng && masks.label_png.size() > 24 && masks.label_png[24] <= 8;
+}
+
 // Adds an entry for every label of the mask that has none, so that later stages find one for each label.
 void AddUnlistedLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
   std::vector<bool> listed(65536, false);
-  listed[0] = true;
+  listed[0] = listed[kIgnoreLabel] = true;
   for (const Instance& instance : instances) listed[instance.label] = true;
   for (int y = 0; y < labels.rows; ++y) {
     const auto* row = labels.ptr<uint16_t>(y);
@@ -102,9 +108,11 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   ROMAP_ASSIGN_OR_RETURN(frame->image_bgr, DecodeColorImage(input, camera_));
   ROMAP_ASSIGN_OR_RETURN(frame->labels, DecodeLabels(input, camera_));
   ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
+  depth_sentinels_.Remove(frame->frame_id, input.depth_scale_mu, &frame->depth_mu);
   frame->has_masks = !frame->labels.empty();
   if (camera_.HasDistortion()) Undistort(*frame);
   if (frame->has_masks) AddUnlistedLabels(frame->labels, frame->instances);
+  mask_interpreter_.Interpret(HasEightBits(input), frame.get());
   AddAccepted(*frame);
   return std::shared_ptr<const Frame>(std::move(frame));
 }
@@ -130,8 +138,15 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_));
   if (camera_.HasDistortion()) UndistortNearest(masks.labels);
   AddUnlistedLabels(masks.labels, masks.instances);
+  mask_interpreter_.Interpret(HasEightBits(input), &masks);
   frame->has_masks = true;
   return masks;
+}
+
+std::vector<Diagnostic> Ingest::Diagnostics() const {
+  std::vector<Diagnostic> diagnostics = mask_interpreter_.Diagnostics();
+  if (depth_sentinels_.diagnostic()) diagnostics.push_back(*depth_sentinels_.diagnostic());
+  return diagnostics;
 }
 
 absl::StatusOr<Ingest::AcceptedFrame*> Ingest::FindFrameWithoutMasks(uint64_t frame_id) {

@@ -9,10 +9,13 @@
 #include "common/client_input.h"
 #include "common/lens.h"
 #include "common/stage_messages.h"
+#include "server/masks/mask_interpreter.h"
+#include "server/session/depth_sentinels.h"
 
 namespace romap::session {
 
-// The first stage: decodes, validates and undistorts the inputs of one session. Checks that frame ids and timestamps
+// The first stage: decodes, validates and undistorts the inputs of one session, and decides which masks show objects
+// (MaskInterpreter). Checks that frame ids and timestamps
 // increase, and keeps a list of the frames for which late masks are still accepted. Not thread-safe.
 class Ingest {
  public:
@@ -26,6 +29,9 @@ class Ingest {
   // The masks of an accepted frame that has none. INVALID_ARGUMENT: the masks are malformed, the frame is unknown or
   // too old, or it already has masks. Rejected masks have no effect.
   absl::StatusOr<FrameMasks> AcceptMasks(const MasksInput& input);
+
+  // How the accepted inputs were read, if that is not obvious.
+  std::vector<Diagnostic> Diagnostics() const;
 
  private:
   struct AcceptedFrame {
@@ -43,6 +49,8 @@ class Ingest {
   CameraModel camera_;     // of the client's images, with distortion
   UndistortionMaps maps_;  // empty for a pinhole
   double max_mask_delay_s_;
+  masks::MaskInterpreter mask_interpreter_;
+  DepthSentinels depth_sentinels_;
   bool any_expired_ = false;
   std::deque<AcceptedFrame> accepted_;  // by id and time: the newest and those that may still get masks
 };

@@ -41,6 +41,7 @@ CheckedInput Pipeline::Check(Arrival arrival) {
     // A decoder failed. Ingest changes its state only after everything is decoded, so only this input is lost.
     checked.content = Internal("cannot be decoded: {}", e.what());
   }
+  diagnostics_->SetConditions("ingest", ingest_.Diagnostics());
   return checked;
 }
 

@@ -18,6 +18,7 @@ Landmark GoodLandmark(LandmarkKey key, double x_mu = 0) {
   landmark.evidence.observations = static_cast<uint64_t>(config.confirm_frames);
   landmark.evidence.expected = landmark.evidence.observations;
   landmark.evidence.keyframe_observations = config.confirm_keyframes;
+  landmark.evidence.whole_observations = 1;
   landmark.evidence.class_evidence["cup"] = 5;
   landmark.geometry.cuboid = CubeAt(x_mu);
   landmark.geometry.training_box = landmark.geometry.cuboid;
@@ -77,6 +78,12 @@ TEST(DecideConfirmation, NeedsFramesAndKeyframes) {
   ++landmark.evidence.observations;
   --landmark.evidence.keyframe_observations;
   EXPECT_EQ(ReasonNotToConfirm(landmark), "too few keyframes");
+}
+
+TEST(DecideConfirmation, NeedsAViewThatShowsTheWholeObject) {
+  Landmark landmark = GoodLandmark(1);
+  landmark.evidence.whole_observations = 0;
+  EXPECT_EQ(ReasonNotToConfirm(landmark), "always cut off by the border of the image");
 }
 
 TEST(DecideConfirmation, NeedsMoreParallaxWithoutMapPoints) {

@@ -42,8 +42,10 @@ class PipelineFixture : public ::testing::Test {
   Mesher mesher_{config_.mesh, Mesher::Threading::kCaller};
   MapState map_;
   std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);
+  DiagnosticLog diagnostics_{"session", &map_};
   FrameLedger ledger_{"session", &map_};
-  Pipeline pipeline_{"session", Options(), config_, &pool_, &mesher_, &map_, &ledger_, /*recorder=*/nullptr};
+  Pipeline pipeline_{"session", Options(), config_, &pool_, &mesher_, &map_, &ledger_, &diagnostics_,
+                     /*recorder=*/nullptr};
 };
 
 }  // namespace romap::session

@@ -1,0 +1,200 @@
+#include "server/masks/mask_interpreter.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "common/label_image.h"
+#include "server/masks/mask_evidence.h"
+
+namespace romap::masks {
+namespace {
+
+constexpr uint16_t kVoidLabel = 255;         // "ignore" in the 8-bit masks of the public segmentation sets
+constexpr const char* kAnyClass = "object";  // of instances without a class
+
+constexpr int kMinFrames = 4;             // before a mask becomes background; fewer than a confirmation requires
+constexpr double kBackgroundShare = 0.6;  // of its frames in which a mask looks like background
+constexpr double kObjectShare = 0.3;      // below it, a mask is not background any more
+constexpr double kFollowIou = 0.4;        // of a mask in two frames
+
+constexpr size_t kMaxWaiting = 100;  // frames whose masks may follow late
+
+const Instance* FindInstance(const std::vector<Instance>& instances, uint16_t label) {
+  const auto found =
+      std::find_if(instances.begin(), instances.end(), [&](const Instance& i) { return i.label == label; });
+  return found == instances.end() ? nullptr : &*found;
+}
+
+void Replace(const std::map<uint16_t, uint16_t>& replacements, cv::Mat* labels) {
+  if (replacements.empty()) return;
+  std::vector<uint16_t> table(1 << 16);
+  for (size_t label = 0; label < table.size(); ++label) table[label] = static_cast<uint16_t>(label);
+  for (const auto& [from, to] : replacements) table[from] = to;
+  for (int v = 0; v < labels->rows; ++v) {
+    auto* row = labels->ptr<uint16_t>(v);
+    for (int u = 0; u < labels->cols; ++u) row[u] = table[row[u]];
+  }
+}
+
+// The box in pixels of the frame.
+cv::Rect FullBox(const MaskThumbnail& thumbnail, const cv::Rect& box, const cv::Size& size) {
+  const int stride = thumbnail.stride_px;
+  return cv::Rect(box.x * stride, box.y * stride, box.width * stride, box.height * stride) & cv::Rect({}, size);
+}
+
+}  // namespace
+
+void MaskInterpreter::Interpret(bool eight_bit, Frame* frame) {
+  const cv::Mat gray = MakeGray(frame->image_bgr);
+  if (!frame->has_masks) {
+    waiting_.emplace_back(frame->frame_id, gray);
+    if (waiting_.size() > kMaxWaiting) waiting_.pop_front();
+    return;
+  }
+  frame->non_objects = InterpretLabels(frame->frame_id, gray, eight_bit, &frame->labels, &frame->instances);
+}
+
+void MaskInterpreter::Interpret(bool eight_bit, FrameMasks* masks) {
+  const auto found =
+      std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& frame) { return frame.first == masks->frame_id; });
+  const cv::Mat gray = found == waiting_.end() ? cv::Mat() : found->second;
+  masks->non_objects = InterpretLabels(masks->frame_id, gray, eight_bit, &masks->labels, &masks->instances);
+}
+
+std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, const cv::Mat& gray, bool eight_bit,
+                                                            cv::Mat* labels, std::vector<Instance>* instances) {
+  if (eight_bit) IgnoreVoid(frame_id, labels, instances);
+  std::erase_if(*instances, [](const Instance& instance) { return instance.label == kIgnoreLabel; });
+  MaskThumbnail thumbnail = MakeThumbnail(*labels, gray);
+  std::vector<FollowedMask> masks = Follow(thumbnail, *instances);
+  for (FollowedMask& mask : masks) Decide(frame_id, thumbnail, &mask);
+  for (const uint16_t label : scene_motion_.FindCameraFixed(thumbnail)) {
+    const auto mask = std::find_if(masks.begin(), masks.end(), [&](const auto& m) { return m.label == label; });
+    if (mask != masks.end()) mask->role = Role::kCameraFixed;
+  }
+  std::vector<NonObjectMask> non_objects;
+  std::map<uint16_t, uint16_t> replacements;
+  for (const FollowedMask& mask : masks) {
+    if (mask.role == Role::kObject) continue;
+    const bool is_background = mask.role == Role::kBackground;
+    if (!is_background) {
+      Note(frame_id, "mask_moves_with_camera",
+           fmt::format("masks of class \"{}\" keep their place in the image while the scene moves: they are no object, "
+                       "and what they hide is not known",
+                       mask.class_name),
+           "");
+    }
+    replacements[mask.label] = is_background ? uint16_t{0} : kIgnoreLabel;
+    non_objects.push_back({.box_px = FullBox(thumbnail, thumbnail.Find(mask.label)->box, labels->size()),
+                           .class_name = mask.class_name,
+                           .reason = is_background ? "its masks show background" : "it moves with the camera"});
+  }
+  Replace(replacements, labels);
+  std::erase_if(*instances,
+                [&](const Instance& instance) { return replacements.contains(static_cast<uint16_t>(instance.label)); });
+  previous_ = std::move(thumbnail);
+  followed_ = std::move(masks);
+  return non_objects;
+}
+
+// Masks with the values 0 and 255 alone are masks of one object. Where other labels occur, 255 means "ignore".
+void MaskInterpreter::IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector<Instance>* instances) {
+  const Instance* instance = FindInstance(*instances, kVoidLabel);
+  if (instance != nullptr && instance->class_name != kAnyClass) return;  // the client says what it is
+  bool has_void = false;
+  bool has_others = false;
+  for (int v = 0; v < labels->rows; ++v) {
+    const auto* row = labels->ptr<uint16_t>(v);
+    for (int u = 0; u < labels->cols; ++u) {
+      has_void |= row[u] == kVoidLabel;
+      has_others |= row[u] != 0 && row[u] != kVoidLabel;
+    }
+  }
+  if (!has_void) return;
+  void_is_ignored_ |= has_others;
+  if (!void_is_ignored_) return;
+  Replace({{kVoidLabel, kIgnoreLabel}}, labels);
+  std::erase_if(*instances, [](const Instance& i) { return i.label == kVoidLabel; });
+  Note(frame_id, "mask_value_255_ignored",
+       "the value 255 of 8-bit masks is read as \"ignore\": it is neither an object nor background",
+       "if it is an object, list it among the instances with its class");
+}
+
+std::vector<MaskInterpreter::FollowedMask> MaskInterpreter::Follow(const MaskThumbnail& thumbnail,
+                                                                   const std::vector<Instance>& instances) {
+  std::vector<FollowedMask> masks;
+  std::set<uint16_t> taken;  // labels of `previous_`
+  for (const MaskRegion& region : thumbnail.regions) {
+    const Instance* instance = FindInstance(instances, region.label);
+    const std::string class_name = instance != nullptr ? instance->class_name : kAnyClass;
+    const FollowedMask* best = nullptr;
+    double best_iou = kFollowIou;
+    for (const FollowedMask& candidate : followed_) {
+      const MaskRegion* before = previous_.Find(candidate.label);
+      if (taken.contains(candidate.label) || candidate.class_name != class_name) continue;
+      if ((before->box & region.box).empty()) continue;
+      const double iou = MaskIou(previous_, candidate.label, thumbnail, region.label);
+      if (iou <= best_iou) continue;
+      best_iou = iou;
+      best = &candidate;
+    }
+    masks.push_back(best != nullptr ? *best : Begin(region.label, class_name));
+    if (best != nullptr) taken.insert(best->label);
+    masks.back().label = region.label;
+  }
+  return masks;
+}
+
+// A new mask of a class whose masks show background starts with that evidence.
+MaskInterpreter::FollowedMask MaskInterpreter::Begin(uint16_t label, const std::string& class_name) const {
+  FollowedMask mask{.label = label, .class_name = class_name};
+  const auto known = classes_.find(class_name);
+  if (known == classes_.end() || known->second.masks < kMinFrames) return mask;
+  mask.frames = kMinFrames;
+  mask.like_background = kMinFrames * known->second.like_background / known->second.masks;
+  return mask;
+}
+
+void MaskInterpreter::Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, FollowedMask* mask) {
+  const char* reason = LooksLikeBackground(thumbnail, *thumbnail.Find(mask->label), mask->class_name);
+  const int like_background = reason != nullptr ? 1 : 0;
+  ++mask->frames;
+  mask->like_background += like_background;
+  if (mask->class_name != kAnyClass) {
+    ClassEvidence& evidence = classes_[mask->class_name];
+    ++evidence.masks;
+    evidence.like_background += like_background;
+  }
+  if (mask->role == Role::kCameraFixed) return;
+  const double share = static_cast<double>(mask->like_background) / mask->frames;
+  if (mask->role == Role::kBackground && share < kObjectShare) mask->role = Role::kObject;
+  if (mask->role == Role::kObject && mask->frames >= kMinFrames && share >= kBackgroundShare) {
+    mask->role = Role::kBackground;
+    if (reason == nullptr) reason = "they have no outline of their own in most frames";
+    Note(frame_id, "mask_is_background",
+         fmt::format("masks of class \"{}\" are read as background, not as an object: {}", mask->class_name, reason),
+         "");
+  }
+}
+
+void MaskInterpreter::Note(uint64_t frame_id, const std::string& code, const std::string& text,
+                           const std::string& advice) {
+  const auto [it, is_new] = diagnostics_.try_emplace(
+      code, Diagnostic{.code = code, .severity = Severity::kInfo, .first_frame_id = frame_id, .text = text});
+  if (is_new) {
+    it->second.advice = advice;
+  } else {
+    ++it->second.count;
+  }
+}
+
+std::vector<Diagnostic> MaskInterpreter::Diagnostics() const {
+  std::vector<Diagnostic> diagnostics;
+  for (const auto& [code, diagnostic] : diagnostics_) diagnostics.push_back(diagnostic);
+  return diagnostics;
+}
+
+}  // namespace romap::masks
