@@ -71,7 +71,8 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
   MaskThumbnail thumbnail = MakeThumbnail(*labels, gray);
   std::vector<FollowedMask> masks = Follow(thumbnail, *instances);
   for (FollowedMask& mask : masks) Decide(frame_id, thumbnail, &mask);
-  for (const uint16_t label : scene_motion_.FindCameraFixed(thumbnail)) {
+  const SceneMotion::CameraFixed fixed = scene_motion_.Find(thumbnail);
+  for (const uint16_t label : fixed.labels) {
     const auto mask = std::find_if(masks.begin(), masks.end(), [&](const auto& m) { return m.label == label; });
     if (mask != masks.end()) mask->role = Role::kCameraFixed;
   }
@@ -95,6 +96,7 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
   Replace(replacements, labels);
   std::erase_if(*instances,
                 [&](const Instance& instance) { return replacements.contains(static_cast<uint16_t>(instance.label)); });
+  if (!fixed.region.empty()) IgnoreRegion(frame_id, thumbnail, fixed.region, labels);
   previous_ = std::move(thumbnail);
   followed_ = std::move(masks);
   return non_objects;
@@ -121,6 +123,27 @@ void MaskInterpreter::IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector
   Note(frame_id, "mask_value_255_ignored",
        "the value 255 of 8-bit masks is read as \"ignore\": it is neither an object nor background",
        "if it is an object, list it among the instances with its class");
+}
+
+// The part of the image without a mask is not background there: it hides what is behind it.
+void MaskInterpreter::IgnoreRegion(uint64_t frame_id, const MaskThumbnail& thumbnail, const cv::Mat& region,
+                                   cv::Mat* labels) {
+  int ignored = 0;
+  for (int v = 0; v < labels->rows; ++v) {
+    auto* row = labels->ptr<uint16_t>(v);
+    const auto* fixed = region.ptr<uint8_t>(v / thumbnail.stride_px);
+    for (int u = 0; u < labels->cols; ++u) {
+      if (row[u] != 0 || fixed[u / thumbnail.stride_px] == 0) continue;
+      row[u] = kIgnoreLabel;
+      ++ignored;
+    }
+  }
+  if (ignored == 0) return;
+  Note(frame_id, "image_part_moves_with_camera",
+       fmt::format("a part of the image ({:.0f} % in frame {}) keeps its place while the scene moves: what it hides is "
+                   "not known",
+                   100.0 * ignored / static_cast<double>(labels->total()), frame_id),
+       "");
 }
 
 std::vector<MaskInterpreter::FollowedMask> MaskInterpreter::Follow(const MaskThumbnail& thumbnail,

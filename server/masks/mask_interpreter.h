@@ -53,6 +53,7 @@ class MaskInterpreter {
   std::vector<NonObjectMask> InterpretLabels(uint64_t frame_id, const cv::Mat& gray, bool eight_bit, cv::Mat* labels,
                                              std::vector<Instance>* instances);
   void IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector<Instance>* instances);
+  void IgnoreRegion(uint64_t frame_id, const MaskThumbnail& thumbnail, const cv::Mat& region, cv::Mat* labels);
   std::vector<FollowedMask> Follow(const MaskThumbnail& thumbnail, const std::vector<Instance>& instances);
   FollowedMask Begin(uint16_t label, const std::string& class_name) const;
   void Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, FollowedMask* mask);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 namespace romap::masks {
@@ -13,6 +14,14 @@ constexpr double kSamePlaceIou = 0.8;      // of a mask in two frames
 constexpr double kMovedCorrelation = 0.8;  // of the gray values of two frames; below it the scene has moved
 constexpr double kMinContrast = 6;         // gray levels: standard deviation without which no motion can be seen
 constexpr double kMaxChangeShare = 0.6;    // of the mean change of gray values in the mask, relative to the scene's
+
+// Parts without a mask.
+constexpr float kMinTexture = 8;            // gray levels: standard deviation in a window of the thumbnail
+constexpr float kMaxChange = 0.5F;          // of that standard deviation
+constexpr double kStayingShare = 0.8;       // of the textured pixels around
+constexpr double kMinTexturedAround = 0.3;  // of the pixels around
+constexpr double kMinRegion = 0.005;        // of the image
+constexpr int kBorder = 2;                  // thumbnail pixels
 
 bool TouchesBorder(const MaskThumbnail& thumbnail, uint16_t label) {
   const MaskRegion* region = thumbnail.Find(label);
@@ -90,8 +99,49 @@ bool StayedSince(const MaskThumbnail& reference, const MaskThumbnail& thumbnail,
 
 }  // namespace
 
-std::vector<uint16_t> SceneMotion::FindCameraFixed(const MaskThumbnail& thumbnail) {
-  std::vector<uint16_t> fixed;
+// A textured pixel that does not change while the scene moves belongs to a part that moves with the camera. Pixels
+// without texture are filled in between.
+cv::Mat SceneMotion::FindRegion(const MaskThumbnail& thumbnail) const {
+  cv::Mat current, mean, mean_square;
+  thumbnail.gray.convertTo(current, CV_32F);
+  cv::blur(current, mean, {5, 5});
+  cv::blur(current.mul(current), mean_square, {5, 5});
+  const cv::Mat variance = mean_square - mean.mul(mean);
+  const cv::Mat textured = variance > kMinTexture * kMinTexture;
+  cv::Mat stays = textured.clone();
+  for (const MaskThumbnail& reference : references_) {
+    cv::Mat before;
+    reference.gray.convertTo(before, CV_32F);
+    const cv::Mat change = current - before;
+    stays &= change.mul(change) < kMaxChange * kMaxChange * variance;
+  }
+  // Where most of the textured pixels around stay.
+  cv::Mat textured_around, staying_around;
+  cv::blur(textured, textured_around, {9, 9});
+  cv::blur(stays, staying_around, {9, 9});
+  cv::Mat needed;
+  textured_around.convertTo(needed, CV_8U, kStayingShare);
+  cv::Mat region = (staying_around >= needed) & (textured_around > kMinTexturedAround * 255);
+  cv::morphologyEx(region, region, cv::MORPH_CLOSE, cv::Mat::ones(7, 7, CV_8U));
+  // Components that reach the border.
+  cv::Mat components, statistics, centers;
+  const int count = cv::connectedComponentsWithStats(region, components, statistics, centers);
+  cv::Mat kept = cv::Mat::zeros(region.size(), CV_8U);
+  for (int c = 1; c < count; ++c) {
+    const cv::Rect box(statistics.at<int>(c, cv::CC_STAT_LEFT), statistics.at<int>(c, cv::CC_STAT_TOP),
+                       statistics.at<int>(c, cv::CC_STAT_WIDTH), statistics.at<int>(c, cv::CC_STAT_HEIGHT));
+    const bool at_border = box.x <= kBorder || box.y <= kBorder || box.br().x >= region.cols - kBorder ||
+                           box.br().y >= region.rows - kBorder;
+    if (!at_border || statistics.at<int>(c, cv::CC_STAT_AREA) < kMinRegion * thumbnail.pixels()) continue;
+    kept.setTo(255, components == c);
+  }
+  if (cv::countNonZero(kept) == 0) return {};
+  cv::dilate(kept, kept, cv::Mat::ones(3, 3, CV_8U));
+  return kept;
+}
+
+SceneMotion::CameraFixed SceneMotion::Find(const MaskThumbnail& thumbnail) {
+  CameraFixed fixed;
   if (thumbnail.gray.empty()) return fixed;
   std::erase_if(references_,
                 [&](const MaskThumbnail& reference) { return reference.labels.size() != thumbnail.labels.size(); });
@@ -101,8 +151,9 @@ std::vector<uint16_t> SceneMotion::FindCameraFixed(const MaskThumbnail& thumbnai
                           std::all_of(references_.begin(), references_.end(), [&](const MaskThumbnail& reference) {
                             return StayedSince(reference, thumbnail, region.label);
                           });
-      if (stayed) fixed.push_back(region.label);
+      if (stayed) fixed.labels.push_back(region.label);
     }
+    fixed.region = FindRegion(thumbnail);
   }
   const std::optional<double> correlation =
       references_.empty() ? std::nullopt : ScenePairs(references_.back(), thumbnail).Correlation();

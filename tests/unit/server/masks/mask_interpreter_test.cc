@@ -153,6 +153,24 @@ TEST(MaskInterpreterTest, LateMasksOfWhatMovesWithTheCamera) {
   ASSERT_EQ(masks.non_objects.size(), 1u);
 }
 
+TEST(MaskInterpreterTest, AGripperWithoutAMaskIsNoBackground) {
+  const Scene scene;
+  MaskInterpreter interpreter;
+  Frame frame;
+  for (int index = 0; index < 40; ++index) {
+    frame = scene.MakeFrame(index);
+    const cv::Mat before = frame.labels.clone();
+    Scene::AddGripper(&frame);
+    frame.labels = before;
+    frame.instances.pop_back();
+    interpreter.Interpret(true, &frame);
+  }
+  EXPECT_EQ(frame.labels.at<uint16_t>(205, 150), kIgnoreLabel);
+  EXPECT_EQ(frame.labels.at<uint16_t>(20, 20), 0);
+  EXPECT_EQ(frame.labels.at<uint16_t>(200, 300), 0);
+  EXPECT_TRUE(HasDiagnostic(interpreter, "image_part_moves_with_camera"));
+}
+
 TEST(MaskInterpreterTest, AGripperOfACameraThatStandsStillIsNotJudged) {
   const Scene scene;
   MaskInterpreter interpreter;
