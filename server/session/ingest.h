@@ -8,6 +8,7 @@
 
 #include "common/client_input.h"
 #include "common/lens.h"
+#include "common/sample_range.h"
 #include "common/stage_messages.h"
 
 namespace romap::session {
@@ -43,6 +44,7 @@ class Ingest {
   CameraModel camera_;     // of the client's images, with distortion
   UndistortionMaps maps_;  // empty for a pinhole
   double max_mask_delay_s_;
+  SampleRange range_;  // of the accepted color images
   bool any_expired_ = false;
   std::deque<AcceptedFrame> accepted_;  // by id and time: the newest and those that may still get masks
 };
