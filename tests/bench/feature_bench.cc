@@ -48,7 +48,7 @@ std::optional<Frame> LoadFrame(const files::Sequence& sequence, size_t index) {
   Frame frame;
   frame.frame_id = input->frame_id;
   frame.camera = sequence.camera();
-  frame.image_bgr = Decode(input->image, cv::IMREAD_COLOR);
+  frame.image_bgr = Decode(input->image, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   Decode(input->depth, cv::IMREAD_UNCHANGED).convertTo(frame.depth_mu, CV_32F, input->depth_scale_mu);
   frame.has_masks = !input->label_png.empty();
   if (frame.has_masks) Decode(input->label_png, cv::IMREAD_UNCHANGED).convertTo(frame.labels, CV_16U);

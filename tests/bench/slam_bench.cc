@@ -36,7 +36,7 @@ std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraMo
   frame->frame_id = input.frame_id;
   frame->timestamp_ns = input.timestamp_ns;
   frame->camera = camera;
-  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
+  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   frame->has_masks = !input.label_png.empty();
   if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
   if (!input.depth.empty())
