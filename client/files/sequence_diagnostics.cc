@@ -33,9 +33,8 @@ Diagnostic UnmatchedInTime(const std::string& code, const std::string& entries, 
                            std::span<const int64_t> times_ns, std::span<const int64_t> frame_times_ns) {
   return {.code = code,
           .severity = Severity::kWarning,
-          .count = times_ns.size(),
-          .text = fmt::format("none of the {} of {} matches a frame in time: {} are from {}, frames from {}", entries,
-                              file, entries, TimeRange(times_ns), TimeRange(frame_times_ns)),
+          .text = fmt::format("none of the {} {} of {} matches a frame in time: {} are from {}, frames from {}",
+                              times_ns.size(), entries, file, entries, TimeRange(times_ns), TimeRange(frame_times_ns)),
           .advice = fmt::format("use the same clock in {} and rgb.txt{}", file,
                                 entries == "poses" ? "; the camera was tracked from the images instead" : "")};
 }

@@ -224,7 +224,8 @@ TEST_F(SequenceTest, ReportsListsOfAnotherTime) {
   EXPECT_EQ(poses.code, "poses_unmatched");
   EXPECT_EQ(poses.severity, Severity::kWarning);
   EXPECT_THAT(poses.text,
-              AllOf(HasSubstr("poses are from 100.000 s to 100.500 s"), HasSubstr("frames from 0.000 s to 0.300 s")));
+              AllOf(HasSubstr("none of the 2 poses of groundtruth.txt"),
+                    HasSubstr("poses are from 100.000 s to 100.500 s"), HasSubstr("frames from 0.000 s to 0.300 s")));
   EXPECT_THAT(poses.advice, HasSubstr("tracked from the images"));
 }
 
