@@ -35,7 +35,7 @@ struct Instance {
 // The instance label of every pixel of a frame, still encoded.
 struct EncodedMasks {
   MaskEncoding mask_encoding = MaskEncoding::kNone;
-  std::string label_png;             // kLabelPng: 8 or 16 bit, single channel, 0 = no instance, size of the image
+  std::string label_png;             // kLabelPng: gray or palette, 1 to 16 bits, 0 = no instance, size of the image
   std::vector<uint32_t> label_runs;  // kRunLength: (label, length) pairs in row-major order; lengths sum to
                                      // width * height
   std::vector<Instance> instances;   // labels of the mask that are not listed get class "object" and score 1

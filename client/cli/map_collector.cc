@@ -10,16 +10,23 @@ namespace {
 
 constexpr size_t kMaxFaults = 5;
 
+// The file that an error of the server is about: its message starts with the field of the frame.
+const std::string& FileOf(const std::string& error, const files::FramePaths& paths) {
+  return error.starts_with("masks:") ? paths.mask : error.starts_with("depth:") ? paths.depth : paths.image;
+}
+
 }  // namespace
 
 double MapCollector::Now_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
-void MapCollector::NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks) {
+void MapCollector::NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks, bool has_pose,
+                            files::FramePaths paths) {
   if (sent_.empty()) first_sent_s_ = Now_s();
-  sent_[frame_id] = {timestamp_ns, Now_s()};
+  sent_[frame_id] = {timestamp_ns, Now_s(), std::move(paths)};
   if (has_masks) ++sent_with_masks_;
+  if (has_pose) ++sent_with_pose_;
 }
 
 double MapCollector::SentAt_s(uint64_t frame_id) const {
@@ -33,7 +40,7 @@ void MapCollector::ApplyAck(const FrameAck& ack) {
   latencies_s_.push_back(ack.latency_s);
   if (!ack.accepted) {
     ++rejected_;
-    NoteFault(fmt::format("frame {}: {}", ack.frame_id, ack.error));
+    NoteFault("frame", ack.frame_id, ack.error);
     return;
   }
   if (ack.is_keyframe) ++keyframes_;
@@ -53,11 +60,14 @@ void MapCollector::ApplyMasksAck(const MasksAck& ack) {
   ++late_masks_.acknowledged;
   if (ack.accepted) return;
   ++late_masks_.rejected;
-  NoteFault(fmt::format("late masks of frame {}: {}", ack.frame_id, ack.error));
+  NoteFault("late masks of frame", ack.frame_id, ack.error);
 }
 
-void MapCollector::NoteFault(std::string fault) {
-  if (faults_.size() < kMaxFaults) faults_.push_back(std::move(fault));
+void MapCollector::NoteFault(const std::string& what, uint64_t frame_id, const std::string& error) {
+  if (faults_.size() >= kMaxFaults) return;
+  const auto sent = sent_.find(frame_id);
+  const std::string file = sent == sent_.end() ? "" : FileOf(error, sent->second.paths);
+  faults_.push_back(fmt::format("{} {}{}: {}", what, frame_id, file.empty() ? "" : fmt::format(" ({})", file), error));
 }
 
 void MapCollector::Apply(const MapEvent& event) {

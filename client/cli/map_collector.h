@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/files/sequence.h"
 #include "client/files/tum.h"
 #include "client/sdk/map_copy.h"
 #include "common/map_events.h"
@@ -22,8 +23,9 @@ class MapCollector {
     double first_mesh_s = -1;
   };
 
-  // Call before sending a frame, or the late masks of a frame.
-  void NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks);
+  // Call before sending a frame, or the late masks of a frame. `paths`: the files of the frame, for messages.
+  void NoteSent(uint64_t frame_id, int64_t timestamp_ns, bool has_masks, bool has_pose = false,
+                files::FramePaths paths = {});
   void NoteLateMasksSent() { ++late_masks_.sent; }
   void Apply(const MapEvent& event);
 
@@ -49,8 +51,9 @@ class MapCollector {
     size_t sent = 0, acknowledged = 0, rejected = 0;  // rejected masks also count as acknowledged
   };
   size_t sent_with_masks() const { return sent_with_masks_; }
+  size_t sent_with_pose() const { return sent_with_pose_; }
   const LateMasks& late_masks() const { return late_masks_; }
-  // Messages of the first few rejected frames and masks.
+  // Messages of the first few rejected frames and masks, with the file that each is about.
   const std::vector<std::string>& faults() const { return faults_; }
   // Peak memory of the server as reported by its statistics [bytes]; 0 = not reported.
   uint64_t server_peak_bytes() const { return server_peak_bytes_; }
@@ -63,11 +66,12 @@ class MapCollector {
   struct Sent {
     int64_t timestamp_ns = 0;
     double time_s = 0;
+    files::FramePaths paths = {};
   };
 
   void ApplyAck(const FrameAck& ack);
   void ApplyMasksAck(const MasksAck& ack);
-  void NoteFault(std::string fault);
+  void NoteFault(const std::string& what, uint64_t frame_id, const std::string& error);
 
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<uint64_t, Sent> sent_;
@@ -79,7 +83,7 @@ class MapCollector {
   std::optional<Statistics> statistics_;
   Tracking tracking_;
   LateMasks late_masks_;
-  size_t sent_with_masks_ = 0, acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
+  size_t sent_with_masks_ = 0, sent_with_pose_ = 0, acknowledged_ = 0, rejected_ = 0, keyframes_ = 0;
   uint64_t server_peak_bytes_ = 0;
   double last_ack_s_ = 0, first_sent_s_ = 0;
 };

@@ -12,6 +12,7 @@
 #include "client/cli/mapped_frames.h"
 #include "client/files/text_file.h"
 #include "client/pictures/pictures.h"
+#include "common/color_image.h"
 #include "common/lens.h"
 
 namespace romap::cli {
@@ -36,10 +37,11 @@ std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& came
 }
 
 absl::StatusOr<cv::Mat> LoadImage(const files::Sequence& sequence, size_t index) {
-  ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(index));
-  const cv::Mat buffer(1, static_cast<int>(frame.image.size()), CV_8UC1, const_cast<char*>(frame.image.data()));
-  cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR);
-  if (image.empty()) return InvalidArgument("frame {}: cannot decode the image", index);
+  std::vector<files::UnreadableFile> unreadable;  // the picture needs neither mask nor depth
+  ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.LoadReadable(index, &unreadable));
+  SampleRange range;
+  const cv::Mat image = DecodeColor(frame.image, &range);
+  if (image.empty()) return InvalidArgument("{}: the image is damaged", sequence.paths(index).image);
   if (!sequence.camera().HasDistortion()) return image;
   // The poses and cuboids of the map refer to undistorted images.
   const UndistortionMaps maps = MakeUndistortionMaps(sequence.camera());

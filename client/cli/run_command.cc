@@ -58,10 +58,12 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
 }
 
 // What the run used; `romap eval map` reads it from summary.json.
-eval::RunRecord RecordOf(const RunOptions& options, const files::Sequence& sequence, const MapCollector& collector) {
-  eval::RunRecord record{.first_frame = options.stream.first_frame, .frames_sent = collector.sent()};
-  record.poses = "none";  // also if the sequence has no poses to use
-  if (sequence.has_poses() && options.poses != PoseUse::kIgnore) {
+eval::RunRecord RecordOf(const RunOptions& options, const StreamResult& result, const MapCollector& collector) {
+  eval::RunRecord record{.first_frame = options.stream.first_frame,
+                         .frames_sent = collector.sent(),
+                         .skipped_frames = result.skipped_frames};
+  record.poses = "none";  // also if no frame has a pose
+  if (collector.sent_with_pose() > 0 && options.poses != PoseUse::kIgnore) {
     record.poses = options.poses == PoseUse::kGiven ? "given" : "prior";
   }
   return record;
@@ -105,7 +107,7 @@ absl::Status RunSequence(const RunOptions& options) {
   fmt::print("{}", FormatSummary(summary));
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
-  Evaluate(options, RecordOf(options, sequence, collector), sequence, json);
+  Evaluate(options, RecordOf(options, result, collector), sequence, json);
   ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
   if (options.stream.keep_session) fmt::print("session {} remains on the server\n", result.session_id);

@@ -13,6 +13,7 @@
 #include "client/cli/map_files.h"
 #include "client/cli/mask_schedule.h"
 #include "client/cli/progress.h"
+#include "client/cli/unreadable_files.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -35,6 +36,8 @@ class Sender {
         stream_(stream),
         collector_(collector),
         collector_mutex_(collector_mutex),
+        end_(std::min(sequence.size(), options.first_frame + std::min(options.frame_count, sequence.size()))),
+        unreadable_(sequence, options.first_frame, end_),
         thread_([this] {
           status_ = Run();
           done_ = true;
@@ -49,23 +52,34 @@ class Sender {
   bool done() const { return done_; }
   // Valid once done().
   const absl::Status& status() const { return status_; }
+  // Valid after Join().
+  const UnreadableFiles& unreadable() const { return unreadable_; }
 
  private:
   absl::Status Run() {
-    const size_t end =
-        std::min(sequence_.size(), options_.first_frame + std::min(options_.frame_count, sequence_.size()));
-    for (size_t i = options_.first_frame; i < end && !stop_ && !Interrupted(); ++i) {
-      ROMAP_ASSIGN_OR_RETURN(FrameInput frame, sequence_.Load(i));
-      ROMAP_RETURN_IF_ERROR(SendMasksDueBy(frame.timestamp_ns));
-      WaitFor(frame.timestamp_ns);
-      schedule_.Apply(frame);
+    for (size_t i = options_.first_frame; i < end_ && !stop_ && !Interrupted(); ++i) {
+      ROMAP_ASSIGN_OR_RETURN(std::optional<FrameInput> frame, Load(i));
+      if (!frame) continue;
+      ROMAP_RETURN_IF_ERROR(SendMasksDueBy(frame->timestamp_ns));
+      WaitFor(frame->timestamp_ns);
+      schedule_.Apply(*frame);
       {
         std::lock_guard lock(collector_mutex_);
-        collector_.NoteSent(frame.frame_id, frame.timestamp_ns, frame.mask_encoding != MaskEncoding::kNone);
+        collector_.NoteSent(frame->frame_id, frame->timestamp_ns, frame->mask_encoding != MaskEncoding::kNone,
+                            frame->T_world_camera.has_value(), sequence_.paths(i));
       }
-      ROMAP_RETURN_IF_ERROR(stream_.Send(std::move(frame)));
+      ROMAP_RETURN_IF_ERROR(stream_.Send(*std::move(frame)));
     }
     return SendMasksDueBy(std::numeric_limits<int64_t>::max());
+  }
+
+  // nullopt: the image cannot be read. An error: too many files cannot be read.
+  absl::StatusOr<std::optional<FrameInput>> Load(size_t index) {
+    std::vector<files::UnreadableFile> unreadable;
+    absl::StatusOr<FrameInput> frame = sequence_.LoadReadable(index, &unreadable);
+    if (!frame.ok()) unreadable.push_back({files::FileKind::kImage, frame.status()});
+    for (const files::UnreadableFile& file : unreadable) ROMAP_RETURN_IF_ERROR(unreadable_.Note(index + 1, file));
+    return frame.ok() ? std::optional(*std::move(frame)) : std::nullopt;
   }
 
   absl::Status SendMasksDueBy(int64_t timestamp_ns) {
@@ -92,6 +106,8 @@ class Sender {
   MapStream& stream_;
   MapCollector& collector_;
   std::mutex& collector_mutex_;
+  const size_t end_;  // of the frames to send
+  UnreadableFiles unreadable_;
   MaskSchedule schedule_{options_.mask_rate_hz, options_.mask_delay_s};
   const Clock::time_point start_ = Clock::now();
   std::atomic<bool> stop_ = false;
@@ -129,6 +145,14 @@ class Run {
  private:
   absl::Status SendFrames() {
     Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
+    const absl::Status status = AwaitAcknowledgements(sender);
+    sender.Join();
+    result_.diagnostics = sender.unreadable().Diagnostics();
+    result_.skipped_frames = sender.unreadable().skipped_frames();
+    return status;
+  }
+
+  absl::Status AwaitAcknowledgements(Sender& sender) {
     std::optional<Clock::time_point> deadline;
     while (!(sender.done() && AllAcknowledged())) {
       ReceiveEvent();

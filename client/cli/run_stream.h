@@ -8,6 +8,7 @@
 #include "client/cli/map_collector.h"
 #include "client/files/sequence.h"
 #include "client/files/tum.h"
+#include "common/diagnostic.h"
 #include "common/mapping_service.h"
 
 namespace romap::cli {
@@ -32,13 +33,16 @@ struct StreamResult {
   std::optional<std::vector<files::StampedPose>> trajectory;
   bool interrupted = false;
   bool training_complete = false;
-  double mapping_s = 0;   // from the first sent frame to the last acknowledgement
-  double training_s = 0;  // from then to the end of training
+  double mapping_s = 0;                  // from the first sent frame to the last acknowledgement
+  double training_s = 0;                 // from then to the end of training
+  std::vector<Diagnostic> diagnostics;   // about files that could not be read
+  std::vector<uint64_t> skipped_frames;  // ids of the frames whose image could not be read
 };
 
 // Streams a sequence to a mapping service and collects the map: creates a session, sends every frame, waits for all
 // acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early.
-// Shows a progress bar. Returns an error if no session could be opened. Later errors are in StreamResult::status; the
+// Shows a progress bar. Skips images, masks and depth images that cannot be read; too many of them end sending with an
+// error. Returns an error if no session could be opened. Later errors are in StreamResult::status; the
 // session then stays on the server.
 absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);

@@ -33,6 +33,8 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   summary.frames_rejected = collector.rejected();
   summary.tracking = collector.tracking();
   summary.frames_with_masks = collector.sent_with_masks();
+  summary.frames_with_pose = collector.sent_with_pose();
+  summary.skipped_frames = stream.skipped_frames;
   summary.late_masks = collector.late_masks();
   summary.frames_accepted = collector.acknowledged() - collector.rejected();
   summary.keyframes = collector.keyframes();
@@ -44,10 +46,13 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   summary.training_complete = stream.training_complete;
   summary.client_peak_bytes = PeakBytes();
   summary.server_peak_bytes = collector.server_peak_bytes();
+  summary.diagnostics = sequence.diagnostics();
+  summary.diagnostics.insert(summary.diagnostics.end(), stream.diagnostics.begin(), stream.diagnostics.end());
   if (collector.statistics()) {
     summary.frames_dropped = collector.statistics()->frames_dropped;
     summary.map_points = collector.statistics()->map_points;
-    summary.diagnostics = collector.statistics()->diagnostics;
+    const std::vector<Diagnostic>& server = collector.statistics()->diagnostics;
+    summary.diagnostics.insert(summary.diagnostics.end(), server.begin(), server.end());
   }
   summary.faults = collector.faults();
 
@@ -106,6 +111,8 @@ nlohmann::json ToJson(const RunSummary& summary) {
             {"accepted", summary.frames_accepted},
             {"rejected", summary.frames_rejected},
             {"dropped", summary.frames_dropped},
+            {"with_pose", summary.frames_with_pose},
+            {"skipped", summary.skipped_frames},
             {"keyframes", summary.keyframes}}},
           {"masks",
            {{"sent_with_frames", summary.frames_with_masks},
@@ -140,6 +147,7 @@ std::string FormatSummary(const RunSummary& summary) {
       summary.interrupted         ? " (interrupted: partial map)"
       : summary.training_complete ? ""
                                   : " (not finished)");
+  text += fmt::format("poses: {} of {} frames have one\n", summary.frames_with_pose, summary.frames_sent);
   const MapCollector::Tracking& tracking = summary.tracking;
   if (tracking.initializing + tracking.lost > 0) {
     text += fmt::format("camera: {} frames to initialize, {} tracked, {} lost, {} relocalizations",

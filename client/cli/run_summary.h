@@ -33,14 +33,16 @@ struct RunSummary {
   size_t frames_sent = 0, frames_accepted = 0, frames_rejected = 0, keyframes = 0;
   uint64_t frames_dropped = 0, map_points = 0;
   MapCollector::Tracking tracking;
-  size_t frames_with_masks = 0;  // sent together with their masks
+  size_t frames_with_masks = 0;          // sent together with their masks
+  size_t frames_with_pose = 0;           // sent with a pose of the sequence
+  std::vector<uint64_t> skipped_frames;  // ids of the frames that were not sent because their image is unreadable
   MapCollector::LateMasks late_masks;
   double mapping_s = 0, training_s = 0, frames_per_s = 0;
   double median_latency_ms = 0;
   bool interrupted = false, training_complete = false;
   uint64_t server_peak_bytes = 0, client_peak_bytes = 0;
   std::vector<Object> objects;
-  std::vector<Diagnostic> diagnostics;  // at the end of the session
+  std::vector<Diagnostic> diagnostics;  // of the client, then of the server at the end of the session
   std::vector<std::string> faults;
 };
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/mapped_frames.h"
+#include "common/label_png.h"
 
 namespace romap::cli {
 namespace {
@@ -24,11 +24,9 @@ std::map<int, Region> MaskRegions(const files::Sequence& sequence, size_t index)
   if (!sequence.has_mask(index)) return regions;
   const auto frame = sequence.Load(index);
   if (!frame.ok() || frame->label_png.empty()) return regions;
-  const cv::Mat buffer(1, static_cast<int>(frame->label_png.size()), CV_8UC1,
-                       const_cast<char*>(frame->label_png.data()));
-  cv::Mat labels = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  if (labels.empty() || labels.channels() != 1) return regions;
-  labels.convertTo(labels, CV_16U);
+  const absl::StatusOr<cv::Mat> decoded = DecodeLabelPng(frame->label_png);
+  if (!decoded.ok()) return regions;
+  const cv::Mat& labels = *decoded;
   for (int y = 0; y < labels.rows; ++y) {
     for (int x = 0; x < labels.cols; ++x) {
       const int label = labels.at<uint16_t>(y, x);

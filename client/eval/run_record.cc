@@ -25,16 +25,22 @@ RunRecord ReadRunRecord(const std::string& out_dir) {
   if (const auto frames = json.find("frames"); frames != json.end() && frames->is_object()) {
     record.first_frame = Count(*frames, "first");
     record.frames_sent = Count(*frames, "sent");
+    if (const auto skipped = frames->find("skipped"); skipped != frames->end() && skipped->is_array()) {
+      for (const nlohmann::json& id : *skipped) {
+        if (id.is_number_unsigned()) record.skipped_frames.push_back(id.get<uint64_t>());
+      }
+    }
   }
   return record;
 }
 
 std::vector<int64_t> FramesOf(const RunRecord& record, const files::Sequence& sequence) {
-  const size_t sent = record.frames_sent.value_or(0);
-  if (!record.first_frame && sent != sequence.size()) return {};
+  const size_t tried = record.frames_sent.value_or(0) + record.skipped_frames.size();
+  if (!record.first_frame && tried != sequence.size()) return {};
   const size_t first = std::min(record.first_frame.value_or(0), sequence.size());
   std::vector<int64_t> frames_ns;
-  for (size_t k = first; k < std::min(first + sent, sequence.size()); ++k) {
+  for (size_t k = first; k < std::min(first + tried, sequence.size()); ++k) {
+    if (std::ranges::count(record.skipped_frames, k + 1) > 0) continue;
     frames_ns.push_back(sequence.timestamp_ns(k));
   }
   return frames_ns;

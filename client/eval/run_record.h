@@ -15,6 +15,8 @@ struct RunRecord {
   std::optional<std::string> poses = std::nullopt;  // use of the camera poses: "given", "prior" or "none"
   std::optional<size_t> first_frame = std::nullopt;
   std::optional<size_t> frames_sent = std::nullopt;
+  std::vector<uint64_t> skipped_frames =
+      {};  // ids of the frames between them that were not sent; the first frame has 1
 };
 
 // Reads summary.json of the output folder of a run. Missing values and an unreadable file yield nullopt.

@@ -4,7 +4,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "client/files/sequence.h"
+#include "common/label_png.h"
 #include "common/parallel_for.h"
+#include "common/status.h"
 
 namespace romap::eval {
 namespace {
@@ -40,9 +42,15 @@ absl::StatusOr<SeenFrames> SeenFrames::Load(const std::string& sequence_dir, int
   int masks = 0;
   for (size_t k = 0; k < sequence.size(); ++k) {
     if (!sequence.has_mask(k) || masks++ % every != 0) continue;
-    ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.Load(k));
+    // Evaluation needs masks and depth of some frames only, so unreadable files are skipped.
+    std::vector<files::UnreadableFile> unreadable;
+    const absl::StatusOr<FrameInput> loaded = sequence.LoadReadable(k, &unreadable);
+    if (!loaded.ok() || !unreadable.empty()) continue;
+    const FrameInput& frame = *loaded;
     if (!frame.T_world_camera || frame.depth.empty()) continue;
-    View view{frame.T_world_camera->Inverse(), DecodePng(frame.label_png), DecodePng(frame.depth)};
+    absl::StatusOr<cv::Mat> labels = DecodeLabelPng(frame.label_png);
+    if (!labels.ok()) return InvalidArgument("{}: {}", sequence.paths(k).mask, Message(labels.status()));
+    View view{frame.T_world_camera->Inverse(), *std::move(labels), DecodePng(frame.depth)};
     const cv::Size size(frames.camera_.width_px, frames.camera_.height_px);
     if (view.labels.size() != size || view.depth.size() != size) {
       return InvalidArgument("{}: mask or depth at {:.6f} s is not a single-channel PNG of {} x {} pixels",

@@ -28,4 +28,13 @@ std::vector<std::pair<size_t, size_t>> AssociateTimestamps(std::span<const int64
   return pairs;
 }
 
+int64_t MedianStep_ns(std::span<const int64_t> times_ns) {
+  std::vector<int64_t> steps_ns;
+  for (size_t k = 1; k < times_ns.size(); ++k) steps_ns.push_back(times_ns[k] - times_ns[k - 1]);
+  if (steps_ns.empty()) return 0;
+  const auto middle = steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
+  std::nth_element(steps_ns.begin(), middle, steps_ns.end());
+  return *middle;
+}
+
 }  // namespace romap::files

@@ -14,4 +14,7 @@ namespace romap::files {
 std::vector<std::pair<size_t, size_t>> AssociateTimestamps(std::span<const int64_t> a, std::span<const int64_t> b,
                                                            int64_t max_dt_ns);
 
+// The median step of a sorted list of timestamps; 0 if it has less than two.
+int64_t MedianStep_ns(std::span<const int64_t> times_ns);
+
 }  // namespace romap::files

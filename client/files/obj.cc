@@ -13,7 +13,7 @@ namespace {
 
 // tinyobjloader reads missing and malformed coordinates as 0, so they are checked before.
 absl::Status CheckVertexLines(const std::string& path) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ' '));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path));
   for (const TableLine& line : lines) {
     if (line.fields[0] != "v") continue;
     bool valid = line.fields.size() >= 4;

@@ -26,7 +26,7 @@ absl::Status WriteUncertainties(const std::string& path, std::span<const Stamped
 }
 
 absl::Status ReadUncertainties(const std::string& path, std::vector<StampedPose>* poses) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ' '));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path));
   std::map<int64_t, PoseUncertainty> uncertainties;
   for (const TableLine& line : lines) {
     if (line.fields.size() != 3) {

@@ -5,25 +5,14 @@
 #include <filesystem>
 
 #include "client/files/associate.h"
+#include "client/files/image_file.h"
 #include "client/files/permute_labels.h"
-#include "client/files/text_file.h"
-#include "common/utf8.h"
+#include "client/files/sequence_diagnostics.h"
 
 namespace romap::files {
 namespace {
 
 constexpr int64_t kMaxPoseDistance_ns = 20'000'000;
-
-struct ListedFile {
-  int64_t timestamp_ns = 0;
-  std::string path;
-};
-
-// All detections with the same timestamp.
-struct DetectionSet {
-  int64_t timestamp_ns = 0;
-  std::vector<Instance> instances;
-};
 
 template <class T>
 std::vector<int64_t> TimestampsOf(const std::vector<T>& items) {
@@ -32,83 +21,20 @@ std::vector<int64_t> TimestampsOf(const std::vector<T>& items) {
   return timestamps_ns;
 }
 
-// Reads lines of `timestamp filename`. The filename is relative to `dir`; timestamps must strictly increase.
-absl::StatusOr<std::vector<ListedFile>> ReadFileList(const std::string& dir, const std::string& name) {
-  const std::string path = dir + "/" + name;
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ' '));
-  std::vector<ListedFile> files;
-  for (const TableLine& line : lines) {
-    const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
-    if (!timestamp_ns || line.fields.size() != 2) {
-      return InvalidArgument("{}:{}: expected 'timestamp filename' (timestamp in seconds)", path, line.number);
-    }
-    if (!files.empty() && *timestamp_ns <= files.back().timestamp_ns) {
-      return InvalidArgument("{}:{}: timestamps must increase; got {} after {}", path, line.number, line.fields[0],
-                             FormatSeconds(files.back().timestamp_ns));
-    }
-    const std::string file = dir + "/" + line.fields[1];
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) {
-      return NotFound("{}:{}: {} does not exist", path, line.number, file);
-    }
-    files.push_back({*timestamp_ns, file});
-  }
-  return files;
-}
-
-absl::StatusOr<Instance> ParseDetection(const TableLine& line, const std::string& path) {
-  const std::vector<std::string>& fields = line.fields;
-  if (fields.size() != 3 && fields.size() != 4) {
-    return InvalidArgument("{}:{}: {} fields; expected timestamp,label,class[,score]", path, line.number,
-                           fields.size());
-  }
-  const std::optional<double> label = ParseNumber(fields[1]);
-  if (!label || *label < 1 || *label > 65535 || *label != std::floor(*label)) {
-    return InvalidArgument("{}:{}: label '{}' must be an integer from 1 to 65535", path, line.number, fields[1]);
-  }
-  if (!IsUtf8(fields[2])) return InvalidArgument("{}:{}: class name is not valid UTF-8", path, line.number);
-  const std::optional<double> score = fields.size() == 4 ? ParseNumber(fields[3]) : std::optional(1.0);
-  if (!score || *score < 0 || *score > 1) {
-    return InvalidArgument("{}:{}: score '{}' must be a number from 0 to 1", path, line.number, fields[3]);
-  }
-  return Instance{.label = static_cast<uint32_t>(*label), .class_name = fields[2], .score = *score, .track_id = {}};
-}
-
-absl::StatusOr<std::vector<DetectionSet>> ReadDetections(const std::string& path) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ','));
-  std::vector<DetectionSet> sets;
-  for (const TableLine& line : lines) {
-    if (&line == &lines.front() && line.fields[0] == "timestamp") continue;  // header
-    const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
-    if (!timestamp_ns) return InvalidArgument("{}:{}: '{}' is not a timestamp", path, line.number, line.fields[0]);
-    ROMAP_ASSIGN_OR_RETURN(Instance instance, ParseDetection(line, path));
-    if (!sets.empty() && *timestamp_ns < sets.back().timestamp_ns) {
-      return InvalidArgument("{}:{}: timestamps must not decrease; got {} after {}", path, line.number, line.fields[0],
-                             FormatSeconds(sets.back().timestamp_ns));
-    }
-    if (sets.empty() || sets.back().timestamp_ns != *timestamp_ns) sets.push_back({*timestamp_ns, {}});
-    sets.back().instances.push_back(std::move(instance));
-  }
-  return sets;
-}
-
 // Whether to read a file. A file with its default name is optional.
 bool IsRequested(const std::string& dir, const std::string& name, const std::string& default_name) {
   std::error_code error;
   return !name.empty() && (name != default_name || std::filesystem::exists(dir + "/" + name, error));
 }
 
-absl::StatusOr<ImageEncoding> EncodingOf(const std::string& bytes, const std::string& path) {
-  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return ImageEncoding::kPng;
-  if (bytes.starts_with("\xff\xd8\xff")) return ImageEncoding::kJpeg;
-  return InvalidArgument("{}: neither a PNG nor a JPEG file", path);
-}
-
-absl::StatusOr<std::string> ReadPng(const std::string& path) {
-  ROMAP_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
-  ROMAP_ASSIGN_OR_RETURN(const ImageEncoding encoding, EncodingOf(bytes, path));
-  if (encoding != ImageEncoding::kPng) return InvalidArgument("{}: expected a PNG file (JPEG is lossy)", path);
-  return bytes;
+absl::StatusOr<std::string> ReadMask(const std::string& path, std::optional<uint64_t> permutation_seed,
+                                     std::vector<Instance>* instances) {
+  ROMAP_ASSIGN_OR_RETURN(std::string label_png, ReadPngFile(path));
+  if (!permutation_seed) return label_png;
+  if (absl::Status status = PermuteLabels(*permutation_seed, &label_png, instances); !status.ok()) {
+    return InvalidArgument("{}: {}", path, Message(status));
+  }
+  return label_png;
 }
 
 }  // namespace
@@ -125,9 +51,7 @@ absl::StatusOr<Sequence> Sequence::Open(const std::string& dir, const SequenceOp
   sequence.permute_labels_seed_ = options.permute_labels_seed;
   ROMAP_ASSIGN_OR_RETURN(sequence.camera_, ReadCameraYaml(sequence.Path("camera.yaml")));
   if (options.readout_s) sequence.camera_.camera.readout_s = *options.readout_s;
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<ListedFile> images, ReadFileList(dir, "rgb.txt"));
-  if (images.empty()) return InvalidArgument("{}/rgb.txt: no frames listed", dir);
-  for (const ListedFile& image : images) sequence.frames_.push_back({image.timestamp_ns, image.path, {}, {}, {}});
+  ROMAP_RETURN_IF_ERROR(sequence.OpenImages());
   if (std::filesystem::exists(sequence.Path("objects.yaml"), error)) {
     ROMAP_ASSIGN_OR_RETURN(sequence.objects_, ReadObjects(sequence.Path("objects.yaml")));
   }
@@ -135,20 +59,49 @@ absl::StatusOr<Sequence> Sequence::Open(const std::string& dir, const SequenceOp
   ROMAP_RETURN_IF_ERROR(sequence.OpenDetections(options));
   ROMAP_RETURN_IF_ERROR(sequence.OpenPoses(options));
   ROMAP_RETURN_IF_ERROR(sequence.OpenDepth(options));
+  if (!sequence.converted_.empty()) {
+    sequence.diagnostics_.insert(sequence.diagnostics_.begin(), TimestampsConverted(sequence.converted_));
+  }
   return sequence;
+}
+
+void Sequence::NoteUnit(const std::string& file, TimeUnit unit) {
+  if (unit != TimeUnit::kSeconds) converted_.emplace_back(file, unit);
+}
+
+absl::Status Sequence::OpenImages() {
+  ROMAP_ASSIGN_OR_RETURN(const FileList list, ReadFileList(dir_, "rgb.txt"));
+  if (list.files.empty()) return InvalidArgument("{}: no frames listed", Path("rgb.txt"));
+  NoteUnit("rgb.txt", list.unit);
+  for (const ListedFile& image : list.files) {
+    frames_.push_back({.timestamp_ns = image.timestamp_ns, .paths = {.image = image.path, .mask = {}, .depth = {}}});
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Sequence::OpenMasks(const SequenceOptions& options) {
   if (!IsRequested(dir_, options.masks, SequenceOptions{}.masks)) return absl::OkStatus();
-  return AttachFiles(options.masks, &FrameFiles::mask_path);
+  ROMAP_ASSIGN_OR_RETURN(const FileList list, ReadFileList(dir_, options.masks));
+  NoteUnit(options.masks, list.unit);
+  const std::vector<int64_t> times_ns = TimestampsOf(list.files);
+  const auto pairs = AssociateTimestamps(Timestamps(), times_ns, HalfFrame_ns());
+  for (const auto& [frame, mask] : pairs) {
+    frames_[frame].paths.mask = list.files[mask].path;
+    frames_[frame].mask_timestamp_ns = list.files[mask].timestamp_ns;
+  }
+  if (pairs.empty() && !times_ns.empty()) {
+    diagnostics_.push_back(UnmatchedInTime("masks_unmatched", "masks", options.masks, times_ns, Timestamps()));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
   if (IsRequested(dir_, options.detections, SequenceOptions{}.detections)) {
-    ROMAP_ASSIGN_OR_RETURN(std::vector<DetectionSet> sets, ReadDetections(Path(options.detections)));
-    for (const auto& [frame, set] : AssociateTimestamps(Timestamps(), TimestampsOf(sets), HalfFrame_ns())) {
-      frames_[frame].instances = std::move(sets[set].instances);
-    }
+    ROMAP_ASSIGN_OR_RETURN(const DetectionFile detections, ReadDetections(Path(options.detections)));
+    NoteUnit(options.detections, detections.unit);
+    if (detections.scores_in_percent) diagnostics_.push_back(ScoresInPercent(options.detections));
+    if (detections.timestamps_repeat) diagnostics_.push_back(DetectionsRepeat(options.detections, detections));
+    AttachDetections(options.detections, detections);
   } else if (objects_) {
     std::vector<Instance> instances;
     for (const ObjectRecord& object : objects_->objects) {
@@ -161,9 +114,49 @@ absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
   return absl::OkStatus();
 }
 
+void Sequence::AttachDetections(const std::string& name, const DetectionFile& detections) {
+  std::vector<FrameFiles*> frames_with_mask;
+  std::vector<int64_t> mask_times_ns;
+  for (FrameFiles& frame : frames_) {
+    if (frame.paths.mask.empty()) continue;
+    frames_with_mask.push_back(&frame);
+    mask_times_ns.push_back(frame.mask_timestamp_ns);
+  }
+  // The nearest mask is the right one, also if the frames are a part of a recording at the rate of camera.yaml.
+  const int64_t max_dt_ns = std::max(HalfFrame_ns(), MedianStep_ns(Timestamps()) / 2);
+  const std::vector<int64_t> match = MatchDetections(detections, mask_times_ns, max_dt_ns);
+  std::vector<bool> matched(detections.sets.size());
+  for (size_t k = 0; k < match.size(); ++k) {
+    if (match[k] < 0) continue;
+    const auto set = static_cast<size_t>(match[k]);
+    matched[set] = true;
+    frames_with_mask[k]->instances = detections.sets[set].instances;
+  }
+  if (std::ranges::count(matched, false) > 0) {
+    diagnostics_.push_back(DetectionsUnmatched(name, detections, matched));
+  }
+}
+
 absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
   if (!IsRequested(dir_, options.poses, SequenceOptions{}.poses)) return absl::OkStatus();
-  ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses)));
+  TimeUnit unit = TimeUnit::kSeconds;
+  ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses), &unit));
+  NoteUnit(options.poses, unit);
+  size_t posed = 0;
+  std::optional<uint64_t> first_without;
+  for (size_t k = 0; k < frames_.size(); ++k) {
+    if (PoseAt(poses_, frames_[k].timestamp_ns, kMaxPoseDistance_ns)) {
+      ++posed;
+    } else if (!first_without) {
+      first_without = k + 1;
+    }
+  }
+  if (posed == 0) {
+    diagnostics_.push_back(
+        UnmatchedInTime("poses_unmatched", "poses", options.poses, TimestampsOf(poses_), Timestamps()));
+  } else if (first_without) {
+    diagnostics_.push_back(PosesPartial(options.poses, posed, frames_.size(), *first_without));
+  }
   return absl::OkStatus();
 }
 
@@ -172,13 +165,13 @@ absl::Status Sequence::OpenDepth(const SequenceOptions& options) {
   if (camera_.depth_scale <= 0) {
     return InvalidArgument("{}: depth images require 'depth_scale'", Path("camera.yaml"));
   }
-  return AttachFiles("depth.txt", &FrameFiles::depth_path);
-}
-
-absl::Status Sequence::AttachFiles(const std::string& list, std::string FrameFiles::*target) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<ListedFile> files, ReadFileList(dir_, list));
-  for (const auto& [frame, file] : AssociateTimestamps(Timestamps(), TimestampsOf(files), HalfFrame_ns())) {
-    frames_[frame].*target = files[file].path;
+  ROMAP_ASSIGN_OR_RETURN(const FileList list, ReadFileList(dir_, "depth.txt"));
+  NoteUnit("depth.txt", list.unit);
+  const std::vector<int64_t> times_ns = TimestampsOf(list.files);
+  const auto pairs = AssociateTimestamps(Timestamps(), times_ns, HalfFrame_ns());
+  for (const auto& [frame, depth] : pairs) frames_[frame].paths.depth = list.files[depth].path;
+  if (pairs.empty() && !times_ns.empty()) {
+    diagnostics_.push_back(UnmatchedInTime("depth_unmatched", "depth images", "depth.txt", times_ns, Timestamps()));
   }
   return absl::OkStatus();
 }
@@ -188,6 +181,13 @@ std::vector<int64_t> Sequence::Timestamps() const { return TimestampsOf(frames_)
 int64_t Sequence::HalfFrame_ns() const { return std::llround(0.5e9 / camera_.fps); }
 
 absl::StatusOr<FrameInput> Sequence::Load(size_t index) const {
+  std::vector<UnreadableFile> unreadable;
+  ROMAP_ASSIGN_OR_RETURN(FrameInput frame, LoadReadable(index, &unreadable));
+  if (!unreadable.empty()) return unreadable.front().reason;
+  return frame;
+}
+
+absl::StatusOr<FrameInput> Sequence::LoadReadable(size_t index, std::vector<UnreadableFile>* unreadable) const {
   if (index >= frames_.size())
     return InvalidArgument("{}: frame index {} is out of range; the sequence has {} frames", dir_, index,
                            frames_.size());
@@ -195,24 +195,32 @@ absl::StatusOr<FrameInput> Sequence::Load(size_t index) const {
   FrameInput frame;
   frame.frame_id = index + 1;
   frame.timestamp_ns = files.timestamp_ns;
-  ROMAP_ASSIGN_OR_RETURN(frame.image, ReadFile(files.image_path));
-  ROMAP_ASSIGN_OR_RETURN(frame.image_encoding, EncodingOf(frame.image, files.image_path));
-  if (!files.mask_path.empty()) {
-    ROMAP_ASSIGN_OR_RETURN(frame.label_png, ReadPng(files.mask_path));
-    frame.mask_encoding = MaskEncoding::kLabelPng;
-    frame.instances = files.instances;
-    if (permute_labels_seed_) {
-      // Any odd multiplier gives different seeds; this one is 2^64 divided by the golden ratio.
-      const uint64_t seed = *permute_labels_seed_ + 0x9e3779b97f4a7c15 * (index + 1);
-      if (absl::Status status = PermuteLabels(seed, &frame.label_png, &frame.instances); !status.ok()) {
-        return InvalidArgument("{}: {}", files.mask_path, Message(status));
-      }
+  ROMAP_ASSIGN_OR_RETURN(ImageFile image, ReadImageFile(files.paths.image));
+  frame.image = std::move(image.bytes);
+  frame.image_encoding = image.encoding;
+  if (!files.paths.mask.empty()) {
+    // Any odd multiplier gives different seeds; this one is 2^64 divided by the golden ratio.
+    const auto seed =
+        permute_labels_seed_ ? std::optional(*permute_labels_seed_ + 0x9e3779b97f4a7c15 * (index + 1)) : std::nullopt;
+    std::vector<Instance> instances = files.instances;
+    absl::StatusOr<std::string> label_png = ReadMask(files.paths.mask, seed, &instances);
+    if (label_png.ok()) {
+      frame.label_png = *std::move(label_png);
+      frame.mask_encoding = MaskEncoding::kLabelPng;
+      frame.instances = std::move(instances);
+    } else {
+      unreadable->push_back({FileKind::kMask, label_png.status()});
     }
   }
-  if (!files.depth_path.empty()) {
-    ROMAP_ASSIGN_OR_RETURN(frame.depth, ReadPng(files.depth_path));
-    frame.depth_encoding = DepthEncoding::kPng16;
-    frame.depth_scale_mu = camera_.depth_scale;
+  if (!files.paths.depth.empty()) {
+    absl::StatusOr<std::string> depth = ReadPngFile(files.paths.depth);
+    if (depth.ok()) {
+      frame.depth = *std::move(depth);
+      frame.depth_encoding = DepthEncoding::kPng16;
+      frame.depth_scale_mu = camera_.depth_scale;
+    } else {
+      unreadable->push_back({FileKind::kDepth, depth.status()});
+    }
   }
   frame.T_world_camera = PoseAt(poses_, files.timestamp_ns, kMaxPoseDistance_ns);
   return frame;

@@ -1,5 +1,6 @@
 #include "client/files/text_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -21,15 +22,12 @@ std::string_view Trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-std::vector<std::string> Split(std::string_view text, char separator) {
+std::vector<std::string> SplitAtBlanks(std::string_view text) {
   std::vector<std::string> fields;
-  while (!text.empty()) {
-    const size_t end = separator == ' ' ? text.find_first_of(kBlanks) : text.find(separator);
-    fields.emplace_back(Trim(text.substr(0, end)));
-    if (end == std::string_view::npos) return fields;
-    text.remove_prefix(end + 1);
-    if (separator == ' ') text = Trim(text);
-    if (text.empty() && separator != ' ') fields.emplace_back();
+  for (text = Trim(text); !text.empty(); text = Trim(text)) {
+    const std::string_view field = text.substr(0, text.find_first_of(kBlanks));
+    fields.emplace_back(field);
+    text.remove_prefix(field.size());
   }
   return fields;
 }
@@ -68,18 +66,33 @@ absl::Status MakeFolder(const std::string& path) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<TableLine>> ReadTable(const std::string& path, char separator) {
-  ROMAP_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
-  std::vector<TableLine> lines;
+absl::StatusOr<std::string> ReadTextFile(const std::string& path) {
+  ROMAP_ASSIGN_OR_RETURN(std::string text, ReadFile(path));
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  return text;
+}
+
+absl::StatusOr<std::vector<TextLine>> ReadLines(const std::string& path) {
+  ROMAP_ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
+  std::vector<TextLine> lines;
   size_t begin = 0;
   for (int number = 1; begin < text.size(); ++number) {
     const size_t end = std::min(text.find('\n', begin), text.size());
-    std::string_view line = std::string_view(text).substr(begin, end - begin);
+    const std::string_view line = Trim(std::string_view(text).substr(begin, end - begin));
     begin = end + 1;
-    line = Trim(line.substr(0, line.find('#')));
-    if (!line.empty()) lines.push_back({number, Split(line, separator)});
+    if (!line.empty() && line.front() != '#') lines.push_back({number, std::string(line)});
   }
   return lines;
+}
+
+absl::StatusOr<std::vector<TableLine>> ReadTable(const std::string& path) {
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TextLine> lines, ReadLines(path));
+  std::vector<TableLine> table;
+  table.reserve(lines.size());
+  for (const TextLine& line : lines) {
+    table.push_back({line.number, SplitAtBlanks(std::string_view(line.text).substr(0, line.text.find('#')))});
+  }
+  return table;
 }
 
 std::optional<double> ParseNumber(std::string_view text) {
@@ -90,27 +103,32 @@ std::optional<double> ParseNumber(std::string_view text) {
   return value;
 }
 
-std::optional<int64_t> ParseSeconds(std::string_view text) {
-  const std::optional<double> approximate_s = ParseNumber(text);
-  if (!approximate_s || std::abs(*approximate_s) > 9e9) return std::nullopt;
-  if (text.find_first_of("eE") != std::string_view::npos) return std::llround(*approximate_s * 1e9);
-  const bool negative = text.starts_with('-');
-  int64_t value_ns = 0;
-  int decimals = -1;  // digits after the decimal point; -1 before it
-  bool round_up = false;
-  for (const char c : text) {
-    if (c == '.') decimals = 0;
-    if (c < '0' || c > '9') continue;
-    if (decimals == 9) {
-      round_up = c >= '5';
-      break;
-    }
-    value_ns = value_ns * 10 + (c - '0');
-    if (decimals >= 0) ++decimals;
+std::optional<int64_t> ParseSeconds(std::string_view text) { return ParseScaled(text, 9); }
+
+std::optional<int64_t> ParseScaled(std::string_view text, int power) {
+  const std::optional<double> approximate = ParseNumber(text);
+  if (!approximate || std::abs(*approximate) * std::pow(10, power) > 9e18) return std::nullopt;
+  int shift = power;  // decimal places by which the digits move to the left
+  if (const size_t exponent = text.find_first_of("eE"); exponent != std::string_view::npos) {
+    shift += static_cast<int>(std::clamp(*ParseNumber(text.substr(exponent + 1)), -1e4, 1e4));
+    text = text.substr(0, exponent);
   }
-  for (int k = std::max(decimals, 0); k < 9; ++k) value_ns *= 10;
-  value_ns += round_up ? 1 : 0;
-  return negative ? -value_ns : value_ns;
+  // The digits before the decimal point of the result, and the first one after it.
+  std::string digits;
+  size_t before_point = std::string::npos;
+  for (const char c : text) {
+    if (c == '.') before_point = digits.size();
+    if (c >= '0' && c <= '9') digits += c;
+  }
+  const int64_t length = static_cast<int64_t>(std::min(before_point, digits.size())) + shift;
+  int64_t value = 0;
+  for (int64_t k = 0; k < length; ++k) {
+    value = value * 10 + (k < static_cast<int64_t>(digits.size()) ? digits[static_cast<size_t>(k)] - '0' : 0);
+  }
+  const bool round_up =
+      length >= 0 && length < static_cast<int64_t>(digits.size()) && digits[static_cast<size_t>(length)] >= '5';
+  value += round_up ? 1 : 0;
+  return text.starts_with('-') ? -value : value;
 }
 
 std::string FormatSeconds(int64_t timestamp_ns) {

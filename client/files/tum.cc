@@ -13,12 +13,12 @@ namespace {
 // Interpolation over longer gaps would be unreliable.
 constexpr int64_t kMaxInterpolationGap_ns = 100'000'000;
 
-absl::StatusOr<StampedPose> ParsePose(const TableLine& line, const std::string& path) {
+absl::StatusOr<StampedPose> ParsePose(const TableLine& line, TimeUnit unit, const std::string& path) {
   if (line.fields.size() != 8) {
     return InvalidArgument("{}:{}: {} fields; expected 8 (t tx ty tz qx qy qz qw)", path, line.number,
                            line.fields.size());
   }
-  const std::optional<int64_t> timestamp_ns = ParseSeconds(line.fields[0]);
+  const std::optional<int64_t> timestamp_ns = ParseTimestamp(line.fields[0], unit);
   std::array<double, 8> x{};
   for (size_t k = 0; k < x.size(); ++k) {
     const std::optional<double> value = ParseNumber(line.fields[k]);
@@ -45,12 +45,16 @@ SE3<World, Camera> Interpolate(const StampedPose& before, const StampedPose& aft
 
 }  // namespace
 
-absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path) {
-  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path, ' '));
+absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path, TimeUnit* unit) {
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<TableLine> lines, ReadTable(path));
+  std::vector<std::string> timestamps;
+  for (const TableLine& line : lines) timestamps.push_back(line.fields[0]);
+  const TimeUnit detected = DetectTimeUnit(timestamps);
+  if (unit != nullptr) *unit = detected;
   std::vector<StampedPose> poses;
   poses.reserve(lines.size());
   for (const TableLine& line : lines) {
-    ROMAP_ASSIGN_OR_RETURN(StampedPose pose, ParsePose(line, path));
+    ROMAP_ASSIGN_OR_RETURN(StampedPose pose, ParsePose(line, detected, path));
     poses.push_back(pose);
   }
   if (poses.empty()) return InvalidArgument("{}: the file contains no poses", path);

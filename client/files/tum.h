@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/files/time_unit.h"
 #include "common/geometry.h"
 #include "common/pose_uncertainty.h"
 #include "common/status.h"
@@ -19,10 +20,11 @@ struct StampedPose {
   std::optional<PoseUncertainty> uncertainty = {};  // not in the TUM format; see pose_uncertainty_file.h
 };
 
-// Reads lines of `t tx ty tz qx qy qz qw` (t in seconds; camera to world; `#` starts a comment). Returns the poses in
-// order of time. INVALID_ARGUMENT names the file and the line: not eight finite numbers, a quaternion whose norm
-// differs from 1 by more than 5 %, or no poses. Otherwise as ReadFile.
-absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path);
+// Reads lines of `t tx ty tz qx qy qz qw` (camera to world; `#` starts a comment). t is in seconds, or in the unit that
+// DetectTimeUnit finds, which is stored in `unit` if not null. Returns the poses in order of time. INVALID_ARGUMENT
+// names the file and the line: not eight finite numbers, a quaternion whose norm differs from 1 by more than 5 %, or no
+// poses. Otherwise as ReadFile.
+absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path, TimeUnit* unit = nullptr);
 
 // Writes the format of ReadTum. Errors as WriteFile.
 absl::Status WriteTum(const std::string& path, std::span<const StampedPose> poses);

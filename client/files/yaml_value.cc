@@ -15,7 +15,7 @@ std::optional<double> AsNumber(const YAML::Node& node) {
 }  // namespace
 
 absl::StatusOr<YAML::Node> LoadYamlMap(const std::string& path) {
-  ROMAP_ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  ROMAP_ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
   try {
     YAML::Node root = YAML::Load(text);
     if (!root.IsMap()) return InvalidArgument("{}: expected a YAML map of 'key: value' lines", path);

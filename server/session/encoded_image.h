@@ -9,16 +9,17 @@
 
 #include "common/camera_model.h"
 #include "common/client_input.h"
+#include "common/sample_range.h"
 
 namespace romap::session {
 
 // Decodes the color image of a frame to CV_8UC3, BGR. The size in the file header is checked before decoding, so that a
 // small file cannot allocate a huge image. INVALID_ARGUMENT: truncated, not in the stated encoding, or not of the
-// camera's size; the message names the field.
-absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera);
+// camera's size; the message names the field. Orientation tags are ignored. `range` is that of the session.
+absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera, SampleRange* range);
 
-// Decodes instance masks to CV_16UC1 labels; empty for MaskEncoding::kNone. INVALID_ARGUMENT: as above, or the runs do
-// not add up to the size of the image.
+// Decodes instance masks to CV_16UC1 labels; empty for MaskEncoding::kNone. INVALID_ARGUMENT: as above, a PNG with more
+// than one channel, or runs that do not add up to the size of the image.
 absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera);
 
 // Decodes the z depth of a frame to CV_32FC1 in map units, 0 = unknown; empty if the frame has no depth.

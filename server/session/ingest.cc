@@ -105,9 +105,11 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   frame->instances = input.instances;
   frame->T_world_camera = input.T_world_camera;
   if (input.gravity_camera) frame->gravity_camera = input.gravity_camera->normalized();
-  ROMAP_ASSIGN_OR_RETURN(frame->image_bgr, DecodeColorImage(input, camera_));
+  SampleRange range = range_;
+  ROMAP_ASSIGN_OR_RETURN(frame->image_bgr, DecodeColorImage(input, camera_, &range));
   ROMAP_ASSIGN_OR_RETURN(frame->labels, DecodeLabels(input, camera_));
   ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
+  range_ = range;
   depth_sentinels_.Remove(frame->frame_id, input.depth_scale_mu, &frame->depth_mu);
   frame->has_masks = !frame->labels.empty();
   if (camera_.HasDistortion()) Undistort(*frame);

@@ -8,6 +8,7 @@
 
 #include "common/client_input.h"
 #include "common/lens.h"
+#include "common/sample_range.h"
 #include "common/stage_messages.h"
 #include "server/masks/mask_interpreter.h"
 #include "server/session/depth_sentinels.h"
@@ -49,6 +50,7 @@ class Ingest {
   CameraModel camera_;     // of the client's images, with distortion
   UndistortionMaps maps_;  // empty for a pinhole
   double max_mask_delay_s_;
+  SampleRange range_;  // of the accepted color images
   masks::MaskInterpreter mask_interpreter_;
   DepthSentinels depth_sentinels_;
   bool any_expired_ = false;

@@ -27,6 +27,7 @@
 
 #include "client/files/sequence.h"
 #include "common/config.h"
+#include "common/label_png.h"
 #include "server/slam/features/feature_extractor.h"
 #include "tests/bench/user_seconds.h"
 
@@ -48,10 +49,10 @@ std::optional<Frame> LoadFrame(const files::Sequence& sequence, size_t index) {
   Frame frame;
   frame.frame_id = input->frame_id;
   frame.camera = sequence.camera();
-  frame.image_bgr = Decode(input->image, cv::IMREAD_COLOR);
+  frame.image_bgr = Decode(input->image, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   Decode(input->depth, cv::IMREAD_UNCHANGED).convertTo(frame.depth_mu, CV_32F, input->depth_scale_mu);
   frame.has_masks = !input->label_png.empty();
-  if (frame.has_masks) Decode(input->label_png, cv::IMREAD_UNCHANGED).convertTo(frame.labels, CV_16U);
+  if (frame.has_masks) frame.labels = DecodeLabelPng(input->label_png).value();
   frame.T_world_camera = input->T_world_camera;
   return frame;
 }

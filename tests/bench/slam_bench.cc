@@ -16,6 +16,7 @@
 
 #include "client/files/sequence.h"
 #include "common/config.h"
+#include "common/label_png.h"
 #include "common/statistics.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
@@ -36,9 +37,9 @@ std::shared_ptr<const Frame> DecodeFrame(const FrameInput& input, const CameraMo
   frame->frame_id = input.frame_id;
   frame->timestamp_ns = input.timestamp_ns;
   frame->camera = camera;
-  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR);
+  frame->image_bgr = Decode(input.image, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   frame->has_masks = !input.label_png.empty();
-  if (frame->has_masks) Decode(input.label_png, cv::IMREAD_UNCHANGED).convertTo(frame->labels, CV_16U);
+  if (frame->has_masks) frame->labels = DecodeLabelPng(input.label_png).value();
   if (!input.depth.empty())
     Decode(input.depth, cv::IMREAD_UNCHANGED).convertTo(frame->depth_mu, CV_32F, input.depth_scale_mu);
   frame->T_world_camera = input.T_world_camera;

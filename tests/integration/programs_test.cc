@@ -211,13 +211,28 @@ TEST(ProgramsTest, BothProgramsReportTheSameVersion) {
   EXPECT_EQ(server, "romap-server " + romap.substr(std::string("romap ").size()));
 }
 
-TEST(InvalidInputTest, UnreadableImage) {
+TEST(InvalidInputTest, OneUnreadableImageIsSkipped) {
   const testing_support::TemporaryFolder folder;
   MakeTinySequence(folder / "sequence");
   for (const auto& entry : fs::directory_iterator(folder / "sequence/rgb")) {
     if (entry.path().filename().string().find("12") != std::string::npos) fs::remove(entry.path());
   }
-  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "map"}), 3, "12");
+  const ProcessResult run = Romap({"run", folder / "sequence", "--local", "--out", folder / "map"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("poses: 14 of 14 frames have one"), HasSubstr("file_unreadable"),
+                             HasSubstr("1 of 15 images cannot be read")));
+  const nlohmann::json summary = ReadJson(folder / "map/summary.json");
+  EXPECT_EQ(summary["frames"]["sent"], 14);
+  EXPECT_EQ(summary["frames"]["with_pose"], 14);
+  EXPECT_EQ(summary["frames"]["skipped"].size(), 1u);
+}
+
+TEST(InvalidInputTest, UnreadableImages) {
+  const testing_support::TemporaryFolder folder;
+  MakeTinySequence(folder / "sequence");
+  fs::remove_all(folder / "sequence/rgb");
+  ExpectOneLine(Romap({"run", folder / "sequence", "--local", "--out", folder / "map"}), 3,
+                "15 of 15 listed files are missing");
 }
 
 TEST(InvalidInputTest, UnknownFlagCommandAndConfigKey) {

@@ -99,4 +99,25 @@ TEST(MapCollectorTest, BuildsTheTrajectoryFromAcknowledgements) {
   EXPECT_EQ(collector.faults()[0], "frame 2: image is truncated");
 }
 
+TEST(MapCollectorTest, NamesTheFileOfARejectedFrame) {
+  MapCollector collector;
+  const files::FramePaths paths{.image = "rgb/1.png", .mask = "mask/1.png", .depth = "depth/1.png"};
+  collector.NoteSent(1, 1000, /*has_masks=*/true, /*has_pose=*/true, paths);
+  collector.NoteSent(2, 2000, /*has_masks=*/false);
+  EXPECT_EQ(collector.sent_with_pose(), 1u);
+  for (const char* error : {"masks: PNG has 3 channels", "depth: too small", "image: too small"}) {
+    FrameAck ack;
+    ack.frame_id = 1;
+    ack.accepted = false;
+    ack.error = error;
+    collector.Apply(ack);
+  }
+  collector.Apply(MasksAck{.frame_id = 1, .accepted = false, .error = "masks: too late"});
+  ASSERT_EQ(collector.faults().size(), 4u);
+  EXPECT_EQ(collector.faults()[0], "frame 1 (mask/1.png): masks: PNG has 3 channels");
+  EXPECT_EQ(collector.faults()[1], "frame 1 (depth/1.png): depth: too small");
+  EXPECT_EQ(collector.faults()[2], "frame 1 (rgb/1.png): image: too small");
+  EXPECT_EQ(collector.faults()[3], "late masks of frame 1 (mask/1.png): masks: too late");
+}
+
 }  // namespace romap::cli::map_collector_test

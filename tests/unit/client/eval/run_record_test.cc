@@ -38,7 +38,8 @@ class RunRecordTest : public testing::Test {
 };
 
 TEST_F(RunRecordTest, ReadsTheSummary) {
-  const RunRecord record = Read(R"({"poses": "none", "frames": {"first": 2, "sent": 3}})");
+  const RunRecord record = Read(R"({"poses": "none", "frames": {"first": 2, "sent": 3, "skipped": [4, 5]}})");
+  EXPECT_THAT(record.skipped_frames, ElementsAre(4, 5));
   EXPECT_EQ(record.poses, "none");
   EXPECT_EQ(record.first_frame, 2u);
   EXPECT_EQ(record.frames_sent, 3u);
@@ -59,6 +60,9 @@ TEST_F(RunRecordTest, DeterminesTheFramesOfTheRun) {
   EXPECT_THAT(FramesOf({.first_frame = 1, .frames_sent = 2}, *sequence), ElementsAre(100'000'000, 200'000'000));
   EXPECT_THAT(FramesOf({.frames_sent = 5}, *sequence), SizeIs(5)) << "the whole sequence";
   EXPECT_THAT(FramesOf({.frames_sent = 2}, *sequence), IsEmpty()) << "unknown which two";
+  EXPECT_THAT(FramesOf({.first_frame = 1, .frames_sent = 2, .skipped_frames = {3}}, *sequence),
+              ElementsAre(100'000'000, 300'000'000));
+  EXPECT_THAT(FramesOf({.frames_sent = 4, .skipped_frames = {1}}, *sequence), SizeIs(4)) << "the whole sequence";
   EXPECT_THAT(FramesOf({.first_frame = 9, .frames_sent = 2}, *sequence), IsEmpty());
 }
 

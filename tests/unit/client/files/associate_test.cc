@@ -17,4 +17,10 @@ TEST(AssociateTimestampsTest, PairsOneToOneAndClosestFirst) {
   EXPECT_TRUE(AssociateTimestamps(a, {}, 10).empty());
 }
 
+TEST(MedianStepTest, IgnoresGaps) {
+  const std::vector<int64_t> times{0, 10, 20, 1000, 1010, 1021};
+  EXPECT_EQ(MedianStep_ns(times), 10);
+  EXPECT_EQ(MedianStep_ns({}), 0);
+}
+
 }  // namespace romap::files::associate_test

@@ -9,6 +9,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
+#include "common/label_png.h"
+#include "tests/support/test_png.h"
+
 namespace romap::files::sequence_test {
 
 using ::testing::AllOf;
@@ -38,7 +41,9 @@ class SequenceTest : public testing::Test {
   }
   void TearDown() override { fs::remove_all(dir_); }
 
-  void Put(const std::string& name, const std::string& text) { std::ofstream(dir_ + "/" + name) << text; }
+  void Put(const std::string& name, const std::string& text) {
+    std::ofstream(dir_ + "/" + name, std::ios::binary) << text;
+  }
 
   // The error message of Open; "" on success.
   std::string OpenError(const SequenceOptions& options = {}) {
@@ -178,8 +183,123 @@ TEST_F(SequenceTest, NamesAFileThatIsNotAnImage) {
   const auto sequence = Sequence::Open(dir_);
   ASSERT_TRUE(sequence.ok());
   EXPECT_THAT(std::string(sequence->Load(1).status().message()), HasSubstr("rgb/1.png: neither a PNG nor a JPEG"));
-  EXPECT_THAT(std::string(sequence->Load(0).status().message()), HasSubstr("mask/0.png"));
+  EXPECT_THAT(std::string(sequence->Load(0).status().message()), HasSubstr("mask/0.png: the file is empty"));
   EXPECT_FALSE(sequence->Load(4).ok());
+}
+
+TEST_F(SequenceTest, SoundInputHasNoDiagnostics) {
+  Put("mask.txt", "0.0 mask/0.png\n0.1 mask/1.png\n0.2 mask/2.png\n");
+  Put("detections.csv", "timestamp,label,class,score\n0.0,1,cup,0.5\n0.0,2,cup,0.5\n0.2,1,book,1\n");
+  Put("groundtruth.txt", "-0.01 0 0 0 0 0 0 1\n0.31 2 0 0 0 0 0 1\n0.105 0 0 0 0 0 0 1\n0.2 0 0 0 0 0 0 1\n");
+  Put("depth.txt", "0 depth/0.png\n0.1 depth/1.png\n");
+  const auto sequence = Sequence::Open(dir_, {.use_depth = true});
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  EXPECT_TRUE(sequence->diagnostics().empty()) << sequence->diagnostics().front().text;
+}
+
+TEST_F(SequenceTest, MatchesListsInDifferentUnits) {
+  Put("groundtruth.txt",
+      "0 0 0 0 0 0 0 1\n100000000 1 0 0 0 0 0 1\n200000000 2 0 0 0 0 0 1\n300000000 3 0 0 0 0 0 1\n");
+  Put("mask.txt", "0 mask/0.png\n100000 mask/1.png\n200000 mask/2.png\n300000 mask/3.png\n");
+  const auto sequence = Sequence::Open(dir_);
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  EXPECT_EQ(sequence->Load(3)->T_world_camera->translation().x(), 3);
+  EXPECT_TRUE(sequence->has_mask(3));
+  ASSERT_EQ(sequence->diagnostics().size(), 1u);
+  const Diagnostic& diagnostic = sequence->diagnostics()[0];
+  EXPECT_EQ(diagnostic.code, "timestamps_converted");
+  EXPECT_EQ(diagnostic.severity, Severity::kInfo);
+  EXPECT_THAT(diagnostic.text,
+              AllOf(HasSubstr("mask.txt in microseconds"), HasSubstr("groundtruth.txt in nanoseconds")));
+}
+
+TEST_F(SequenceTest, ReportsListsOfAnotherTime) {
+  Put("mask.txt", "5.0 mask/0.png\n5.1 mask/1.png\n");
+  Put("groundtruth.txt", "100 0 0 0 0 0 0 1\n100.5 0 0 0 0 0 0 1\n");
+  const auto sequence = Sequence::Open(dir_);
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  ASSERT_EQ(sequence->diagnostics().size(), 2u);
+  EXPECT_EQ(sequence->diagnostics()[0].code, "masks_unmatched");
+  const Diagnostic& poses = sequence->diagnostics()[1];
+  EXPECT_EQ(poses.code, "poses_unmatched");
+  EXPECT_EQ(poses.severity, Severity::kWarning);
+  EXPECT_THAT(poses.text,
+              AllOf(HasSubstr("none of the 2 poses of groundtruth.txt"),
+                    HasSubstr("poses are from 100.000 s to 100.500 s"), HasSubstr("frames from 0.000 s to 0.300 s")));
+  EXPECT_THAT(poses.advice, HasSubstr("tracked from the images"));
+}
+
+TEST_F(SequenceTest, ReportsFramesWithoutPose) {
+  Put("groundtruth.txt", "0.1 0 0 0 0 0 0 1\n0.2 0 0 0 0 0 0 1\n0.3 0 0 0 0 0 0 1\n");
+  const auto most = Sequence::Open(dir_);
+  ASSERT_EQ(most->diagnostics().size(), 1u);
+  EXPECT_EQ(most->diagnostics()[0].code, "poses_partial");
+  EXPECT_EQ(most->diagnostics()[0].severity, Severity::kInfo);
+  EXPECT_EQ(most->diagnostics()[0].count, 1u);
+  EXPECT_EQ(most->diagnostics()[0].first_frame_id, 1u);
+  EXPECT_THAT(most->diagnostics()[0].text, HasSubstr("3 of 4 frames"));
+  Put("groundtruth.txt", "0.0 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(Sequence::Open(dir_)->diagnostics()[0].severity, Severity::kWarning);
+  EXPECT_TRUE(Sequence::Open(dir_, {.poses = ""})->diagnostics().empty());
+}
+
+TEST_F(SequenceTest, CountsDetectionsWithoutMask) {
+  Put("mask.txt", "0.0 mask/0.png\n0.1 mask/1.png\n");
+  Put("detections.csv", "0.0,1,cup,90\n0.1,1,cup,80\n0.25,1,cup,70\n0.25,2,pen,70\n");
+  const auto sequence = Sequence::Open(dir_);
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  EXPECT_DOUBLE_EQ(sequence->Load(0)->instances[0].score, 0.9);
+  ASSERT_EQ(sequence->diagnostics().size(), 2u);
+  EXPECT_EQ(sequence->diagnostics()[0].code, "scores_percent");
+  const Diagnostic& unmatched = sequence->diagnostics()[1];
+  EXPECT_EQ(unmatched.code, "detections_unmatched");
+  EXPECT_EQ(unmatched.severity, Severity::kWarning);
+  EXPECT_EQ(unmatched.count, 2u);
+  EXPECT_THAT(unmatched.text, HasSubstr("2 of 4 rows of detections.csv match no mask in time, the first at 0.250 s in "
+                                        "line 3"));
+}
+
+TEST_F(SequenceTest, ReadsYamlWithByteOrderMark) {
+  Put("camera.yaml", "\xEF\xBB\xBFwidth: 32\r\nheight: 24\r\nfx: 30\r\nfy: 31\r\ncx: 15.5\r\ncy: 11.5\r\n");
+  EXPECT_EQ(OpenError(), "");
+}
+
+TEST_F(SequenceTest, OmitsMasksAndDepthThatCannotBeRead) {
+  Put("mask.txt", "0 mask/0.png\n0.1 mask/1.png\n0.2 mask/2.png\n0.3 mask/3.png\n");
+  Put("depth.txt", "0 depth/0.png\n0.1 depth/1.png\n0.2 depth/2.png\n0.3 depth/3.png\n");
+  Put("mask/0.png", "");
+  fs::resize_file(dir_ + "/mask/1.png", fs::file_size(dir_ + "/mask/1.png") - 5);
+  fs::resize_file(dir_ + "/depth/1.png", 30);
+  const auto sequence = Sequence::Open(dir_, {.use_depth = true});
+  ASSERT_TRUE(sequence.ok()) << sequence.status();
+  fs::remove(dir_ + "/rgb/3.png");
+
+  std::vector<UnreadableFile> unreadable;
+  const auto frame = sequence->LoadReadable(1, &unreadable);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(frame->mask_encoding, MaskEncoding::kNone);
+  EXPECT_EQ(frame->depth_encoding, DepthEncoding::kNone);
+  ASSERT_EQ(unreadable.size(), 2u);
+  EXPECT_EQ(unreadable[0].kind, FileKind::kMask);
+  EXPECT_THAT(std::string(unreadable[0].reason.message()), HasSubstr("mask/1.png: PNG file is truncated"));
+  EXPECT_EQ(unreadable[1].kind, FileKind::kDepth);
+  EXPECT_THAT(std::string(unreadable[1].reason.message()), HasSubstr("depth/1.png: PNG file is truncated"));
+  EXPECT_FALSE(sequence->Load(1).ok());
+  EXPECT_EQ(sequence->LoadReadable(3, &unreadable).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(SequenceTest, PermutesPaletteMasks) {
+  cv::Mat labels = cv::Mat::zeros(24, 32, CV_8UC1);
+  labels.colRange(0, 10) = 1;
+  Put("mask/0.png", testing_support::EncodeLabels(labels, testing_support::PngKind::kPalette, 1));
+  Put("mask.txt", "0 mask/0.png\n");
+  Put("detections.csv", "0,1,cup,1\n");
+  const auto frame = Sequence::Open(dir_, {.permute_labels_seed = 7})->Load(0);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  const auto permuted = DecodeLabelPng(frame->label_png);
+  ASSERT_TRUE(permuted.ok()) << permuted.status();
+  EXPECT_EQ(permuted->at<uint16_t>(12, 5), frame->instances[0].label);
+  EXPECT_EQ(permuted->at<uint16_t>(12, 15), 0);
 }
 
 TEST(SequenceDataTest, OpensASequenceWithDepthAndMasks) {

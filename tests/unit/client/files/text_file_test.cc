@@ -29,19 +29,40 @@ TEST(ParseSecondsTest, KeepsAllDigitsOfAUnixTime) {
   }
 }
 
-TEST(ReadTableTest, SplitsAtBlanksOrCommas) {
+TEST(ParseScaledTest, IsExact) {
+  EXPECT_EQ(ParseScaled("1403636579763555584", 0), 1403636579763555584);
+  EXPECT_EQ(ParseScaled("1.403636579763555584e+18", 0), 1403636579763555584);
+  EXPECT_EQ(ParseScaled("1700000000123456", 3), 1700000000123456000);
+  EXPECT_EQ(ParseScaled("1700000000123.4564", 6), 1700000000123456400);
+  EXPECT_EQ(ParseScaled("-2.5", 0), -3);
+  EXPECT_EQ(ParseScaled("0.4", 0), 0);
+  EXPECT_EQ(ParseScaled("5e-2", 0), 0);
+  EXPECT_EQ(ParseScaled("9500000000000000000", 0), std::nullopt);
+}
+
+TEST(ReadTableTest, SplitsAtBlanks) {
   const std::string path = TempPath("table");
   std::ofstream(path) << "# head\n\n 1 \t two  3 # tail\r\na b";
-  const auto words = ReadTable(path, ' ');
+  const auto words = ReadTable(path);
   ASSERT_TRUE(words.ok());
   EXPECT_EQ((*words)[0].number, 3);
   EXPECT_THAT((*words)[0].fields, ElementsAre("1", "two", "3"));
   EXPECT_THAT((*words)[1].fields, ElementsAre("a", "b"));
-  std::ofstream(path) << "1, potted plant ,,\n";
-  EXPECT_THAT((*ReadTable(path, ','))[0].fields, ElementsAre("1", "potted plant", "", ""));
   std::filesystem::remove(path);
-  EXPECT_EQ(ReadTable(path, ',').status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(ReadTable(testing::TempDir(), ',').status().code(), absl::StatusCode::kPermissionDenied) << "a folder";
+  EXPECT_EQ(ReadTable(path).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(ReadTable(testing::TempDir()).status().code(), absl::StatusCode::kPermissionDenied) << "a folder";
+}
+
+TEST(ReadLinesTest, IgnoresByteOrderMarkAndCarriageReturns) {
+  const std::string path = TempPath("lines");
+  std::ofstream(path) << "\xEF\xBB\xBF# head\r\n\r\n 1 my file.png # tail \r\n2";
+  const auto lines = ReadLines(path);
+  ASSERT_TRUE(lines.ok());
+  ASSERT_EQ(lines->size(), 2u);
+  EXPECT_EQ((*lines)[0].number, 3);
+  EXPECT_EQ((*lines)[0].text, "1 my file.png # tail");
+  EXPECT_EQ((*lines)[1].text, "2");
+  std::filesystem::remove(path);
 }
 
 }  // namespace romap::files::text_file_test

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/status.h"
+#include "tests/support/test_png.h"
 
 namespace romap::session::ingest_test {
 
@@ -101,6 +102,49 @@ TEST(IngestTest, ReadsMasksAsPngAndAsRuns) {
     EXPECT_EQ((*frame)->instances[0].label, 7u);
     EXPECT_EQ((*frame)->instances[0].class_name, "object");
   }
+}
+
+TEST(IngestTest, ReadsMasksWithPalette) {
+  cv::Mat labels = cv::Mat::zeros(48, 64, CV_8UC1);
+  labels(cv::Rect(10, 10, 20, 8)) = 3;
+  FrameInput input = ValidFrame();
+  input.mask_encoding = MaskEncoding::kLabelPng;
+  input.label_png = testing_support::EncodeLabels(labels, testing_support::PngKind::kPalette, 2);
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  const auto frame = ingest.Accept(input);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(cv::countNonZero((*frame)->labels == 3), 160);
+
+  input = ValidFrame(2);
+  input.mask_encoding = MaskEncoding::kLabelPng;
+  input.label_png = Encode(".png", Gradient(64, 48));
+  EXPECT_THAT(ErrorOf(ingest, input), HasSubstr("masks: PNG has 3 channels; expected one channel"));
+}
+
+TEST(IngestTest, OrientationTagsAreIgnored) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  uint64_t id = 0;
+  for (const int orientation : {6, 3}) {
+    for (const ImageEncoding encoding : {ImageEncoding::kPng, ImageEncoding::kJpeg}) {
+      FrameInput input = ValidFrame(++id);
+      const std::string plain = Encode(encoding == ImageEncoding::kPng ? ".png" : ".jpg", Gradient(64, 48));
+      input.image_encoding = encoding;
+      input.image = testing_support::WithOrientation(plain, orientation);
+      const auto frame = ingest.Accept(input);
+      ASSERT_TRUE(frame.ok()) << frame.status();
+      EXPECT_LT(cv::norm((*frame)->image_bgr, Gradient(64, 48), cv::NORM_L1) / (64 * 48 * 3), 5);
+    }
+  }
+}
+
+TEST(IngestTest, TheRangeOf16BitImagesIsThatOfTheSession) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput bright = ValidFrame(1);
+  bright.image = Encode(".png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(1000, 2000, 4095)));
+  FrameInput dark = ValidFrame(2);
+  dark.image = Encode(".png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(160, 160, 160)));
+  EXPECT_EQ((*ingest.Accept(bright))->image_bgr.at<cv::Vec3b>(5, 5), cv::Vec3b(62, 125, 255));
+  EXPECT_EQ((*ingest.Accept(dark))->image_bgr.at<cv::Vec3b>(5, 5), cv::Vec3b(10, 10, 10));
 }
 
 TEST(IngestTest, DepthIsConvertedToMapUnits) {

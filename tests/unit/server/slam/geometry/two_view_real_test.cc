@@ -55,7 +55,7 @@ std::vector<TimedPose> ReadTrajectory(const std::filesystem::path& file) {
 
 View Extract(const std::filesystem::path& image) {
   View view;
-  const cv::Mat gray = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+  const cv::Mat gray = cv::imread(image.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   cv::ORB::create(1500)->detectAndCompute(gray, cv::noArray(), view.keypoints, view.descriptors);
   return view;
 }
