@@ -25,6 +25,7 @@ int RunCli(int argc, const char* const* argv) {
       ->capture_default_str();
   Command chosen;
   AddRunCommand(app, &chosen);
+  AddDoctorCommand(app, &chosen);
   AddReplayCommand(app, &chosen);
   AddEvalCommand(app, &chosen);
   AddBenchCommand(app, &chosen);

@@ -19,6 +19,7 @@ void AddBenchCommand(CLI::App& app, Command* chosen);
 void AddEvalCommand(CLI::App& app, Command* chosen);
 void AddReplayCommand(CLI::App& app, Command* chosen);
 void AddSynthCommand(CLI::App& app, Command* chosen);
+void AddDoctorCommand(CLI::App& app, Command* chosen);
 void AddExportCommand(CLI::App& app, Command* chosen);
 void AddSessionsCommand(CLI::App& app, Command* chosen);
 

@@ -57,7 +57,7 @@ class Sender {
 
  private:
   absl::Status Run() {
-    for (size_t i = options_.first_frame; i < end_ && !stop_ && !Interrupted(); ++i) {
+    for (size_t i = options_.first_frame; i < end_ && !stop_ && !Interrupted(); i += options_.stride) {
       ROMAP_ASSIGN_OR_RETURN(std::optional<FrameInput> frame, Load(i));
       if (!frame) continue;
       ROMAP_RETURN_IF_ERROR(SendMasksDueBy(frame->timestamp_ns));
@@ -220,7 +220,8 @@ class Run {
   }
 
   size_t TotalFrames() const {
-    return std::min(options_.frame_count, sequence_.size() - std::min(sequence_.size(), options_.first_frame));
+    const size_t frames = sequence_.size() - std::min(sequence_.size(), options_.first_frame);
+    return (std::min(options_.frame_count, frames) + options_.stride - 1) / options_.stride;
   }
 
   void ShowFrames() {

@@ -20,9 +20,10 @@ struct StreamOptions {
   double mask_rate_hz = 0;  // maximum rate of frames with masks, by timestamps; 0 = unlimited
   double mask_delay_s = 0;  // delay of masks after their frame, by timestamps; 0 = sent with the frame
   size_t first_frame = 0;
-  size_t frame_count = SIZE_MAX;
-  double max_training_s = 600;  // maximum wait for training after the last frame
-  bool keep_session = false;    // do not delete the session
+  size_t frame_count = SIZE_MAX;  // from the first frame on, sent or not
+  size_t stride = 1;              // send every `stride`-th of these
+  double max_training_s = 600;    // maximum wait for training after the last frame
+  bool keep_session = false;      // do not delete the session
 };
 
 struct StreamResult {
