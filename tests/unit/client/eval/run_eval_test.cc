@@ -95,6 +95,10 @@ TEST_F(RunEvalTest, TablesKeepTheDigitsOfSmallFigures) {
   report.matched = 1;
   report.center_cm = 0.0000123;
   EXPECT_THAT(FormatTable(report), HasSubstr("  1.23e-05"));
+  TrajectoryReport in_kilometers;
+  in_kilometers.extent_m = 0.0007;
+  in_kilometers.ate_rmse_m = 0.0000109;
+  EXPECT_THAT(FormatTable(in_kilometers), AllOf(HasSubstr("ATE rmse 0.000010900 m"), HasSubstr("extent 0.000700 m")));
 }
 
 TEST_F(RunEvalTest, NotesFiguresThatCannotBeMeasured) {
