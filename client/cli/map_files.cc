@@ -25,14 +25,6 @@ std::string FileStem(const ObjectUpdate& object) {
   return stem;
 }
 
-void MoveToWorld(const SE3<World, Object>& T_world_mesh, double mesh_scale, Mesh& mesh) {
-  const Eigen::Matrix3f rotation = T_world_mesh.RotationMatrix().cast<float>();
-  for (Eigen::Vector3f& vertex : mesh.vertices) {
-    vertex = (T_world_mesh * (mesh_scale * vertex.cast<double>())).cast<float>();
-  }
-  for (Eigen::Vector3f& normal : mesh.normals) normal = rotation * normal;
-}
-
 // Creates a folder and removes the meshes in it.
 absl::Status MakeMeshFolder(const fs::path& folder) {
   ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder.string()));
@@ -57,9 +49,10 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
       entry.train_seconds = snapshot.mesh->train_seconds;
       entry.steps = snapshot.mesh->steps;
       if (auto mesh = DecodeDraco(snapshot.mesh->draco); mesh.ok()) {
-        entry.mesh_world = *std::move(mesh);
-        MoveToWorld(snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object),
-                    snapshot.object.mesh_scale, entry.mesh_world);
+        const SE3<World, Object> T_world_mesh =
+            snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object);
+        entry.mesh = *std::move(mesh);
+        entry.S_world_mesh = {snapshot.object.mesh_scale, T_world_mesh.rotation(), T_world_mesh.translation()};
       } else {
         faults->push_back(
             fmt::format("{}: cannot decode the mesh: {}", snapshot.object.id.ToString(), Message(mesh.status())));
@@ -94,9 +87,10 @@ absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>&
                                .T_world_object = object.cuboid.T_world_object,
                                .half_extents = object.cuboid.half_extents,
                                .confidence = object.cuboid.confidence});
-    if (entry.mesh_world.triangles.empty()) continue;
-    ROMAP_RETURN_IF_ERROR(files::WritePly((folder / (entry.file_stem + ".ply")).string(), entry.mesh_world));
-    ROMAP_RETURN_IF_ERROR(files::WriteGlb((folder / (entry.file_stem + ".glb")).string(), entry.mesh_world));
+    if (entry.mesh.triangles.empty()) continue;
+    const std::string stem = (folder / entry.file_stem).string();
+    ROMAP_RETURN_IF_ERROR(files::WriteWorldPly(stem + ".ply", entry.mesh, entry.S_world_mesh));
+    ROMAP_RETURN_IF_ERROR(files::WriteGlb(stem + ".glb", entry.mesh, entry.S_world_mesh));
   }
   return files::WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
 }

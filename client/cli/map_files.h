@@ -11,11 +11,12 @@
 
 namespace romap::cli {
 
-// One object of a map with its decoded mesh in the World frame.
+// One object of a map with its decoded mesh.
 struct MapObject {
   ObjectUpdate object;
-  std::string file_stem;     // "<id>_<class>", with only characters that are safe in file names
-  Mesh mesh_world;           // map units; empty if the object has no mesh
+  std::string file_stem;  // "<id>_<class>", with only characters that are safe in file names
+  Mesh mesh;              // in its own frame, near its origin; empty if the object has no mesh
+  Sim3<World, Object> S_world_mesh;
   double train_seconds = 0;  // of the mesh
   uint64_t steps = 0;        // training steps of the mesh
 };

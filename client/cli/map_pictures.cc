@@ -21,6 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr size_t kCuboidFrames = 6;  // evenly spaced over the sequence
 
+render::MeshInstance InstanceOf(const MapObject& entry) {
+  return {.mesh = &entry.mesh, .id = 1, .S_world_mesh = entry.S_world_mesh};
+}
+
 // The frame in which the cuboid is largest; nullopt if it is never completely visible.
 std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
                                    const std::vector<PosedFrame>& frames) {
@@ -77,10 +81,10 @@ absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& seq
     ROMAP_ASSIGN_OR_RETURN(const cv::Mat image, LoadImage(sequence, view->index));
     ROMAP_RETURN_IF_ERROR(WriteImage(
         folder / (entry.file_stem + ".png"),
-        pictures::DrawMeshBesideView(entry.mesh_world, image, camera, view->T_world_camera, &entry.object.cuboid)));
+        pictures::DrawMeshBesideView(InstanceOf(entry), image, camera, view->T_world_camera, &entry.object.cuboid)));
   }
-  std::vector<Mesh> meshes;
-  for (const MapObject& entry : objects) meshes.push_back(entry.mesh_world);
+  std::vector<render::MeshInstance> meshes;
+  for (const MapObject& entry : objects) meshes.push_back(InstanceOf(entry));
   const Eigen::Vector3d up_world =
       objects.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
                       : objects.front().object.cuboid.T_world_object.rotation() * Eigen::Vector3d::UnitZ();

@@ -68,8 +68,8 @@ nlohmann::json ToJson(const wire::Recording& recording, const Statistics& statis
                     {"class", entry.object.class_name},
                     {"observations", entry.object.observations},
                     {"training_steps", entry.steps},
-                    {"vertices", entry.mesh_world.vertices.size()},
-                    {"triangles", entry.mesh_world.triangles.size()}});
+                    {"vertices", entry.mesh.vertices.size()},
+                    {"triangles", entry.mesh.triangles.size()}});
   }
   return {{"recording", recording.path()},
           {"lost_bytes", recording.lost_bytes()},

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/format_length.h"
 #include "client/cli/trackable.h"
 #include "client/files/format_diagnostic.h"
 #include "common/statistics.h"
@@ -22,6 +23,31 @@ uint64_t PeakBytes() {
 std::string SecondsText(double seconds) { return seconds < 0 ? "-" : fmt::format("{:.2f} s", seconds); }
 
 nlohmann::json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+// The table of the objects. Its decimals suit the unit of the map and its columns the distance from the origin.
+std::string FormatObjects(const std::vector<RunSummary::Object>& objects) {
+  double largest = 0;
+  for (const RunSummary::Object& object : objects) largest = std::max(largest, 2 * object.half_extents.maxCoeff());
+  const int decimals = DecimalsFor(largest);
+  std::vector<std::string> centers, sizes;
+  size_t center_width = 24, size_width = 24;
+  for (const RunSummary::Object& object : objects) {
+    centers.push_back(FormatVector(object.center_world, " ", decimals));
+    sizes.push_back(FormatVector(2 * object.half_extents, " x ", decimals));
+    center_width = std::max(center_width, centers.back().size());
+    size_width = std::max(size_width, sizes.back().size());
+  }
+  std::string text =
+      fmt::format("{:<22} {:>{}} {:>{}} {:>9} {:>10} {:>12} {:>11}\n", "object", "center [map units]", center_width,
+                  "size [map units]", size_width, "training", "triangles", "first cuboid", "first mesh");
+  for (size_t i = 0; i < objects.size(); ++i) {
+    const RunSummary::Object& object = objects[i];
+    text += fmt::format("{:<22} {:>{}} {:>{}} {:>9} {:>10} {:>12} {:>11}\n", object.name, centers[i], center_width,
+                        sizes[i], size_width, fmt::format("{:.2f} s", object.train_s), object.triangles,
+                        SecondsText(object.first_cuboid_s), SecondsText(object.first_mesh_s));
+  }
+  return objects.empty() ? text + "(no objects mapped)\n" : text;
+}
 
 }  // namespace
 
@@ -67,8 +93,8 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
     object.map_id = entry.object.map_id.value;
     object.steps = entry.steps;
     object.train_s = entry.train_seconds;
-    object.vertices = entry.mesh_world.vertices.size();
-    object.triangles = entry.mesh_world.triangles.size();
+    object.vertices = entry.mesh.vertices.size();
+    object.triangles = entry.mesh.triangles.size();
     const MapCollector::Arrival arrival = collector.ArrivalOf(entry.object.id);
     if (const auto it = trackable.find(entry.object.id); it != trackable.end()) {
       const double trackable_s = collector.SentAt_s(it->second + 1);  // frame ids count from 1
@@ -161,18 +187,7 @@ std::string FormatSummary(const RunSummary& summary) {
   }
   text += fmt::format("peak memory: mapping {} MiB, client {} MiB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
-  text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", "object", "center [map units]",
-                      "size [map units]", "training", "triangles", "first cuboid", "first mesh");
-  for (const RunSummary::Object& object : summary.objects) {
-    const Eigen::Vector3d& c = object.center_world;
-    const Eigen::Vector3d size = 2 * object.half_extents;
-    text += fmt::format("{:<22} {:>24} {:>24} {:>9} {:>10} {:>12} {:>11}\n", object.name,
-                        fmt::format("{:.3f} {:.3f} {:.3f}", c.x(), c.y(), c.z()),
-                        fmt::format("{:.3f} x {:.3f} x {:.3f}", size.x(), size.y(), size.z()),
-                        fmt::format("{:.2f} s", object.train_s), object.triangles, SecondsText(object.first_cuboid_s),
-                        SecondsText(object.first_mesh_s));
-  }
-  if (summary.objects.empty()) text += "(no objects mapped)\n";
+  text += FormatObjects(summary.objects);
   for (const Diagnostic& diagnostic : summary.diagnostics) text += files::FormatDiagnostic(diagnostic) + "\n";
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;

@@ -13,12 +13,13 @@ namespace {
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
-// Corners of the footprint in the xy plane, counter-clockwise.
-Polygon Footprint(const YawBox& box) {
+// Corners of the footprint in the xy plane, relative to `origin`, counter-clockwise.
+Polygon Footprint(const YawBox& box, const Eigen::Vector2d& origin) {
   Polygon corners;
   const Eigen::Rotation2Dd yaw(box.yaw_rad);
   for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
-    corners.push_back(yaw * Eigen::Vector2d(x * box.half_extents.x(), y * box.half_extents.y()) + box.center.head<2>());
+    corners.push_back(yaw * Eigen::Vector2d(x * box.half_extents.x(), y * box.half_extents.y()) +
+                      (box.center.head<2>() - origin));
   }
   return corners;
 }
@@ -118,8 +119,9 @@ YawBox MakeUpright(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& cente
 }
 
 double IntersectionOverUnion(const YawBox& a, const YawBox& b) {
-  Polygon overlap = Footprint(a);
-  const Polygon edges = Footprint(b);
+  // The products of coordinates in Area() cancel, so the origin must be near.
+  Polygon overlap = Footprint(a, a.center.head<2>());
+  const Polygon edges = Footprint(b, a.center.head<2>());
   for (size_t k = 0; k < edges.size() && !overlap.empty(); ++k) {
     overlap = Clip(overlap, edges[k], edges[(k + 1) % edges.size()]);
   }

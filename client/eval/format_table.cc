@@ -14,7 +14,9 @@ constexpr int kNumberWidth = 10;
 // A number padded to the column width; `-` if absent.
 std::string Cell(std::optional<double> value) {
   if (!value) return fmt::format("{:>{}}", "-", kNumberWidth);
-  return fmt::format("{:>{}.{}f}", *value, kNumberWidth, std::abs(*value) < 100 ? 4 : 2);
+  const double size = std::abs(*value);
+  if (size > 0 && size < 1e-3) return fmt::format("{:>{}.2e}", *value, kNumberWidth);  // e.g. of a map in kilometers
+  return fmt::format("{:>{}.{}f}", *value, kNumberWidth, size < 100 ? 4 : 2);
 }
 
 std::string Cell(const std::string& text) { return fmt::format("{:>{}}", text, kNumberWidth); }

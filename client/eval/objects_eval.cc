@@ -77,6 +77,7 @@ absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const 
   for (const auto& [name, file] : files) {
     Surface surface{name, {}, {}, file.mesh.triangles.size()};
     ROMAP_ASSIGN_OR_RETURN(surface.points, SampleSurface(file.mesh, options.samples, seed, dir + "/" + name));
+    for (Eigen::Vector3d& point : surface.points) point += file.origin;
     surface.seen.assign(surface.points.size(), true);
     const auto seen = file.scalars.find("seen");
     const auto source = file.scalars.find("source");

@@ -135,7 +135,7 @@ MotionFigures MeasureMotion(std::span<const PosePair> pairs, double extent_m, do
                         .jumps = LargestJumps(frames, fit_scale)};
   if (extent_m < kMinExtent_m) {
     figures.scale_note =
-        fmt::format("the true positions vary by only {:.4f} m rms; at least {} m required", extent_m, kMinExtent_m);
+        fmt::format("the true positions vary by only {:.3g} m rms; at least {} m required", extent_m, kMinExtent_m);
     return figures;
   }
   figures.frame_correlation = DirectionCorrelation(frames);

@@ -121,7 +121,7 @@ Verdict Judge(const TrajectoryReport& report) {
   }
   if (!judges_translation) {
     verdict.reasons.push_back(
-        fmt::format("translation not judged: the true positions vary by only {:.4f} m rms", report.extent_m));
+        fmt::format("translation not judged: the true positions vary by only {:.3g} m rms", report.extent_m));
   }
   return verdict;
 }

@@ -87,7 +87,7 @@ int AddColors(const Mesh& mesh, tinygltf::Model* model) {
   return index;
 }
 
-tinygltf::Model ToModel(const Mesh& mesh) {
+tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh) {
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "romap";
@@ -116,10 +116,19 @@ tinygltf::Model ToModel(const Mesh& mesh) {
   model.materials.push_back(std::move(material));
 
   constexpr double kHalf = std::numbers::sqrt2 / 2;
+  tinygltf::Node world;
+  world.name = "world";
+  world.rotation = {-kHalf, 0, 0, kHalf};  // x y z w: -90 degrees about x, z up to y up
+  world.children = {1};
+  model.nodes.push_back(std::move(world));
   tinygltf::Node node;
   node.name = kObjectName;
   node.mesh = 0;
-  node.rotation = {-kHalf, 0, 0, kHalf};  // x y z w: -90 degrees about x, z up to y up
+  const Eigen::Vector3d& translation = S_world_mesh.translation();
+  const Eigen::Vector4d& rotation = S_world_mesh.rotation().coeffs();  // x y z w
+  node.translation.assign(translation.data(), translation.data() + 3);
+  node.rotation.assign(rotation.data(), rotation.data() + 4);
+  node.scale.assign(3, S_world_mesh.scale());
   model.nodes.push_back(std::move(node));
   tinygltf::Scene scene;
   scene.nodes = {0};
@@ -130,14 +139,14 @@ tinygltf::Model ToModel(const Mesh& mesh) {
 
 }  // namespace
 
-absl::Status WriteGlb(const std::string& path, const Mesh& mesh) {
+absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const Sim3<World, Object>& S_world_mesh) {
   ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh, path));
   const auto fits = [&](size_t size) { return size == 0 || size == mesh.vertices.size(); };
   if (!fits(mesh.normals.size()) || !fits(mesh.colors.size())) {
     return InvalidArgument("{}: {} normals and {} colors for {} vertices", path, mesh.normals.size(),
                            mesh.colors.size(), mesh.vertices.size());
   }
-  const tinygltf::Model model = ToModel(mesh);
+  const tinygltf::Model model = ToModel(mesh, S_world_mesh);
   constexpr size_t kJsonReserve = 1 << 16;  // upper bound for the JSON chunk and the headers [bytes]
   if (model.buffers.front().data.size() + kJsonReserve > UINT32_MAX) {
     return InvalidArgument("{}: the mesh exceeds the 4 GiB limit of GLB", path);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include "client/files/obj.h"
 #include "client/files/ply.h"
@@ -18,14 +20,26 @@ std::string LowerExtension(const std::filesystem::path& path) {
   return extension;
 }
 
+// The origin of one coordinate; see MeshFile::origin.
+double OriginOf(const std::vector<double>& values) {
+  const auto is_exact = [](double value) { return !std::isfinite(value) || value == static_cast<float>(value); };
+  if (std::all_of(values.begin(), values.end(), is_exact)) return 0;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  return low + (high - low) / 2;
+}
+
 }  // namespace
 
 absl::StatusOr<MeshFile> ReadMeshFile(const std::string& path) {
   const std::string extension = LowerExtension(path);
   if (extension == ".ply") return ReadPly(path);
   if (extension != ".obj") return InvalidArgument("{}: unknown mesh format; expected a .ply or .obj file", path);
-  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, ReadObj(path));
-  return MeshFile{std::move(mesh), {}};
+  return ReadObj(path);
 }
 
 absl::StatusOr<std::map<std::string, MeshFile>> ReadMeshFolder(const std::string& dir) {
@@ -57,6 +71,16 @@ absl::Status ValidateMesh(const Mesh& mesh, const std::string& name) {
     }
   }
   return absl::OkStatus();
+}
+
+void SetPositions(const std::array<std::vector<double>, 3>& columns, MeshFile* file) {
+  file->mesh.vertices.resize(columns[0].size());
+  for (int axis = 0; axis < 3; ++axis) {
+    file->origin[axis] = OriginOf(columns[axis]);
+    for (size_t k = 0; k < columns[axis].size(); ++k) {
+      file->mesh.vertices[k][axis] = static_cast<float>(columns[axis][k] - file->origin[axis]);
+    }
+  }
 }
 
 void AppendFan(const std::vector<uint32_t>& polygon, std::vector<std::array<uint32_t, 3>>* triangles) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/files/mesh_file.h"
+#include "common/geometry.h"
 #include "common/mesh.h"
 #include "common/status.h"
 
@@ -26,5 +27,9 @@ absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& nam
 // Otherwise as WriteFile.
 absl::Status WritePly(const std::string& path, const Mesh& mesh,
                       const std::map<std::string, std::vector<double>>& scalars = {});
+
+// Writes a mesh in the World frame: as above without `scalars`, but with double x y z, because single precision would
+// destroy the shape of a mesh far from the origin. MeshLab, CloudCompare, Open3D and Blender read both.
+absl::Status WriteWorldPly(const std::string& path, const Mesh& mesh, const Sim3<World, Object>& S_world_mesh);
 
 }  // namespace romap::files

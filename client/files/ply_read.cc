@@ -286,7 +286,7 @@ absl::StatusOr<MeshFile> ParsePly(std::string_view bytes, const std::string& nam
     if (element.name != "vertex") continue;
     std::array<std::vector<double>, 3> taken;
     if (!TakeColumns({"x", "y", "z"}, &columns, &taken)) return InvalidArgument("{}: vertices lack x, y or z", name);
-    file.mesh.vertices = ToVectors(taken);
+    SetPositions(taken, &file);
     if (TakeColumns({"nx", "ny", "nz"}, &columns, &taken)) file.mesh.normals = ToVectors(taken);
     if (TakeColumns({"red", "green", "blue"}, &columns, &taken)) {
       for (size_t k = 0; k < taken[0].size(); ++k) {

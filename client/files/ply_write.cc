@@ -26,11 +26,13 @@ struct Column {
   bool as_bytes;  // uchar, otherwise float
 };
 
-std::string WriteHeader(const Mesh& mesh, const std::map<std::string, std::vector<double>>& scalars) {
+using Scalars = std::map<std::string, std::vector<double>>;
+
+std::string WriteHeader(const Mesh& mesh, const Scalars& scalars, const char* coordinate_type) {
   std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
-      "property float x\nproperty float y\nproperty float z\n",
-      mesh.vertices.size());
+      "ply\nformat binary_little_endian 1.0\nelement vertex {0}\n"
+      "property {1} x\nproperty {1} y\nproperty {1} z\n",
+      mesh.vertices.size(), coordinate_type);
   if (!mesh.normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!mesh.colors.empty()) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (!mesh.confidence.empty()) header += "property float confidence\n";
@@ -43,10 +45,9 @@ std::string WriteHeader(const Mesh& mesh, const std::map<std::string, std::vecto
   return header + "end_header\n";
 }
 
-}  // namespace
-
-absl::Status WritePly(const std::string& path, const Mesh& mesh,
-                      const std::map<std::string, std::vector<double>>& scalars) {
+// `S_world_mesh` is null if the vertices are written unchanged.
+absl::Status WriteAnyPly(const std::string& path, const Mesh& mesh, const Scalars& scalars,
+                         const Sim3<World, Object>* S_world_mesh) {
   ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh, path));
   const size_t count = mesh.vertices.size();
   const auto fits = [count](size_t size) { return size == 0 || size == count; };
@@ -63,11 +64,22 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
   if (!mesh.confidence.empty() && scalars.contains("confidence")) {
     return InvalidArgument("{}: 'confidence' is given both by the mesh and by the scalars", path);
   }
-  std::string bytes = WriteHeader(mesh, scalars);
-  bytes.reserve(bytes.size() + 36 * count + 13 * mesh.triangles.size());
+  std::string bytes = WriteHeader(mesh, scalars, S_world_mesh != nullptr ? "double" : "float");
+  bytes.reserve(bytes.size() + 48 * count + 13 * mesh.triangles.size());
+  const Eigen::Matrix3f R_world_mesh = S_world_mesh != nullptr
+                                           ? S_world_mesh->rotation().toRotationMatrix().cast<float>().eval()
+                                           : Eigen::Matrix3f::Identity().eval();
   for (size_t k = 0; k < count; ++k) {
-    Append(mesh.vertices[k], &bytes);
-    if (!mesh.normals.empty()) Append(mesh.normals[k], &bytes);
+    if (S_world_mesh != nullptr) {
+      const Eigen::Vector3d p_world = *S_world_mesh * mesh.vertices[k].cast<double>();
+      Append(p_world, &bytes);
+    } else {
+      Append(mesh.vertices[k], &bytes);
+    }
+    if (!mesh.normals.empty()) {
+      const Eigen::Vector3f normal = R_world_mesh * mesh.normals[k];
+      Append(normal, &bytes);
+    }
     if (!mesh.colors.empty()) Append(mesh.colors[k], &bytes);
     if (!mesh.confidence.empty()) Append(mesh.confidence[k], &bytes);
     for (const Column& column : columns) {
@@ -80,6 +92,17 @@ absl::Status WritePly(const std::string& path, const Mesh& mesh,
     Append(triangle, &bytes);
   }
   return WriteFile(path, bytes);
+}
+
+}  // namespace
+
+absl::Status WritePly(const std::string& path, const Mesh& mesh,
+                      const std::map<std::string, std::vector<double>>& scalars) {
+  return WriteAnyPly(path, mesh, scalars, nullptr);
+}
+
+absl::Status WriteWorldPly(const std::string& path, const Mesh& mesh, const Sim3<World, Object>& S_world_mesh) {
+  return WriteAnyPly(path, mesh, {}, &S_world_mesh);
 }
 
 }  // namespace romap::files

@@ -7,7 +7,6 @@
 
 #include "client/pictures/cuboids.h"
 #include "client/pictures/pictures.h"
-#include "client/render/mesh_view.h"
 
 namespace romap::pictures {
 namespace {
@@ -66,10 +65,12 @@ cv::Mat CropSquare(const cv::Mat& image_bgr, const Square& square, int panel_sid
 
 }  // namespace
 
-cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, const CameraModel& camera,
+cv::Mat DrawMeshBesideView(const render::MeshInstance& mesh, const cv::Mat& view_bgr, const CameraModel& camera,
                            const SE3<World, Camera>& T_world_camera, const Cuboid* cuboid, int panel_side_px) {
   std::vector<Eigen::Vector3d> points_world;
-  for (const Eigen::Vector3f& vertex : mesh_world.vertices) points_world.emplace_back(vertex.cast<double>());
+  for (const Eigen::Vector3f& vertex : mesh.mesh->vertices) {
+    points_world.emplace_back(mesh.S_world_mesh * vertex.cast<double>());
+  }
   if (cuboid != nullptr) {
     const std::array<Eigen::Vector3d, 8> corners = CuboidCorners(*cuboid);
     points_world.insert(points_world.end(), corners.begin(), corners.end());
@@ -79,7 +80,7 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
 
   cv::Mat photo = CropSquare(view_bgr, square, panel_side_px);
   if (cuboid != nullptr) DrawCuboidEdges(photo, panel_camera, T_world_camera, *cuboid, cv::Scalar(60, 200, 255));
-  const std::array<render::MeshInstance, 1> instances = {{{&mesh_world, 1}}};
+  const std::span<const render::MeshInstance> instances(&mesh, 1);
   cv::Mat picture;
   cv::hconcat(
       std::vector<cv::Mat>{
@@ -89,13 +90,13 @@ cv::Mat DrawMeshBesideView(const Mesh& mesh_world, const cv::Mat& view_bgr, cons
   return picture;
 }
 
-cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectUpdate> objects,
+cv::Mat DrawOverview(std::span<const render::MeshInstance> meshes, std::span<const ObjectUpdate> objects,
                      const Eigen::Vector3d& up_world, const cv::Size& size_px) {
   Eigen::AlignedBox3d bounds;
-  std::vector<render::MeshInstance> instances;
-  for (const Mesh& mesh : meshes_world) {
-    for (const Eigen::Vector3f& vertex : mesh.vertices) bounds.extend(vertex.cast<double>());
-    instances.push_back({&mesh, 1});
+  for (const render::MeshInstance& instance : meshes) {
+    for (const Eigen::Vector3f& vertex : instance.mesh->vertices) {
+      bounds.extend(instance.S_world_mesh * vertex.cast<double>());
+    }
   }
   for (const ObjectUpdate& object : objects) {
     if (object.state == ObjectState::kLost) continue;
@@ -117,10 +118,10 @@ cv::Mat DrawOverview(std::span<const Mesh> meshes_world, std::span<const ObjectU
   rotation << forward.cross(up_world).normalized(), forward.cross(forward.cross(up_world)).normalized(), forward;
   // The bounding sphere fits the smaller side of the image.
   const double half_view_rad = std::atan(0.5 * std::min(size_px.width, size_px.height) / camera.fx_px);
-  const double distance_mu = std::max(0.5 * bounds.diagonal().norm(), 1e-6) / std::sin(half_view_rad);
+  const double distance_mu = std::max(0.5 * bounds.diagonal().norm(), 1e-12) / std::sin(half_view_rad);
   const SE3<World, Camera> T_world_camera(rotation, bounds.center() - distance_mu * forward);
 
-  cv::Mat picture = render::RenderMeshes(instances, camera, T_world_camera, render::MeshPaint::kColored).color_bgr;
+  cv::Mat picture = render::RenderMeshes(meshes, camera, T_world_camera, render::MeshPaint::kColored).color_bgr;
   DrawCuboids(picture, camera, T_world_camera, objects);
   return picture;
 }

@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kSamplesAcross = 2;
 
-// All meshes merged into one set of arrays, with attributes per vertex.
+// All meshes merged into one set of arrays, with attributes per vertex. The origin of the World frame is moved to the
+// camera, because single precision is too coarse far from the origin.
 struct MergedMeshes {
   std::vector<Eigen::Vector3f> positions_world;
   std::vector<Eigen::Vector3f> normals;     // zero: use the triangle normal
@@ -22,16 +23,19 @@ struct MergedMeshes {
   std::vector<uint16_t> ids;  // per triangle
 };
 
-MergedMeshes Merge(std::span<const MeshInstance> meshes) {
+MergedMeshes Merge(std::span<const MeshInstance> meshes, const Eigen::Vector3d& origin_world) {
   MergedMeshes merged;
   for (const MeshInstance& instance : meshes) {
-    const Mesh& mesh = *instance.mesh_world;
+    const Mesh& mesh = *instance.mesh;
+    const Eigen::Matrix3f R_world_mesh = instance.S_world_mesh.rotation().toRotationMatrix().cast<float>();
     const auto base = static_cast<uint32_t>(merged.positions_world.size());
     const bool has_normals = mesh.normals.size() == mesh.vertices.size();
     const bool has_colors = mesh.colors.size() == mesh.vertices.size();
     for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-      merged.positions_world.push_back(mesh.vertices[i]);
-      merged.normals.push_back(has_normals ? mesh.normals[i] : Eigen::Vector3f(Eigen::Vector3f::Zero()));
+      const Eigen::Vector3d p_world = instance.S_world_mesh * mesh.vertices[i].cast<double>();
+      merged.positions_world.emplace_back((p_world - origin_world).cast<float>());
+      merged.normals.push_back(has_normals ? Eigen::Vector3f(R_world_mesh * mesh.normals[i])
+                                           : Eigen::Vector3f(Eigen::Vector3f::Zero()));
       merged.colors_bgr.push_back(has_colors ? Eigen::Vector3f(mesh.colors[i][2], mesh.colors[i][1], mesh.colors[i][0])
                                              : Eigen::Vector3f(Eigen::Vector3f::Constant(-1)));
     }
@@ -42,6 +46,14 @@ MergedMeshes Merge(std::span<const MeshInstance> meshes) {
     }
   }
   return merged;
+}
+
+// Relative to the distance of the farthest vertex, because the map unit may be a kilometer.
+double NearPlane(const std::vector<Eigen::Vector3f>& from_camera) {
+  constexpr double kShare = 1e-4;
+  float farthest_mu = 0;
+  for (const Eigen::Vector3f& position : from_camera) farthest_mu = std::max(farthest_mu, position.norm());
+  return farthest_mu > 0 ? kShare * farthest_mu : kShare;
 }
 
 // The color of triangle `triangle` at its intersection with the ray. The light is above and left of the camera: a light
@@ -58,7 +70,9 @@ Eigen::Vector3f ShadeBgr(const MergedMeshes& merged, int32_t triangle, const SE3
 
   Eigen::Vector3f normal =
       weights.x() * merged.normals[a] + weights.y() * merged.normals[b] + weights.z() * merged.normals[c];
-  if (normal.squaredNorm() < 1e-12F) normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  if (normal.squaredNorm() < 1e-12F) {
+    normal = (corners[1] - corners[0]).normalized().cross((corners[2] - corners[0]).normalized());
+  }
   normal.normalize();
   static const Eigen::Vector3d kToLightCamera = Eigen::Vector3d(-0.35, -0.6, -0.72).normalized();
   const Eigen::Vector3f to_light = (T_world_camera.rotation() * kToLightCamera).cast<float>();
@@ -70,12 +84,14 @@ Eigen::Vector3f ShadeBgr(const MergedMeshes& merged, int32_t triangle, const SE3
 }  // namespace
 
 RenderedView RenderMeshes(std::span<const MeshInstance> meshes, const CameraModel& camera,
-                          const SE3<World, Camera>& T_world_camera, MeshPaint paint, const cv::Scalar& background_bgr) {
-  const MergedMeshes merged = Merge(meshes);
+                          const SE3<World, Camera>& T_given_camera, MeshPaint paint, const cv::Scalar& background_bgr) {
+  const MergedMeshes merged = Merge(meshes, T_given_camera.translation());
+  const SE3<World, Camera> T_world_camera(T_given_camera.rotation(), Eigen::Vector3d::Zero());
   const TriangleSoup soup{merged.positions_world, merged.triangles};
-  const VisibilityImage centers = Rasterize(camera, T_world_camera, soup);
+  const RasterOptions options{.near_mu = NearPlane(merged.positions_world)};
+  const VisibilityImage centers = Rasterize(camera, T_world_camera, soup, options);
   const CameraModel fine_camera = Supersampled(camera, kSamplesAcross);
-  const VisibilityImage fine = Rasterize(fine_camera, T_world_camera, soup);
+  const VisibilityImage fine = Rasterize(fine_camera, T_world_camera, soup, options);
 
   RenderedView view;
   view.color_bgr.create(camera.height_px, camera.width_px, CV_8UC3);

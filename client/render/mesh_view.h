@@ -16,8 +16,9 @@ enum class MeshPaint {
 
 // A mesh to draw. Shading uses the vertex normals if the mesh has them, otherwise the triangle normals.
 struct MeshInstance {
-  const Mesh* mesh_world = nullptr;  // vertices in the World frame, map units; may be empty
-  uint16_t id = 0;                   // value in RenderedView::ids, > 0
+  const Mesh* mesh = nullptr;  // may be empty
+  uint16_t id = 0;             // value in RenderedView::ids, > 0
+  Sim3<World, Object> S_world_mesh = {};
 };
 
 // A rendered view; all images have the size of the camera image.

@@ -14,8 +14,9 @@ namespace romap::session {
 namespace {
 
 constexpr size_t kMaxClassNameBytes = 100;
-// Single-precision geometry is too coarse beyond this distance from the origin.
-constexpr double kMaxDistance_mu = 1e6;
+// World coordinates are in double precision, which resolves 1.5e-8 map units at this distance from the origin.
+// Earth-centered coordinates in meters reach 6.4e6.
+constexpr double kMaxDistance_mu = 1e8;
 
 absl::Status CheckPose(const FrameInput& input) {
   if (input.T_world_camera && !input.T_world_camera->IsFinite()) {

@@ -55,7 +55,7 @@ std::vector<Eigen::Vector3d> TrueSurface(const files::Sequence& sequence, const 
     if (!ply.ok()) continue;
     const auto seen = ply->scalars.find("seen");
     for (size_t i = 0; i < ply->mesh.vertices.size(); ++i) {
-      if (seen == ply->scalars.end() || seen->second[i] > 0) points.push_back(ply->mesh.vertices[i].cast<double>());
+      if (seen == ply->scalars.end() || seen->second[i] > 0) points.push_back(ply->Position(i));
     }
   }
   return points;

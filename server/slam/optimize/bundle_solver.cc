@@ -38,8 +38,9 @@ bool IsUsable(const PosePrior& prior) {
          std::isfinite(prior.rotation_sigma_rad) && std::isfinite(prior.translation_sigma_mu);
 }
 
-// Solves a bundle problem with Ceres. Lengths are divided by the typical distance from camera to point, so that the
-// effect of tolerances and damping does not depend on the map's unit.
+// Solves a bundle problem with Ceres. The origin is moved to the first camera and lengths are divided by the typical
+// distance from camera to point, so that the effect of tolerances and damping does not depend on the map's origin and
+// unit.
 class BundleSolver {
  public:
   BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& use);
@@ -48,6 +49,10 @@ class BundleSolver {
 
  private:
   void MeasureUnit();
+  SE3<World, Camera> ToSolver(const SE3<World, Camera>& pose) const {
+    return {pose.rotation(), (pose.translation() - origin_world_) / unit_mu_};
+  }
+  Eigen::Vector3d FromSolver(const Eigen::Vector3d& position) const { return position * unit_mu_ + origin_world_; }
   void SelectPoints();
   void AddObservations();
   template <class Cost>
@@ -61,6 +66,7 @@ class BundleSolver {
 
   BundleProblem& problem_;
   std::vector<uint8_t> use_;
+  Eigen::Vector3d origin_world_ = Eigen::Vector3d::Zero();
   double unit_mu_ = 1;
 
   std::vector<CameraState> cameras_;
@@ -94,14 +100,14 @@ ceres::Problem::Options BundleSolver::ProblemOptions(RefreshCameras* refresh) {
 BundleSolver::BundleSolver(BundleProblem& problem, const std::vector<uint8_t>& use)
     : problem_(problem), use_(use), ceres_(ProblemOptions(&refresh_)) {
   MeasureUnit();
-  cameras_.reserve(problem.cameras.size());
-  for (const BundleCamera& camera : problem.cameras) {
-    const SE3<World, Camera>& T = camera.T_world_camera;
-    cameras_.emplace_back(SE3<World, Camera>(T.rotation(), T.translation() / unit_mu_));
+  if (!problem.cameras.empty() && problem.cameras.front().T_world_camera.IsFinite()) {
+    origin_world_ = problem.cameras.front().T_world_camera.translation();
   }
+  cameras_.reserve(problem.cameras.size());
+  for (const BundleCamera& camera : problem.cameras) cameras_.emplace_back(ToSolver(camera.T_world_camera));
   points_.resize(problem.points.size());
   for (size_t i = 0; i < points_.size(); ++i) {
-    Eigen::Map<Eigen::Vector3d>(points_[i].data()) = problem.points[i].position_world / unit_mu_;
+    Eigen::Map<Eigen::Vector3d>(points_[i].data()) = (problem.points[i].position_world - origin_world_) / unit_mu_;
   }
   if (problem.lens) lens_k1_ = problem.lens->correction.k1;
   varied_cameras_.assign(cameras_.size(), 0);
@@ -196,8 +202,7 @@ void BundleSolver::AddPriors() {
     const BundleCamera& camera = problem_.cameras[i];
     if (camera.fixed || !camera.prior || !IsUsable(*camera.prior) || !camera.T_world_camera.IsFinite()) continue;
     PosePrior prior = *camera.prior;
-    const SE3<World, Camera>& T = prior.T_world_camera;
-    prior.T_world_camera = SE3<World, Camera>(T.rotation(), T.translation() / unit_mu_);
+    prior.T_world_camera = ToSolver(prior.T_world_camera);
     prior.translation_sigma_mu /= unit_mu_;
     prior_costs_.emplace_back(&cameras_[i], prior);
     ceres_.AddResidualBlock(&prior_costs_.back(), nullptr, cameras_[i].increment.data());
@@ -264,11 +269,11 @@ bool BundleSolver::WriteBack() const {
   for (size_t i = 0; i < cameras_.size(); ++i) {
     if (!varied_cameras_[i]) continue;
     const SE3<World, Camera> pose = cameras_[i].Pose();
-    problem_.cameras[i].T_world_camera = SE3<World, Camera>(pose.rotation(), pose.translation() * unit_mu_);
+    problem_.cameras[i].T_world_camera = SE3<World, Camera>(pose.rotation(), FromSolver(pose.translation()));
   }
   for (size_t i = 0; i < points_.size(); ++i) {
     if (!varied_points_[i]) continue;
-    problem_.points[i].position_world = Eigen::Map<const Eigen::Vector3d>(points_[i].data()) * unit_mu_;
+    problem_.points[i].position_world = FromSolver(Eigen::Map<const Eigen::Vector3d>(points_[i].data()));
   }
   return true;
 }

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
+#include "client/files/ply.h"
 #include "common/mesh_codec.h"
 
 namespace romap::cli::map_files_test {
@@ -18,29 +21,38 @@ Mesh Tetrahedron() {
   return mesh;
 }
 
-TEST(MapFilesTest, TransformsAndScalesMeshesToTheWorldFrame) {
-  const auto draco = EncodeDraco(Tetrahedron(), DracoOptions{});
-  ASSERT_TRUE(draco.ok());
+ObjectSnapshot SnapshotAt(const Eigen::Vector3d& origin_world) {
   ObjectSnapshot snapshot;
   snapshot.object.id = ObjectId{1};
   snapshot.object.state = ObjectState::kConfirmed;
   snapshot.object.T_world_mesh.emplace(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX())),
-                                       Eigen::Vector3d(10, 20, 30));
-  snapshot.mesh.emplace();
-  snapshot.mesh->draco = *draco;
-
-  std::vector<std::string> faults;
-  const std::vector<MapObject> plain = DecodeObjects({snapshot}, &faults);
+                                       origin_world);
   snapshot.object.mesh_scale = 1.5;
-  const std::vector<MapObject> scaled = DecodeObjects({snapshot}, &faults);
-  EXPECT_THAT(faults, IsEmpty());
-  const Eigen::Vector3f origin(10, 20, 30);
-  ASSERT_THAT(scaled.at(0).mesh_world.vertices, SizeIs(4));
-  for (size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector3f expected = origin + 1.5f * (plain.at(0).mesh_world.vertices[i] - origin);
-    EXPECT_LT((scaled[0].mesh_world.vertices[i] - expected).norm(), 1e-4f);
-    EXPECT_LT((scaled[0].mesh_world.normals[i] - plain[0].mesh_world.normals[i]).norm(), 1e-5f);
+  snapshot.mesh.emplace();
+  snapshot.mesh->draco = EncodeDraco(Tetrahedron(), DracoOptions{}).value();
+  return snapshot;
+}
+
+TEST(MapFilesTest, WritesMeshesFarFromTheOriginWithTheirFullShape) {
+  const std::string dir = testing::TempDir() + "romap_map_files_test";
+  for (const Eigen::Vector3d& origin : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(500'000.123, -6'400'000, 100)}) {
+    const ObjectSnapshot snapshot = SnapshotAt(origin);
+    std::vector<std::string> faults;
+    const std::vector<MapObject> objects = DecodeObjects({snapshot}, &faults);
+    EXPECT_THAT(faults, IsEmpty());
+    ASSERT_TRUE(WriteMapFiles(dir, objects).ok());
+    const auto file = files::ReadPly(dir + "/objects/1_.ply");
+    ASSERT_TRUE(file.ok()) << file.status();
+    const Mesh& local = objects.at(0).mesh;
+    ASSERT_THAT(local.vertices, SizeIs(4));
+    const Eigen::Quaterniond& rotation = snapshot.object.T_world_mesh->rotation();
+    for (size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector3d from_origin = rotation * (1.5 * local.vertices[i].cast<double>());
+      EXPECT_LT((file->Position(i) - origin - from_origin).norm(), 1e-6);
+      EXPECT_LT((file->mesh.normals[i].cast<double>() - rotation * local.normals[i].cast<double>()).norm(), 1e-6);
+    }
   }
+  std::filesystem::remove_all(dir);
 }
 
 TEST(MapFilesTest, TrajectorySkipsFramesWithoutPose) {

@@ -55,6 +55,17 @@ TEST_F(BoxesEvalTest, AShiftByHalfALengthGivesAnIouOfOneThird) {
   EXPECT_NEAR(report->rows[0].match->center_cm, 10, 1e-6);
 }
 
+TEST_F(BoxesEvalTest, TheOverlapDoesNotDependOnTheOrigin) {
+  const auto iou = [](const Eigen::Vector3d& origin) {
+    const YawBox a{.center = origin, .yaw_rad = 0.3, .half_extents = {0.1, 0.2, 0.05}};
+    YawBox b = a;
+    b.center += Eigen::Vector3d(0.03, -0.02, 0.01);
+    b.yaw_rad = 0.5;
+    return IntersectionOverUnion(a, b);
+  };
+  EXPECT_NEAR(iou({500'000, -6'400'000, 100}), iou({0, 0, 0}), 1e-6);
+}
+
 TEST_F(BoxesEvalTest, AQuarterTurnWithSwappedSidesIsTheSameBox) {
   const auto report = Evaluate({eval_world::UprightCuboid(1, {0, 0, 0}, 0.3 + std::numbers::pi / 2, {0.2, 0.1, 0.05}),
                                 eval_world::UprightCuboid(2, {1, 0, 0.1}, -0.5 + 10 * kRadPerDeg, {0.15, 0.1, 0.2})});

@@ -21,10 +21,10 @@ uint32_t WordAt(const std::string& bytes, size_t offset) {
 // A GLB file, parsed according to the specification.
 struct Glb {
   // Writes the mesh and reads the file.
-  explicit Glb(const Mesh& mesh) {
+  explicit Glb(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh = {}) {
     const std::string path =
         ::testing::TempDir() + "romap_" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".glb";
-    EXPECT_OK(WriteGlb(path, mesh));
+    EXPECT_OK(WriteGlb(path, mesh, S_world_mesh));
     const std::string bytes = ReadFile(path).value();
     std::filesystem::remove(path);
     EXPECT_EQ(bytes.substr(0, 4), "glTF");
@@ -71,7 +71,8 @@ TEST(GlbTest, StoresTheMeshAccordingToTheSpecification) {
   const Glb glb(Triangle());
   EXPECT_EQ(glb.document["asset"]["version"], "2.0");
   EXPECT_EQ(glb.document["scenes"][glb.document["scene"].get<int>()]["nodes"], nlohmann::json({0}));
-  EXPECT_EQ(glb.document["nodes"][0]["mesh"], 0);
+  EXPECT_EQ(glb.document["nodes"][0]["children"], nlohmann::json({1}));
+  EXPECT_EQ(glb.document["nodes"][1]["mesh"], 0);
   const auto& primitive = glb.document["meshes"][0]["primitives"][0];
   const int position = primitive["attributes"]["POSITION"];
   EXPECT_EQ(glb.Read<float>(position, 3), (std::vector<float>{0, 0, -1, 2, 0, 0, 0, 3, 0}));
@@ -94,6 +95,21 @@ TEST(GlbTest, RotatesZUpToYUp) {
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   EXPECT_TRUE((rotation * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitY(), 1e-12));
   EXPECT_TRUE((rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitX(), 1e-12));
+}
+
+TEST(GlbTest, StoresThePoseInTheNodeInDoublePrecision) {
+  const Sim3<World, Object> S_world_mesh(
+      1e-3, Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized())),
+      Eigen::Vector3d(500'000.123456789, 6'400'000.25, -100.1));
+  const Glb glb(Triangle(), S_world_mesh);
+  const auto& node = glb.document["nodes"][1];
+  EXPECT_EQ(node["translation"].get<std::vector<double>>(),
+            (std::vector<double>{500'000.123456789, 6'400'000.25, -100.1}));
+  EXPECT_EQ(node["scale"].get<std::vector<double>>(), std::vector<double>(3, 1e-3));
+  const auto q = node["rotation"].get<std::vector<double>>();  // x y z w
+  EXPECT_LT(S_world_mesh.rotation().angularDistance(Eigen::Quaterniond(q[3], q[0], q[1], q[2])), 1e-12);
+  const int position = glb.document["meshes"][0]["primitives"][0]["attributes"]["POSITION"];
+  EXPECT_EQ(glb.Read<float>(position, 3), (std::vector<float>{0, 0, -1, 2, 0, 0, 0, 3, 0})) << "unchanged";
 }
 
 TEST(GlbTest, WritesAMeshWithoutTrianglesAsPoints) {

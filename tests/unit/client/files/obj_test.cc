@@ -21,11 +21,22 @@ TEST(ObjTest, ReadsPolygonsAndRelativeIndices) {
   const std::string path = TempPath("a.obj");
   std::ofstream(path) << "# quad\nmtllib a.mtl\nv 0 0 0 1 1 1\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\n"
                          "f 1//1 2//1 3//1 4//1\nf -4/1 -1 -2/2/1\n";
-  const auto mesh = ReadObj(path);
-  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  const auto file = ReadObj(path);
+  ASSERT_TRUE(file.ok()) << file.status();
   using Triangle = std::array<uint32_t, 3>;
-  EXPECT_THAT(mesh->triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}, Triangle{0, 3, 2}));
+  EXPECT_EQ(file->Position(2), Eigen::Vector3d(1, 1, 0));
+  EXPECT_THAT(file->mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}, Triangle{0, 3, 2}));
   std::filesystem::remove(path);
+}
+
+TEST(ObjTest, KeepsTheShapeOfAMeshFarFromTheOrigin) {
+  const std::string path = TempPath("far.obj");
+  std::ofstream(path) << "v 500000.001 6400000.25 0\nv 500000.002 6400000.5 1\nv 500000.003 6400000 2\nf 1 2 3\n";
+  const auto file = ReadObj(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(file.ok()) << file.status();
+  EXPECT_LT((file->Position(1) - Eigen::Vector3d(500000.002, 6400000.5, 1)).norm(), 1e-8);
+  EXPECT_NEAR(file->mesh.vertices[1].x() - file->mesh.vertices[0].x(), 1e-3, 1e-8);
 }
 
 TEST(ObjTest, NamesTheInvalidLineOrFace) {

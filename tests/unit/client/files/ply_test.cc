@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "client/files/text_file.h"
@@ -41,6 +42,7 @@ TEST(PlyTest, RoundTrip) {
   ASSERT_TRUE(file.ok()) << file.status();
   const Mesh expected = Tetrahedron();
   EXPECT_EQ(file->mesh.vertices, expected.vertices);
+  EXPECT_EQ(file->origin, Eigen::Vector3d(0, 0, 0));
   EXPECT_EQ(file->mesh.normals, expected.normals);
   EXPECT_EQ(file->mesh.colors, expected.colors);
   EXPECT_EQ(file->mesh.triangles, expected.triangles);
@@ -91,6 +93,22 @@ TEST(PlyTest, ReadsBigEndianPointClouds) {
   ASSERT_TRUE(file.ok()) << file.status();
   EXPECT_EQ(file->mesh.vertices[0], Eigen::Vector3f(1, -2, 3));
   EXPECT_TRUE(file->mesh.triangles.empty());
+}
+
+TEST(PlyTest, KeepsTheShapeOfAMeshFarFromTheOrigin) {
+  const Eigen::Quaterniond quarter_turn(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
+  const Sim3<World, Object> S_world_mesh(1e-3, quarter_turn, Eigen::Vector3d(500'000.1, 6'400'000.2, 0.5));
+  const std::string path = TempPath("far.ply");
+  ASSERT_TRUE(WriteWorldPly(path, Tetrahedron(), S_world_mesh).ok());
+  const auto file = ReadPly(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(file.ok()) << file.status();
+  for (size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector3d expected = S_world_mesh * Tetrahedron().vertices[k].cast<double>();
+    EXPECT_LT((file->Position(k) - expected).norm(), 2e-9) << k;
+  }
+  EXPECT_LT((file->mesh.normals[1] - Eigen::Vector3f(0, 1, 0)).norm(), 1e-6f);
+  EXPECT_LT(file->mesh.vertices[1].norm(), 2e-3f) << "relative to an origin nearby";
 }
 
 TEST(PlyTest, NamesTheErrorInMalformedFiles) {

@@ -115,7 +115,7 @@ TEST(DrawMeshBesideViewTest, ShowsTheSameSquareInThreePanels) {
   const Eigen::Vector2d high = camera.Project({0.7, 0.1, 3.7});
   cv::rectangle(view, cv::Point(cvRound(low.x()), cvRound(low.y())), cv::Point(cvRound(high.x()), cvRound(high.y())),
                 {0, 255, 0}, cv::FILLED);
-  const cv::Mat picture = DrawMeshBesideView(mesh, view, camera, {}, nullptr, 120);
+  const cv::Mat picture = DrawMeshBesideView({&mesh}, view, camera, {}, nullptr, 120);
   ASSERT_EQ(picture.size(), cv::Size(360, 120));
   EXPECT_EQ(picture.at<cv::Vec3b>(60, 60), cv::Vec3b(0, 255, 0));
   const auto shaded = picture.at<cv::Vec3b>(60, 180);
@@ -139,19 +139,21 @@ TEST(DrawMeshBesideViewTest, AcceptsEmptyMeshesAndObjectsBehindTheCamera) {
   const cv::Mat view(240, 320, CV_8UC3, cv::Scalar(9, 8, 7));
   const Mesh behind = Cube({0, 0, -4}, 0.3F, Rgb8{1, 1, 1});
   for (const Mesh& mesh : {Mesh{}, behind}) {
-    const cv::Mat picture = DrawMeshBesideView(mesh, view, SmallCamera(), {}, nullptr, 64);
+    const cv::Mat picture = DrawMeshBesideView({&mesh}, view, SmallCamera(), {}, nullptr, 64);
     ASSERT_EQ(picture.size(), cv::Size(192, 64));
     EXPECT_EQ(picture.at<cv::Vec3b>(32, 32), cv::Vec3b(9, 8, 7));
     EXPECT_EQ(picture.at<cv::Vec3b>(32, 96), cv::Vec3b(255, 255, 255));
   }
+  const Mesh empty;
   const Cuboid cuboid = ObjectAt(1, {0, 0, 4}, {0.5, 0.5, 0.5}).cuboid;
-  const cv::Mat outlined = DrawMeshBesideView(Mesh{}, view, SmallCamera(), {}, &cuboid, 64);
+  const cv::Mat outlined = DrawMeshBesideView({&empty}, view, SmallCamera(), {}, &cuboid, 64);
   EXPECT_GT(cv::norm(outlined.colRange(0, 64), cv::Mat(64, 64, CV_8UC3, cv::Scalar(9, 8, 7))), 1000);
 }
 
 TEST(DrawOverviewTest, FitsEverythingIntoTheImage) {
   const std::array meshes = {Cube({10, 0, 0}, 0.5F, Rgb8{0, 0, 255}), Cube({-10, 3, 0}, 0.5F, Rgb8{255, 0, 0})};
-  const cv::Mat picture = DrawOverview(meshes, {}, Eigen::Vector3d::UnitZ(), {300, 200});
+  const std::array<render::MeshInstance, 2> instances = {{{&meshes[0]}, {&meshes[1]}}};
+  const cv::Mat picture = DrawOverview(instances, {}, Eigen::Vector3d::UnitZ(), {300, 200});
   ASSERT_EQ(picture.size(), cv::Size(300, 200));
   EXPECT_TRUE(HasColor(picture, cv::Scalar(255, 0, 0)));
   EXPECT_TRUE(HasColor(picture, cv::Scalar(0, 0, 255)));
@@ -165,7 +167,8 @@ TEST(DrawOverviewTest, ViewsFromAbove) {
   for (const Eigen::Vector3d& up : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, -1)}) {
     const std::array meshes = {Cube((1.2 * up).cast<float>(), 0.5F, Rgb8{0, 0, 255}),
                                Cube({0, 0, 0}, 0.1F, Rgb8{255, 0, 0})};
-    const cv::Mat picture = DrawOverview(meshes, {}, up, {300, 200});
+    const std::array<render::MeshInstance, 2> instances = {{{&meshes[0]}, {&meshes[1]}}};
+    const cv::Mat picture = DrawOverview(instances, {}, up, {300, 200});
     int blue_v = 0, red_v = 0, blue = 0, red = 0;
     for (int v = 0; v < picture.rows; ++v) {
       for (int u = 0; u < picture.cols; ++u) {
@@ -178,6 +181,23 @@ TEST(DrawOverviewTest, ViewsFromAbove) {
     ASSERT_GT(red, 0);
     EXPECT_LT(blue_v / blue, red_v / red) << "up = " << up.transpose();
   }
+}
+
+TEST(DrawOverviewTest, DrawsTheSamePictureFarFromTheOriginAndInAnyUnit) {
+  const Mesh mesh = Cube({0.1F, 0.2F, 0}, 0.5F, Rgb8{0, 0, 255});
+  const auto picture = [&](double scale, const Eigen::Vector3d& origin) {
+    const render::MeshInstance instance{
+        .mesh = &mesh, .S_world_mesh = Sim3<World, Object>(scale, Eigen::Quaterniond::Identity(), origin)};
+    ObjectUpdate object = ObjectAt(1, {0, 0, 0}, scale * Eigen::Vector3d(0.7, 0.8, 0.6));
+    object.cuboid.T_world_object = SE3<World, Object>(Eigen::Quaterniond::Identity(), origin);
+    return DrawOverview(std::span(&instance, 1), std::span(&object, 1), Eigen::Vector3d::UnitZ(), {300, 200});
+  };
+  const cv::Mat near = picture(1, {0, 0, 0});
+  EXPECT_TRUE(HasColor(near, cv::Scalar(255, 0, 0)));
+  // Rounding may change single pixels.
+  EXPECT_LT(cv::norm(near, picture(1, {500'000, -6'400'000, 100}), cv::NORM_L1) / (300.0 * 200 * 3), 0.2);
+  EXPECT_LT(cv::norm(near, picture(1e-3, {0, 0, 0}), cv::NORM_L1) / (300.0 * 200 * 3), 0.2);
+  EXPECT_LT(cv::norm(near, picture(1e3, {0, 0, 0}), cv::NORM_L1) / (300.0 * 200 * 3), 0.2);
 }
 
 TEST(DrawOverviewTest, AcceptsAnEmptyMap) {

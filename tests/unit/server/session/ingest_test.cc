@@ -212,6 +212,8 @@ TEST(IngestTest, InvalidNumbersAreRejected) {
   FrameInput pose = ValidFrame();
   pose.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, std::nan(""), 0));
   EXPECT_THAT(ErrorOf(ingest, pose), HasSubstr("t_world_camera: all numbers must be finite"));
+  pose.T_world_camera = SE3<World, Camera>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 2e8, 0));
+  EXPECT_THAT(ErrorOf(ingest, pose), HasSubstr("t_world_camera: must be within 1e+08 map units of the origin"));
   FrameInput gravity = ValidFrame();
   gravity.gravity_camera = Eigen::Vector3d::Zero();
   EXPECT_THAT(ErrorOf(ingest, gravity), HasSubstr("gravity_camera: must be a finite vector"));

@@ -77,6 +77,26 @@ TEST(BundleAdjustment, RecoversTheExactSceneWithoutNoise) {
   }
 }
 
+TEST(BundleAdjustment, TheResultDoesNotDependOnTheOrigin) {
+  const Eigen::Vector3d origin(500'000, -6'400'000, 100);
+  BundleWorld near = MakeBundleWorld(NoisyStart());
+  BundleWorld distant = near;
+  for (BundleCamera& camera : distant.problem.cameras) {
+    camera.T_world_camera = {camera.T_world_camera.rotation(),
+                             Eigen::Vector3d(camera.T_world_camera.translation() + origin)};
+  }
+  for (BundlePoint& point : distant.problem.points) point.position_world += origin;
+  const BundleOptions options{.max_iterations = 30};
+  const BundleSummary near_summary = AdjustBundle(near.problem, options);
+  const BundleSummary distant_summary = AdjustBundle(distant.problem, options);
+  EXPECT_EQ(distant_summary.iterations, near_summary.iterations);
+  EXPECT_NEAR(distant_summary.final_rms_px, near_summary.final_rms_px, 1e-6);
+  for (size_t i = 0; i < near.problem.cameras.size(); ++i) {
+    const Eigen::Vector3d moved = distant.problem.cameras[i].T_world_camera.translation() - origin;
+    EXPECT_LT((moved - near.problem.cameras[i].T_world_camera.translation()).norm(), 1e-6) << i;
+  }
+}
+
 TEST(BundleAdjustment, AccuracyMatchesTheNoise) {
   BundleWorld world = MakeBundleWorld(NoisyStart());
   const double pose_before_mu = RmsPoseErrorMu(world);
