@@ -164,6 +164,7 @@ absl::Status Sequence::OpenDetections(const SequenceOptions& options) {
 absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
   if (!IsRequested(dir_, options.poses, SequenceOptions{}.poses)) return absl::OkStatus();
   ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses)));
+  for (StampedPose& pose : poses_) pose.T_world_camera = ApplyConvention(options.convention, pose.T_world_camera);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 
 #include "client/files/camera_yaml.h"
 #include "client/files/objects_yaml.h"
+#include "client/files/pose_convention.h"
 #include "client/files/tum.h"
 #include "common/client_input.h"
 #include "common/status.h"
@@ -21,6 +22,7 @@ struct SequenceOptions {
   std::string masks = "mask.txt";             // list of label images; empty = no masks
   std::string detections = "detections.csv";  // class and score per label; empty = labels are the ids of objects.yaml
   std::string poses = "groundtruth.txt";      // camera poses to send with the frames; empty = none
+  PoseConvention convention = {};             // of `poses`
   bool use_depth = false;                     // load the depth images of depth.txt
   std::optional<double> readout_s = std::nullopt;  // replaces CameraModel::readout_s of camera.yaml
   // Permutes the labels at random in each frame, like the output of a detector without a tracker.
