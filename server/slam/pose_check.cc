@@ -22,9 +22,12 @@ constexpr size_t kFewPairMatches =
 // Median movement of the matches, as a share of the image width.
 constexpr double kMovement = 0.08;
 constexpr double kLeastMovement = 0.04;
-// Tolerated distance of a match, as a share of the movement.
+// Tolerated distance of a match, as a share of the movement. Noisy poses get more tolerance than the alternatives: an
+// error of half a degree is common.
 constexpr double kToleranceShare = 0.15;
 constexpr double kMinTolerance_px = 2;
+constexpr double kGivenToleranceShare = 0.25;
+constexpr double kMinGivenTolerance_rad = 0.01;
 // A pair agrees if the given motion explains this share of its matches. It contradicts if the given motion explains
 // less than `kMaxGivenShare`, and less than `kMaxGivenRatio` of what another motion explains, which must be at least
 // `kMinBestShare`.
@@ -95,7 +98,7 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr
   const double wanted = matches.size() < kFewPairMatches ? kLeastMovement : kMovement;
   if (movement_px < wanted * frame->camera.width_px) return std::nullopt;
   reference_ = second;
-  const Pair pair = Judge(first, second, matches, std::max(kMinTolerance_px, kToleranceShare * movement_px));
+  const Pair pair = Judge(first, second, matches, movement_px);
   spdlog::debug("slam: given poses of frames {} and {}: explain {:.2f} of {} matches, best {:.2f}, movement {:.0f} px",
                 first.features->frame_id, frame->frame_id, pair.given_share, pair.matches, pair.best_share,
                 movement_px);
@@ -109,14 +112,18 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr
 
 // A pair that neither agrees nor contradicts has no `shares`.
 PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const CheckedFrame& second,
-                                 const std::vector<TwoViewMatch>& matches, double tolerance_px) const {
+                                 const std::vector<TwoViewMatch>& matches, double movement_px) const {
   Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(matches.size())};
   const CameraModel& camera = second.features->camera;
+  const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * movement_px);
+  const double given_tolerance_px =
+      std::max({tolerance_px, kGivenToleranceShare * movement_px, kMinGivenTolerance_rad * camera.fx_px});
+  pair.given_share =
+      ExplainedShare(camera, ReadMotion({}, first.T_world_camera, second.T_world_camera), matches, given_tolerance_px);
   const auto share_of = [&](const PoseHypothesis& hypothesis) {
     return ExplainedShare(ReadCamera(hypothesis, camera),
                           ReadMotion(hypothesis, first.T_world_camera, second.T_world_camera), matches, tolerance_px);
   };
-  pair.given_share = share_of({});
   pair.agrees = pair.given_share >= kAgreeingShare;
   if (pair.agrees) return pair;
   std::vector<double> shares;
@@ -236,8 +243,8 @@ std::optional<Diagnostic> PoseCheck::Check() const {
         R_body_camera->x(), R_body_camera->y(), R_body_camera->z(), R_body_camera->w());
   } else {
     diagnostic.advice =
-        "send poses of the camera, camera to world, with x right, y down, z forward, and check the calibration and the "
-        "clock of the poses";
+        "check the calibration and the clock of the poses, and whether they are those of the camera, with x right, y "
+        "down, z forward, or of a body that carries it (--pose-offset)";
   }
   diagnostic.text += "; frames are not used while this lasts";
   return diagnostic;

@@ -62,7 +62,7 @@ class PoseCheck {
   };
 
   Pair Judge(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
-             double tolerance_px) const;
+             double movement_px) const;
   void AddBestMotion(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
                      double tolerance_px, Pair& pair) const;
   void Decide();
