@@ -34,6 +34,11 @@ struct SessionOptions {
   CameraModel camera;
   FrameMode mode = FrameMode::kReplay;
   PoseUse pose_use = PoseUse::kGiven;
+  // Up in the world of the client's poses, of any length > 0. nullopt: against the gravity that the client sends, else
+  // z.
+  std::optional<Eigen::Vector3d> up_world = {};
+  // Without `up_world` and gravity: estimate up in the world of the client's poses from the images instead.
+  bool estimate_up = false;
 };
 
 struct SessionInfo {

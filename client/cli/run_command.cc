@@ -34,6 +34,9 @@ struct RunOptions {
   StreamOptions stream;
   ServiceOptions service;
   bool no_pictures = false;
+  std::vector<std::string> conventions;
+  std::string pose_offset;
+  std::string up;
   int64_t permute_labels_seed = -1;
   double readout_ms = -1;
 };
@@ -43,12 +46,24 @@ absl::Status PrepareOutput(const std::string& out) {
   return files::MakeFolder((fs::path(out) / "pictures").string());
 }
 
-files::SequenceOptions ToSequenceOptions(const RunOptions& options) {
+absl::StatusOr<files::SequenceOptions> ToSequenceOptions(const RunOptions& options) {
   files::SequenceOptions sequence = options.sequence;
+  for (const std::string& names : options.conventions) {
+    ROMAP_RETURN_IF_ERROR(files::ParseConvention(names, &sequence.convention));
+  }
+  if (!options.pose_offset.empty()) {
+    ROMAP_ASSIGN_OR_RETURN(sequence.convention.offset, files::ParsePoseOffset(options.pose_offset));
+  }
   if (options.poses == PoseUse::kIgnore) sequence.poses.clear();
   if (options.readout_ms >= 0) sequence.readout_s = 1e-3 * options.readout_ms;
   if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
   return sequence;
+}
+
+// "x" to "-z".
+Eigen::Vector3d AxisOf(const std::string& name) {
+  const double sign = name.front() == '-' ? -1 : 1;
+  return sign * Eigen::Vector3d::Unit(name.back() - 'x');
 }
 
 std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
@@ -87,8 +102,8 @@ void Evaluate(const RunOptions& options, const eval::RunRecord& record, const fi
 }
 
 absl::Status RunSequence(const RunOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence,
-                         files::Sequence::Open(options.sequence_dir, ToSequenceOptions(options)));
+  ROMAP_ASSIGN_OR_RETURN(const files::SequenceOptions sequence_options, ToSequenceOptions(options));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(options.sequence_dir, sequence_options));
   ROMAP_RETURN_IF_ERROR(PrepareOutput(options.out));
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
 
@@ -135,6 +150,19 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
       ->add_option("--pose-file", options->sequence.poses,
                    "File with the camera poses in the sequence folder (TUM format)")
       ->capture_default_str();
+  command
+      ->add_option(
+          "--pose-convention", options->conventions,
+          "Convention of the poses, if it is not camera to world with x right, y down, z forward: opengl (y up, "
+          "z backward), world_to_camera, wxyz (quaternions with w first); several are separated by commas")
+      ->option_text("NAME,... [opencv]");
+  command
+      ->add_option("--pose-offset", options->pose_offset,
+                   "Pose of the camera on the body, if the poses are those of a body that carries the camera")
+      ->option_text("\"tx ty tz qx qy qz qw\"");
+  command->add_option("--up", options->up, "Up in the world of the poses; auto: estimated from gravity or the images")
+      ->check(CLI::IsMember({"x", "-x", "y", "-y", "z", "-z", "auto"}))
+      ->option_text("x|-x|y|-y|z|-z|auto [z]");
   command
       ->add_option("--readout-ms", options->readout_ms,
                    "Rolling shutter: the time from the first to the last row of an image [ms]; 0 = global shutter")
@@ -189,6 +217,8 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
   command->callback([options, chosen] {
     options->stream.pose_use = options->poses;
+    options->stream.estimate_up = options->up == "auto";
+    if (!options->up.empty() && options->up != "auto") options->stream.up_world = AxisOf(options->up);
     *chosen = [options] { return RunSequence(*options); };
   });
 }

@@ -126,6 +126,8 @@ class Run {
     session.name = options_.session_name;
     session.camera = sequence_.camera();
     session.pose_use = options_.pose_use;
+    session.up_world = options_.up_world;
+    session.estimate_up = options_.estimate_up;
     session.mode = options_.realtime ? FrameMode::kLive : FrameMode::kReplay;
     ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
     result_.session_id = info.id;

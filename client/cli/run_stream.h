@@ -15,6 +15,8 @@ namespace romap::cli {
 
 struct StreamOptions {
   PoseUse pose_use = PoseUse::kGiven;
+  std::optional<Eigen::Vector3d> up_world = std::nullopt;  // see SessionOptions
+  bool estimate_up = false;
   std::string session_name;
   bool realtime = false;    // send at the recorded rate; the server drops frames when overloaded
   double mask_rate_hz = 0;  // maximum rate of frames with masks, by timestamps; 0 = unlimited

@@ -142,6 +142,7 @@ absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
   TimeUnit unit = TimeUnit::kSeconds;
   ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses), &unit));
   NoteUnit(options.poses, unit);
+  for (StampedPose& pose : poses_) pose.T_world_camera = ApplyConvention(options.convention, pose.T_world_camera);
   size_t posed = 0;
   std::optional<uint64_t> first_without;
   for (size_t k = 0; k < frames_.size(); ++k) {

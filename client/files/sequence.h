@@ -12,6 +12,7 @@
 #include "client/files/detections.h"
 #include "client/files/file_list.h"
 #include "client/files/objects_yaml.h"
+#include "client/files/pose_convention.h"
 #include "client/files/time_unit.h"
 #include "client/files/tum.h"
 #include "common/client_input.h"
@@ -26,6 +27,7 @@ struct SequenceOptions {
   std::string masks = "mask.txt";             // list of label images; empty = no masks
   std::string detections = "detections.csv";  // class and score per label; empty = labels are the ids of objects.yaml
   std::string poses = "groundtruth.txt";      // camera poses to send with the frames; empty = none
+  PoseConvention convention = {};             // of `poses`
   bool use_depth = false;                     // load the depth images of depth.txt
   std::optional<double> readout_s = std::nullopt;  // replaces CameraModel::readout_s of camera.yaml
   // Permutes the labels at random in each frame, like the output of a detector without a tracker.

@@ -35,6 +35,8 @@ v1::CreateSessionRequest ToProto(const SessionOptions& options) {
   *proto.mutable_camera() = ToProto(options.camera);
   proto.set_mode(EnumToProto(kFrameModes, options.mode));
   proto.set_pose_use(EnumToProto(kPoseUses, options.pose_use));
+  if (options.up_world) *proto.mutable_up_world() = ToProto(*options.up_world);
+  proto.set_estimate_up(options.estimate_up);
   return proto;
 }
 
@@ -45,6 +47,11 @@ absl::StatusOr<SessionOptions> FromProto(const v1::CreateSessionRequest& proto) 
   ROMAP_ASSIGN_OR_RETURN(options.camera, CameraFromProto(proto.camera(), "camera"));
   ROMAP_ASSIGN_OR_RETURN(options.mode, EnumFromProto(kFrameModes, proto.mode(), "mode"));
   ROMAP_ASSIGN_OR_RETURN(options.pose_use, EnumFromProto(kPoseUses, proto.pose_use(), "pose_use"));
+  if (proto.has_up_world()) {
+    ROMAP_ASSIGN_OR_RETURN(options.up_world, VectorFromProto(proto.up_world(), "up_world"));
+    if (!(options.up_world->norm() > 0)) return InvalidArgument("up_world: is zero; expected a direction");
+  }
+  options.estimate_up = proto.estimate_up();
   return options;
 }
 

@@ -16,6 +16,7 @@ namespace romap::objects {
 
 // Evidence of the detections for one landmark. Frames are counted by the mapper; client frame ids may have gaps.
 struct LandmarkEvidence {
+  uint64_t first_frame_id = 0;    // the client's, of the first observation
   uint64_t last_frame = 0;        // index of the frame of the last observation
   uint64_t dormant_frames = 0;    // frames since then during which its map was not the current one
   uint64_t observations = 0;      // frames with a mask of it

@@ -184,6 +184,7 @@ void LandmarkStore::Merge(Landmark& from, Landmark& into, bool adopt_silhouettes
   }
   AddEvidence(from.evidence, into.key, &into.evidence);
   into.keyframes.insert(into.keyframes.end(), from.keyframes.begin(), from.keyframes.end());
+  into.evidence.first_frame_id = std::min(from.evidence.first_frame_id, into.evidence.first_frame_id);
   if (from.evidence.last_frame > into.evidence.last_frame) {
     into.evidence.last_frame = from.evidence.last_frame;
     into.evidence.dormant_frames = from.evidence.dormant_frames;

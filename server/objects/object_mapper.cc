@@ -43,6 +43,7 @@ ObjectMapper::ObjectMapper(const ObjectsConfig& config)
 
 ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   current_ = {};
+  if (tracked.contradicted_since_frame != 0) return RemoveContradicted(tracked);
   if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return {};
   SetMap(tracked.map);
   history_.Add(tracked);
@@ -52,6 +53,21 @@ ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   if (tracked.is_keyframe) return output;
   const auto stand_in = history_.MakeStandIn(tracked, store_.points());
   if (stand_in) output.Append(ObserveMaskedKeyframe(*stand_in));
+  return output;
+}
+
+// Also confirmed ones: their cuboids follow from wrong poses.
+ObjectOutput ObjectMapper::RemoveContradicted(const TrackedFrame& tracked) {
+  ObjectOutput output;
+  SetMap(tracked.map);
+  history_.ForgetFrames();
+  scene_depth_ = {};
+  Prune(
+      [&](const Landmark& landmark) {
+        return Decision{landmark.evidence.first_frame_id >= tracked.contradicted_since_frame,
+                        "the given poses contradict the images"};
+      },
+      &output);
   return output;
 }
 
@@ -201,6 +217,7 @@ void ObjectMapper::RecordObservation(const Match& match, const Detection& detect
   const bool is_new = match.landmark < 0;
   Landmark& landmark = is_new ? store_.Create() : *store_.landmarks()[static_cast<size_t>(match.landmark)];
   if (is_new) {
+    landmark.evidence.first_frame_id = current_.frame_id;
     spdlog::debug("objects: frame {}: label {} ({}) is a new landmark {}", current_.frame_id, detection.label,
                   detection.class_name, landmark.key);
   }

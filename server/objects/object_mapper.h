@@ -23,6 +23,9 @@ namespace romap::objects {
 // The map that TrackedFrame::map names is the current one. Landmarks of other maps are dormant until the camera returns
 // to their map or the maps are merged: they stay as they are and remain published.
 //
+// Frames whose given poses contradict the images are not used, and landmarks that were first observed since the
+// contradiction began are removed (TrackedFrame::contradicted_since_frame).
+//
 // Single-threaded and deterministic: equal input gives equal output. Frames without a reliable pose (initializing, lost
 // or not finite) and masks whose size differs from the image are ignored.
 class ObjectMapper {
@@ -46,6 +49,7 @@ class ObjectMapper {
 
  private:
   void SetMap(SparseMapId map);
+  ObjectOutput RemoveContradicted(const TrackedFrame& tracked);
 
   // Steps that process a frame with masks.
   ObjectOutput ObserveMaskedFrame(const TrackedFrame& tracked);

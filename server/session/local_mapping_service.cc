@@ -91,6 +91,9 @@ std::string LocalMappingService::NewId() {
 
 absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
+  if (options.up_world && !(options.up_world->norm() > 0 && options.up_world->allFinite())) {
+    return InvalidArgument("up_world: must be finite and not zero");
+  }
   if (options.name.size() > kMaxNameLength) {
     return InvalidArgument("name: must have at most {} bytes, has {}", kMaxNameLength, options.name.size());
   }

@@ -81,7 +81,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
   MappingStep step;
   step.is_keyframe = image.tracked.is_keyframe;
   step.may_be_skipped = !image.tracked.is_keyframe && !image.initial_views;
-  step.relocalizes = is_lost && !image.initial_views;
+  step.relocalizes = is_lost && !image.initial_views && image.features;
   step.changes_local_map = !image.pose_given && (image.tracked.is_keyframe || image.initial_views || is_lost);
 
   step.run = [this, image = std::move(image)] {
@@ -168,7 +168,8 @@ Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const 
       ingest_(options.camera, config.objects.max_mask_delay_s),
       recorder_(std::move(recorder)),
       tracker_(config.slam, options.pose_use, &local_map_),
-      sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session)),
+      sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session),
+                     {.direction_world = options.up_world, .estimate = options.estimate_up}),
       object_mapper_(config.objects) {
   mesher_session_ =
       mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });

@@ -35,6 +35,7 @@ std::shared_ptr<const LocalMap> MakeLocalMap(const SessionMap& session_map, int 
   local->generation = generation;
   local->map = session_map.id;
   local->lens = map.lens();
+  if (session_map.world_is_given) local->up_world = session_map.given_up_world;
   local->reference = reference;
   local->relocalized = session_map.relocalized;
   const MapKeyframe* center = map.FindKeyframe(reference);

@@ -62,7 +62,8 @@ void SessionMap::Absorb(SessionMap& from, bool has_camera) {
 }
 
 std::vector<Diagnostic> SessionMap::Diagnostics() const {
-  if (world_is_given || map.keyframes().empty()) return {};
+  if (map.keyframes().empty()) return {};
+  if (world_is_given) return given_up_is_estimated ? up.Diagnostics() : std::vector<Diagnostic>{};
   std::vector<Diagnostic> diagnostics = up.Diagnostics();
   if (!has_depth_scale && parallax_rad < kMinParallax_rad) {
     diagnostics.push_back(

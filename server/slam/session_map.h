@@ -61,6 +61,8 @@ struct SessionMap {
   // Work on keyframes that has time until no new ones wait.
   std::deque<KeyframeId> unchecked = {};                                            // for loops
   std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
+  Eigen::Vector3d given_up_world = Eigen::Vector3d::UnitZ();  // unit length; in a world of given poses
+  bool given_up_is_estimated = false;
   bool world_is_given = false;      // the client's poses, given or as priors, define the world
   bool has_depth_scale = false;     // depth images define the scale
   uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop

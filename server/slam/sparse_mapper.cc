@@ -28,9 +28,11 @@ bool HasPose(const TrackedFrame& tracked) {
 
 }  // namespace
 
-SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background)
+SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background,
+                           const GivenUp& given_up)
     : config_(config),
       background_(background),
+      given_up_(given_up),
       slot_(local_map),
       keyframe_builder_(config),
       local_adjuster_(config, /*run_inline=*/background != Background::kAllAdjustment),
@@ -41,7 +43,7 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Ba
 
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
-  tracking_diagnostic_ = image.diagnostic;
+  tracking_diagnostics_ = image.diagnostics;
   const int generation_before = generation_;
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
   const bool was_merged = ConcludeMerge(/*wait=*/false);
@@ -57,7 +59,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
     // The frame was tracked against a map that is not the current one any more.
     mapped.tracked.state = TrackingState::kLost;
     mapped.tracked.is_keyframe = false;
-  } else if (image.tracked.state == TrackingState::kLost && is_of_current_map) {
+  } else if (image.tracked.state == TrackingState::kLost && is_of_current_map && image.features) {
     if (!current().map.keyframes().empty()) Relocalize(*image.features);
   }
   if (HasPose(mapped.tracked)) mapped.tracked.map = current().id;
@@ -74,7 +76,7 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
 
 std::vector<Diagnostic> SparseMapper::Diagnostics() const {
   std::vector<Diagnostic> diagnostics = atlas_.Diagnostics();
-  if (tracking_diagnostic_) diagnostics.push_back(*tracking_diagnostic_);
+  diagnostics.insert(diagnostics.end(), tracking_diagnostics_.begin(), tracking_diagnostics_.end());
   return diagnostics;
 }
 
@@ -95,7 +97,9 @@ MapCorrection SparseMapper::Finish() {
   }
   atlas_.SwitchTo(last);
   LogSummary();
-  return TakeCorrection(/*of_all_maps=*/true).value_or(MapCorrection{});
+  MapCorrection last_correction;
+  last_correction.up_world = UpWorld();
+  return TakeCorrection(/*of_all_maps=*/true).value_or(last_correction);
 }
 
 void SparseMapper::FinishCurrentMap() {
@@ -117,6 +121,7 @@ void SparseMapper::FinishCurrentMap() {
     current().uncertainty.RequestUpdate();
     UpdateUncertainties();
   }
+  UpdateGivenUp(current().given_up_world, /*is_last=*/true);
 }
 
 // ------------------------------------------------------------------------------------------------ steps of Process
@@ -163,7 +168,7 @@ void SparseMapper::InitializeFrom(const TrackedImage& image, MappedFrame& mapped
 void SparseMapper::MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped) {
   maps_refused_ = 0;
   if (!image.pose_given) UpdatePose(mapped.tracked);
-  if (!current().world_is_given) {
+  if (!current().world_is_given || given_up_.estimate) {
     current().up.ObserveGravity(*image.tracked.frame, mapped.tracked.T_world_camera);
   }
   if (image.tracked.is_keyframe) {
@@ -171,6 +176,7 @@ void SparseMapper::MapTrackedFrame(const TrackedImage& image, MappedFrame& mappe
   } else if (!current().world_is_given) {
     current().mask_voter.ObserveFrame(mapped.tracked, current().map);
   }
+  mapped.tracked.up_world = UpWorld();
   current().last_reference = mapped.tracked.reference;
   current().T_reference_last = mapped.tracked.T_reference_camera;
 }
@@ -216,6 +222,7 @@ std::optional<MapCorrection> SparseMapper::TakeCorrection(bool of_all_maps) {
     correction.uncertainties = current().corrections.Uncertainties(current().map);
   }
   correction.merged_maps = std::exchange(merges_, {});
+  correction.up_world = UpWorld();
   const bool is_empty = correction.keyframes.empty() && correction.points.empty() && correction.merged_maps.empty() &&
                         correction.uncertainties.empty();
   return is_empty ? std::nullopt : std::optional(std::move(correction));
@@ -248,6 +255,8 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   if (!is_live) CheckNextLoop();
   AlignWithGivenPoses(image, keyframe);
   AlignWithUp();
+  UpdateGivenUp(image.tracked.up_world);
+  mapped.tracked.up_world = UpWorld();
   if (!is_live || !keyframes_wait_) UpdateUncertainties();
   PublishLocalMap(keyframe.id);
 
@@ -400,6 +409,21 @@ void SparseMapper::AlignWithUp(bool is_last) {
   if (!R_new_old) return;
   MoveMap({1.0, *R_new_old, Eigen::Vector3d::Zero()});
   current().up.Rotate(*R_new_old);
+}
+
+// The world of the client's poses is not turned; what is up in it may be estimated from the same evidence.
+void SparseMapper::UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool is_last) {
+  SessionMap& current = this->current();
+  if (!current.world_is_given) return;
+  if (given_up_.direction_world) {
+    current.given_up_world = given_up_.direction_world->normalized();
+  } else if (given_up_.estimate) {
+    current.given_up_is_estimated = true;
+    current.up.ProposeRotation(current.map, is_last);
+    current.given_up_world = current.up.up_world();
+  } else {
+    current.given_up_world = tracked_up_world;
+  }
 }
 
 // Poses that began after the map, whose world is another one.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <cstddef>
 #include <optional>
@@ -18,6 +19,12 @@
 #include "server/slam/tracker.h"
 
 namespace romap::slam {
+
+// What the client knows about up in the world of its poses, see SessionOptions.
+struct GivenUp {
+  std::optional<Eigen::Vector3d> direction_world = {};  // any length > 0; nullopt: z, or from gravity
+  bool estimate = false;                                // without direction and gravity: from the images
+};
 
 // The result of mapping one frame.
 struct MappedFrame {
@@ -44,8 +51,8 @@ class SparseMapper {
   };
 
   // `local_map` outlives the mapper.
-  SparseMapper(const SlamConfig& config, LocalMapSlot* local_map,
-               Background background = Background::kGlobalAdjustment);
+  SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Background background = Background::kGlobalAdjustment,
+               const GivenUp& given_up = {});
 
   MappedFrame Process(const TrackedImage& image);
   // Masks that arrive after their frame, in the order of their frames. They show which points lie on objects, which
@@ -73,6 +80,9 @@ class SparseMapper {
     int maps_merged = 0;
   };
 
+  Eigen::Vector3d UpWorld() const {
+    return current().world_is_given ? current().given_up_world : Eigen::Vector3d::UnitZ();
+  }
   SessionMap& current() { return atlas_.current(); }
   const SessionMap& current() const { return atlas_.current(); }
 
@@ -97,6 +107,7 @@ class SparseMapper {
   bool CanEstimateLens() const;
   void AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe);
   void AlignWithUp(bool is_last = false);
+  void UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool is_last = false);
   void MoveMap(const Sim3<World, World>& S_new_old);
   void UpdateUncertainties();
   void UpdatePose(TrackedFrame& tracked) const;
@@ -105,6 +116,7 @@ class SparseMapper {
 
   const SlamConfig config_;
   const Background background_;
+  const GivenUp given_up_;
   std::atomic<bool> keyframes_wait_ = false;
   LocalMapSlot* const slot_;
   KeyframeBuilder keyframe_builder_;
@@ -113,7 +125,7 @@ class SparseMapper {
   LoopTrial loop_trial_;
   MapAtlas atlas_;
   MapMerger merger_;
-  std::optional<Diagnostic> tracking_diagnostic_;
+  std::vector<Diagnostic> tracking_diagnostics_;
   std::vector<MapMerge> merges_;  // not reported yet
   int generation_ = 0;            // see LocalMap::generation
   int maps_refused_ = 0;          // new ones, because the place of the camera was known, since it was tracked

@@ -56,11 +56,14 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       monocular_initializer_(config),
       selector_(config),
       tentative_points_(config),
-      rotation_(config) {}
+      rotation_(config),
+      pose_check_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
-  if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame));
+  const cv::Mat depth_mu = frame->depth_mu;
+  if (depth_check_.IsContradicted() && !depth_mu.empty()) frame = WithoutDepth(*frame);
+  if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame), depth_mu);
   auto features = MakeFrameFeatures(*frame, RemoveFixed(*frame, extractor_.ExtractScene(*frame)),
                                     map_ ? map_->lens : RadialCorrection{});
   const bool has_map = HasMap() && !pending_map_;
@@ -68,7 +71,7 @@ TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TrackedImage image =
       has_map ? TrackByImage(std::move(frame), std::move(features)) : Initialize(std::move(frame), std::move(features));
   image.fixed_px = fixed_px_;
-  image.diagnostic = readout_check_.Check(image.tracked.frame->camera.readout_s);
+  image.diagnostics = Diagnostics(*image.tracked.frame);
   image.pose_ignored = has_pose && pose_use_ != PoseUse::kIgnore && has_map && !world_is_given_;
   return image;
 }
@@ -167,7 +170,8 @@ bool Tracker::ShouldUseGivenPose(const Frame& frame) const {
   return !map_suffices;
 }
 
-TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
+// `depth_mu`: of the frame, even if it is not used.
+TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv::Mat& depth_mu) {
   TrackedImage image;
   const SE3<World, Camera>& pose = *frame->T_world_camera;
   const auto readout = motion_.ReadoutTo(pose, frame->camera.readout_s, frame->timestamp_ns);
@@ -183,13 +187,39 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame) {
   last_points_.clear();
   if (shutter) converter_.Convert(*shutter, image.tracked);
   if (!image.pose_given) AnchorToReference(image.tracked);
-  if (!image.tracked.is_keyframe) return image;
-  const Frame& converted = *image.tracked.frame;
-  image.features =
-      MakeFrameFeatures(converted, RemoveFixed(converted, extractor_.Extract(converted)), RadialCorrection{}, shutter);
-  image.points.resize(image.features->size());
-  ++keyframes_sent_;
+  if (image.tracked.is_keyframe) {
+    const Frame& converted = *image.tracked.frame;
+    image.features = MakeFrameFeatures(converted, RemoveFixed(converted, extractor_.Extract(converted)),
+                                       RadialCorrection{}, shutter);
+    const auto agreeing = pose_check_.AddFrame(image.features, pose);
+    if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
+  }
+  image.diagnostics = Diagnostics(*frame);
+  if (pose_check_.IsContradicted()) {
+    RefuseGivenPose(image);
+  } else if (image.tracked.is_keyframe) {
+    image.points.resize(image.features->size());
+    ++keyframes_sent_;
+  }
   return image;
+}
+
+void Tracker::RefuseGivenPose(TrackedImage& image) {
+  TrackedFrame& tracked = image.tracked;
+  status_.OnLost(tracked.frame->frame_id, tracked.frame->timestamp_ns);
+  tracked.state = TrackingState::kLost;
+  tracked.is_keyframe = false;
+  tracked.reason = "the given pose contradicts the images";
+  tracked.contradicted_since_frame = pose_check_.contradicted_since_frame();
+  image.features = nullptr;
+}
+
+std::vector<Diagnostic> Tracker::Diagnostics(const Frame& frame) const {
+  std::vector<Diagnostic> diagnostics;
+  for (auto& diagnostic : {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(), depth_check_.Check()}) {
+    if (diagnostic) diagnostics.push_back(*diagnostic);
+  }
+  return diagnostics;
 }
 
 // ------------------------------------------------------------------------------------------------ initialization

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/stage_messages.h"
+#include "server/slam/depth_check.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/fixed_features.h"
 #include "server/slam/frame_converter.h"
@@ -17,6 +18,7 @@
 #include "server/slam/local_map_tracking.h"
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
+#include "server/slam/pose_check.h"
 #include "server/slam/readout_check.h"
 #include "server/slam/rolling_shutter.h"
 #include "server/slam/rotation_tracker.h"
@@ -36,7 +38,7 @@ struct TrackedImage {
   bool pose_given = false;                             // by the client; must not be corrected
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
-  std::optional<Diagnostic> diagnostic = {};           // about the camera, while it lasts
+  std::vector<Diagnostic> diagnostics = {};            // about the camera, its poses and depth images, while they last
 };
 
 // Finds the camera pose of each frame: uses the given pose, or tracks the camera from the image against the local map.
@@ -77,7 +79,8 @@ class Tracker {
   bool ShouldUseGivenPose(const Frame& frame) const;
 
   std::vector<Feature> RemoveFixed(const Frame& frame, std::vector<Feature> features);
-  TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame);
+  TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame, const cv::Mat& depth_mu);
+  void RefuseGivenPose(TrackedImage& image);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   void FindInitialViews(TrackedImage& image, std::string* reason);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
@@ -97,6 +100,7 @@ class Tracker {
   void CheckReadout(const FrameFeatures& rolling, const PoseFromPoints& pose, const LocalMapTracking& tracking,
                     const TrackedImage& image);
   void TrackRotation(TrackedImage& image);
+  std::vector<Diagnostic> Diagnostics(const Frame& frame) const;
   void MarkLost(const std::string& why, TrackedImage& image);
   bool DecideKeyframe(const TrackedImage& image, double depth_mu, int points_by_feature);
   void AnchorToReference(TrackedFrame& tracked) const;
@@ -125,6 +129,8 @@ class Tracker {
   SparseMapId newest_map_;  // of those that the camera was in
   std::optional<PendingMap> pending_map_;
   ReadoutCheck readout_check_;
+  PoseCheck pose_check_;
+  DepthCheck depth_check_;
   FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
 };

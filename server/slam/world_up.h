@@ -32,6 +32,8 @@ class WorldUp {
   // The world was rotated.
   void Rotate(const Eigen::Quaterniond& R_new_old);
 
+  // The estimate, unit length. Before there is evidence, that of the start: z.
+  const Eigen::Vector3d& up_world() const { return up_world_; }
   double confidence() const { return confidence_; }  // 0..1
   // Standard deviation of the up direction.
   double sigma_rad() const { return sigma_rad_; }

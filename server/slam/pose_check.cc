@@ -1,0 +1,253 @@
+#include "server/slam/pose_check.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+
+#include "common/statistics.h"
+#include "server/slam/descriptor_matching.h"
+#include "server/slam/geometry/epipolar.h"
+#include "server/slam/geometry/motion_search.h"
+
+namespace romap::slam {
+namespace {
+
+constexpr size_t kMaxFirstFeatures = 300;  // bounds the time of matching to about half a millisecond
+constexpr size_t kMinPairMatches = 40;
+constexpr size_t kFewPairMatches =
+    80;  // the view of the reference is left; a pair with less movement is better than none
+// Median movement of the matches, as a share of the image width.
+constexpr double kMovement = 0.08;
+constexpr double kLeastMovement = 0.04;
+// Tolerated distance of a match, as a share of the movement. Noisy poses get more tolerance than the alternatives: an
+// error of half a degree is common.
+constexpr double kToleranceShare = 0.15;
+constexpr double kMinTolerance_px = 2;
+constexpr double kGivenToleranceShare = 0.25;
+constexpr double kMinGivenTolerance_rad = 0.01;
+// A pair agrees if the given motion explains this share of its matches. It contradicts if the given motion explains
+// less than `kMaxGivenShare`, and less than `kMaxGivenRatio` of what another motion explains, which must be at least
+// `kMinBestShare`.
+constexpr double kAgreeingShare = 0.65;
+constexpr double kMaxGivenShare = 0.5;
+constexpr double kMaxGivenRatio = 0.6;
+constexpr double kMinBestShare = 0.65;
+constexpr int kPoseCheckIterations = 80;
+// If one pair of sound poses in twenty contradicts, because they are noisy or a moving object fills the image, five of
+// six do with a probability of 2e-6.
+constexpr size_t kWindowPairs = 12;
+constexpr int kMinContradicting = 5;
+constexpr double kContradictingShare = 0.8;
+constexpr double kSoundShare = 0.25;  // of contradicting pairs: below, the contradiction has ended
+// An alternative is named if it explains this share of the matches that can be explained, in this share of the pairs,
+// and on average this much more than the second best.
+constexpr double kNamedRatio = 0.8;
+constexpr double kNamedPairs = 0.8;
+constexpr double kNamedMargin = 0.08;
+
+std::vector<Descriptor> EveryDescriptor(const FrameFeatures& frame, size_t step) {
+  std::vector<Descriptor> descriptors;
+  descriptors.reserve(frame.size() / step + 1);
+  for (size_t i = 0; i < frame.size(); i += step) descriptors.push_back(frame.features[i].descriptor);
+  return descriptors;
+}
+
+std::vector<TwoViewMatch> MatchPair(const FrameFeatures& first, const FrameFeatures& second, double pixel_sigma_px) {
+  const size_t step = 1 + first.size() / (kMaxFirstFeatures + 1);
+  std::vector<TwoViewMatch> matches;
+  for (const DescriptorMatch& match : MatchDescriptors(EveryDescriptor(first, step), EveryDescriptor(second, 1),
+                                                       kMaxMatchDistance_bits, kMaxMatchRatio)) {
+    const Feature& a = first.features[step * static_cast<size_t>(match.first)];
+    const Feature& b = second.features[static_cast<size_t>(match.second)];
+    matches.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
+                       pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
+  }
+  return matches;
+}
+
+double MedianMovement_px(const std::vector<TwoViewMatch>& matches) {
+  std::vector<double> movements_px;
+  for (const TwoViewMatch& match : matches) movements_px.push_back((match.second_px - match.first_px).norm());
+  return Median(std::move(movements_px));
+}
+
+Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
+  const Eigen::AngleAxisd angle_axis(rotation);
+  return angle_axis.angle() * angle_axis.axis();
+}
+
+}  // namespace
+
+std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
+                                                           const SE3<World, Camera>& T_world_camera) {
+  const CheckedFrame second{frame, T_world_camera};
+  if (!reference_) {
+    reference_ = second;
+    return std::nullopt;
+  }
+  const CheckedFrame first = *reference_;
+  std::vector<TwoViewMatch> matches = MatchPair(*first.features, *frame, config_.pixel_sigma_px);
+  if (matches.size() < kMinPairMatches) {
+    reference_ = second;
+    return std::nullopt;
+  }
+  const double movement_px = MedianMovement_px(matches);
+  const double wanted = matches.size() < kFewPairMatches ? kLeastMovement : kMovement;
+  if (movement_px < wanted * frame->camera.width_px) return std::nullopt;
+  reference_ = second;
+  const Pair pair = Judge(first, second, matches, movement_px);
+  spdlog::debug("slam: given poses of frames {} and {}: explain {:.2f} of {} matches, best {:.2f}, movement {:.0f} px",
+                first.features->frame_id, frame->frame_id, pair.given_share, pair.matches, pair.best_share,
+                movement_px);
+  if (!pair.agrees && pair.shares.empty()) return std::nullopt;
+  pairs_.push_back(pair);
+  if (pairs_.size() > kWindowPairs) pairs_.pop_front();
+  Decide();
+  if (!pair.agrees) return std::nullopt;
+  return AgreeingPair{T_world_camera.Inverse() * first.T_world_camera, std::move(matches)};
+}
+
+// A pair that neither agrees nor contradicts has no `shares`.
+PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const CheckedFrame& second,
+                                 const std::vector<TwoViewMatch>& matches, double movement_px) const {
+  Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(matches.size())};
+  const CameraModel& camera = second.features->camera;
+  const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * movement_px);
+  const double given_tolerance_px =
+      std::max({tolerance_px, kGivenToleranceShare * movement_px, kMinGivenTolerance_rad * camera.fx_px});
+  pair.given_share =
+      ExplainedShare(camera, ReadMotion({}, first.T_world_camera, second.T_world_camera), matches, given_tolerance_px);
+  const auto share_of = [&](const PoseHypothesis& hypothesis) {
+    return ExplainedShare(ReadCamera(hypothesis, camera),
+                          ReadMotion(hypothesis, first.T_world_camera, second.T_world_camera), matches, tolerance_px);
+  };
+  pair.agrees = pair.given_share >= kAgreeingShare;
+  if (pair.agrees) return pair;
+  std::vector<double> shares;
+  for (const PoseHypothesis& hypothesis : AllPoseHypotheses()) shares.push_back(share_of(hypothesis));
+  pair.best_share = *std::max_element(shares.begin(), shares.end());
+  AddBestMotion(first, second, matches, tolerance_px, pair);
+  const bool contradicts = pair.given_share < kMaxGivenShare && pair.best_share >= kMinBestShare &&
+                           pair.given_share < kMaxGivenRatio * pair.best_share;
+  if (contradicts) pair.shares = std::move(shares);
+  return pair;
+}
+
+void PoseCheck::AddBestMotion(const CheckedFrame& first, const CheckedFrame& second,
+                              const std::vector<TwoViewMatch>& matches, double tolerance_px, Pair& pair) const {
+  const CameraModel& camera = second.features->camera;
+  const std::vector<RayMatch> rays = ToRays(camera, matches);
+  const MotionSearch search =
+      SearchMotions(camera, rays, kPoseCheckIterations, config_.Seed(second.features->frame_id));
+  if (search.motions.empty()) return;
+  const Motion motion = RefineMotion(camera, search.motions.front(), rays).motion;
+  const SE3<Camera, Camera> T_second_first(motion.rotation, motion.direction);
+  const double share = ExplainedShare(camera, T_second_first, matches, tolerance_px);
+  pair.best_share = std::max(pair.best_share, share);
+  if (share < kMinBestShare) return;
+  const Eigen::Quaterniond given = second.T_world_camera.rotation().conjugate() * first.T_world_camera.rotation();
+  pair.rotation = RotationPair{RotationVector(T_second_first.rotation()), RotationVector(given)};
+}
+
+void PoseCheck::Decide() {
+  int contradicting = 0;
+  uint64_t since_frame = 0;
+  for (const Pair& pair : pairs_) {
+    if (pair.agrees) continue;
+    if (contradicting++ == 0) since_frame = pair.first_frame_id;
+  }
+  const double share = contradicting / static_cast<double>(pairs_.size());
+  if (IsContradicted()) {
+    if (share < kSoundShare) contradicted_since_frame_ = 0;
+  } else if (contradicting >= kMinContradicting && share >= kContradictingShare) {
+    contradicted_since_frame_ = since_frame;
+  }
+}
+
+std::optional<size_t> PoseCheck::BestHypothesis() const {
+  const size_t count = AllPoseHypotheses().size();
+  std::vector<double> sums(count, 0), fitting(count, 0);
+  double pairs = 0;
+  for (const Pair& pair : pairs_) {
+    if (pair.agrees) continue;
+    ++pairs;
+    for (size_t i = 0; i < count; ++i) {
+      sums[i] += pair.shares[i];
+      if (pair.shares[i] >= kNamedRatio * pair.best_share) ++fitting[i];
+    }
+  }
+  const size_t best = static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
+  if (pairs == 0 || fitting[best] < kNamedPairs * pairs) return std::nullopt;
+  for (size_t i = 0; i < count; ++i) {
+    if (i != best && sums[i] > sums[best] - kNamedMargin * pairs) return std::nullopt;
+  }
+  return best;
+}
+
+std::optional<Eigen::Quaterniond> PoseCheck::BodyRotation() const {
+  std::vector<RotationPair> rotations;
+  for (const Pair& pair : pairs_) {
+    if (pair.rotation) rotations.push_back(*pair.rotation);
+  }
+  return FindBodyRotation(rotations);
+}
+
+std::optional<Diagnostic> PoseCheck::Check() const {
+  if (!IsContradicted()) return std::nullopt;
+  const std::optional<size_t> best = BestHypothesis();
+  double matches = 0, given = 0, alternative = 0;
+  int pairs = 0;
+  for (const Pair& pair : pairs_) {
+    if (pair.agrees) continue;
+    ++pairs;
+    matches += pair.matches;
+    given += pair.matches * pair.given_share;
+    if (best) alternative += pair.matches * pair.shares[*best];
+  }
+  const PoseHypothesis hypothesis = best ? AllPoseHypotheses()[*best] : PoseHypothesis{};
+  Diagnostic diagnostic{
+      .code = "poses_contradict_images", .severity = Severity::kError, .first_frame_id = contradicted_since_frame_};
+  const double given_percent = 100 * given / matches;
+  const double alternative_percent = 100 * alternative / matches;
+  if (hypothesis.IsCalibration()) {
+    diagnostic.code = "calibration_contradicts_images";
+    diagnostic.text = fmt::format(
+        "the intrinsics of the camera do not fit the images and the given poses: {:.0f} % of the feature matches of {} "
+        "pairs of frames agree with them; {:.0f} % agree with {} {:.2f} times as large; frames are not used while this "
+        "lasts",
+        given_percent, pairs, alternative_percent,
+        hypothesis.resolution_factor != 1 ? "focal length and principal point" : "a focal length",
+        hypothesis.resolution_factor * hypothesis.focal_factor);
+    diagnostic.advice =
+        "state the intrinsics of the image size that is sent: of another image size, they have to be multiplied by the "
+        "ratio of the widths";
+    return diagnostic;
+  }
+  diagnostic.text = fmt::format(
+      "the given poses do not fit the images: {:.0f} % of the feature matches of {} pairs of frames agree with them",
+      given_percent, pairs);
+  if (best) {
+    diagnostic.text +=
+        fmt::format("; {:.0f} % agree when the poses are taken {}", alternative_percent, Describe(hypothesis));
+    diagnostic.advice = "run with --pose-convention " + ConventionOption(hypothesis);
+  } else if (const auto R_body_camera = BodyRotation()) {
+    diagnostic.text +=
+        "; their rotations fit if the camera is turned by a constant rotation on the body whose poses "
+        "they are";
+    diagnostic.advice = fmt::format(
+        "run with --pose-offset \"tx ty tz {:.3f} {:.3f} {:.3f} {:.3f}\", where tx ty tz is the position of the camera "
+        "on the body, or send poses of the camera",
+        R_body_camera->x(), R_body_camera->y(), R_body_camera->z(), R_body_camera->w());
+  } else {
+    diagnostic.advice =
+        "check the calibration and the clock of the poses, and whether they are those of the camera, with x right, y "
+        "down, z forward, or of a body that carries it (--pose-offset)";
+  }
+  diagnostic.text += "; frames are not used while this lasts";
+  return diagnostic;
+}
+
+}  // namespace romap::slam

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/diagnostic.h"
+#include "common/stage_messages.h"
+#include "server/slam/body_rotation.h"
+#include "server/slam/frame_features.h"
+#include "server/slam/geometry/two_view.h"
+#include "server/slam/pose_hypothesis.h"
+#include "server/slam/slam_config.h"
+
+namespace romap::slam {
+
+// Checks given poses against the images. Features are matched between pairs of frames whose images clearly moved. The
+// given motion of a pair should explain most of the matches, up to a share of their movement. This share is far above
+// the noise of real poses (also a clock that is 20 ms off) and far below the errors of a wrong convention.
+//
+// A pair contradicts the poses only if another motion of the camera explains its matches much better; scenes that move,
+// and textures that repeat, give matches that no motion explains. The poses are contradicted when several pairs in a
+// row are. The alternatives are the usual mistakes (PoseHypothesis), and any motion at all.
+class PoseCheck {
+ public:
+  // Two frames, their matches and what explains them.
+  struct Pair {
+    uint64_t first_frame_id = 0;
+    bool agrees = false;
+    int matches = 0;
+    double given_share = 0;           // of the matches: explained by the given poses
+    double best_share = 0;            // explained by the best alternative
+    std::vector<double> shares = {};  // of AllPoseHypotheses(); empty if the pair agrees
+    std::optional<RotationPair> rotation = {};
+  };
+  // A pair that agrees with the given poses, for further checks.
+  struct AgreeingPair {
+    SE3<Camera, Camera> T_second_first;
+    std::vector<TwoViewMatch> matches;
+  };
+
+  explicit PoseCheck(const SlamConfig& config) : config_(config) {}
+
+  // Call for each frame with a given pose whose features are known. Returns the pair that the frame completed, if it
+  // agrees.
+  std::optional<AgreeingPair> AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
+                                       const SE3<World, Camera>& T_world_camera);
+
+  bool IsContradicted() const { return contradicted_since_frame_ != 0; }
+  // The first frame of the pairs that contradict the poses; 0: they are not contradicted.
+  uint64_t contradicted_since_frame() const { return contradicted_since_frame_; }
+  std::optional<Diagnostic> Check() const;
+
+  const std::deque<Pair>& pairs() const { return pairs_; }  // the newest ones, oldest first
+
+ private:
+  struct CheckedFrame {
+    std::shared_ptr<const FrameFeatures> features;
+    SE3<World, Camera> T_world_camera;
+  };
+
+  Pair Judge(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
+             double movement_px) const;
+  void AddBestMotion(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
+                     double tolerance_px, Pair& pair) const;
+  void Decide();
+  // The hypothesis that explains most of the matches of nearly all contradicting pairs, better than all others.
+  std::optional<size_t> BestHypothesis() const;
+  std::optional<Eigen::Quaterniond> BodyRotation() const;
+
+  const SlamConfig config_;
+  std::optional<CheckedFrame> reference_;
+  std::deque<Pair> pairs_;
+  uint64_t contradicted_since_frame_ = 0;
+};
+
+}  // namespace romap::slam

@@ -1,0 +1,101 @@
+#include "server/slam/pose_hypothesis.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "server/slam/geometry/projection_ray.h"
+
+namespace romap::slam {
+namespace {
+
+std::vector<PoseHypothesis> MakeHypotheses() {
+  std::vector<PoseHypothesis> hypotheses;
+  for (int flags = 0; flags < 8; ++flags) {
+    hypotheses.push_back({.wxyz = (flags & 1) != 0, .world_to_camera = (flags & 2) != 0, .opengl = (flags & 4) != 0});
+  }
+  std::stable_sort(hypotheses.begin(), hypotheses.end(), [](const PoseHypothesis& a, const PoseHypothesis& b) {
+    const auto count = [](const PoseHypothesis& h) {
+      return static_cast<int>(h.wxyz) + static_cast<int>(h.world_to_camera) + static_cast<int>(h.opengl);
+    };
+    return count(a) < count(b);
+  });
+  // Ratios of usual image sizes.
+  for (const double factor : {0.5, 2.0, 2.0 / 3, 1.5, 1.0 / 3, 3.0, 0.25, 4.0}) {
+    hypotheses.push_back({.resolution_factor = factor});
+    hypotheses.push_back({.focal_factor = factor});
+  }
+  return hypotheses;
+}
+
+}  // namespace
+
+const std::vector<PoseHypothesis>& AllPoseHypotheses() {
+  static const std::vector<PoseHypothesis> hypotheses = MakeHypotheses();
+  return hypotheses;
+}
+
+SE3<World, Camera> ReadPose(const PoseHypothesis& hypothesis, const SE3<World, Camera>& given) {
+  SE3<World, Camera> pose = given;
+  if (hypothesis.wxyz) {
+    const Eigen::Quaterniond& q = given.rotation();
+    pose = {Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()), given.translation()};
+  }
+  if (hypothesis.world_to_camera) {
+    const SE3<Camera, World> inverse = pose.Inverse();
+    pose = {inverse.rotation(), inverse.translation()};
+  }
+  if (hypothesis.opengl) {
+    const Eigen::Quaterniond half_turn_about_x(0, 1, 0, 0);
+    pose = {pose.rotation() * half_turn_about_x, pose.translation()};
+  }
+  return pose;
+}
+
+CameraModel ReadCamera(const PoseHypothesis& hypothesis, const CameraModel& given) {
+  CameraModel camera = given;
+  camera.fx_px *= hypothesis.resolution_factor * hypothesis.focal_factor;
+  camera.fy_px *= hypothesis.resolution_factor * hypothesis.focal_factor;
+  // Pixel centers are at integers, the image begins at -0.5.
+  camera.cx_px = (given.cx_px + 0.5) * hypothesis.resolution_factor - 0.5;
+  camera.cy_px = (given.cy_px + 0.5) * hypothesis.resolution_factor - 0.5;
+  return camera;
+}
+
+SE3<Camera, Camera> ReadMotion(const PoseHypothesis& hypothesis, const SE3<World, Camera>& first,
+                               const SE3<World, Camera>& second) {
+  return ReadPose(hypothesis, second).Inverse() * ReadPose(hypothesis, first);
+}
+
+double ExplainedShare(const CameraModel& camera, const SE3<Camera, Camera>& motion,
+                      std::span<const TwoViewMatch> matches, double max_distance_px) {
+  if (matches.empty()) return 0;
+  const Eigen::Matrix3d rotation = motion.RotationMatrix();
+  int explained = 0;
+  for (const TwoViewMatch& match : matches) {
+    const Eigen::Vector3d ray = camera.Unproject(match.first_px.x(), match.first_px.y());
+    const double distance_px = DistanceToProjectionRay_px(camera, rotation, motion.translation(), ray, match.second_px);
+    explained += distance_px < max_distance_px ? 1 : 0;
+  }
+  return explained / static_cast<double>(matches.size());
+}
+
+std::string Describe(const PoseHypothesis& hypothesis) {
+  std::vector<std::string> parts;
+  if (hypothesis.world_to_camera) parts.emplace_back("as world-to-camera");
+  if (hypothesis.wxyz) parts.emplace_back("with w first in the quaternions");
+  if (hypothesis.opengl) parts.emplace_back("with OpenGL camera axes");
+  return fmt::format("{}", fmt::join(parts, " and "));
+}
+
+std::string ConventionOption(const PoseHypothesis& hypothesis) {
+  std::vector<std::string> parts;
+  if (hypothesis.wxyz) parts.emplace_back("wxyz");
+  if (hypothesis.world_to_camera) parts.emplace_back("world_to_camera");
+  if (hypothesis.opengl) parts.emplace_back("opengl");
+  return fmt::format("{}", fmt::join(parts, ","));
+}
+
+}  // namespace romap::slam

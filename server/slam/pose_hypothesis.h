@@ -1,0 +1,45 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/camera_model.h"
+#include "common/geometry.h"
+#include "server/slam/geometry/two_view.h"
+
+namespace romap::slam {
+
+// A way to read the poses and the intrinsics of a client. All false and 1: as they are given.
+struct PoseHypothesis {
+  bool wxyz = false;             // the quaternions have w first: what was read as x y z w is w x y z
+  bool world_to_camera = false;  // the poses are T_camera_world
+  bool opengl = false;           // the camera has OpenGL's axes: x right, y up, z backward
+  double resolution_factor = 1;  // focal length and principal point belong to another resolution
+  double focal_factor = 1;       // only the focal length does
+
+  bool IsCalibration() const { return resolution_factor != 1 || focal_factor != 1; }
+  bool operator==(const PoseHypothesis&) const = default;
+};
+
+// As given first, then the conventions, alone before combined, then calibrations.
+const std::vector<PoseHypothesis>& AllPoseHypotheses();
+
+// The pose or camera that a client means, if the hypothesis is true.
+SE3<World, Camera> ReadPose(const PoseHypothesis& hypothesis, const SE3<World, Camera>& given);
+CameraModel ReadCamera(const PoseHypothesis& hypothesis, const CameraModel& given);
+
+// T_second_first of two given poses, read by the hypothesis.
+SE3<Camera, Camera> ReadMotion(const PoseHypothesis& hypothesis, const SE3<World, Camera>& first,
+                               const SE3<World, Camera>& second);
+
+// Share of the matches that the motion T_second_first explains within a distance.
+double ExplainedShare(const CameraModel& camera, const SE3<Camera, Camera>& motion,
+                      std::span<const TwoViewMatch> matches, double max_distance_px);
+
+// For users: "world-to-camera and OpenGL camera axes".
+std::string Describe(const PoseHypothesis& hypothesis);
+// Of the option --pose-convention of the client: "world_to_camera,opengl".
+std::string ConventionOption(const PoseHypothesis& hypothesis);
+
+}  // namespace romap::slam
