@@ -1,99 +1,25 @@
-// Maps recordings as people bring them: copies of one sound sequence with unusual labels, depth, poses, images and
-// lists. Each must give the map of the sound sequence, or say what is wrong.
+// Recordings with masks and depth as detectors and sensors really write them. Each must give the map of the sound
+// sequence, or say what is wrong.
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
-#include "client/synth/synth.h"
-#include "tests/support/recording.h"
-#include "tests/support/subprocess.h"
+#include "tests/integration/recording_fixture.h"
 
-namespace romap::recordings_test {
+namespace romap::mask_recording_test {
 
+using recordings::kObjects;
+using recordings::RunResult;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-using testing_support::ProcessResult;
 using testing_support::Recording;
 
-constexpr int kFrames = 60;
-constexpr int kObjects = 4;
-
-// The result of `romap run`.
-struct Result {
-  ProcessResult process;
-  nlohmann::json summary;
-
-  size_t objects() const { return summary["objects"].size(); }
-  std::vector<std::string> Classes() const {
-    std::vector<std::string> classes;
-    for (const auto& object : summary["objects"]) classes.push_back(object["class"]);
-    std::sort(classes.begin(), classes.end());
-    return classes;
-  }
-  std::vector<std::string> Codes() const {
-    std::vector<std::string> codes;
-    for (const auto& diagnostic : summary["diagnostics"]) codes.push_back(diagnostic["code"]);
-    return codes;
-  }
-  // Of the codes with a severity above info.
-  std::vector<std::string> Warnings() const {
-    std::vector<std::string> codes;
-    for (const auto& diagnostic : summary["diagnostics"]) {
-      if (diagnostic["severity"] != "info") codes.push_back(diagnostic["code"]);
-    }
-    return codes;
-  }
-  double Mean(const char* figure) const { return summary["evaluation"]["objects"]["mean"][figure]; }
-};
-
-class RecordingsTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    synth::SynthOptions options;
-    options.seed = 1;
-    options.objects = kObjects;
-    options.frames = kFrames;
-    options.width_px = 320;
-    options.height_px = 240;
-    ASSERT_TRUE(synth::MakeSequence(options, folder_ / "base").ok());
-    recording_.emplace(folder_ / "base", folder_ / "recording");
-  }
-
-  const Recording& recording() const { return *recording_; }
-
-  Result Run(std::vector<std::string> options = {}) {
-    std::vector<std::string> command = {ROMAP_CLIENT,    "run",     recording().dir(), "--out",
-                                        folder_ / "map", "--local", "--no-pictures"};
-    command.insert(command.end(), options.begin(), options.end());
-    Result result;
-    result.process = testing_support::RunProcess(command);
-    if (std::ifstream in(folder_ / "map/summary.json"); in) result.summary = nlohmann::json::parse(in);
-    return result;
-  }
-
-  // The map of the sound sequence, within the tolerance of so few frames.
-  static void ExpectTheMap(const Result& result) {
-    ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
-    EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
-    if (result.summary["evaluation"].contains("objects")) {
-      EXPECT_LT(result.Mean("comp_seen_cm"), 0.8) << result.process.out;
-      EXPECT_LT(result.Mean("acc_cm"), 0.9) << result.process.out;
-    }
-  }
-
- private:
-  testing_support::TemporaryFolder folder_;
-  std::optional<Recording> recording_;
-};
+class MaskRecordingTest : public recordings::RecordingTest {};
 
 constexpr uint8_t kSurface = 200;
 constexpr int kGripper = 9;
@@ -128,33 +54,33 @@ void AddGripper(const Recording& recording, int label) {
 
 // ----------------------------------------------------------------------------------------------------------- sound
 
-TEST_F(RecordingsTest, ASoundRecordingGivesNoDiagnostics) {
-  const Result result = Run();
+TEST_F(MaskRecordingTest, ASoundRecordingGivesNoDiagnostics) {
+  const RunResult result = Run();
   ExpectTheMap(result);
   EXPECT_THAT(result.Codes(), IsEmpty()) << result.process.out;
 }
 
-TEST_F(RecordingsTest, ASoundRecordingWithDepthGivesNoDiagnostics) {
-  const Result result = Run({"--depth"});
+TEST_F(MaskRecordingTest, ASoundRecordingWithDepthGivesNoDiagnostics) {
+  const RunResult result = Run({"--depth"});
   ExpectTheMap(result);
   EXPECT_THAT(result.Codes(), IsEmpty()) << result.process.out;
 }
 
 // ----------------------------------------------------------------------------------------------------------- masks
 
-TEST_F(RecordingsTest, ALabelForEverythingElseIsBackground) {
+TEST_F(MaskRecordingTest, ALabelForEverythingElseIsBackground) {
   recording().ChangeImages("mask", [](const cv::Mat& mask, size_t) {
     cv::Mat labels = ToLabels8(mask);
     labels.setTo(kSurface, labels == 0);
     return labels;
   });
   recording().AddDetections(kSurface, "table");
-  const Result result = Run();
+  const RunResult result = Run();
   ExpectTheMap(result);
   EXPECT_THAT(result.Codes(), Contains("mask_is_background"));
 }
 
-TEST_F(RecordingsTest, ALabelAroundTheObjectsIsBackground) {
+TEST_F(MaskRecordingTest, ALabelAroundTheObjectsIsBackground) {
   recording().ChangeImages("mask", [](const cv::Mat& mask, size_t) {
     cv::Mat labels = ToLabels8(mask), near;
     cv::dilate(labels > 0, near, cv::Mat::ones(41, 41, CV_8U));
@@ -162,28 +88,28 @@ TEST_F(RecordingsTest, ALabelAroundTheObjectsIsBackground) {
     return labels;
   });
   recording().AddDetections(kSurface, "dining table");
-  const Result result = Run();
+  const RunResult result = Run();
   ExpectTheMap(result);
   EXPECT_THAT(result.Classes(), Not(Contains("dining table")));
 }
 
-TEST_F(RecordingsTest, AGripperIsNoObject) {
+TEST_F(MaskRecordingTest, AGripperIsNoObject) {
   AddGripper(recording(), kGripper);
-  const Result result = Run();
+  const RunResult result = Run();
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
   EXPECT_THAT(result.Classes(), Not(Contains("robot gripper")));
   EXPECT_LE(result.objects(), static_cast<size_t>(kObjects)) << "the gripper hides some of them";
   EXPECT_GE(result.objects(), static_cast<size_t>(kObjects) - 1);
 }
 
-TEST_F(RecordingsTest, AGripperWithoutAMaskDoesNotMoveTheMap) {
+TEST_F(MaskRecordingTest, AGripperWithoutAMaskDoesNotMoveTheMap) {
   AddGripper(recording(), 0);
-  const Result result = Run({"--poses", "none"});
+  const RunResult result = Run({"--poses", "none"});
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
-  EXPECT_LT(result.summary["evaluation"]["trajectory"]["ate_rmse_cm"].get<double>(), 1.0) << result.process.out;
+  EXPECT_LT(result.summary["evaluation"]["trajectory"]["ate_rmse_m"].get<double>(), 0.01) << result.process.out;
 }
 
-TEST_F(RecordingsTest, TheValue255OfMasksIsIgnored) {
+TEST_F(MaskRecordingTest, TheValue255OfMasksIsIgnored) {
   recording().ChangeImages("mask", [](const cv::Mat& mask, size_t) {
     const cv::Mat before = ToLabels8(mask);
     cv::Mat labels = before.clone();
@@ -197,7 +123,7 @@ TEST_F(RecordingsTest, TheValue255OfMasksIsIgnored) {
     }
     return labels;
   });
-  const Result result = Run();
+  const RunResult result = Run();
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
   EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
   EXPECT_THAT(result.Codes(), Contains("mask_value_255_ignored"));
@@ -205,18 +131,18 @@ TEST_F(RecordingsTest, TheValue255OfMasksIsIgnored) {
 
 // ----------------------------------------------------------------------------------------------------------- depth
 
-TEST_F(RecordingsTest, TheDepth65535IsUnknown) {
+TEST_F(MaskRecordingTest, TheDepth65535IsUnknown) {
   const std::vector<std::string> masks = recording().Files("mask");
   recording().ChangeImages("depth", [&](cv::Mat depth, size_t index) {
     depth.setTo(65535, cv::imread(masks[index], cv::IMREAD_UNCHANGED) > 0);
     return depth;
   });
   for (const char* poses : {"given", "none"}) {
-    const Result result = Run({"--depth", "--poses", poses});
+    const RunResult result = Run({"--depth", "--poses", poses});
     ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
     EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
     EXPECT_THAT(result.Codes(), Contains("depth_value_ignored"));
   }
 }
 
-}  // namespace romap::recordings_test
+}  // namespace romap::mask_recording_test

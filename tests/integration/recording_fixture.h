@@ -1,0 +1,107 @@
+#pragma once
+
+// Maps a copy of one sound sequence that a test has changed, with the built program.
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "client/files/mesh_file.h"
+#include "client/synth/synth.h"
+#include "tests/support/recording.h"
+#include "tests/support/subprocess.h"
+
+namespace romap::recordings {
+
+inline constexpr int kFrames = 60;
+inline constexpr int kObjects = 4;
+
+// The result of `romap run`.
+struct RunResult {
+  testing_support::ProcessResult process;
+  nlohmann::json summary;
+  nlohmann::json cuboids;
+  std::string dir;
+
+  size_t objects() const { return summary["objects"].size(); }
+  std::vector<std::string> Classes() const {
+    std::vector<std::string> classes;
+    for (const auto& object : summary["objects"]) classes.push_back(object["class"]);
+    std::sort(classes.begin(), classes.end());
+    return classes;
+  }
+  std::vector<std::string> Codes() const {
+    std::vector<std::string> codes;
+    for (const auto& diagnostic : summary["diagnostics"]) codes.push_back(diagnostic["code"]);
+    return codes;
+  }
+  // Of the codes with a severity above info.
+  std::vector<std::string> Warnings() const {
+    std::vector<std::string> codes;
+    for (const auto& diagnostic : summary["diagnostics"]) {
+      if (diagnostic["severity"] != "info") codes.push_back(diagnostic["code"]);
+    }
+    return codes;
+  }
+  // Number of different x coordinates in the meshes' files.
+  size_t DistinctX() const {
+    std::set<double> distinct;
+    const auto meshes = files::ReadMeshFolder(dir + "/objects");
+    EXPECT_TRUE(meshes.ok()) << meshes.status();
+    for (const auto& [name, mesh] : *meshes) {
+      for (size_t k = 0; k < mesh.mesh.vertices.size(); ++k) distinct.insert(mesh.Position(k).x());
+    }
+    return distinct.size();
+  }
+  double Mean(const char* figure) const { return summary["evaluation"]["objects"]["mean"][figure]; }
+};
+
+class RecordingTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    synth::SynthOptions options;
+    options.seed = 1;
+    options.objects = kObjects;
+    options.frames = kFrames;
+    options.width_px = 320;
+    options.height_px = 240;
+    ASSERT_TRUE(synth::MakeSequence(options, folder_ / "base").ok());
+    recording_.emplace(folder_ / "base", folder_ / "recording");
+  }
+
+  const testing_support::Recording& recording() const { return *recording_; }
+
+  RunResult Run(std::vector<std::string> options = {}) {
+    std::vector<std::string> command = {ROMAP_CLIENT,    "run",     recording().dir(), "--out",
+                                        folder_ / "map", "--local", "--no-pictures"};
+    command.insert(command.end(), options.begin(), options.end());
+    RunResult result;
+    result.process = testing_support::RunProcess(command);
+    result.dir = folder_ / "map";
+    if (std::ifstream in(result.dir + "/summary.json"); in) result.summary = nlohmann::json::parse(in);
+    if (std::ifstream in(result.dir + "/cuboids.json"); in) result.cuboids = nlohmann::json::parse(in);
+    return result;
+  }
+
+  // The map of the sound sequence, within the tolerance of so few frames.
+  static void ExpectTheMap(const RunResult& result) {
+    ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
+    EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
+    if (result.summary["evaluation"].contains("objects")) {
+      EXPECT_LT(result.Mean("comp_seen_cm"), 0.8) << result.process.out;
+      EXPECT_LT(result.Mean("acc_cm"), 0.9) << result.process.out;
+    }
+  }
+
+ private:
+  testing_support::TemporaryFolder folder_;
+  std::optional<testing_support::Recording> recording_;
+};
+
+}  // namespace romap::recordings
