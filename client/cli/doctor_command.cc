@@ -35,7 +35,7 @@ struct DoctorOptions {
 // What the recording contains, for the first lines of the report.
 struct Contents {
   size_t frames = 0, with_masks = 0, with_poses = 0, with_depth = 0;
-  std::set<std::string> classes;
+  std::set<std::string> classes = {};
 };
 
 Contents ContentsOf(const files::Sequence& sequence, const std::vector<size_t>& indices) {

@@ -36,15 +36,16 @@ Surroundings MeasureSurroundings(const MaskThumbnail& thumbnail, uint16_t label)
 
 }  // namespace
 
-const char* LooksLikeBackground(const MaskThumbnail& thumbnail, const MaskRegion& region, std::string_view class_name) {
+BackgroundSign FindBackgroundSign(const MaskThumbnail& thumbnail, const MaskRegion& region,
+                                  std::string_view class_name) {
   const bool is_surface = IsSurfaceName(class_name);
-  if (region.area > kMostOfImage * thumbnail.pixels()) return "they fill most of the image";
+  if (region.area > kMostOfImage * thumbnail.pixels()) return BackgroundSign::kFillsImage;
   const Surroundings around = MeasureSurroundings(thumbnail, region.label);
   if (around.share >= kSurrounded && around.surrounded >= (is_surface ? 1 : kMinSurrounded)) {
-    return "they surround the other masks";
+    return BackgroundSign::kSurroundsOthers;
   }
-  if (region.sides >= (is_surface ? kSurfaceSides : kMostSides)) return "they extend beyond most sides of the image";
-  return nullptr;
+  return region.sides >= (is_surface ? kSurfaceSides : kMostSides) ? BackgroundSign::kCrossesBorders
+                                                                   : BackgroundSign::kNone;
 }
 
 }  // namespace romap::masks

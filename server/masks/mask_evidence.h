@@ -6,8 +6,15 @@
 
 namespace romap::masks {
 
-// Reason why the mask of one frame looks like background, as text; nullptr if it looks like an object. Background has
-// no outline of its own: it fills most of the image, extends beyond most sides of it, or surrounds the other masks.
-const char* LooksLikeBackground(const MaskThumbnail& thumbnail, const MaskRegion& region, std::string_view class_name);
+// Why the mask of one frame looks like background, not like an object: it has no outline of its own.
+enum class BackgroundSign {
+  kNone,
+  kFillsImage,       // most of it
+  kSurroundsOthers,  // the other masks lie within it, but for a part of their outline
+  kCrossesBorders,   // it extends beyond most sides of the image
+};
+
+BackgroundSign FindBackgroundSign(const MaskThumbnail& thumbnail, const MaskRegion& region,
+                                  std::string_view class_name);
 
 }  // namespace romap::masks

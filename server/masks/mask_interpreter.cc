@@ -8,6 +8,7 @@
 
 #include "common/label_image.h"
 #include "server/masks/mask_evidence.h"
+#include "server/masks/surface_names.h"
 
 namespace romap::masks {
 namespace {
@@ -74,7 +75,7 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
   const SceneMotion::CameraFixed fixed = scene_motion_.Find(thumbnail);
   for (const uint16_t label : fixed.labels) {
     const auto mask = std::find_if(masks.begin(), masks.end(), [&](const auto& m) { return m.label == label; });
-    if (mask != masks.end()) mask->role = Role::kCameraFixed;
+    if (mask != masks.end() && mask->may_move_with_camera) mask->role = Role::kCameraFixed;
   }
   std::vector<NonObjectMask> non_objects;
   std::map<uint16_t, uint16_t> replacements;
@@ -82,11 +83,10 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
     if (mask.role == Role::kObject) continue;
     const bool is_background = mask.role == Role::kBackground;
     if (!is_background) {
-      Note(frame_id, "mask_moves_with_camera",
-           fmt::format("masks of class \"{}\" keep their place in the image while the scene moves: they are no object, "
-                       "and what they hide is not known",
-                       mask.class_name),
-           "");
+      Note(frame_id, {.code = "mask_moves_with_camera",
+                      .text = "keep their place in the image while the scene moves: they are no object, and what they "
+                              "hide is not known",
+                      .classes = {mask.class_name}});
     }
     replacements[mask.label] = is_background ? uint16_t{0} : kIgnoreLabel;
     non_objects.push_back({.box_px = FullBox(thumbnail, thumbnail.Find(mask.label)->box, labels->size()),
@@ -120,9 +120,9 @@ void MaskInterpreter::IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector
   if (!void_is_ignored_) return;
   Replace({{kVoidLabel, kIgnoreLabel}}, labels);
   std::erase_if(*instances, [](const Instance& i) { return i.label == kVoidLabel; });
-  Note(frame_id, "mask_value_255_ignored",
-       "the value 255 of 8-bit masks is read as \"ignore\": it is neither an object nor background",
-       "if it is an object, list it among the instances with its class");
+  Note(frame_id, {.code = "mask_value_255_ignored",
+                  .text = "the value 255 of 8-bit masks is read as \"ignore\": it is neither an object nor background",
+                  .advice = "if it is an object, list it among the instances with its class"});
 }
 
 // The part of the image without a mask is not background there: it hides what is behind it.
@@ -139,11 +139,11 @@ void MaskInterpreter::IgnoreRegion(uint64_t frame_id, const MaskThumbnail& thumb
     }
   }
   if (ignored == 0) return;
-  Note(frame_id, "image_part_moves_with_camera",
-       fmt::format("a part of the image ({:.0f} % in frame {}) keeps its place while the scene moves: what it hides is "
-                   "not known",
-                   100.0 * ignored / static_cast<double>(labels->total()), frame_id),
-       "");
+  Note(frame_id,
+       {.code = "image_part_moves_with_camera",
+        .text = fmt::format("a part of the image ({:.0f} % in frame {}) keeps its place while the scene moves: "
+                            "what it hides is not known",
+                            100.0 * ignored / static_cast<double>(labels->total()), frame_id)});
 }
 
 std::vector<MaskInterpreter::FollowedMask> MaskInterpreter::Follow(const MaskThumbnail& thumbnail,
@@ -182,8 +182,10 @@ MaskInterpreter::FollowedMask MaskInterpreter::Begin(uint16_t label, const std::
 }
 
 void MaskInterpreter::Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, FollowedMask* mask) {
-  const char* reason = LooksLikeBackground(thumbnail, *thumbnail.Find(mask->label), mask->class_name);
-  const int like_background = reason != nullptr ? 1 : 0;
+  const BackgroundSign sign = FindBackgroundSign(thumbnail, *thumbnail.Find(mask->label), mask->class_name);
+  const int like_background = sign != BackgroundSign::kNone ? 1 : 0;
+  // A table that fills the image keeps its place too. The hood of a rover only extends beyond its sides.
+  mask->may_move_with_camera = sign == BackgroundSign::kNone || sign == BackgroundSign::kCrossesBorders;
   ++mask->frames;
   mask->like_background += like_background;
   if (mask->class_name != kAnyClass) {
@@ -196,27 +198,40 @@ void MaskInterpreter::Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, 
   if (mask->role == Role::kBackground && share < kObjectShare) mask->role = Role::kObject;
   if (mask->role == Role::kObject && mask->frames >= kMinFrames && share >= kBackgroundShare) {
     mask->role = Role::kBackground;
-    if (reason == nullptr) reason = "they have no outline of their own in most frames";
-    Note(frame_id, "mask_is_background",
-         fmt::format("masks of class \"{}\" are read as background, not as an object: {}", mask->class_name, reason),
-         "");
+    // The name of a surface agrees with the evidence; any other name contradicts it.
+    const bool is_surface = IsSurfaceName(mask->class_name);
+    Note(frame_id, {.code = "mask_is_background",
+                    .severity = is_surface ? Severity::kInfo : Severity::kWarning,
+                    .text = "are read as background, because they fill most of the image, extend beyond most of its "
+                            "sides, or surround the other masks",
+                    .advice = is_surface ? "" : "if they show an object, record it from further away",
+                    .classes = {mask->class_name}});
   }
 }
 
-void MaskInterpreter::Note(uint64_t frame_id, const std::string& code, const std::string& text,
-                           const std::string& advice) {
-  const auto [it, is_new] = diagnostics_.try_emplace(
-      code, Diagnostic{.code = code, .severity = Severity::kInfo, .first_frame_id = frame_id, .text = text});
-  if (is_new) {
-    it->second.advice = advice;
-  } else {
-    ++it->second.count;
-  }
+void MaskInterpreter::Note(uint64_t frame_id, const Finding& finding) {
+  const auto [it, is_new] = findings_.try_emplace(finding.code, finding);
+  Finding& known = it->second;
+  if (is_new) known.first_frame_id = frame_id;
+  ++known.count;
+  known.severity = std::max(known.severity, finding.severity);
+  if (known.advice.empty()) known.advice = finding.advice;
+  known.classes.insert(finding.classes.begin(), finding.classes.end());
 }
 
 std::vector<Diagnostic> MaskInterpreter::Diagnostics() const {
   std::vector<Diagnostic> diagnostics;
-  for (const auto& [code, diagnostic] : diagnostics_) diagnostics.push_back(diagnostic);
+  for (const auto& [code, finding] : findings_) {
+    std::string text;
+    for (const std::string& name : finding.classes) text += fmt::format("{}\"{}\"", text.empty() ? "" : ", ", name);
+    if (!text.empty()) text = "masks of class " + text + " ";
+    diagnostics.push_back({.code = code,
+                           .severity = finding.severity,
+                           .first_frame_id = finding.first_frame_id,
+                           .count = finding.count,
+                           .text = text + finding.text,
+                           .advice = finding.advice});
+  }
   return diagnostics;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,8 +42,19 @@ class MaskInterpreter {
     uint16_t label = 0;  // in `previous_`
     std::string class_name;
     int frames = 0;
-    int like_background = 0;  // of these
+    int like_background = 0;           // of these
+    bool may_move_with_camera = true;  // in the newest frame
     Role role = Role::kObject;
+  };
+  // A Diagnostic whose text begins with the classes of the masks, if any.
+  struct Finding {
+    std::string code = {};
+    Severity severity = Severity::kInfo;
+    uint64_t first_frame_id = 0;
+    uint64_t count = 0;
+    std::string text = {};
+    std::string advice = {};
+    std::set<std::string> classes = {};
   };
   // Masks of one class, followed or not.
   struct ClassEvidence {
@@ -57,7 +69,7 @@ class MaskInterpreter {
   std::vector<FollowedMask> Follow(const MaskThumbnail& thumbnail, const std::vector<Instance>& instances);
   FollowedMask Begin(uint16_t label, const std::string& class_name) const;
   void Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, FollowedMask* mask);
-  void Note(uint64_t frame_id, const std::string& code, const std::string& text, const std::string& advice);
+  void Note(uint64_t frame_id, const Finding& finding);
 
   bool void_is_ignored_ = false;
   MaskThumbnail previous_;
@@ -65,7 +77,7 @@ class MaskInterpreter {
   std::map<std::string, ClassEvidence> classes_;  // by class name, without "object"
   SceneMotion scene_motion_;
   std::deque<std::pair<uint64_t, cv::Mat>> waiting_;  // frame id and MakeGray() of recent frames without masks
-  std::map<std::string, Diagnostic> diagnostics_;     // by code
+  std::map<std::string, Finding> findings_;           // by code
 };
 
 }  // namespace romap::masks

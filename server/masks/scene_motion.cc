@@ -9,11 +9,11 @@
 namespace romap::masks {
 namespace {
 
-constexpr size_t kReferences = 3;          // motions of the scene that a mask must have survived
+constexpr size_t kReferences = 4;          // motions of the scene that a mask must have survived
 constexpr double kSamePlaceIou = 0.8;      // of a mask in two frames
 constexpr double kMovedCorrelation = 0.8;  // of the gray values of two frames; below it the scene has moved
 constexpr double kMinContrast = 6;         // gray levels: standard deviation without which no motion can be seen
-constexpr double kMaxChangeShare = 0.6;    // of the mean change of gray values in the mask, relative to the scene's
+constexpr double kMaxChangeShare = 0.4;    // of the mean change of gray values in the mask, relative to the scene's
 
 // Parts without a mask.
 constexpr float kMinTexture = 8;            // gray levels: standard deviation in a window of the thumbnail

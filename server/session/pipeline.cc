@@ -75,7 +75,9 @@ void Pipeline::Reject(const Arrival& arrival, const absl::Status& reason) {
 void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame,
                             const MappingExecutor& execute) {
   // Track.
-  slam::TrackedImage image = tracker_.Track(frame);
+  std::optional<slam::TrackedImage> tracked_image = Track(arrival, frame);
+  if (!tracked_image) return;
+  slam::TrackedImage& image = *tracked_image;
   ledger_->AcknowledgeFrame(arrival, image.tracked);
   const bool is_lost = image.tracked.state == TrackingState::kLost;
   MappingStep step;
@@ -99,6 +101,21 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
     ledger_->CountMappedFrame(mapped.view.has_value(), sparse_mapper_.points());
   };
   execute(std::move(step));
+}
+
+// A library that fails on one image costs this image: the tracker keeps its last frame and finds the camera again from
+// there. If it fails on all images, the session ends.
+std::optional<slam::TrackedImage> Pipeline::Track(const Arrival& arrival, const std::shared_ptr<const Frame>& frame) {
+  constexpr int kMaxFailuresInARow = 10;
+  try {
+    slam::TrackedImage image = tracker_.Track(frame);
+    failures_in_a_row_ = 0;
+    return image;
+  } catch (const std::exception& e) {
+    if (++failures_in_a_row_ > kMaxFailuresInARow) throw;
+    Reject(arrival, Internal("cannot be tracked: {}", e.what()));
+    return std::nullopt;
+  }
 }
 
 // Late masks take the same path, so that every stage has processed the frame before its masks.

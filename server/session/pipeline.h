@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -82,6 +83,7 @@ class Pipeline {
 
  private:
   void ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame, const MappingExecutor& execute);
+  std::optional<slam::TrackedImage> Track(const Arrival& arrival, const std::shared_ptr<const Frame>& frame);
   void ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& execute);
   void Reject(const Arrival& arrival, const absl::Status& reason);
   void Record(const SessionInput& input);
@@ -104,6 +106,7 @@ class Pipeline {
   std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
   // Used by Process().
   slam::Tracker tracker_;
+  int failures_in_a_row_ = 0;  // frames that the tracker failed on
   // Used by the mapping steps.
   slam::SparseMapper sparse_mapper_;
   objects::ObjectMapper object_mapper_;

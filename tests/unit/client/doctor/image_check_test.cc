@@ -49,7 +49,7 @@ TEST_F(ImageCheckTest, SoundImages) {
 }
 
 TEST_F(ImageCheckTest, BlurredImages) {
-  EXPECT_THAT(CodesAfter([](cv::Mat& image, int) { cv::blur(image, image, {9, 9}); }), ElementsAre("images_blurred"));
+  EXPECT_THAT(CodesAfter([](cv::Mat& image, int) { cv::blur(image, image, {5, 5}); }), ElementsAre("images_blurred"));
 }
 
 TEST_F(ImageCheckTest, OverexposedAndDarkImages) {
