@@ -192,7 +192,7 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
     image.features = MakeFrameFeatures(converted, RemoveFixed(converted, extractor_.Extract(converted)),
                                        RadialCorrection{}, shutter);
     const auto agreeing = pose_check_.AddFrame(image.features, pose);
-    if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
+    if (agreeing && agreeing->second == image.features) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
   }
   image.diagnostics = Diagnostics(*frame);
   if (pose_check_.IsContradicted()) {
