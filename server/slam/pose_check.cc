@@ -41,12 +41,12 @@ constexpr int kPoseCheckIterations = 80;
 constexpr size_t kWindowPairs = 16;
 constexpr int kMinContradicting = 5;
 constexpr double kContradictingShare = 0.8;
-constexpr double kSoundShare = 0.25;  // of contradicting pairs: below, the contradiction has ended
-// Some motions are the same in two conventions. So fewer pairs suffice, among others that agree, if one alternative
-// explains all of them: noise of the poses would not agree with it.
+constexpr double kSoundShare = 0.25;  // of the pairs: if another motion fits fewer better, there is no contradiction
+// Some motions are nearly the same in two conventions. So fewer pairs suffice, among others that agree, and pairs that
+// the given poses explain partly, if one alternative explains all of them: noise of the poses would not agree with it.
 constexpr int kMinContradictingWithBest = 3;
 // An alternative is named if it explains this share of the matches that can be explained, in this share of all pairs,
-// and in those that contradict on average this much more than the second best.
+// and in those that it fits better on average this much more than the second best.
 constexpr double kNamedRatio = 0.8;
 constexpr double kNamedPairs = 0.85;
 constexpr double kNamedMargin = 0.08;
@@ -109,7 +109,7 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddPair(const CheckedFrame& fi
   spdlog::debug("slam: given poses of frames {} and {}: explain {:.2f} of {} matches, best {:.2f}, movement {:.0f} px",
                 first.features->frame_id, second.features->frame_id, pair.given_share, pair.matches, pair.best_share,
                 last.movement_px);
-  if (!pair.agrees && !pair.contradicts) return std::nullopt;
+  if (!pair.agrees && !pair.fits_better) return std::nullopt;
   pairs_.push_back(pair);
   if (pairs_.size() > kWindowPairs) pairs_.pop_front();
   Decide();
@@ -133,10 +133,10 @@ PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& las
                                          last.matches, tolerance_px));
   }
   pair.best_share = std::max(pair.given_share, *std::max_element(pair.shares.begin(), pair.shares.end()));
-  if (pair.agrees) return pair;
-  AddBestMotion(first, last, tolerance_px, pair);
-  pair.contradicts = pair.given_share < kMaxGivenShare && pair.best_share >= kMinBestShare &&
-                     pair.given_share < kMaxGivenRatio * pair.best_share;
+  if (!pair.agrees) AddBestMotion(first, last, tolerance_px, pair);
+  pair.fits_better = pair.best_share >= kMinBestShare && pair.shares.front() < kMaxGivenRatio * pair.best_share;
+  pair.contradicts =
+      pair.fits_better && pair.given_share < kMaxGivenShare && pair.given_share < kMaxGivenRatio * pair.best_share;
   return pair;
 }
 
@@ -156,36 +156,38 @@ void PoseCheck::AddBestMotion(const CheckedFrame& first, const Candidate& last, 
 }
 
 void PoseCheck::Decide() {
-  int contradicting = 0;
+  int contradicting = 0, better = 0;
   uint64_t since_frame = 0;
   for (const Pair& pair : pairs_) {
+    better += pair.fits_better ? 1 : 0;
     if (pair.contradicts && contradicting++ == 0) since_frame = pair.first_frame_id;
   }
-  const double share = contradicting / static_cast<double>(pairs_.size());
-  best_ = contradicting > 0 ? BestHypothesis() : std::nullopt;
+  const auto pairs = static_cast<double>(pairs_.size());
+  best_ = better > 0 ? BestHypothesis() : std::nullopt;
   if (IsContradicted()) {
-    if (share < kSoundShare && !best_) contradicted_since_frame_ = 0;
-  } else if ((contradicting >= kMinContradicting && share >= kContradictingShare) ||
-             (contradicting >= kMinContradictingWithBest && best_)) {
-    contradicted_since_frame_ = best_ ? pairs_.front().first_frame_id : since_frame;
+    if (better < kSoundShare * pairs) contradicted_since_frame_ = 0;
+  } else if (best_ && better >= kMinContradictingWithBest && better >= kSoundShare * pairs) {
+    contradicted_since_frame_ = pairs_.front().first_frame_id;
+  } else if (contradicting >= kMinContradicting && contradicting >= kContradictingShare * pairs) {
+    contradicted_since_frame_ = since_frame;
   }
 }
 
 std::optional<size_t> PoseCheck::BestHypothesis() const {
   const size_t count = AllPoseHypotheses().size();
   std::vector<double> sums(count, 0), fitting(count, 0);
-  double contradicting = 0;
+  double better = 0;
   for (const Pair& pair : pairs_) {
     for (size_t i = 0; i < count; ++i) {
       if (pair.shares[i] >= kNamedRatio * pair.best_share) ++fitting[i];
-      if (pair.contradicts) sums[i] += pair.shares[i];
+      if (pair.fits_better) sums[i] += pair.shares[i];
     }
-    contradicting += pair.contradicts ? 1 : 0;
+    better += pair.fits_better ? 1 : 0;
   }
   const size_t best = static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
   if (fitting[best] < kNamedPairs * static_cast<double>(pairs_.size())) return std::nullopt;
   for (size_t i = 0; i < count; ++i) {
-    if (i != best && sums[i] > sums[best] - kNamedMargin * contradicting) return std::nullopt;
+    if (i != best && sums[i] > sums[best] - kNamedMargin * better) return std::nullopt;
   }
   return best;
 }
@@ -203,10 +205,10 @@ std::optional<Diagnostic> PoseCheck::Check() const {
   double matches = 0, given = 0, alternative = 0;
   int pairs = 0;
   for (const Pair& pair : pairs_) {
-    if (!pair.contradicts) continue;
+    if (!pair.fits_better) continue;
     ++pairs;
     matches += pair.matches;
-    given += pair.matches * pair.given_share;
+    given += pair.matches * pair.shares.front();
     if (best_) alternative += pair.matches * pair.shares[*best_];
   }
   const PoseHypothesis hypothesis = best_ ? AllPoseHypotheses()[*best_] : PoseHypothesis{};

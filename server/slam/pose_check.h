@@ -29,7 +29,8 @@ class PoseCheck {
   struct Pair {
     uint64_t first_frame_id = 0;
     bool agrees = false;
-    bool contradicts = false;
+    bool fits_better = false;  // another motion of the camera fits clearly better
+    bool contradicts = false;  // and the given poses do not fit at all
     int matches = 0;
     double given_share = 0;           // of the matches: explained by the given poses, with more tolerance
     double best_share = 0;            // explained by the best alternative
