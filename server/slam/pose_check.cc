@@ -91,30 +91,42 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr
   if (reference_->features == frame) return std::nullopt;
   Candidate candidate{.second = newest, .matches = MatchPair(*reference_->features, *frame, config_.pixel_sigma_px)};
   const bool is_lost = candidate.matches.size() < kMinPairMatches;
+  std::optional<AgreeingPair> agreeing;
   if (!is_lost) {
     candidate.movement_px = UpperMovement_px(candidate.matches);
-    const bool has_moved = candidate.movement_px > kLeastMovement * frame->camera.width_px;
-    if (has_moved) candidate_ = candidate;
-    if (candidate.movement_px < kMovement * frame->camera.width_px) return std::nullopt;
+    if (candidate.movement_px > kLeastMovement * frame->camera.width_px) {
+      candidate_ = candidate;
+      if (GivenShare(*reference_, candidate) >= kAgreeingShare) {
+        agreeing = AgreeingPair{.first_frame_id = reference_->features->frame_id,
+                                .T_second_first = T_world_camera.Inverse() * reference_->T_world_camera,
+                                .matches = candidate.matches};
+      }
+    }
+    if (candidate.movement_px < kMovement * frame->camera.width_px) return agreeing;
   }
   // The view of the reference may be left before the image moved enough: then less must do.
   const CheckedFrame first = std::exchange(*reference_, newest);
   const std::optional<Candidate> last = std::exchange(candidate_, std::nullopt);
-  return last ? AddPair(first, *last) : std::nullopt;
+  if (last) AddPair(first, *last);
+  return agreeing;
 }
 
-std::optional<PoseCheck::AgreeingPair> PoseCheck::AddPair(const CheckedFrame& first, const Candidate& last) {
-  const CheckedFrame& second = last.second;
+void PoseCheck::AddPair(const CheckedFrame& first, const Candidate& last) {
   const Pair pair = Judge(first, last);
   spdlog::debug("slam: given poses of frames {} and {}: explain {:.2f} of {} matches, best {:.2f}, movement {:.0f} px",
-                first.features->frame_id, second.features->frame_id, pair.given_share, pair.matches, pair.best_share,
-                last.movement_px);
-  if (!pair.agrees && !pair.fits_better) return std::nullopt;
+                first.features->frame_id, last.second.features->frame_id, pair.given_share, pair.matches,
+                pair.best_share, last.movement_px);
+  if (!pair.agrees && !pair.fits_better) return;
   pairs_.push_back(pair);
   if (pairs_.size() > kWindowPairs) pairs_.pop_front();
   Decide();
-  if (!pair.agrees) return std::nullopt;
-  return AgreeingPair{second.features, second.T_world_camera.Inverse() * first.T_world_camera, last.matches};
+}
+
+double PoseCheck::GivenShare(const CheckedFrame& first, const Candidate& last) const {
+  const CameraModel& camera = last.second.features->camera;
+  const double tolerance_px = std::max(kGivenToleranceShare * last.movement_px, kMinGivenTolerance_rad * camera.fx_px);
+  return ExplainedShare(camera, ReadMotion({}, first.T_world_camera, last.second.T_world_camera), last.matches,
+                        tolerance_px);
 }
 
 PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& last) const {
@@ -122,10 +134,7 @@ PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& las
   Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(last.matches.size())};
   const CameraModel& camera = second.features->camera;
   const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * last.movement_px);
-  const double given_tolerance_px =
-      std::max({tolerance_px, kGivenToleranceShare * last.movement_px, kMinGivenTolerance_rad * camera.fx_px});
-  pair.given_share = ExplainedShare(camera, ReadMotion({}, first.T_world_camera, second.T_world_camera), last.matches,
-                                    given_tolerance_px);
+  pair.given_share = GivenShare(first, last);
   pair.agrees = pair.given_share >= kAgreeingShare;
   for (const PoseHypothesis& hypothesis : AllPoseHypotheses()) {
     pair.shares.push_back(ExplainedShare(ReadCamera(hypothesis, camera),

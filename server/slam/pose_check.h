@@ -39,15 +39,15 @@ class PoseCheck {
   };
   // A pair that agrees with the given poses, for further checks.
   struct AgreeingPair {
-    std::shared_ptr<const FrameFeatures> second;
-    SE3<Camera, Camera> T_second_first;
-    std::vector<TwoViewMatch> matches;
+    uint64_t first_frame_id = 0;
+    SE3<Camera, Camera> T_second_first = {};
+    std::vector<TwoViewMatch> matches = {};
   };
 
   explicit PoseCheck(const SlamConfig& config) : config_(config) {}
 
-  // Call for each frame with a given pose whose features are known. Returns the pair that the frame completed, if it
-  // agrees.
+  // Call for each frame with a given pose whose features are known. Returns the frame with an earlier one, if the image
+  // moved at least a little and the poses agree.
   std::optional<AgreeingPair> AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
                                        const SE3<World, Camera>& T_world_camera);
 
@@ -71,7 +71,8 @@ class PoseCheck {
     double movement_px = 0;
   };
 
-  std::optional<AgreeingPair> AddPair(const CheckedFrame& first, const Candidate& last);
+  void AddPair(const CheckedFrame& first, const Candidate& last);
+  double GivenShare(const CheckedFrame& first, const Candidate& last) const;
   Pair Judge(const CheckedFrame& first, const Candidate& last) const;
   void AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const;
   void Decide();
