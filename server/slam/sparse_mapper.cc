@@ -427,6 +427,8 @@ void SparseMapper::UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool i
     current.given_up_world = given_up_.direction_world->normalized();
   } else if (given_up_.estimate) {
     current.given_up_is_estimated = true;
+    const MapKeyframe* newest = current.map.FindKeyframe(current.newest);
+    if (newest != nullptr) current.up.Assume(newest->T_world_camera().rotation() * -Eigen::Vector3d::UnitY());
     current.up.ProposeRotation(current.map, is_last);
     current.given_up_world = current.up.up_world();
   } else {
