@@ -96,8 +96,8 @@ struct TrackedFrame {
   // While the frame is not tracked: its rotation, if the camera rotates in place. In the world of the last map, or in a
   // provisional one before there is a map.
   std::optional<Eigen::Quaterniond> R_world_camera = {};
-  // The frame is lost because its given pose contradicts the images, and so do those of the frames since this one,
-  // which were used before that was known: what was found by them is wrong. 0: no contradiction.
+  // The given poses (then the frame is lost) or the depth images of the frames since this one contradict the images.
+  // They were used before that was known: objects that were found by them are wrong. 0: no contradiction.
   uint64_t contradicted_since_frame = 0;
 };
 

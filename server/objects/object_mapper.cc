@@ -43,20 +43,21 @@ ObjectMapper::ObjectMapper(const ObjectsConfig& config)
 
 ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   current_ = {};
-  if (tracked.contradicted_since_frame != 0) return RemoveContradicted(tracked);
-  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return {};
+  ObjectOutput output;
+  if (tracked.contradicted_since_frame != 0) output = RemoveContradicted(tracked);
+  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
   SetMap(tracked.map);
   history_.Add(tracked);
   // If no detector ran on a frame, the frame is no evidence that objects are missing.
-  if (!tracked.frame->has_masks) return {};
-  ObjectOutput output = ObserveMaskedFrame(tracked);
+  if (!tracked.frame->has_masks) return output;
+  output.Append(ObserveMaskedFrame(tracked));
   if (tracked.is_keyframe) return output;
   const auto stand_in = history_.MakeStandIn(tracked, store_.points());
   if (stand_in) output.Append(ObserveMaskedKeyframe(*stand_in));
   return output;
 }
 
-// Also confirmed ones: their cuboids follow from wrong poses.
+// Also confirmed ones: their cuboids follow from wrong poses or depths.
 ObjectOutput ObjectMapper::RemoveContradicted(const TrackedFrame& tracked) {
   ObjectOutput output;
   SetMap(tracked.map);
@@ -65,7 +66,7 @@ ObjectOutput ObjectMapper::RemoveContradicted(const TrackedFrame& tracked) {
   Prune(
       [&](const Landmark& landmark) {
         return Decision{landmark.evidence.first_frame_id >= tracked.contradicted_since_frame,
-                        "the given poses contradict the images"};
+                        "the given poses or depth images contradict the images"};
       },
       &output);
   return output;

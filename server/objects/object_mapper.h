@@ -23,8 +23,8 @@ namespace romap::objects {
 // The map that TrackedFrame::map names is the current one. Landmarks of other maps are dormant until the camera returns
 // to their map or the maps are merged: they stay as they are and remain published.
 //
-// Frames whose given poses contradict the images are not used, and landmarks that were first observed since the
-// contradiction began are removed (TrackedFrame::contradicted_since_frame).
+// Landmarks that were first observed since poses or depth images contradict the images are removed
+// (TrackedFrame::contradicted_since_frame).
 //
 // Single-threaded and deterministic: equal input gives equal output. Frames without a reliable pose (initializing, lost
 // or not finite) and masks whose size differs from the image are ignored.

@@ -55,7 +55,11 @@ void DepthCheck::AddPair(const CameraModel& camera, const PoseCheck::AgreeingPai
   }
   if (log_ratios.size() < kMinDepthPoints) return;
   log_ratios_.push_back(Median(log_ratios));
-  if (log_ratios_.size() > kDepthWindowPairs) log_ratios_.pop_front();
+  if (log_ratios_.size() > 1) first_frame_ids_.push_back(pair.first_frame_id);
+  if (log_ratios_.size() > kDepthWindowPairs) {
+    log_ratios_.pop_front();
+    first_frame_ids_.pop_front();
+  }
   spdlog::debug("slam: depth by the given poses over that of the image: {:.3f} at {} points",
                 std::exp(log_ratios_.back()), log_ratios.size());
   Decide();

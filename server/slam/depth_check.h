@@ -19,11 +19,14 @@ class DepthCheck {
   void AddPair(const CameraModel& camera, const PoseCheck::AgreeingPair& pair, const cv::Mat& depth_mu);
 
   bool IsContradicted() const { return factor_.has_value(); }
+  // The first frame of the pairs; 1 if all pairs so far are considered.
+  uint64_t contradicted_since_frame() const { return first_frame_ids_.front(); }
   std::optional<Diagnostic> Check() const;
 
  private:
   void Decide();
 
+  std::deque<uint64_t> first_frame_ids_ = {1};  // of the pairs
   std::deque<double> log_ratios_;  // per pair: of the depth by the poses over that of the image; the newest ones
   std::optional<double> factor_;   // that makes the depth images fit
 };

@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <numeric>
+#include <utility>
 
 #include "common/statistics.h"
 #include "server/slam/descriptor_matching.h"
@@ -38,14 +38,17 @@ constexpr double kMinBestShare = 0.65;
 constexpr int kPoseCheckIterations = 80;
 // If one pair of sound poses in twenty contradicts, because they are noisy or a moving object fills the image, five of
 // six do with a probability of 2e-6.
-constexpr size_t kWindowPairs = 12;
+constexpr size_t kWindowPairs = 16;
 constexpr int kMinContradicting = 5;
 constexpr double kContradictingShare = 0.8;
-constexpr double kSoundShare = 0.25;  // of contradicting pairs: below, the contradiction has ended
-// An alternative is named if it explains this share of the matches that can be explained, in this share of the pairs,
-// and on average this much more than the second best.
+constexpr double kSoundShare = 0.25;  // of the pairs: if another motion fits fewer better, there is no contradiction
+// Some motions are nearly the same in two conventions. So fewer pairs suffice, among others that agree, and pairs that
+// the given poses explain partly, if one alternative explains all of them: noise of the poses would not agree with it.
+constexpr int kMinContradictingWithBest = 3;
+// An alternative is named if it explains this share of the matches that can be explained, in this share of all pairs,
+// and in those that it fits better on average this much more than the second best.
 constexpr double kNamedRatio = 0.8;
-constexpr double kNamedPairs = 0.8;
+constexpr double kNamedPairs = 0.85;
 constexpr double kNamedMargin = 0.08;
 
 std::vector<Descriptor> EveryDescriptor(const FrameFeatures& frame, size_t step) {
@@ -68,10 +71,10 @@ std::vector<TwoViewMatch> MatchPair(const FrameFeatures& first, const FrameFeatu
   return matches;
 }
 
-double MedianMovement_px(const std::vector<TwoViewMatch>& matches) {
+double UpperMovement_px(const std::vector<TwoViewMatch>& matches) {
   std::vector<double> movements_px;
   for (const TwoViewMatch& match : matches) movements_px.push_back((match.second_px - match.first_px).norm());
-  return Median(std::move(movements_px));
+  return Quantile(std::move(movements_px), 0.75);
 }
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
@@ -83,86 +86,98 @@ Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
 
 std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
                                                            const SE3<World, Camera>& T_world_camera) {
-  const CheckedFrame second{frame, T_world_camera};
-  if (!reference_) {
-    reference_ = second;
-    return std::nullopt;
+  const CheckedFrame newest{frame, T_world_camera};
+  if (!reference_) reference_ = newest;
+  if (reference_->features == frame) return std::nullopt;
+  Candidate candidate{.second = newest, .matches = MatchPair(*reference_->features, *frame, config_.pixel_sigma_px)};
+  const bool is_lost = candidate.matches.size() < kMinPairMatches;
+  std::optional<AgreeingPair> agreeing;
+  if (!is_lost) {
+    candidate.movement_px = UpperMovement_px(candidate.matches);
+    if (candidate.movement_px > kLeastMovement * frame->camera.width_px) {
+      candidate_ = candidate;
+      if (GivenShare(*reference_, candidate) >= kAgreeingShare) {
+        agreeing = AgreeingPair{.first_frame_id = reference_->features->frame_id,
+                                .T_second_first = T_world_camera.Inverse() * reference_->T_world_camera,
+                                .matches = candidate.matches};
+      }
+    }
+    if (candidate.movement_px < kMovement * frame->camera.width_px) return agreeing;
   }
-  const CheckedFrame first = *reference_;
-  std::vector<TwoViewMatch> matches = MatchPair(*first.features, *frame, config_.pixel_sigma_px);
-  if (matches.size() < kMinPairMatches) {
-    reference_ = second;
-    return std::nullopt;
-  }
-  const double movement_px = MedianMovement_px(matches);
-  const double wanted = matches.size() < kFewPairMatches ? kLeastMovement : kMovement;
-  if (movement_px < wanted * frame->camera.width_px) return std::nullopt;
-  reference_ = second;
-  const Pair pair = Judge(first, second, matches, movement_px);
+  // The view of the reference may be left before the image moved enough: then less must do.
+  const CheckedFrame first = std::exchange(*reference_, newest);
+  const std::optional<Candidate> last = std::exchange(candidate_, std::nullopt);
+  if (last) AddPair(first, *last);
+  return agreeing;
+}
+
+void PoseCheck::AddPair(const CheckedFrame& first, const Candidate& last) {
+  const Pair pair = Judge(first, last);
   spdlog::debug("slam: given poses of frames {} and {}: explain {:.2f} of {} matches, best {:.2f}, movement {:.0f} px",
-                first.features->frame_id, frame->frame_id, pair.given_share, pair.matches, pair.best_share,
-                movement_px);
-  if (!pair.agrees && pair.shares.empty()) return std::nullopt;
+                first.features->frame_id, last.second.features->frame_id, pair.given_share, pair.matches,
+                pair.best_share, last.movement_px);
+  if (!pair.agrees && !pair.fits_better) return;
   pairs_.push_back(pair);
   if (pairs_.size() > kWindowPairs) pairs_.pop_front();
   Decide();
-  if (!pair.agrees) return std::nullopt;
-  return AgreeingPair{T_world_camera.Inverse() * first.T_world_camera, std::move(matches)};
 }
 
-// A pair that neither agrees nor contradicts has no `shares`.
-PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const CheckedFrame& second,
-                                 const std::vector<TwoViewMatch>& matches, double movement_px) const {
-  Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(matches.size())};
+double PoseCheck::GivenShare(const CheckedFrame& first, const Candidate& last) const {
+  const CameraModel& camera = last.second.features->camera;
+  const double tolerance_px = std::max(kGivenToleranceShare * last.movement_px, kMinGivenTolerance_rad * camera.fx_px);
+  return ExplainedShare(camera, ReadMotion({}, first.T_world_camera, last.second.T_world_camera), last.matches,
+                        tolerance_px);
+}
+
+PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& last) const {
+  const CheckedFrame& second = last.second;
+  Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(last.matches.size())};
   const CameraModel& camera = second.features->camera;
-  const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * movement_px);
-  const double given_tolerance_px =
-      std::max({tolerance_px, kGivenToleranceShare * movement_px, kMinGivenTolerance_rad * camera.fx_px});
-  pair.given_share =
-      ExplainedShare(camera, ReadMotion({}, first.T_world_camera, second.T_world_camera), matches, given_tolerance_px);
-  const auto share_of = [&](const PoseHypothesis& hypothesis) {
-    return ExplainedShare(ReadCamera(hypothesis, camera),
-                          ReadMotion(hypothesis, first.T_world_camera, second.T_world_camera), matches, tolerance_px);
-  };
+  const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * last.movement_px);
+  pair.given_share = GivenShare(first, last);
   pair.agrees = pair.given_share >= kAgreeingShare;
-  if (pair.agrees) return pair;
-  std::vector<double> shares;
-  for (const PoseHypothesis& hypothesis : AllPoseHypotheses()) shares.push_back(share_of(hypothesis));
-  pair.best_share = *std::max_element(shares.begin(), shares.end());
-  AddBestMotion(first, second, matches, tolerance_px, pair);
-  const bool contradicts = pair.given_share < kMaxGivenShare && pair.best_share >= kMinBestShare &&
-                           pair.given_share < kMaxGivenRatio * pair.best_share;
-  if (contradicts) pair.shares = std::move(shares);
+  for (const PoseHypothesis& hypothesis : AllPoseHypotheses()) {
+    pair.shares.push_back(ExplainedShare(ReadCamera(hypothesis, camera),
+                                         ReadMotion(hypothesis, first.T_world_camera, second.T_world_camera),
+                                         last.matches, tolerance_px));
+  }
+  pair.best_share = std::max(pair.given_share, *std::max_element(pair.shares.begin(), pair.shares.end()));
+  if (!pair.agrees) AddBestMotion(first, last, tolerance_px, pair);
+  pair.fits_better = pair.best_share >= kMinBestShare && pair.shares.front() < kMaxGivenRatio * pair.best_share;
+  pair.contradicts =
+      pair.fits_better && pair.given_share < kMaxGivenShare && pair.given_share < kMaxGivenRatio * pair.best_share;
   return pair;
 }
 
-void PoseCheck::AddBestMotion(const CheckedFrame& first, const CheckedFrame& second,
-                              const std::vector<TwoViewMatch>& matches, double tolerance_px, Pair& pair) const {
-  const CameraModel& camera = second.features->camera;
-  const std::vector<RayMatch> rays = ToRays(camera, matches);
+void PoseCheck::AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const {
+  const CameraModel& camera = last.second.features->camera;
+  const std::vector<RayMatch> rays = ToRays(camera, last.matches);
   const MotionSearch search =
-      SearchMotions(camera, rays, kPoseCheckIterations, config_.Seed(second.features->frame_id));
+      SearchMotions(camera, rays, kPoseCheckIterations, config_.Seed(last.second.features->frame_id));
   if (search.motions.empty()) return;
   const Motion motion = RefineMotion(camera, search.motions.front(), rays).motion;
   const SE3<Camera, Camera> T_second_first(motion.rotation, motion.direction);
-  const double share = ExplainedShare(camera, T_second_first, matches, tolerance_px);
+  const double share = ExplainedShare(camera, T_second_first, last.matches, tolerance_px);
   pair.best_share = std::max(pair.best_share, share);
   if (share < kMinBestShare) return;
-  const Eigen::Quaterniond given = second.T_world_camera.rotation().conjugate() * first.T_world_camera.rotation();
+  const Eigen::Quaterniond given = last.second.T_world_camera.rotation().conjugate() * first.T_world_camera.rotation();
   pair.rotation = RotationPair{RotationVector(T_second_first.rotation()), RotationVector(given)};
 }
 
 void PoseCheck::Decide() {
-  int contradicting = 0;
+  int contradicting = 0, better = 0;
   uint64_t since_frame = 0;
   for (const Pair& pair : pairs_) {
-    if (pair.agrees) continue;
-    if (contradicting++ == 0) since_frame = pair.first_frame_id;
+    better += pair.fits_better ? 1 : 0;
+    if (pair.contradicts && contradicting++ == 0) since_frame = pair.first_frame_id;
   }
-  const double share = contradicting / static_cast<double>(pairs_.size());
+  const auto pairs = static_cast<double>(pairs_.size());
+  best_ = better > 0 ? BestHypothesis() : std::nullopt;
   if (IsContradicted()) {
-    if (share < kSoundShare) contradicted_since_frame_ = 0;
-  } else if (contradicting >= kMinContradicting && share >= kContradictingShare) {
+    if (better < kSoundShare * pairs) contradicted_since_frame_ = 0;
+  } else if (best_ && better >= kMinContradictingWithBest && better >= kSoundShare * pairs) {
+    contradicted_since_frame_ = pairs_.front().first_frame_id;
+  } else if (contradicting >= kMinContradicting && contradicting >= kContradictingShare * pairs) {
     contradicted_since_frame_ = since_frame;
   }
 }
@@ -170,19 +185,18 @@ void PoseCheck::Decide() {
 std::optional<size_t> PoseCheck::BestHypothesis() const {
   const size_t count = AllPoseHypotheses().size();
   std::vector<double> sums(count, 0), fitting(count, 0);
-  double pairs = 0;
+  double better = 0;
   for (const Pair& pair : pairs_) {
-    if (pair.agrees) continue;
-    ++pairs;
     for (size_t i = 0; i < count; ++i) {
-      sums[i] += pair.shares[i];
       if (pair.shares[i] >= kNamedRatio * pair.best_share) ++fitting[i];
+      if (pair.fits_better) sums[i] += pair.shares[i];
     }
+    better += pair.fits_better ? 1 : 0;
   }
   const size_t best = static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
-  if (pairs == 0 || fitting[best] < kNamedPairs * pairs) return std::nullopt;
+  if (fitting[best] < kNamedPairs * static_cast<double>(pairs_.size())) return std::nullopt;
   for (size_t i = 0; i < count; ++i) {
-    if (i != best && sums[i] > sums[best] - kNamedMargin * pairs) return std::nullopt;
+    if (i != best && sums[i] > sums[best] - kNamedMargin * better) return std::nullopt;
   }
   return best;
 }
@@ -197,17 +211,16 @@ std::optional<Eigen::Quaterniond> PoseCheck::BodyRotation() const {
 
 std::optional<Diagnostic> PoseCheck::Check() const {
   if (!IsContradicted()) return std::nullopt;
-  const std::optional<size_t> best = BestHypothesis();
   double matches = 0, given = 0, alternative = 0;
   int pairs = 0;
   for (const Pair& pair : pairs_) {
-    if (pair.agrees) continue;
+    if (!pair.fits_better) continue;
     ++pairs;
     matches += pair.matches;
-    given += pair.matches * pair.given_share;
-    if (best) alternative += pair.matches * pair.shares[*best];
+    given += pair.matches * pair.shares.front();
+    if (best_) alternative += pair.matches * pair.shares[*best_];
   }
-  const PoseHypothesis hypothesis = best ? AllPoseHypotheses()[*best] : PoseHypothesis{};
+  const PoseHypothesis hypothesis = best_ ? AllPoseHypotheses()[*best_] : PoseHypothesis{};
   Diagnostic diagnostic{
       .code = "poses_contradict_images", .severity = Severity::kError, .first_frame_id = contradicted_since_frame_};
   const double given_percent = 100 * given / matches;
@@ -229,7 +242,7 @@ std::optional<Diagnostic> PoseCheck::Check() const {
   diagnostic.text = fmt::format(
       "the given poses do not fit the images: {:.0f} % of the feature matches of {} pairs of frames agree with them",
       given_percent, pairs);
-  if (best) {
+  if (best_) {
     diagnostic.text +=
         fmt::format("; {:.0f} % agree when the poses are taken {}", alternative_percent, Describe(hypothesis));
     diagnostic.advice = "run with --pose-convention " + ConventionOption(hypothesis);

@@ -29,22 +29,25 @@ class PoseCheck {
   struct Pair {
     uint64_t first_frame_id = 0;
     bool agrees = false;
+    bool fits_better = false;  // another motion of the camera fits clearly better
+    bool contradicts = false;  // and the given poses do not fit at all
     int matches = 0;
-    double given_share = 0;           // of the matches: explained by the given poses
+    double given_share = 0;           // of the matches: explained by the given poses, with more tolerance
     double best_share = 0;            // explained by the best alternative
-    std::vector<double> shares = {};  // of AllPoseHypotheses(); empty if the pair agrees
+    std::vector<double> shares = {};  // explained by each of AllPoseHypotheses()
     std::optional<RotationPair> rotation = {};
   };
   // A pair that agrees with the given poses, for further checks.
   struct AgreeingPair {
-    SE3<Camera, Camera> T_second_first;
-    std::vector<TwoViewMatch> matches;
+    uint64_t first_frame_id = 0;
+    SE3<Camera, Camera> T_second_first = {};
+    std::vector<TwoViewMatch> matches = {};
   };
 
   explicit PoseCheck(const SlamConfig& config) : config_(config) {}
 
-  // Call for each frame with a given pose whose features are known. Returns the pair that the frame completed, if it
-  // agrees.
+  // Call for each frame with a given pose whose features are known. Returns the frame with an earlier one, if the image
+  // moved at least a little and the poses agree.
   std::optional<AgreeingPair> AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
                                        const SE3<World, Camera>& T_world_camera);
 
@@ -61,18 +64,28 @@ class PoseCheck {
     SE3<World, Camera> T_world_camera;
   };
 
-  Pair Judge(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
-             double movement_px) const;
-  void AddBestMotion(const CheckedFrame& first, const CheckedFrame& second, const std::vector<TwoViewMatch>& matches,
-                     double tolerance_px, Pair& pair) const;
+  // A frame that matches the reference.
+  struct Candidate {
+    CheckedFrame second;
+    std::vector<TwoViewMatch> matches = {};
+    double movement_px = 0;
+  };
+
+  void AddPair(const CheckedFrame& first, const Candidate& last);
+  double GivenShare(const CheckedFrame& first, const Candidate& last) const;
+  Pair Judge(const CheckedFrame& first, const Candidate& last) const;
+  void AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const;
   void Decide();
-  // The hypothesis that explains most of the matches of nearly all contradicting pairs, better than all others.
+  // The hypothesis that explains most of the matches of nearly all pairs, and those that contradict better than all
+  // others.
   std::optional<size_t> BestHypothesis() const;
   std::optional<Eigen::Quaterniond> BodyRotation() const;
 
   const SlamConfig config_;
   std::optional<CheckedFrame> reference_;
+  std::optional<Candidate> candidate_;  // the newest one that moved at least a little
   std::deque<Pair> pairs_;
+  std::optional<size_t> best_;  // alternative
   uint64_t contradicted_since_frame_ = 0;
 };
 

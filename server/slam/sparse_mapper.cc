@@ -44,6 +44,7 @@ SparseMapper::SparseMapper(const SlamConfig& config, LocalMapSlot* local_map, Ba
 MappedFrame SparseMapper::Process(const TrackedImage& image) {
   MappedFrame mapped{.tracked = image.tracked};
   tracking_diagnostics_ = image.diagnostics;
+  if (image.discard_points) DiscardPoints();
   const int generation_before = generation_;
   const bool loop_was_closed = ConcludeLoopTrial(/*wait=*/false);
   const bool was_merged = ConcludeMerge(/*wait=*/false);
@@ -72,6 +73,13 @@ MappedFrame SparseMapper::Process(const TrackedImage& image) {
     current().corrections.Record(*mapped.view, current().map.FindKeyframe(mapped.view->id)->scale);
   }
   return mapped;
+}
+
+void SparseMapper::DiscardPoints() {
+  std::vector<MapPointId> discarded;
+  for (const auto& [id, track] : current().map.points()) discarded.push_back(id);
+  for (const MapPointId id : discarded) current().map.RemovePoint(id);
+  if (current().reference) PublishLocalMap(current().reference);
 }
 
 std::vector<Diagnostic> SparseMapper::Diagnostics() const {
@@ -419,6 +427,8 @@ void SparseMapper::UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool i
     current.given_up_world = given_up_.direction_world->normalized();
   } else if (given_up_.estimate) {
     current.given_up_is_estimated = true;
+    const MapKeyframe* newest = current.map.FindKeyframe(current.newest);
+    if (newest != nullptr) current.up.Assume(newest->T_world_camera().rotation() * -Eigen::Vector3d::UnitY());
     current.up.ProposeRotation(current.map, is_last);
     current.given_up_world = current.up.up_world();
   } else {

@@ -86,6 +86,7 @@ class SparseMapper {
   SessionMap& current() { return atlas_.current(); }
   const SessionMap& current() const { return atlas_.current(); }
 
+  void DiscardPoints();
   void InitializeFrom(const TrackedImage& image, MappedFrame& mapped);
   void MapTrackedFrame(const TrackedImage& image, MappedFrame& mapped);
   bool Relocalize(const FrameFeatures& frame);

@@ -191,8 +191,10 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
     const Frame& converted = *image.tracked.frame;
     image.features = MakeFrameFeatures(converted, RemoveFixed(converted, extractor_.Extract(converted)),
                                        RadialCorrection{}, shutter);
+    const bool depth_was_wrong = depth_check_.IsContradicted();
     const auto agreeing = pose_check_.AddFrame(image.features, pose);
     if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
+    if (depth_check_.IsContradicted() && !depth_was_wrong) RefuseDepth(image);
   }
   image.diagnostics = Diagnostics(*frame);
   if (pose_check_.IsContradicted()) {
@@ -212,6 +214,15 @@ void Tracker::RefuseGivenPose(TrackedImage& image) {
   tracked.reason = "the given pose contradicts the images";
   tracked.contradicted_since_frame = pose_check_.contradicted_since_frame();
   image.features = nullptr;
+}
+
+// This frame is the first one whose depth is not used.
+void Tracker::RefuseDepth(TrackedImage& image) {
+  image.tracked.frame = WithoutDepth(*image.tracked.frame);
+  image.tracked.is_keyframe = false;
+  image.tracked.contradicted_since_frame = depth_check_.contradicted_since_frame();
+  image.features = nullptr;
+  image.discard_points = true;
 }
 
 std::vector<Diagnostic> Tracker::Diagnostics(const Frame& frame) const {

@@ -36,6 +36,7 @@ struct TrackedImage {
   std::vector<MapPointId> points = {};                 // tracked: per feature of `features`, 0 = none
   std::optional<InitialViews> initial_views = {};      // a new map can be initialized with this frame
   bool pose_given = false;                             // by the client; must not be corrected
+  bool discard_points = false;                         // those of the map: their depth images contradict the poses
   bool pose_ignored = false;                           // the client gave one, but the world was started from images
   int generation = 0;                                  // of the local map it was tracked against
   std::vector<Diagnostic> diagnostics = {};            // about the camera, its poses and depth images, while they last
@@ -81,6 +82,7 @@ class Tracker {
   std::vector<Feature> RemoveFixed(const Frame& frame, std::vector<Feature> features);
   TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame, const cv::Mat& depth_mu);
   void RefuseGivenPose(TrackedImage& image);
+  void RefuseDepth(TrackedImage& image);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   void FindInitialViews(TrackedImage& image, std::string* reason);
   TrackedImage TrackByImage(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);

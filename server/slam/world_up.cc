@@ -175,6 +175,10 @@ std::optional<Eigen::Quaterniond> WorldUp::ProposeRotation(const SlamMap& map, b
   return RotationFromZTo(up_world_).conjugate();
 }
 
+void WorldUp::Assume(const Eigen::Vector3d& up_world) {
+  if (confidence_ == 0) up_world_ = up_world;
+}
+
 void WorldUp::Rotate(const Eigen::Quaterniond& R_new_old) {
   gravity_.Rotate(R_new_old);
   up_world_ = R_new_old * up_world_;

@@ -29,6 +29,8 @@ class WorldUp {
   std::optional<Eigen::Quaterniond> ProposeRotation(const SlamMap& map, bool is_last = false);
   // The whole map changed: the next ProposeRotation() evaluates it again.
   void RequestUpdate() { next_fit_ = 0; }
+  // What to assume before there is evidence, unit length; ignored afterward.
+  void Assume(const Eigen::Vector3d& up_world);
   // The world was rotated.
   void Rotate(const Eigen::Quaterniond& R_new_old);
 

@@ -32,6 +32,18 @@ TEST(WireSessions, OptionsRoundTrip) {
   EXPECT_EQ(got->mode, FrameMode::kLive);
 }
 
+TEST(WireSessions, UpRoundTripsAndMustNotBeZero) {
+  v1::CreateSessionRequest proto = ToProto(SessionOptions{.name = "", .camera = SomeCamera()});
+  EXPECT_FALSE(FromProto(proto)->up_world.has_value());
+  proto = ToProto(SessionOptions{.name = "", .camera = SomeCamera(), .up_world = Eigen::Vector3d(0, -2, 0)});
+  EXPECT_EQ(FromProto(proto)->up_world, Eigen::Vector3d(0, -2, 0));
+  EXPECT_FALSE(FromProto(proto)->estimate_up);
+  proto.mutable_up_world()->set_y(0);
+  EXPECT_THAT(Message(FromProto(proto).status()), HasSubstr("up_world: is zero; expected a direction"));
+  proto = ToProto(SessionOptions{.name = "", .camera = SomeCamera(), .estimate_up = true});
+  EXPECT_TRUE(FromProto(proto)->estimate_up);
+}
+
 TEST(WireSessions, FisheyeCameraRoundTripsWithFourCoefficients) {
   CameraModel camera = SomeCamera();
   camera.lens = LensModel::kFisheye;

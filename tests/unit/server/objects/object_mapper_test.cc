@@ -236,6 +236,27 @@ TEST(ObjectMapper, DoesNotPublishShortFalseDetections) {
   for (const auto& [id, object] : published.objects) EXPECT_NE(object.class_name, kFalseDetectionClass);
 }
 
+TEST(ObjectMapper, RemovesObjectsOfPosesThatContradictTheImages) {
+  const SyntheticWorld world({});
+  for (const uint64_t since_frame : {world.MakeFrame(0).frame->frame_id, world.MakeFrame(40).frame->frame_id}) {
+    ObjectMapper mapper{ObjectsConfig{}};
+    Published published;
+    for (int i = 0; i < 50; ++i) {
+      const TrackedFrame frame = world.MakeFrame(i);
+      Take(mapper.ObserveFrame(frame), i, &published);
+      if (world.IsKeyframe(i)) Take(mapper.ObserveKeyframe(world.MakeKeyframe(i, frame)), i, &published);
+    }
+    ASSERT_THAT(published.objects, Not(IsEmpty()));
+    TrackedFrame refused = world.MakeFrame(50);
+    refused.state = TrackingState::kLost;
+    refused.contradicted_since_frame = since_frame;
+    Take(mapper.ObserveFrame(refused), 50, &published);
+    Take(mapper.Finish(), 51, &published);
+    // Objects that were known before the contradiction began remain.
+    EXPECT_EQ(published.objects.empty(), since_frame == world.MakeFrame(0).frame->frame_id) << since_frame;
+  }
+}
+
 TEST(ObjectMapper, PublishesUnconfirmedObjectsAsProvisionalWithoutTraining) {
   SyntheticWorldOptions options;
   // A false detection that persists for some frames.

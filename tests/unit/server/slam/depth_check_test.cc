@@ -21,7 +21,7 @@ DepthCheck Feed(double factor, double baseline_mu, double depth_noise, int pairs
   std::uniform_real_distribution<double> u(20, 620), v(20, 460), depth(1, 4);
   std::normal_distribution<double> noise(0, 1);
   for (int k = 0; k < pairs; ++k) {
-    PoseCheck::AgreeingPair pair;
+    PoseCheck::AgreeingPair pair{.first_frame_id = static_cast<uint64_t>(k + 1)};
     pair.T_second_first = {Eigen::Quaterniond::Identity(), Eigen::Vector3d(baseline_mu, 0.02, 0)};
     cv::Mat depth_mu(480, 640, CV_32FC1, cv::Scalar(0));
     for (int i = 0; i < 120; ++i) {
