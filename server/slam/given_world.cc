@@ -31,8 +31,9 @@ std::optional<Sim3<World, World>> GivenWorld::ProposeMotion(const SlamMap& map, 
   for (const auto& [keyframe, given] : poses_) {
     if (const auto pose = map.KeyframePose(keyframe)) pairs.push_back({pose->T_world_camera, given});
   }
-  reason_ =
-      fmt::format("the camera has not moved enough since the first given pose: {} keyframes have one", pairs.size());
+  reason_ = pairs.size() < kMinTwoWorldPoses
+                ? fmt::format("only {} keyframes have one; {} are needed", pairs.size(), kMinTwoWorldPoses)
+                : fmt::format("the camera has not moved enough in the {} keyframes that have one", pairs.size());
   const std::optional<WorldAlignment> alignment = AlignWorlds(pairs, scale_is_known);
   if (!alignment) return std::nullopt;
   const bool is_noisy = alignment->position_sigma_mu > kMaxPositionSigmaShare * alignment->extent_mu ||
