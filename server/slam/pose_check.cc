@@ -29,18 +29,18 @@ constexpr double kMinTolerance_px = 2;
 constexpr double kGivenToleranceShare = 0.25;
 constexpr double kMinGivenTolerance_rad = 0.01;
 // A pair agrees if the given motion explains this share of its matches. It contradicts if the given motion explains
-// less than `kMaxGivenShare`, and less than `kMaxGivenRatio` of what another motion explains, which must be at least
-// `kMinBestShare`.
+// less than `kMaxGivenShare`, less than `kMaxGivenRatio` of what another motion explains, which must be at least
+// `kMinBestShare`, and no more than chance would.
 constexpr double kAgreeingShare = 0.65;
 constexpr double kMaxGivenShare = 0.5;
 constexpr double kMaxGivenRatio = 0.6;
 constexpr double kMinBestShare = 0.65;
 constexpr int kPoseCheckIterations = 80;
-// If one pair of sound poses in twenty contradicts, because they are noisy or a moving object fills the image, five of
-// six do with a probability of 2e-6.
+// Even while a moving object fills most of the image, at most about one pair of sound poses in seven contradicts them:
+// six of eight do with a probability of 2e-4.
 constexpr size_t kWindowPairs = 16;
-constexpr int kMinContradicting = 5;
-constexpr double kContradictingShare = 0.8;
+constexpr int kMinContradicting = 6;
+constexpr double kContradictingShare = 0.7;
 constexpr double kSoundShare = 0.25;  // of the pairs: if another motion fits fewer better, there is no contradiction
 // Some motions are nearly the same in two conventions. So fewer pairs suffice, among others that agree, and pairs that
 // the given poses explain partly, if one alternative explains all of them: noise of the poses would not agree with it.
@@ -75,6 +75,16 @@ double UpperMovement_px(const std::vector<TwoViewMatch>& matches) {
   std::vector<double> movements_px;
   for (const TwoViewMatch& match : matches) movements_px.push_back((match.second_px - match.first_px).norm());
   return Quantile(std::move(movements_px), 0.75);
+}
+
+// What a wrong convention may explain by chance: the most that one of the other conventions explains. A motion that
+// explains more is not wrong, even if a moving object has most of the matches.
+double ChanceShare(const PoseCheck::Pair& pair) {
+  double most = 0;
+  for (size_t i = 1; i < pair.shares.size(); ++i) {
+    if (!AllPoseHypotheses()[i].IsCalibration()) most = std::max(most, pair.shares[i]);
+  }
+  return most;
 }
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
@@ -118,7 +128,10 @@ void PoseCheck::AddPair(const CheckedFrame& first, const Candidate& last) {
                 pair.best_share, last.movement_px);
   if (!pair.agrees && !pair.fits_better) return;
   pairs_.push_back(pair);
-  if (pairs_.size() > kWindowPairs) pairs_.pop_front();
+  if (pairs_.size() > kWindowPairs) {
+    pairs_.pop_front();
+    has_older_pairs_ = true;
+  }
   Decide();
 }
 
@@ -144,8 +157,8 @@ PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& las
   pair.best_share = std::max(pair.given_share, *std::max_element(pair.shares.begin(), pair.shares.end()));
   if (!pair.agrees) AddBestMotion(first, last, tolerance_px, pair);
   pair.fits_better = pair.best_share >= kMinBestShare && pair.shares.front() < kMaxGivenRatio * pair.best_share;
-  pair.contradicts =
-      pair.fits_better && pair.given_share < kMaxGivenShare && pair.given_share < kMaxGivenRatio * pair.best_share;
+  pair.contradicts = pair.fits_better && pair.given_share < kMaxGivenShare &&
+                     pair.given_share < kMaxGivenRatio * pair.best_share && pair.shares.front() < ChanceShare(pair);
   return pair;
 }
 
@@ -166,20 +179,25 @@ void PoseCheck::AddBestMotion(const CheckedFrame& first, const Candidate& last, 
 
 void PoseCheck::Decide() {
   int contradicting = 0, better = 0;
-  uint64_t since_frame = 0;
   for (const Pair& pair : pairs_) {
     better += pair.fits_better ? 1 : 0;
-    if (pair.contradicts && contradicting++ == 0) since_frame = pair.first_frame_id;
+    contradicting += pair.contradicts ? 1 : 0;
   }
   const auto pairs = static_cast<double>(pairs_.size());
   best_ = better > 0 ? BestHypothesis() : std::nullopt;
   if (IsContradicted()) {
     if (better < kSoundShare * pairs) contradicted_since_frame_ = 0;
   } else if (best_ && better >= kMinContradictingWithBest && better >= kSoundShare * pairs) {
-    contradicted_since_frame_ = pairs_.front().first_frame_id;
+    contradicted_since_frame_ = FrameBefore(pairs_.begin());
   } else if (contradicting >= kMinContradicting && contradicting >= kContradictingShare * pairs) {
-    contradicted_since_frame_ = since_frame;
+    const auto contradicts = [](const Pair& pair) { return pair.contradicts; };
+    contradicted_since_frame_ = FrameBefore(std::find_if(pairs_.begin(), pairs_.end(), contradicts));
   }
+}
+
+// The first frame whose pose is as doubtful as those of the pair. Frames before the first pair of all were not checked.
+uint64_t PoseCheck::FrameBefore(std::deque<Pair>::const_iterator pair) const {
+  return pair == pairs_.begin() && !has_older_pairs_ ? 1 : pair->first_frame_id;
 }
 
 std::optional<size_t> PoseCheck::BestHypothesis() const {

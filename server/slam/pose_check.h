@@ -76,6 +76,7 @@ class PoseCheck {
   Pair Judge(const CheckedFrame& first, const Candidate& last) const;
   void AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const;
   void Decide();
+  uint64_t FrameBefore(std::deque<Pair>::const_iterator pair) const;
   // The hypothesis that explains most of the matches of nearly all pairs, and those that contradict better than all
   // others.
   std::optional<size_t> BestHypothesis() const;
@@ -85,6 +86,7 @@ class PoseCheck {
   std::optional<CheckedFrame> reference_;
   std::optional<Candidate> candidate_;  // the newest one that moved at least a little
   std::deque<Pair> pairs_;
+  bool has_older_pairs_ = false;
   std::optional<size_t> best_;  // alternative
   uint64_t contradicted_since_frame_ = 0;
 };

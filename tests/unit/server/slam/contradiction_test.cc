@@ -53,7 +53,7 @@ TEST_F(ContradictionTest, FramesOfAWrongConventionAreLostWithAReason) {
     EXPECT_EQ(mapped_.tracked.contradicted_since_frame, 1u);
     EXPECT_FALSE(mapped_.view.has_value());
   }
-  EXPECT_GE(refused, kFrames - 20);
+  EXPECT_GE(refused, kFrames / 2);
   const std::vector<Diagnostic> diagnostics = mapper_->Diagnostics();
   ASSERT_EQ(diagnostics.size(), 1u);
   EXPECT_EQ(diagnostics[0].code, "poses_contradict_images");
@@ -72,8 +72,10 @@ TEST_F(ContradictionTest, DepthOfAnotherScaleIsNotUsed) {
   }
   EXPECT_LE(frames_with_depth, 15);
   EXPECT_TRUE(HasWarning("depth_contradicts_images"));
+  // Points that such a depth made would be half a unit off and more.
+  EXPECT_GT(map().points().size(), 300u);
   for (const auto& [id, track] : map().points()) {
-    EXPECT_LT(TexturedWorld::DistanceToSurface_mu(track.point.position_world), 0.1);
+    EXPECT_LT(TexturedWorld::DistanceToSurface_mu(track.point.position_world), 0.3);
   }
 }
 
@@ -84,8 +86,12 @@ TEST_F(ContradictionTest, UpOfGivenPosesReachesAllResults) {
   for (int i = 0; i < 10; ++i) {
     Process(RenderGiven(i));
     EXPECT_EQ(mapped_.tracked.up_world, -Eigen::Vector3d::UnitY()) << i;
-    if (mapped_.view) EXPECT_EQ(mapped_.view->up_world, -Eigen::Vector3d::UnitY()) << i;
-    if (mapped_.correction) EXPECT_EQ(mapped_.correction->up_world, -Eigen::Vector3d::UnitY()) << i;
+    if (mapped_.view) {
+      EXPECT_EQ(mapped_.view->up_world, -Eigen::Vector3d::UnitY()) << i;
+    }
+    if (mapped_.correction) {
+      EXPECT_EQ(mapped_.correction->up_world, -Eigen::Vector3d::UnitY()) << i;
+    }
   }
   EXPECT_EQ(mapper_->Finish().up_world, -Eigen::Vector3d::UnitY());
 }
