@@ -19,6 +19,7 @@
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
 #include "server/slam/pose_check.h"
+#include "server/slam/pose_noise.h"
 #include "server/slam/readout_check.h"
 #include "server/slam/rolling_shutter.h"
 #include "server/slam/rotation_tracker.h"
@@ -132,6 +133,7 @@ class Tracker {
   std::optional<PendingMap> pending_map_;
   ReadoutCheck readout_check_;
   PoseCheck pose_check_;
+  PoseNoise pose_noise_;
   DepthCheck depth_check_;
   FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown

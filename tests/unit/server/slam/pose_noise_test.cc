@@ -1,0 +1,54 @@
+#include "server/slam/pose_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/slam/optimize/lie.h"
+
+namespace romap::slam::pose_noise_test {
+
+CameraModel TestCamera() {
+  return {.width_px = 640, .height_px = 480, .fx_px = 525, .fy_px = 525, .cx_px = 319.5, .cy_px = 239.5};
+}
+
+// Matches of random points with half a pixel of noise, for a motion to the side. The stated motion is turned by
+// `error_rad` about the axis that moves the image across it.
+PoseCheck::AgreeingPair MakePair(double error_rad, std::mt19937& random) {
+  const SE3<Camera, Camera> T_second_first(ExpRotation({0, 0.1, 0}), Eigen::Vector3d(-0.3, 0, 0.02));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::normal_distribution<double> noise(0, 0.5);
+  PoseCheck::AgreeingPair pair;
+  while (pair.matches.size() < 150) {
+    const Eigen::Vector3d p_first(uniform(random), 0.7 * uniform(random), 2.5 + uniform(random));
+    const Eigen::Vector3d p_second = T_second_first * p_first;
+    const Eigen::Vector2d first = TestCamera().Project(p_first);
+    const Eigen::Vector2d second = TestCamera().Project(p_second);
+    const Eigen::Vector2d error(noise(random), noise(random));
+    pair.matches.push_back({first, second + error, 1.0});
+  }
+  pair.T_second_first = {ExpRotation({error_rad, 0, 0}) * T_second_first.rotation(), T_second_first.translation()};
+  return pair;
+}
+
+std::optional<Diagnostic> CheckWith(double error_rad, int pairs) {
+  std::mt19937 random(1);
+  PoseNoise noise{SlamConfig{}};
+  for (int i = 0; i < pairs; ++i) noise.AddPair(TestCamera(), MakePair((i % 2 == 0 ? 1 : -1) * error_rad, random));
+  return noise.Check();
+}
+
+TEST(PoseNoiseTest, ExactPosesGiveNoWarning) { EXPECT_FALSE(CheckWith(0, 30).has_value()); }
+
+TEST(PoseNoiseTest, SmallErrorsGiveNoWarning) { EXPECT_FALSE(CheckWith(0.001, 30).has_value()); }
+
+TEST(PoseNoiseTest, LargeErrorsAreStatedInPixels) {
+  const std::optional<Diagnostic> diagnostic = CheckWith(0.01, 30);
+  ASSERT_TRUE(diagnostic.has_value());
+  EXPECT_EQ(diagnostic->code, "poses_inexact");
+  EXPECT_EQ(diagnostic->severity, Severity::kWarning);
+}
+
+TEST(PoseNoiseTest, AFewPairsAreNotJudged) { EXPECT_FALSE(CheckWith(0.01, 5).has_value()); }
+
+}  // namespace romap::slam::pose_noise_test
