@@ -56,7 +56,7 @@ TEST_F(FileRecordingTest, OrientationTags) {
     const std::string tagged = testing_support::WithOrientation(bytes, 6);
     std::ofstream(file, std::ios::binary).write(tagged.data(), static_cast<std::streamsize>(tagged.size()));
   }
-  const RunResult result = Run({"--poses", "none"});
+  const RunResult result = Run();
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
   EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
   EXPECT_EQ(result.summary["frames"]["rejected"], 0);

@@ -111,7 +111,7 @@ TEST_F(PoseRecordingTest, FarFromTheOrigin) {
     return Pose{pose.rotation(), Eigen::Vector3d(pose.translation() + Eigen::Vector3d(500000, 400000, 100))};
   });
   recording().Remove("objects.yaml");
-  const RunResult result = Run();
+  const RunResult result = RunTrained();
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
   EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
   EXPECT_GT(result.DistinctX(), 1000u);

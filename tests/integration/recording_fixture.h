@@ -68,14 +68,15 @@ class RecordingTest : public ::testing::Test {
 
   const testing_support::Recording& recording() const { return *recording_; }
 
+  // Maps the objects, but hardly trains them.
   RunResult Run(std::vector<std::string> options = {}) {
-    // A short training: the shape need not be as good as it can be.
+    options.insert(options.end(), {"--max-training", "1"});
+    return RunTrained(options);
+  }
+
+  RunResult RunTrained(std::vector<std::string> options = {}) {
     std::vector<std::string> command = {ROMAP_CLIENT,    "run",     recording().dir(), "--out",
                                         folder_ / "map", "--local", "--no-pictures"};
-    for (const char* setting :
-         {"nerf.full_budget_steps=150", "nerf.max_refine_steps=0", "nerf.refine_steps_per_view=0"}) {
-      command.insert(command.end(), {"--set", setting});
-    }
     command.insert(command.end(), options.begin(), options.end());
     RunResult result;
     result.process = testing_support::RunProcess(command);
@@ -85,14 +86,17 @@ class RecordingTest : public ::testing::Test {
     return result;
   }
 
-  // The map of the sound sequence, within the tolerance of so few frames.
+  // All objects of the sound sequence, and no others.
   static void ExpectTheMap(const RunResult& result) {
     ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
     EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
-    if (result.summary["evaluation"].contains("objects")) {
-      EXPECT_LT(result.Mean("comp_seen_cm"), 0.5) << result.process.out;
-      EXPECT_LT(result.Mean("acc_cm"), 0.9) << result.process.out;
-    }
+  }
+
+  // The same, with shapes as good as those of the sound sequence, within the tolerance of so few frames.
+  static void ExpectTheShapes(const RunResult& result) {
+    ExpectTheMap(result);
+    EXPECT_LT(result.Mean("comp_seen_cm"), 0.5) << result.process.out;
+    EXPECT_LT(result.Mean("acc_cm"), 0.7) << result.process.out;
   }
 
  private:
