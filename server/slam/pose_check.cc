@@ -30,11 +30,13 @@ constexpr double kGivenToleranceShare = 0.25;
 constexpr double kMinGivenTolerance_rad = 0.01;
 // A pair agrees if the given motion explains this share of its matches. It contradicts if the given motion explains
 // less than `kMaxGivenShare`, less than `kMaxGivenRatio` of what another motion explains, which must be at least
-// `kMinBestShare`, and no more than chance would.
+// `kMinBestShare`, and does not explain the rest.
 constexpr double kAgreeingShare = 0.65;
 constexpr double kMaxGivenShare = 0.5;
 constexpr double kMaxGivenRatio = 0.6;
 constexpr double kMinBestShare = 0.65;
+constexpr int kMinRestMatches = 5;
+constexpr double kMinRestShare = 0.5;
 constexpr int kPoseCheckIterations = 80;
 // Even while a moving object fills most of the image, at most about one pair of sound poses in seven contradicts them:
 // six of eight do with a probability of 2e-4.
@@ -45,8 +47,9 @@ constexpr double kSoundShare = 0.25;  // of the pairs: if another motion fits fe
 // Some motions are nearly the same in two conventions. So fewer pairs suffice, among others that agree, and pairs that
 // the given poses explain partly, if one alternative explains all of them: noise of the poses would not agree with it.
 constexpr int kMinContradictingWithBest = 3;
-// An alternative is named if it explains this share of the matches that can be explained, in this share of all pairs,
+// An alternative is named if it explains enough matches, nearly as many as any hypothesis, in this share of all pairs,
 // and in those that it fits better on average this much more than the second best.
+constexpr double kMinNamedShare = 0.4;  // a moving object may have the others
 constexpr double kNamedRatio = 0.8;
 constexpr double kNamedPairs = 0.85;
 constexpr double kNamedMargin = 0.08;
@@ -77,14 +80,16 @@ double UpperMovement_px(const std::vector<TwoViewMatch>& matches) {
   return Quantile(std::move(movements_px), 0.75);
 }
 
-// What a wrong convention may explain by chance: the most that one of the other conventions explains. A motion that
-// explains more is not wrong, even if a moving object has most of the matches.
-double ChanceShare(const PoseCheck::Pair& pair) {
-  double most = 0;
-  for (size_t i = 1; i < pair.shares.size(); ++i) {
-    if (!AllPoseHypotheses()[i].IsCalibration()) most = std::max(most, pair.shares[i]);
+// Whether the given poses explain most of the matches that the best motion does not. Then the best motion is that of an
+// object that fills most of the image, not that of the camera.
+bool ExplainRest(const std::vector<bool>& by_given, const std::vector<bool>& by_best) {
+  int rest = 0, explained = 0;
+  for (size_t i = 0; i < by_best.size(); ++i) {
+    if (by_best[i]) continue;
+    ++rest;
+    explained += by_given[i] ? 1 : 0;
   }
-  return most;
+  return explained >= kMinRestMatches && explained >= kMinRestShare * rest;
 }
 
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
@@ -106,7 +111,7 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr
     candidate.movement_px = UpperMovement_px(candidate.matches);
     if (candidate.movement_px > kLeastMovement * frame->camera.width_px) {
       candidate_ = candidate;
-      if (GivenShare(*reference_, candidate) >= kAgreeingShare) {
+      if (ShareOf(ExplainedByGiven(*reference_, candidate)) >= kAgreeingShare) {
         agreeing = AgreeingPair{.first_frame_id = reference_->features->frame_id,
                                 .T_second_first = T_world_camera.Inverse() * reference_->T_world_camera,
                                 .matches = candidate.matches};
@@ -135,46 +140,58 @@ void PoseCheck::AddPair(const CheckedFrame& first, const Candidate& last) {
   Decide();
 }
 
-double PoseCheck::GivenShare(const CheckedFrame& first, const Candidate& last) const {
+std::vector<bool> PoseCheck::ExplainedByGiven(const CheckedFrame& first, const Candidate& last) const {
   const CameraModel& camera = last.second.features->camera;
   const double tolerance_px = std::max(kGivenToleranceShare * last.movement_px, kMinGivenTolerance_rad * camera.fx_px);
-  return ExplainedShare(camera, ReadMotion({}, first.T_world_camera, last.second.T_world_camera), last.matches,
-                        tolerance_px);
+  return Explained(camera, ReadMotion({}, first.T_world_camera, last.second.T_world_camera), last.matches,
+                   tolerance_px);
 }
 
 PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& last) const {
-  const CheckedFrame& second = last.second;
   Pair pair{.first_frame_id = first.features->frame_id, .matches = static_cast<int>(last.matches.size())};
-  const CameraModel& camera = second.features->camera;
+  const CameraModel& camera = last.second.features->camera;
   const double tolerance_px = std::max(kMinTolerance_px, kToleranceShare * last.movement_px);
-  pair.given_share = GivenShare(first, last);
+  const std::vector<bool> by_given = ExplainedByGiven(first, last);
+  pair.given_share = ShareOf(by_given);
   pair.agrees = pair.given_share >= kAgreeingShare;
+  std::vector<bool> by_best = by_given;
+  pair.best_share = pair.given_share;
+  const auto compare = [&](std::vector<bool> explained) {
+    const double share = ShareOf(explained);
+    if (share > pair.best_share) {
+      pair.best_share = share;
+      by_best = std::move(explained);
+    }
+    return share;
+  };
   for (const PoseHypothesis& hypothesis : AllPoseHypotheses()) {
-    pair.shares.push_back(ExplainedShare(ReadCamera(hypothesis, camera),
-                                         ReadMotion(hypothesis, first.T_world_camera, second.T_world_camera),
-                                         last.matches, tolerance_px));
+    pair.shares.push_back(compare(Explained(ReadCamera(hypothesis, camera),
+                                            ReadMotion(hypothesis, first.T_world_camera, last.second.T_world_camera),
+                                            last.matches, tolerance_px)));
   }
-  pair.best_share = std::max(pair.given_share, *std::max_element(pair.shares.begin(), pair.shares.end()));
-  if (!pair.agrees) AddBestMotion(first, last, tolerance_px, pair);
+  if (!pair.agrees) {
+    const std::optional<SE3<Camera, Camera>> T_second_first = FindMotion(last);
+    if (T_second_first && compare(Explained(camera, *T_second_first, last.matches, tolerance_px)) >= kMinBestShare) {
+      const Eigen::Quaterniond given =
+          last.second.T_world_camera.rotation().conjugate() * first.T_world_camera.rotation();
+      pair.rotation = RotationPair{RotationVector(T_second_first->rotation()), RotationVector(given)};
+    }
+  }
   pair.fits_better = pair.best_share >= kMinBestShare && pair.shares.front() < kMaxGivenRatio * pair.best_share;
   pair.contradicts = pair.fits_better && pair.given_share < kMaxGivenShare &&
-                     pair.given_share < kMaxGivenRatio * pair.best_share && pair.shares.front() < ChanceShare(pair);
+                     pair.given_share < kMaxGivenRatio * pair.best_share && !ExplainRest(by_given, by_best);
   return pair;
 }
 
-void PoseCheck::AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const {
+// The motion of the camera as the matches alone show it.
+std::optional<SE3<Camera, Camera>> PoseCheck::FindMotion(const Candidate& last) const {
   const CameraModel& camera = last.second.features->camera;
   const std::vector<RayMatch> rays = ToRays(camera, last.matches);
   const MotionSearch search =
       SearchMotions(camera, rays, kPoseCheckIterations, config_.Seed(last.second.features->frame_id));
-  if (search.motions.empty()) return;
+  if (search.motions.empty()) return std::nullopt;
   const Motion motion = RefineMotion(camera, search.motions.front(), rays).motion;
-  const SE3<Camera, Camera> T_second_first(motion.rotation, motion.direction);
-  const double share = ExplainedShare(camera, T_second_first, last.matches, tolerance_px);
-  pair.best_share = std::max(pair.best_share, share);
-  if (share < kMinBestShare) return;
-  const Eigen::Quaterniond given = last.second.T_world_camera.rotation().conjugate() * first.T_world_camera.rotation();
-  pair.rotation = RotationPair{RotationVector(T_second_first.rotation()), RotationVector(given)};
+  return SE3<Camera, Camera>(motion.rotation, motion.direction);
 }
 
 void PoseCheck::Decide() {
@@ -190,14 +207,14 @@ void PoseCheck::Decide() {
   } else if (best_ && better >= kMinContradictingWithBest && better >= kSoundShare * pairs) {
     contradicted_since_frame_ = FrameBefore(pairs_.begin());
   } else if (contradicting >= kMinContradicting && contradicting >= kContradictingShare * pairs) {
-    const auto contradicts = [](const Pair& pair) { return pair.contradicts; };
-    contradicted_since_frame_ = FrameBefore(std::find_if(pairs_.begin(), pairs_.end(), contradicts));
+    const auto is_doubtful = [](const Pair& pair) { return !pair.agrees; };
+    contradicted_since_frame_ = FrameBefore(std::find_if(pairs_.begin(), pairs_.end(), is_doubtful));
   }
 }
 
-// The first frame whose pose is as doubtful as those of the pair. Frames before the first pair of all were not checked.
+// The first frame whose pose is as doubtful as those of the pair. If most pairs so far are, all frames are.
 uint64_t PoseCheck::FrameBefore(std::deque<Pair>::const_iterator pair) const {
-  return pair == pairs_.begin() && !has_older_pairs_ ? 1 : pair->first_frame_id;
+  return has_older_pairs_ ? pair->first_frame_id : 1;
 }
 
 std::optional<size_t> PoseCheck::BestHypothesis() const {
@@ -205,8 +222,9 @@ std::optional<size_t> PoseCheck::BestHypothesis() const {
   std::vector<double> sums(count, 0), fitting(count, 0);
   double better = 0;
   for (const Pair& pair : pairs_) {
+    const double most = *std::max_element(pair.shares.begin(), pair.shares.end());
     for (size_t i = 0; i < count; ++i) {
-      if (pair.shares[i] >= kNamedRatio * pair.best_share) ++fitting[i];
+      if (pair.shares[i] >= std::max(kMinNamedShare, kNamedRatio * most)) ++fitting[i];
       if (pair.fits_better) sums[i] += pair.shares[i];
     }
     better += pair.fits_better ? 1 : 0;

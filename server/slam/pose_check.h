@@ -21,8 +21,10 @@ namespace romap::slam {
 // the noise of real poses (also a clock that is 20 ms off) and far below the errors of a wrong convention.
 //
 // A pair contradicts the poses only if another motion of the camera explains its matches much better; scenes that move,
-// and textures that repeat, give matches that no motion explains. The poses are contradicted when several pairs in a
-// row are. The alternatives are the usual mistakes (PoseHypothesis), and any motion at all.
+// and textures that repeat, give matches that no motion explains. If the given motion explains the rest of the matches,
+// the other motion is that of an object, and the pair does not contradict. The poses are contradicted when most of
+// several pairs contradict, or when one of the usual mistakes (PoseHypothesis) explains all pairs, and the given poses
+// do not.
 class PoseCheck {
  public:
   // Two frames, their matches and what explains them.
@@ -72,9 +74,10 @@ class PoseCheck {
   };
 
   void AddPair(const CheckedFrame& first, const Candidate& last);
-  double GivenShare(const CheckedFrame& first, const Candidate& last) const;
+  // Per match; with more tolerance than for the alternatives.
+  std::vector<bool> ExplainedByGiven(const CheckedFrame& first, const Candidate& last) const;
   Pair Judge(const CheckedFrame& first, const Candidate& last) const;
-  void AddBestMotion(const CheckedFrame& first, const Candidate& last, double tolerance_px, Pair& pair) const;
+  std::optional<SE3<Camera, Camera>> FindMotion(const Candidate& last) const;
   void Decide();
   uint64_t FrameBefore(std::deque<Pair>::const_iterator pair) const;
   // The hypothesis that explains most of the matches of nearly all pairs, and those that contradict better than all

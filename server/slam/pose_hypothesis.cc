@@ -69,17 +69,22 @@ SE3<Camera, Camera> ReadMotion(const PoseHypothesis& hypothesis, const SE3<World
   return ReadPose(hypothesis, second).Inverse() * ReadPose(hypothesis, first);
 }
 
-double ExplainedShare(const CameraModel& camera, const SE3<Camera, Camera>& motion,
-                      std::span<const TwoViewMatch> matches, double max_distance_px) {
-  if (matches.empty()) return 0;
+std::vector<bool> Explained(const CameraModel& camera, const SE3<Camera, Camera>& motion,
+                            std::span<const TwoViewMatch> matches, double max_distance_px) {
   const Eigen::Matrix3d rotation = motion.RotationMatrix();
-  int explained = 0;
+  std::vector<bool> explained;
+  explained.reserve(matches.size());
   for (const TwoViewMatch& match : matches) {
     const Eigen::Vector3d ray = camera.Unproject(match.first_px.x(), match.first_px.y());
-    const double distance_px = DistanceToProjectionRay_px(camera, rotation, motion.translation(), ray, match.second_px);
-    explained += distance_px < max_distance_px ? 1 : 0;
+    explained.push_back(DistanceToProjectionRay_px(camera, rotation, motion.translation(), ray, match.second_px) <
+                        max_distance_px);
   }
-  return explained / static_cast<double>(matches.size());
+  return explained;
+}
+
+double ShareOf(const std::vector<bool>& explained) {
+  const auto count = std::count(explained.begin(), explained.end(), true);
+  return explained.empty() ? 0 : static_cast<double>(count) / static_cast<double>(explained.size());
 }
 
 std::string Describe(const PoseHypothesis& hypothesis) {

@@ -33,9 +33,11 @@ CameraModel ReadCamera(const PoseHypothesis& hypothesis, const CameraModel& give
 SE3<Camera, Camera> ReadMotion(const PoseHypothesis& hypothesis, const SE3<World, Camera>& first,
                                const SE3<World, Camera>& second);
 
-// Share of the matches that the motion T_second_first explains within a distance.
-double ExplainedShare(const CameraModel& camera, const SE3<Camera, Camera>& motion,
-                      std::span<const TwoViewMatch> matches, double max_distance_px);
+// Per match: whether the motion T_second_first explains it within a distance.
+std::vector<bool> Explained(const CameraModel& camera, const SE3<Camera, Camera>& motion,
+                            std::span<const TwoViewMatch> matches, double max_distance_px);
+// Share of the true values.
+double ShareOf(const std::vector<bool>& explained);
 
 // For users: "world-to-camera and OpenGL camera axes".
 std::string Describe(const PoseHypothesis& hypothesis);
