@@ -138,7 +138,8 @@ void MaskInterpreter::IgnoreRegion(uint64_t frame_id, const MaskThumbnail& thumb
       ++ignored;
     }
   }
-  if (ignored == 0) return;
+  constexpr double kNoteworthy = 0.003;  // of the image; less is the border of a mask that moves with the camera
+  if (ignored < kNoteworthy * static_cast<double>(labels->total())) return;
   Note(frame_id,
        {.code = "image_part_moves_with_camera",
         .text = fmt::format("a part of the image ({:.0f} % in frame {}) keeps its place while the scene moves: "

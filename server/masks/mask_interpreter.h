@@ -17,7 +17,7 @@ namespace romap::masks {
 
 // Decides what each mask of a session shows. Masks of objects stay as they are. Masks of the background (table, floor,
 // wall) get label 0: they hide nothing that lies in front of them. Masks of what moves with the camera, and the label
-// 255 where it means "ignore", get kIgnoreLabel: what is behind them is not known. See LooksLikeBackground() and
+// 255 where it means "ignore", get kIgnoreLabel: what is behind them is not known. See BackgroundSign and
 // SceneMotion for the evidence.
 //
 // A mask is followed from frame to frame by its overlap, because labels are valid for one frame only. Its role is
