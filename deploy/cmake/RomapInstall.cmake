@@ -15,7 +15,7 @@ install(TARGETS romap_sdk romap_wire romap_common romap_opencv romap_proto EXPOR
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} ${CMAKE_INSTALL_INCLUDEDIR}/romap)
 file(GLOB sdk_headers CONFIGURE_DEPENDS client/sdk/*.h)
 install(FILES ${sdk_headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/romap/client/sdk COMPONENT dev)
-foreach(header camera_model client_input cuboid geometry ids map_events mapping_service mesh mesh_codec
+foreach(header camera_model client_input cuboid diagnostic geometry ids map_events mapping_service mesh mesh_codec
         pose_uncertainty)
   install(FILES common/${header}.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/romap/common COMPONENT dev)
 endforeach()
