@@ -64,10 +64,10 @@ std::optional<Diagnostic> PoseNoise::Check() const {
       .code = "poses_inexact",
       .severity = Severity::kWarning,
       .text = fmt::format("the given poses are less exact than the images: with them, half of the feature matches are "
-                          "more than {:.1f} px off their epipolar lines, with the best motion {:.1f} px; meshes are "
-                          "blurred",
+                          "more than {:.1f} px off their epipolar lines, with the best motion {:.1f} px; objects are "
+                          "less accurate",
                           given_median * width_px_, best_median * width_px_),
-      .advice = "check the calibration and the clock of the poses, or run with --poses prior, which corrects them"};
+      .advice = "check the calibration and the clock of the poses; with --poses prior, tracking corrects them"};
 }
 
 }  // namespace romap::slam

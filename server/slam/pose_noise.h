@@ -11,8 +11,8 @@
 namespace romap::slam {
 
 // Measures how well given poses that agree with the images do so: the distance of matched features from their epipolar
-// lines, compared with that for the motion which fits the same matches best. Meshes of poses that are clearly less
-// exact than the images are blurred, and tracking could correct such poses.
+// lines, compared with that for the motion which fits the same matches best. Poses that are clearly less exact
+// than the images make objects less accurate, and tracking could correct them.
 class PoseNoise {
  public:
   explicit PoseNoise(const SlamConfig& config) : config_(config) {}
