@@ -11,8 +11,8 @@ enum class Severity {
   kError,    // the map is wrong, or a large part of the input is unusable
 };
 
-// One thing that a person should know about the input or the map of a session. Any stage may report one; the codes are
-// listed in proto/romap/v1/mapping.proto.
+// What a person should know about the input or the map of a session, in one sentence. Any stage may report one; the
+// codes are listed in proto/romap/v1/mapping.proto.
 struct Diagnostic {
   std::string code = {};  // stable identifier for programs, e.g. "up_unknown"
   Severity severity = Severity::kWarning;

@@ -11,6 +11,7 @@
 #include "client/cli/map_pictures.h"
 #include "client/cli/run_stream.h"
 #include "client/cli/run_summary.h"
+#include "client/cli/sequence_arguments.h"
 #include "client/cli/service_options.h"
 #include "client/eval/eval.h"
 #include "client/eval/run_record.h"
@@ -23,47 +24,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::map<std::string, PoseUse> kPoseUses = {
-    {"given", PoseUse::kGiven}, {"prior", PoseUse::kPrior}, {"none", PoseUse::kIgnore}};
-
 struct RunOptions {
-  std::string sequence_dir;
+  SequenceArguments sequence;
   std::string out;
-  PoseUse poses = PoseUse::kGiven;
-  files::SequenceOptions sequence;
   StreamOptions stream;
   ServiceOptions service;
   bool no_pictures = false;
-  std::vector<std::string> conventions;
-  std::string pose_offset;
-  std::string up;
   int64_t permute_labels_seed = -1;
-  double readout_ms = -1;
 };
 
 absl::Status PrepareOutput(const std::string& out) {
   ROMAP_RETURN_IF_ERROR(files::MakeFolder((fs::path(out) / "objects").string()));
   return files::MakeFolder((fs::path(out) / "pictures").string());
-}
-
-absl::StatusOr<files::SequenceOptions> ToSequenceOptions(const RunOptions& options) {
-  files::SequenceOptions sequence = options.sequence;
-  for (const std::string& names : options.conventions) {
-    ROMAP_RETURN_IF_ERROR(files::ParseConvention(names, &sequence.convention));
-  }
-  if (!options.pose_offset.empty()) {
-    ROMAP_ASSIGN_OR_RETURN(sequence.convention.offset, files::ParsePoseOffset(options.pose_offset));
-  }
-  if (options.poses == PoseUse::kIgnore) sequence.poses.clear();
-  if (options.readout_ms >= 0) sequence.readout_s = 1e-3 * options.readout_ms;
-  if (options.permute_labels_seed >= 0) sequence.permute_labels_seed = options.permute_labels_seed;
-  return sequence;
-}
-
-// "x" to "-z".
-Eigen::Vector3d AxisOf(const std::string& name) {
-  const double sign = name.front() == '-' ? -1 : 1;
-  return sign * Eigen::Vector3d::Unit(name.back() - 'x');
 }
 
 std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
@@ -78,8 +50,8 @@ eval::RunRecord RecordOf(const RunOptions& options, const StreamResult& result, 
                          .frames_sent = collector.sent(),
                          .skipped_frames = result.skipped_frames};
   record.poses = "none";  // also if no frame has a pose
-  if (collector.sent_with_pose() > 0 && options.poses != PoseUse::kIgnore) {
-    record.poses = options.poses == PoseUse::kGiven ? "given" : "prior";
+  if (collector.sent_with_pose() > 0 && options.sequence.poses != PoseUse::kIgnore) {
+    record.poses = options.sequence.poses == PoseUse::kGiven ? "given" : "prior";
   }
   return record;
 }
@@ -88,8 +60,8 @@ eval::RunRecord RecordOf(const RunOptions& options, const StreamResult& result, 
 // run that estimated the poses gets a verdict on its trajectory even if it mapped no object.
 void Evaluate(const RunOptions& options, const eval::RunRecord& record, const files::Sequence& sequence,
               nlohmann::json& summary) {
-  const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence_dir,
-                                                   eval::DetermineAlignment(record, options.out, options.sequence_dir),
+  const eval::RunReport report = eval::EvaluateRun(options.out, options.sequence.dir,
+                                                   eval::DetermineAlignment(record, options.out, options.sequence.dir),
                                                    eval::FramesOf(record, sequence));
   summary["poses"] = *record.poses;
   summary["frames"]["first"] = *record.first_frame;
@@ -98,12 +70,13 @@ void Evaluate(const RunOptions& options, const eval::RunRecord& record, const fi
   const std::string text = has_true_objects           ? eval::FormatTable(report)
                            : *record.poses == "given" ? ""
                                                       : eval::FormatTrajectory(report);
-  if (!text.empty()) fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence_dir, text);
+  if (!text.empty()) fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence.dir, text);
 }
 
 absl::Status RunSequence(const RunOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(const files::SequenceOptions sequence_options, ToSequenceOptions(options));
-  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(options.sequence_dir, sequence_options));
+  ROMAP_ASSIGN_OR_RETURN(files::SequenceOptions sequence_options, options.sequence.FileOptions());
+  if (options.permute_labels_seed >= 0) sequence_options.permute_labels_seed = options.permute_labels_seed;
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(options.sequence.dir, sequence_options));
   ROMAP_RETURN_IF_ERROR(PrepareOutput(options.out));
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
 
@@ -132,48 +105,14 @@ absl::Status RunSequence(const RunOptions& options) {
                                                           Message(result.status), result.session_id));
   }
   if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
-    return InvalidArgument("all frames of {} were rejected; first error: {}", options.sequence_dir,
+    return InvalidArgument("all frames of {} were rejected; first error: {}", options.sequence.dir,
                            summary.faults.empty() ? "" : summary.faults.front());
   }
   return absl::OkStatus();
 }
 
-// The options that select and modify the input.
-void AddInputOptions(RunOptions* options, CLI::App* command) {
-  command
-      ->add_option("--poses", options->poses,
-                   "Use of the camera poses of the sequence: given (exact), prior (initial values, corrected by "
-                   "tracking) or none (the camera is tracked from the images only)")
-      ->transform(CLI::CheckedTransformer(kPoseUses))
-      ->option_text("given|prior|none [given]");
-  command
-      ->add_option("--pose-file", options->sequence.poses,
-                   "File with the camera poses in the sequence folder (TUM format)")
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--pose-convention", options->conventions,
-          "Convention of the poses, if it is not camera to world with x right, y down, z forward: opengl (y up, "
-          "z backward), world_to_camera, wxyz (quaternions with w first); several are separated by commas")
-      ->option_text("NAME,... [opencv]");
-  command
-      ->add_option("--pose-offset", options->pose_offset,
-                   "Pose of the camera on the body, if the poses are those of a body that carries the camera")
-      ->option_text("\"tx ty tz qx qy qz qw\"");
-  command->add_option("--up", options->up, "Up in the world of the poses; auto: estimated from gravity or the images")
-      ->check(CLI::IsMember({"x", "-x", "y", "-y", "z", "-z", "auto"}))
-      ->option_text("x|-x|y|-y|z|-z|auto [z]");
-  command
-      ->add_option("--readout-ms", options->readout_ms,
-                   "Rolling shutter: the time from the first to the last row of an image [ms]; 0 = global shutter")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->option_text("MS [readout_s of camera.yaml]");
-  command->add_option("--masks", options->sequence.masks, "File with the list of mask images in the sequence folder")
-      ->capture_default_str();
-  command
-      ->add_option("--detections", options->sequence.detections,
-                   "File with the class and score of each label in the sequence folder")
-      ->capture_default_str();
+// The options that simulate another detector.
+void AddDetectorOptions(RunOptions* options, CLI::App* command) {
   command
       ->add_option("--mask-rate", options->stream.mask_rate_hz,
                    "Maximum rate of frames with masks [Hz], simulating a slow detector; 0 = unlimited")
@@ -185,7 +124,6 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
                    "the server accepts masks up to objects.max_mask_delay_s late")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--depth", options->sequence.use_depth, "Also send the depth images");
   command
       ->add_option("--permute-labels", options->permute_labels_seed,
                    "Permute the labels at random in each frame with this seed, simulating a detector without a tracker")
@@ -197,11 +135,11 @@ void AddInputOptions(RunOptions* options, CLI::App* command) {
 void AddRunCommand(CLI::App& app, Command* chosen) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "Map a recorded sequence and write the map to files");
-  command->add_option("sequence", options->sequence_dir, "Sequence folder")->required();
   command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory, images and summary")
       ->required();
   options->service.AddTo(*command, /*offer_local=*/true);
-  AddInputOptions(options.get(), command);
+  options->sequence.AddTo(*command);
+  AddDetectorOptions(options.get(), command);
   command->add_flag("--realtime", options->stream.realtime,
                     "Send frames at the recorded rate; the server drops frames when overloaded");
   command->add_option("--first", options->stream.first_frame, "Index of the first frame to send");
@@ -216,9 +154,7 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_flag("--keep-session", options->stream.keep_session, "Do not delete the session from the server");
   command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
   command->callback([options, chosen] {
-    options->stream.pose_use = options->poses;
-    options->stream.estimate_up = options->up == "auto";
-    if (!options->up.empty() && options->up != "auto") options->stream.up_world = AxisOf(options->up);
+    options->sequence.SetPoseUse(&options->stream);
     *chosen = [options] { return RunSequence(*options); };
   });
 }

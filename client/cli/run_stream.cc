@@ -262,4 +262,13 @@ absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, Map
   return Run(sequence, service, options, collector).Execute();
 }
 
+std::vector<Diagnostic> DiagnosticsOf(const StreamResult& result, const MapCollector& collector) {
+  std::vector<Diagnostic> diagnostics = result.diagnostics;
+  if (collector.statistics()) {
+    const std::vector<Diagnostic>& server = collector.statistics()->diagnostics;
+    diagnostics.insert(diagnostics.end(), server.begin(), server.end());
+  }
+  return diagnostics;
+}
+
 }  // namespace romap::cli

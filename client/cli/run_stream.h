@@ -50,4 +50,7 @@ struct StreamResult {
 absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);
 
+// What the client noticed while sending, then what the server noticed.
+std::vector<Diagnostic> DiagnosticsOf(const StreamResult& result, const MapCollector& collector);
+
 }  // namespace romap::cli

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/format_diagnostic.h"
 #include "client/cli/format_length.h"
 #include "client/cli/trackable.h"
-#include "client/files/format_diagnostic.h"
 #include "common/statistics.h"
 
 namespace romap::cli {
@@ -73,12 +73,11 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   summary.client_peak_bytes = PeakBytes();
   summary.server_peak_bytes = collector.server_peak_bytes();
   summary.diagnostics = sequence.diagnostics();
-  summary.diagnostics.insert(summary.diagnostics.end(), stream.diagnostics.begin(), stream.diagnostics.end());
+  const std::vector<Diagnostic> of_stream = DiagnosticsOf(stream, collector);
+  summary.diagnostics.insert(summary.diagnostics.end(), of_stream.begin(), of_stream.end());
   if (collector.statistics()) {
     summary.frames_dropped = collector.statistics()->frames_dropped;
     summary.map_points = collector.statistics()->map_points;
-    const std::vector<Diagnostic>& server = collector.statistics()->diagnostics;
-    summary.diagnostics.insert(summary.diagnostics.end(), server.begin(), server.end());
   }
   summary.faults = collector.faults();
 
@@ -125,7 +124,7 @@ nlohmann::json ToJson(const RunSummary& summary) {
   nlohmann::json diagnostics = nlohmann::json::array();
   for (const Diagnostic& diagnostic : summary.diagnostics) {
     diagnostics.push_back({{"code", diagnostic.code},
-                           {"severity", files::SeverityName(diagnostic.severity)},
+                           {"severity", SeverityName(diagnostic.severity)},
                            {"first_frame_id", diagnostic.first_frame_id},
                            {"count", diagnostic.count},
                            {"text", diagnostic.text},
@@ -188,7 +187,7 @@ std::string FormatSummary(const RunSummary& summary) {
   text += fmt::format("peak memory: mapping {} MiB, client {} MiB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
   text += FormatObjects(summary.objects);
-  for (const Diagnostic& diagnostic : summary.diagnostics) text += files::FormatDiagnostic(diagnostic) + "\n";
+  for (const Diagnostic& diagnostic : summary.diagnostics) text += FormatDiagnostic(diagnostic) + "\n";
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;
 }

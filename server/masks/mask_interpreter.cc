@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <set>
 #include <utility>
 
@@ -21,23 +22,16 @@ constexpr double kBackgroundShare = 0.6;  // of its frames in which a mask looks
 constexpr double kObjectShare = 0.3;      // below it, a mask is not background any more
 constexpr double kFollowIou = 0.4;        // of a mask in two frames
 
+// A client may send a new class name with every mask.
+constexpr size_t kMaxClasses = 1000;
+constexpr size_t kMaxNamedClasses = 5;  // in the text of a diagnostic
+
 constexpr size_t kMaxWaiting = 100;  // frames whose masks may follow late
 
 const Instance* FindInstance(const std::vector<Instance>& instances, uint16_t label) {
   const auto found =
       std::find_if(instances.begin(), instances.end(), [&](const Instance& i) { return i.label == label; });
   return found == instances.end() ? nullptr : &*found;
-}
-
-void Replace(const std::map<uint16_t, uint16_t>& replacements, cv::Mat* labels) {
-  if (replacements.empty()) return;
-  std::vector<uint16_t> table(1 << 16);
-  for (size_t label = 0; label < table.size(); ++label) table[label] = static_cast<uint16_t>(label);
-  for (const auto& [from, to] : replacements) table[from] = to;
-  for (int v = 0; v < labels->rows; ++v) {
-    auto* row = labels->ptr<uint16_t>(v);
-    for (int u = 0; u < labels->cols; ++u) row[u] = table[row[u]];
-  }
 }
 
 // The box in pixels of the frame.
@@ -78,7 +72,6 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
     if (mask != masks.end() && mask->may_move_with_camera) mask->role = Role::kCameraFixed;
   }
   std::vector<NonObjectMask> non_objects;
-  std::map<uint16_t, uint16_t> replacements;
   for (const FollowedMask& mask : masks) {
     if (mask.role == Role::kObject) continue;
     const bool is_background = mask.role == Role::kBackground;
@@ -88,14 +81,12 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
                               "hide is not known",
                       .classes = {mask.class_name}});
     }
-    replacements[mask.label] = is_background ? uint16_t{0} : kIgnoreLabel;
+    labels->setTo(is_background ? uint16_t{0} : kIgnoreLabel, *labels == mask.label);
+    std::erase_if(*instances, [&](const Instance& instance) { return instance.label == mask.label; });
     non_objects.push_back({.box_px = FullBox(thumbnail, thumbnail.Find(mask.label)->box, labels->size()),
                            .class_name = mask.class_name,
                            .reason = is_background ? "its masks show background" : "it moves with the camera"});
   }
-  Replace(replacements, labels);
-  std::erase_if(*instances,
-                [&](const Instance& instance) { return replacements.contains(static_cast<uint16_t>(instance.label)); });
   if (!fixed.region.empty()) IgnoreRegion(frame_id, thumbnail, fixed.region, labels);
   previous_ = std::move(thumbnail);
   followed_ = std::move(masks);
@@ -106,19 +97,11 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
 void MaskInterpreter::IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector<Instance>* instances) {
   const Instance* instance = FindInstance(*instances, kVoidLabel);
   if (instance != nullptr && instance->class_name != kAnyClass) return;  // the client says what it is
-  bool has_void = false;
-  bool has_others = false;
-  for (int v = 0; v < labels->rows; ++v) {
-    const auto* row = labels->ptr<uint16_t>(v);
-    for (int u = 0; u < labels->cols; ++u) {
-      has_void |= row[u] == kVoidLabel;
-      has_others |= row[u] != 0 && row[u] != kVoidLabel;
-    }
-  }
-  if (!has_void) return;
-  void_is_ignored_ |= has_others;
+  const cv::Mat is_void = *labels == kVoidLabel;
+  if (cv::countNonZero(is_void) == 0) return;
+  void_is_ignored_ |= cv::countNonZero(*labels) > cv::countNonZero(is_void);
   if (!void_is_ignored_) return;
-  Replace({{kVoidLabel, kIgnoreLabel}}, labels);
+  labels->setTo(kIgnoreLabel, is_void);
   std::erase_if(*instances, [](const Instance& i) { return i.label == kVoidLabel; });
   Note(frame_id, {.code = "mask_value_255_ignored",
                   .text = "the value 255 of 8-bit masks is read as \"ignore\": it is neither an object nor background",
@@ -128,16 +111,12 @@ void MaskInterpreter::IgnoreVoid(uint64_t frame_id, cv::Mat* labels, std::vector
 // The part of the image without a mask is not background there: it hides what is behind it.
 void MaskInterpreter::IgnoreRegion(uint64_t frame_id, const MaskThumbnail& thumbnail, const cv::Mat& region,
                                    cv::Mat* labels) {
-  int ignored = 0;
-  for (int v = 0; v < labels->rows; ++v) {
-    auto* row = labels->ptr<uint16_t>(v);
-    const auto* fixed = region.ptr<uint8_t>(v / thumbnail.stride_px);
-    for (int u = 0; u < labels->cols; ++u) {
-      if (row[u] != 0 || fixed[u / thumbnail.stride_px] == 0) continue;
-      row[u] = kIgnoreLabel;
-      ++ignored;
-    }
-  }
+  const int stride = thumbnail.stride_px;
+  cv::Mat enlarged;
+  cv::resize(region, enlarged, cv::Size(stride * region.cols, stride * region.rows), 0, 0, cv::INTER_NEAREST);
+  const cv::Mat selected = enlarged(cv::Rect({}, labels->size())) & (*labels == 0);
+  labels->setTo(kIgnoreLabel, selected);
+  const int ignored = cv::countNonZero(selected);
   constexpr double kNoteworthy = 0.003;  // of the image; less is the border of a mask that moves with the camera
   if (ignored < kNoteworthy * static_cast<double>(labels->total())) return;
   Note(frame_id,
@@ -189,7 +168,7 @@ void MaskInterpreter::Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, 
   mask->may_move_with_camera = sign == BackgroundSign::kNone || sign == BackgroundSign::kCrossesBorders;
   ++mask->frames;
   mask->like_background += like_background;
-  if (mask->class_name != kAnyClass) {
+  if (mask->class_name != kAnyClass && (classes_.size() < kMaxClasses || classes_.contains(mask->class_name))) {
     ClassEvidence& evidence = classes_[mask->class_name];
     ++evidence.masks;
     evidence.like_background += like_background;
@@ -217,7 +196,10 @@ void MaskInterpreter::Note(uint64_t frame_id, const Finding& finding) {
   ++known.count;
   known.severity = std::max(known.severity, finding.severity);
   if (known.advice.empty()) known.advice = finding.advice;
-  known.classes.insert(finding.classes.begin(), finding.classes.end());
+  for (const std::string& name : finding.classes) {
+    if (known.classes.size() < kMaxNamedClasses) known.classes.insert(name);
+    known.has_more_classes |= !known.classes.contains(name);
+  }
 }
 
 std::vector<Diagnostic> MaskInterpreter::Diagnostics() const {
@@ -225,7 +207,7 @@ std::vector<Diagnostic> MaskInterpreter::Diagnostics() const {
   for (const auto& [code, finding] : findings_) {
     std::string text;
     for (const std::string& name : finding.classes) text += fmt::format("{}\"{}\"", text.empty() ? "" : ", ", name);
-    if (!text.empty()) text = "masks of class " + text + " ";
+    if (!text.empty()) text = "masks of class " + text + (finding.has_more_classes ? " and others " : " ");
     diagnostics.push_back({.code = code,
                            .severity = finding.severity,
                            .first_frame_id = finding.first_frame_id,

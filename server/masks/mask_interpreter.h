@@ -54,7 +54,8 @@ class MaskInterpreter {
     uint64_t count = 0;
     std::string text = {};
     std::string advice = {};
-    std::set<std::string> classes = {};
+    std::set<std::string> classes = {};  // the first of them
+    bool has_more_classes = false;
   };
   // Masks of one class, followed or not.
   struct ClassEvidence {
@@ -74,7 +75,7 @@ class MaskInterpreter {
   bool void_is_ignored_ = false;
   MaskThumbnail previous_;
   std::vector<FollowedMask> followed_;            // the masks of `previous_`
-  std::map<std::string, ClassEvidence> classes_;  // by class name, without "object"
+  std::map<std::string, ClassEvidence> classes_;  // by class name, without "object"; of the first kMaxClasses
   SceneMotion scene_motion_;
   std::deque<std::pair<uint64_t, cv::Mat>> waiting_;  // frame id and MakeGray() of recent frames without masks
   std::map<std::string, Finding> findings_;           // by code

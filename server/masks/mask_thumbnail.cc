@@ -106,17 +106,10 @@ MaskThumbnail MakeThumbnail(const cv::Mat& labels, const cv::Mat& gray) {
 
 double MaskIou(const MaskThumbnail& first, uint16_t a, const MaskThumbnail& second, uint16_t b) {
   if (first.labels.size() != second.labels.size()) return 0;
-  int both = 0;
-  int either = 0;
-  for (int v = 0; v < first.labels.rows; ++v) {
-    const auto* x = first.labels.ptr<uint16_t>(v);
-    const auto* y = second.labels.ptr<uint16_t>(v);
-    for (int u = 0; u < first.labels.cols; ++u) {
-      both += x[u] == a && y[u] == b ? 1 : 0;
-      either += x[u] == a || y[u] == b ? 1 : 0;
-    }
-  }
-  return either > 0 ? static_cast<double>(both) / either : 0;
+  const cv::Mat in_first = first.labels == a;
+  const cv::Mat in_second = second.labels == b;
+  const int either = cv::countNonZero(in_first | in_second);
+  return either > 0 ? static_cast<double>(cv::countNonZero(in_first & in_second)) / either : 0;
 }
 
 }  // namespace romap::masks

@@ -1,10 +1,7 @@
 #include "server/masks/scene_motion.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 namespace romap::masks {
 namespace {
@@ -23,61 +20,34 @@ constexpr double kMinTexturedAround = 0.3;  // of the pixels around
 constexpr double kMinRegion = 0.005;        // of the image
 constexpr int kBorder = 2;                  // thumbnail pixels
 
-bool TouchesBorder(const MaskThumbnail& thumbnail, uint16_t label) {
-  const MaskRegion* region = thumbnail.Find(label);
-  return region != nullptr && region->sides > 0;
+// The pixels that are under no mask that reaches the border, CV_8UC1.
+cv::Mat SceneOf(const MaskThumbnail& thumbnail) {
+  cv::Mat scene(thumbnail.labels.size(), CV_8UC1, cv::Scalar(255));
+  for (const MaskRegion& region : thumbnail.regions) {
+    if (region.sides > 0) scene.setTo(0, thumbnail.labels == region.label);
+  }
+  return scene;
 }
 
-// Gray values of two frames at the same pixels, as sums.
-class GrayPairs {
- public:
-  void Add(double a, double b) {
-    ++count_;
-    sum_a_ += a;
-    sum_b_ += b;
-    sum_aa_ += a * a;
-    sum_bb_ += b * b;
-    sum_ab_ += a * b;
-    change_ += std::abs(a - b);
-  }
-  int count() const { return count_; }
-  double MeanChange() const { return count_ > 0 ? change_ / count_ : 0; }
-  // nullopt if there is too little contrast for a comparison.
-  std::optional<double> Correlation() const {
-    if (count_ == 0) return std::nullopt;
-    const double variance_a = sum_aa_ / count_ - sum_a_ * sum_a_ / count_ / count_;
-    const double variance_b = sum_bb_ / count_ - sum_b_ * sum_b_ / count_ / count_;
-    if (std::min(variance_a, variance_b) < kMinContrast * kMinContrast) return std::nullopt;
-    return (sum_ab_ / count_ - sum_a_ * sum_b_ / count_ / count_) / std::sqrt(variance_a * variance_b);
-  }
-
- private:
-  int count_ = 0;
-  double sum_a_ = 0, sum_b_ = 0, sum_aa_ = 0, sum_bb_ = 0, sum_ab_ = 0, change_ = 0;
-};
-
-// The pixels that `use` accepts, given the labels in both frames.
-template <class Use>
-GrayPairs PairsWhere(const MaskThumbnail& a, const MaskThumbnail& b, const Use& use) {
-  GrayPairs pairs;
-  for (int v = 0; v < a.labels.rows; ++v) {
-    const auto* label_a = a.labels.ptr<uint16_t>(v);
-    const auto* label_b = b.labels.ptr<uint16_t>(v);
-    const auto* gray_a = a.gray.ptr<uint8_t>(v);
-    const auto* gray_b = b.gray.ptr<uint8_t>(v);
-    for (int u = 0; u < a.labels.cols; ++u) {
-      if (use(label_a[u], label_b[u])) pairs.Add(gray_a[u], gray_b[u]);
-    }
-  }
-  return pairs;
+// Mean absolute difference of the gray values where `selected` is not 0.
+double MeanChange(const MaskThumbnail& a, const MaskThumbnail& b, const cv::Mat& selected) {
+  cv::Mat change;
+  cv::absdiff(a.gray, b.gray, change);
+  return cv::mean(change, selected)[0];
 }
 
-// What is not under a mask that reaches the border.
-GrayPairs ScenePairs(const MaskThumbnail& a, const MaskThumbnail& b) {
-  std::vector<bool> at_border_a(1 << 16, false), at_border_b(1 << 16, false);
-  for (const MaskRegion& region : a.regions) at_border_a[region.label] = region.sides > 0;
-  for (const MaskRegion& region : b.regions) at_border_b[region.label] = region.sides > 0;
-  return PairsWhere(a, b, [&](uint16_t x, uint16_t y) { return !at_border_a[x] && !at_border_b[y]; });
+// Whether the scene moved between two frames. False if it has too little contrast to tell.
+bool HasMoved(const MaskThumbnail& a, const MaskThumbnail& b) {
+  const cv::Mat scene = SceneOf(a) & SceneOf(b);
+  if (cv::countNonZero(scene) == 0) return false;
+  cv::Scalar mean_a, mean_b, deviation_a, deviation_b;
+  cv::meanStdDev(a.gray, mean_a, deviation_a, scene);
+  cv::meanStdDev(b.gray, mean_b, deviation_b, scene);
+  if (std::min(deviation_a[0], deviation_b[0]) < kMinContrast) return false;
+  cv::Mat product;
+  cv::multiply(a.gray, b.gray, product, 1, CV_32F);
+  const double covariance = cv::mean(product, scene)[0] - mean_a[0] * mean_b[0];
+  return covariance < kMovedCorrelation * deviation_a[0] * deviation_b[0];
 }
 
 // The label of the mask in `other` that has the same place; 0 if there is none.
@@ -92,9 +62,9 @@ uint16_t SamePlace(const MaskThumbnail& thumbnail, uint16_t label, const MaskThu
 bool StayedSince(const MaskThumbnail& reference, const MaskThumbnail& thumbnail, uint16_t label) {
   const uint16_t before = SamePlace(thumbnail, label, reference);
   if (before == 0) return false;
-  const GrayPairs inside =
-      PairsWhere(reference, thumbnail, [&](uint16_t x, uint16_t y) { return x == before && y == label; });
-  return inside.MeanChange() <= kMaxChangeShare * ScenePairs(reference, thumbnail).MeanChange();
+  const cv::Mat inside = (reference.labels == before) & (thumbnail.labels == label);
+  const cv::Mat scene = SceneOf(reference) & SceneOf(thumbnail);
+  return MeanChange(reference, thumbnail, inside) <= kMaxChangeShare * MeanChange(reference, thumbnail, scene);
 }
 
 }  // namespace
@@ -147,17 +117,15 @@ SceneMotion::CameraFixed SceneMotion::Find(const MaskThumbnail& thumbnail) {
                 [&](const MaskThumbnail& reference) { return reference.labels.size() != thumbnail.labels.size(); });
   if (references_.size() == kReferences) {
     for (const MaskRegion& region : thumbnail.regions) {
-      const bool stayed = TouchesBorder(thumbnail, region.label) &&
-                          std::all_of(references_.begin(), references_.end(), [&](const MaskThumbnail& reference) {
-                            return StayedSince(reference, thumbnail, region.label);
-                          });
+      const bool stayed =
+          region.sides > 0 && std::all_of(references_.begin(), references_.end(), [&](const MaskThumbnail& reference) {
+            return StayedSince(reference, thumbnail, region.label);
+          });
       if (stayed) fixed.labels.push_back(region.label);
     }
     fixed.region = FindRegion(thumbnail);
   }
-  const std::optional<double> correlation =
-      references_.empty() ? std::nullopt : ScenePairs(references_.back(), thumbnail).Correlation();
-  if (references_.empty() || (correlation && *correlation < kMovedCorrelation)) {
+  if (references_.empty() || HasMoved(references_.back(), thumbnail)) {
     references_.push_back(thumbnail);
     if (references_.size() > kReferences) references_.pop_front();
   }

@@ -18,12 +18,6 @@ constexpr double kMinShareInImage = 0.3;  // of the body points: enough to compa
 constexpr double kMinBetterFit = 0.1;     // IoU by which two boxes together must fit better than one alone
 constexpr double kMostlyCovered = 0.7;    // share of the body under one mask
 
-double BoxIou(const cv::Rect& a, const cv::Rect& b) {
-  const double both = (a & b).area();
-  const double either = a.area() + b.area() - both;
-  return either > 0 ? both / either : 0;
-}
-
 // Predicts the box of the last observation in the current image, assuming that its corners are at depth `depth_mu`.
 cv::Rect PredictBox(const Landmark& landmark, const TrackedFrame& tracked, double depth_mu) {
   const CameraModel& camera = tracked.frame->camera;

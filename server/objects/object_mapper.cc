@@ -7,6 +7,7 @@
 
 #include "common/angles.h"
 #include "server/objects/landmark_decisions.h"
+#include "server/objects/projection.h"
 
 namespace romap::objects {
 namespace {
@@ -169,9 +170,8 @@ void ObjectMapper::RemoveNonObjects(const std::vector<NonObjectMask>& masks, Obj
   for (const NonObjectMask& mask : masks) {
     Prune(
         [&](const Landmark& landmark) -> Decision {
-          const double both = (landmark.last_box_px & mask.box_px).area();
-          const double either = landmark.last_box_px.area() + mask.box_px.area() - both;
-          const bool is_same = frame_index_ - landmark.evidence.last_frame <= kMaxAge && both > kSameMaskIou * either &&
+          const bool is_same = frame_index_ - landmark.evidence.last_frame <= kMaxAge &&
+                               BoxIou(landmark.last_box_px, mask.box_px) > kSameMaskIou &&
                                landmark.evidence.BestClass().first == mask.class_name;
           return {is_same, is_same ? mask.reason : "another mask"};
         },

@@ -46,6 +46,12 @@ std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, Wor
   return {center - reach, center + reach};
 }
 
+double BoxIou(const cv::Rect& a, const cv::Rect& b) {
+  const double both = (a & b).area();
+  const double either = a.area() + b.area() - both;
+  return either > 0 ? both / either : 0;
+}
+
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,
                        const SE3<World, Camera>& T_world_camera) {
   const SE3<Camera, World> T_camera_world = T_world_camera.Inverse();

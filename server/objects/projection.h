@@ -21,6 +21,9 @@ cv::Rect BoundProjections(std::span<const Eigen::Vector3d> points_camera, const 
 // Smallest and largest z depth of a cuboid's corners.
 std::pair<double, double> DepthRange(const Cuboid& cuboid, const SE3<Camera, World>& T_camera_world);
 
+// Intersection over union of two boxes in an image; 0 if both are empty.
+double BoxIou(const cv::Rect& a, const cv::Rect& b);
+
 // Bounding box of a projected cuboid, see BoundProjections().
 cv::Rect ProjectCuboid(const Cuboid& cuboid, double enlargement, const CameraModel& camera,
                        const SE3<World, Camera>& T_world_camera);

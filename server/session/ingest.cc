@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "common/image_bytes.h"
 #include "common/label_image.h"
 #include "common/status.h"
 #include "common/utf8.h"
@@ -55,9 +56,11 @@ absl::Status CheckInstances(const std::vector<Instance>& instances) {
   return absl::OkStatus();
 }
 
-// Whether the masks are an image with at most 8 bits per pixel: byte 24 of a PNG file is its bit depth.
+// Whether the masks are an image with at most 8 bits per pixel.
 bool HasEightBits(const EncodedMasks& masks) {
-  return masks.mask_encoding == MaskEncoding::kLabelPng && masks.label_png.size() > 24 && masks.label_png[24] <= 8;
+  if (masks.mask_encoding != MaskEncoding::kLabelPng) return false;
+  const auto header = PngHeader(masks.label_png);
+  return header && header->bits <= 8;
 }
 
 // Adds an entry for every label of the mask that has none, so that later stages find one for each label.

@@ -57,19 +57,12 @@ void Pipeline::Process(const CheckedInput& input, const MappingExecutor& execute
 
 void Pipeline::Reject(const Arrival& arrival, const absl::Status& reason) {
   ledger_->Reject(arrival, reason);
-  Diagnostic diagnostic;
-  diagnostic.advice = "correct the client, or repair the file";
   if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
-    diagnostic.code = "frames_rejected";
-    diagnostic.first_frame_id = frame->frame_id;
-    diagnostic.text = fmt::format("frame {} was rejected: {}", frame->frame_id, Message(reason));
+    rejections_.AddFrame(frame->frame_id, reason);
   } else {
-    const uint64_t frame_id = std::get<MasksInput>(arrival.input).frame_id;
-    diagnostic.code = "masks_rejected";
-    diagnostic.first_frame_id = frame_id;
-    diagnostic.text = fmt::format("the late masks of frame {} were rejected: {}", frame_id, Message(reason));
+    rejections_.AddMasks(std::get<MasksInput>(arrival.input).frame_id, reason);
   }
-  diagnostics_->Report(std::move(diagnostic));
+  diagnostics_->SetConditions("input", rejections_.Diagnostics());
 }
 
 void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const Frame>& frame,
@@ -79,6 +72,8 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
   if (!tracked_image) return;
   slam::TrackedImage& image = *tracked_image;
   ledger_->AcknowledgeFrame(arrival, image.tracked);
+  rejections_.CountAcceptedFrame();
+  diagnostics_->SetConditions("input", rejections_.Diagnostics());
   const bool is_lost = image.tracked.state == TrackingState::kLost;
   MappingStep step;
   step.is_keyframe = image.tracked.is_keyframe;
@@ -106,16 +101,10 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
 // A library that fails on one image costs this image: the tracker keeps its last frame and finds the camera again from
 // there. If it fails on all images, the session ends.
 std::optional<slam::TrackedImage> Pipeline::Track(const Arrival& arrival, const std::shared_ptr<const Frame>& frame) {
-  constexpr int kMaxFailuresInARow = 10;
-  try {
-    slam::TrackedImage image = tracker_.Track(frame);
-    failures_in_a_row_ = 0;
-    return image;
-  } catch (const std::exception& e) {
-    if (++failures_in_a_row_ > kMaxFailuresInARow) throw;
-    Reject(arrival, Internal("cannot be tracked: {}", e.what()));
-    return std::nullopt;
-  }
+  absl::StatusOr<slam::TrackedImage> image = tracker_guard_.Run([&] { return tracker_.Track(frame); });
+  if (image.ok()) return *std::move(image);
+  Reject(arrival, Internal("cannot be tracked: {}", Message(image.status())));
+  return std::nullopt;
 }
 
 // Late masks take the same path, so that every stage has processed the frame before its masks.

@@ -15,11 +15,13 @@
 #include "server/objects/object_mapper.h"
 #include "server/session/arrival.h"
 #include "server/session/diagnostic_log.h"
+#include "server/session/failure_guard.h"
 #include "server/session/frame_ledger.h"
 #include "server/session/ingest.h"
 #include "server/session/map_state.h"
 #include "server/session/mesh_pose.h"
 #include "server/session/mesher.h"
+#include "server/session/rejections.h"
 #include "server/session/server_config.h"
 #include "server/slam/sparse_mapper.h"
 #include "server/slam/tracker.h"
@@ -106,7 +108,8 @@ class Pipeline {
   std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
   // Used by Process().
   slam::Tracker tracker_;
-  int failures_in_a_row_ = 0;  // frames that the tracker failed on
+  FailureGuard tracker_guard_{/*max_failures_in_a_row=*/10};
+  Rejections rejections_;
   // Used by the mapping steps.
   slam::SparseMapper sparse_mapper_;
   objects::ObjectMapper object_mapper_;

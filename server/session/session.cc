@@ -32,6 +32,7 @@ Session::Session(std::string id, const SessionOptions& options, const ServerConf
       options_(options),
       config_(config.session),
       created_unix_ns_(UnixNow_ns()),
+      lifecycle_(id_),
       ledger_(id_, &map_),
       diagnostics_(id_, &map_),
       pipeline_(id_, options, config, pool, mesher, &map_, &ledger_, &diagnostics_, std::move(recorder)),
@@ -45,16 +46,6 @@ Scheduler::Callbacks Session::SchedulerCallbacks() {
           .failed = [this](const char* stage, const std::string& what) { OnFailed(stage, what); }};
 }
 
-absl::Status Session::CheckOpen() const {
-  const SessionState state = state_;
-  if (state == SessionState::kOpen) return absl::OkStatus();
-  if (state != SessionState::kFailed) {
-    return FailedPrecondition("session '{}' was finished and accepts no more frames", id_);
-  }
-  std::lock_guard lock(failure_mutex_);
-  return FailedPrecondition("session '{}' accepts no more frames, because {}", id_, failure_);
-}
-
 absl::Status Session::Offer(SessionInput input) {
   if (scheduler_.Offer(std::move(input))) return absl::OkStatus();
   ROMAP_RETURN_IF_ERROR(CheckOpen());
@@ -62,28 +53,24 @@ absl::Status Session::Offer(SessionInput input) {
 }
 
 void Session::Finish() {
-  SessionState open = SessionState::kOpen;
-  state_.compare_exchange_strong(open, SessionState::kFinishing);
+  lifecycle_.BeginFinish();
   scheduler_.CloseInputs();
 }
 
 void Session::OnFinished() {
   map_.Publish(CurrentStatistics());
-  state_ = SessionState::kFinished;
+  lifecycle_.Finish();
   map_.Close(absl::OkStatus());
 }
 
 void Session::OnFailed(const char* stage, const std::string& what) {
-  {
-    std::lock_guard lock(failure_mutex_);
-    if (failure_.empty()) failure_ = fmt::format("{} failed: {}", stage, what);
-  }
+  const std::string cause = fmt::format("{} failed: {}", stage, what);
   diagnostics_.Report({.code = "session_failed",
                        .severity = Severity::kError,
-                       .text = fmt::format("{} failed: {}", stage, what),
+                       .text = cause,
                        .advice = "export the map as it is, and start a new session"});
-  state_ = SessionState::kFailed;
-  map_.Close(Internal("session '{}': {} failed: {}", id_, stage, what));
+  lifecycle_.Fail(cause);
+  map_.Close(Internal("session '{}': {}", id_, cause));
 }
 
 void Session::Stop(const absl::Status& status) {
@@ -121,7 +108,7 @@ SessionInfo Session::Info() const {
   info.name = options_.name;
   info.camera = options_.camera;
   info.mode = options_.mode;
-  info.state = state_;
+  info.state = lifecycle_.state();
   info.created_unix_ns = created_unix_ns_;
   info.stream_open = sender_attached_;
   info.statistics = CurrentStatistics();
@@ -131,7 +118,7 @@ SessionInfo Session::Info() const {
 MapSnapshot Session::Export() const {
   MapSnapshot snapshot = map_.Snapshot();
   snapshot.session_id = id_;
-  snapshot.state = state_;
+  snapshot.state = lifecycle_.state();
   snapshot.statistics = CurrentStatistics();
   return snapshot;
 }

@@ -18,6 +18,7 @@
 #include "server/session/pipeline.h"
 #include "server/session/scheduler.h"
 #include "server/session/server_config.h"
+#include "server/session/session_lifecycle.h"
 
 namespace romap::session {
 
@@ -36,7 +37,7 @@ class Session {
   MapSnapshot Export() const;
 
   // FAILED_PRECONDITION if the session accepts no more inputs.
-  absl::Status CheckOpen() const;
+  absl::Status CheckOpen() const { return lifecycle_.CheckOpen(); }
   // Queues a frame, or the masks of an earlier frame; the FrameAck or MasksAck follows as an event. If the queue is
   // full, kReplay waits and kLive drops the oldest input. FAILED_PRECONDITION as CheckOpen().
   absl::Status Offer(SessionInput input);
@@ -68,10 +69,8 @@ class Session {
   const SessionConfig config_;
   const int64_t created_unix_ns_;
 
-  std::atomic<SessionState> state_ = SessionState::kOpen;
+  SessionLifecycle lifecycle_;
   std::atomic<bool> sender_attached_ = false;
-  mutable std::mutex failure_mutex_;
-  std::string failure_;  // the stage that failed, and how; set before state_ becomes kFailed
   Clock::time_point next_statistics_ = Clock::now();  // the scheduler's mapping thread
 
   MapState map_;

@@ -9,6 +9,7 @@
 #include "common/angles.h"
 #include "common/statistics.h"
 #include "server/slam/descriptor_matching.h"
+#include "server/slam/frame_matching.h"
 
 namespace romap::slam {
 namespace {
@@ -104,8 +105,7 @@ std::optional<InitialViews> MonocularInitializer::TryToInitialize(const Followed
   for (const Match& match : view.matches) {
     const Feature& a = view.frame->features[static_cast<size_t>(match.first)];
     const Feature& b = frame->features[static_cast<size_t>(match.second)];
-    two_view_matches.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
-                                config_.pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
+    two_view_matches.push_back(MakeTwoViewMatch(a, b, config_.pixel_sigma_px));
   }
   TwoViewOptions options;
   options.min_parallax_deg = kMinParallax_deg;

@@ -8,14 +8,16 @@
 #include <utility>
 
 #include "common/statistics.h"
-#include "server/slam/descriptor_matching.h"
+#include "server/slam/frame_matching.h"
 #include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/motion_search.h"
 
 namespace romap::slam {
 namespace {
 
-constexpr size_t kMaxFirstFeatures = 300;  // bounds the time of matching to about half a millisecond
+// The number of features bounds the time of matching to about half a millisecond.
+constexpr FrameMatching kPoseCheckMatching = {
+    .max_distance_bits = kMaxMatchDistance_bits, .max_ratio = kMaxMatchRatio, .max_first = 300};
 constexpr size_t kMinPairMatches = 40;
 constexpr size_t kFewPairMatches =
     80;  // the view of the reference is left; a pair with less movement is better than none
@@ -54,26 +56,6 @@ constexpr double kNamedRatio = 0.8;
 constexpr double kNamedPairs = 0.85;
 constexpr double kNamedMargin = 0.08;
 
-std::vector<Descriptor> EveryDescriptor(const FrameFeatures& frame, size_t step) {
-  std::vector<Descriptor> descriptors;
-  descriptors.reserve(frame.size() / step + 1);
-  for (size_t i = 0; i < frame.size(); i += step) descriptors.push_back(frame.features[i].descriptor);
-  return descriptors;
-}
-
-std::vector<TwoViewMatch> MatchPair(const FrameFeatures& first, const FrameFeatures& second, double pixel_sigma_px) {
-  const size_t step = 1 + first.size() / (kMaxFirstFeatures + 1);
-  std::vector<TwoViewMatch> matches;
-  for (const DescriptorMatch& match : MatchDescriptors(EveryDescriptor(first, step), EveryDescriptor(second, 1),
-                                                       kMaxMatchDistance_bits, kMaxMatchRatio)) {
-    const Feature& a = first.features[step * static_cast<size_t>(match.first)];
-    const Feature& b = second.features[static_cast<size_t>(match.second)];
-    matches.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
-                       pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
-  }
-  return matches;
-}
-
 double UpperMovement_px(const std::vector<TwoViewMatch>& matches) {
   std::vector<double> movements_px;
   for (const TwoViewMatch& match : matches) movements_px.push_back((match.second_px - match.first_px).norm());
@@ -104,7 +86,9 @@ std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr
   const CheckedFrame newest{frame, T_world_camera};
   if (!reference_) reference_ = newest;
   if (reference_->features == frame) return std::nullopt;
-  Candidate candidate{.second = newest, .matches = MatchPair(*reference_->features, *frame, config_.pixel_sigma_px)};
+  Candidate candidate{
+      .second = newest,
+      .matches = MatchFrames(*reference_->features, *frame, kPoseCheckMatching, config_.pixel_sigma_px)};
   const bool is_lost = candidate.matches.size() < kMinPairMatches;
   std::optional<AgreeingPair> agreeing;
   if (!is_lost) {
@@ -187,11 +171,10 @@ PoseCheck::Pair PoseCheck::Judge(const CheckedFrame& first, const Candidate& las
 std::optional<SE3<Camera, Camera>> PoseCheck::FindMotion(const Candidate& last) const {
   const CameraModel& camera = last.second.features->camera;
   const std::vector<RayMatch> rays = ToRays(camera, last.matches);
-  const MotionSearch search =
-      SearchMotions(camera, rays, kPoseCheckIterations, config_.Seed(last.second.features->frame_id));
-  if (search.motions.empty()) return std::nullopt;
-  const Motion motion = RefineMotion(camera, search.motions.front(), rays).motion;
-  return SE3<Camera, Camera>(motion.rotation, motion.direction);
+  const auto motion =
+      slam::FindMotion(camera, rays, kPoseCheckIterations, config_.Seed(last.second.features->frame_id));
+  if (!motion) return std::nullopt;
+  return SE3<Camera, Camera>(motion->rotation, motion->direction);
 }
 
 void PoseCheck::Decide() {

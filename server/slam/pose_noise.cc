@@ -40,11 +40,8 @@ void PoseNoise::AddPair(const CameraModel& camera, const PoseCheck::AgreeingPair
   Residuals residuals{.given = MedianDistance_px(camera, given, rays) / camera.width_px};
   residuals.best = residuals.given;
   if (residuals.given > kInexact) {
-    const MotionSearch search = SearchMotions(camera, rays, kNoiseIterations, config_.Seed(++pairs_seen_));
-    if (!search.motions.empty()) {
-      const Motion best = RefineMotion(camera, search.motions.front(), rays).motion;
-      residuals.best = std::min(residuals.given, MedianDistance_px(camera, best, rays) / camera.width_px);
-    }
+    const auto best = FindMotion(camera, rays, kNoiseIterations, config_.Seed(++pairs_seen_));
+    if (best) residuals.best = std::min(residuals.given, MedianDistance_px(camera, *best, rays) / camera.width_px);
   }
   pairs_.push_back(residuals);
   if (pairs_.size() > kMaxNoisePairs) pairs_.pop_front();

@@ -5,15 +5,14 @@
 #include <vector>
 
 #include "common/angles.h"
-#include "server/slam/descriptor_matching.h"
+#include "server/slam/frame_matching.h"
 #include "server/slam/geometry/homography.h"
 #include "server/slam/geometry/motion_search.h"
 
 namespace romap::slam {
 namespace {
 
-constexpr int kMaxRotationDistance = 60;  // Hamming, bits
-constexpr double kRotationRatio = 0.85;
+constexpr FrameMatching kRotationMatching = {.max_distance_bits = 60, .max_ratio = 0.85};
 constexpr size_t kMinRotationMatches = 60;
 constexpr int kRotationIterations = 100;
 // Support per match. Noise costs 0.1 to 0.3, the rest is for moving objects and wrong matches. With parallax, points at
@@ -22,23 +21,6 @@ constexpr double kMinRotationSupport = 0.5;
 // A translation along a plane looks similar to a rotation, but a homography fits it better.
 constexpr double kMinShareOfHomography = 0.9;
 constexpr double kMaxFromReference_rad = 15 * kRadPerDeg;
-
-std::vector<RayMatch> Match(const FrameFeatures& first, const FrameFeatures& second, double pixel_sigma_px) {
-  const auto descriptors = [](const FrameFeatures& frame) {
-    std::vector<Descriptor> all;
-    for (const Feature& feature : frame.features) all.push_back(feature.descriptor);
-    return all;
-  };
-  std::vector<TwoViewMatch> matches;
-  for (const DescriptorMatch& match :
-       MatchDescriptors(descriptors(first), descriptors(second), kMaxRotationDistance, kRotationRatio)) {
-    const Feature& a = first.features[static_cast<size_t>(match.first)];
-    const Feature& b = second.features[static_cast<size_t>(match.second)];
-    matches.push_back({a.pixel_px.cast<double>(), b.pixel_px.cast<double>(),
-                       pixel_sigma_px * std::max(a.octave_scale, b.octave_scale)});
-  }
-  return ToRays(first.camera, matches);
-}
 
 }  // namespace
 
@@ -50,7 +32,8 @@ void RotationTracker::Start(std::shared_ptr<const FrameFeatures> frame, const Ei
 std::optional<Eigen::Quaterniond> RotationTracker::Track(const std::shared_ptr<const FrameFeatures>& frame) {
   if (!reference_) return std::nullopt;
   const CameraModel& camera = frame->camera;
-  const std::vector<RayMatch> matches = Match(*reference_, *frame, config_.pixel_sigma_px);
+  const std::vector<RayMatch> matches =
+      ToRays(camera, MatchFrames(*reference_, *frame, kRotationMatching, config_.pixel_sigma_px));
   if (matches.size() < kMinRotationMatches) return std::nullopt;
   const MotionSearch search = SearchMotions(camera, matches, kRotationIterations, config_.Seed(frame->frame_id));
   if (!search.homography) return std::nullopt;

@@ -19,14 +19,6 @@ using testing_support::Recording;
 
 class PoseRecordingTest : public recordings::RecordingTest {
  protected:
-  // Replaces every pose of the sequence.
-  template <class Change>
-  void ChangePoses(const Change& change) {
-    std::vector<files::StampedPose> poses = recording().Poses();
-    for (files::StampedPose& pose : poses) pose.T_world_camera = change(pose.T_world_camera);
-    recording().WritePoses(poses);
-  }
-
   static void ExpectContradiction(const RunResult& result, const char* convention) {
     EXPECT_THAT(result.Codes(), Contains("poses_contradict_images")) << result.process.out;
     EXPECT_THAT(result.process.out, HasSubstr(convention));

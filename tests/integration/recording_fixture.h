@@ -59,6 +59,17 @@ struct RunResult {
     }
     return distinct.size();
   }
+  // Mean over the colors of all meshes, 0 to 255.
+  double MeanBrightness() const {
+    const auto meshes = files::ReadMeshFolder(dir + "/objects");
+    EXPECT_TRUE(meshes.ok()) << meshes.status();
+    double sum = 0, count = 0;
+    for (const auto& [name, mesh] : *meshes) {
+      for (const Rgb8& color : mesh.mesh.colors) sum += (color[0] + color[1] + color[2]) / 3.0;
+      count += static_cast<double>(mesh.mesh.colors.size());
+    }
+    return sum / count;
+  }
   double Mean(const char* figure) const { return summary["evaluation"]["objects"]["mean"][figure]; }
 };
 
@@ -67,6 +78,14 @@ class RecordingTest : public ::testing::Test {
   void SetUp() override { recording_.emplace(SoundSequence(), folder_ / "recording"); }
 
   const testing_support::Recording& recording() const { return *recording_; }
+
+  // Replaces every pose of the sequence.
+  template <class Change>
+  void ChangePoses(const Change& change) const {
+    std::vector<files::StampedPose> poses = recording().Poses();
+    for (files::StampedPose& pose : poses) pose.T_world_camera = change(pose.T_world_camera);
+    recording().WritePoses(poses);
+  }
 
   // Maps the objects, but hardly trains them.
   RunResult Run(std::vector<std::string> options = {}) {

@@ -128,6 +128,13 @@ class Shortlist {
 
 }  // namespace
 
+std::optional<Motion> FindMotion(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
+                                 uint64_t seed) {
+  const MotionSearch search = SearchMotions(camera, matches, max_iterations, seed);
+  if (search.motions.empty()) return std::nullopt;
+  return RefineMotion(camera, search.motions.front(), matches).motion;
+}
+
 bool AreSimilar(const Motion& a, const Motion& b, double rotation_rad, double direction_rad) {
   const double turn_rad = Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle();
   return turn_rad < rotation_rad && a.direction.dot(b.direction) > std::cos(direction_rad);

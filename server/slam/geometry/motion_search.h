@@ -23,6 +23,10 @@ struct MotionSearch {
 MotionSearch SearchMotions(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
                            uint64_t seed);
 
+// The best motion of a search, refined; nullopt if the search finds none.
+std::optional<Motion> FindMotion(const CameraModel& camera, std::span<const RayMatch> matches, int max_iterations,
+                                 uint64_t seed);
+
 // Whether two motions differ by less than these angles.
 bool AreSimilar(const Motion& a, const Motion& b, double rotation_rad, double direction_rad);
 

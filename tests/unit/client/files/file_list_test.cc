@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "client/files/text_file.h"
+#include "tests/support/subprocess.h"
 
 namespace romap::files::file_list_test {
 
@@ -16,12 +17,10 @@ namespace fs = std::filesystem;
 class FileListTest : public testing::Test {
  protected:
   void SetUp() override {
-    fs::remove_all(dir_);
     fs::create_directories(dir_ + "/my rgb");
     for (int k = 0; k < 6; ++k) EXPECT_TRUE(WriteFile(dir_ + "/my rgb/" + std::to_string(k) + ".png", "").ok());
     EXPECT_TRUE(WriteFile(dir_ + "/my rgb/a #1#2.png", "").ok());
   }
-  void TearDown() override { fs::remove_all(dir_); }
 
   absl::StatusOr<FileList> Read(const std::string& text) {
     EXPECT_TRUE(WriteFile(dir_ + "/rgb.txt", text).ok());
@@ -29,8 +28,8 @@ class FileListTest : public testing::Test {
   }
   std::string ErrorOf(const std::string& text) { return std::string(Read(text).status().message()); }
 
-  const std::string dir_ =
-      testing::TempDir() + "romap_list_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+  const testing_support::TemporaryFolder folder_;
+  const std::string dir_ = folder_.path();
 };
 
 TEST_F(FileListTest, NamesMayHaveBlanksAndQuotes) {

@@ -66,172 +66,161 @@ bool HasInstance(const Frame& frame, uint16_t label) {
   return std::any_of(frame.instances.begin(), frame.instances.end(), [&](const auto& i) { return i.label == label; });
 }
 
-bool HasDiagnostic(const MaskInterpreter& interpreter, const std::string& code) {
-  const std::vector<Diagnostic> diagnostics = interpreter.Diagnostics();
-  return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
-}
+class MaskInterpreterTest : public ::testing::Test {
+ protected:
+  // Interprets `count` frames of the scene, each changed first. Returns the last one.
+  template <class Change>
+  Frame InterpretFrames(int count, const Change& change) {
+    Frame frame;
+    for (int index = 0; index < count; ++index) {
+      frame = scene_.MakeFrame(index);
+      change(&frame);
+      interpreter_.Interpret(true, &frame);
+    }
+    return frame;
+  }
 
-TEST(MaskInterpreterTest, LeavesMasksOfObjectsAlone) {
-  const Scene scene;
-  MaskInterpreter interpreter;
+  bool HasDiagnostic(const std::string& code) const {
+    const std::vector<Diagnostic> diagnostics = interpreter_.Diagnostics();
+    return std::any_of(diagnostics.begin(), diagnostics.end(), [&](const Diagnostic& d) { return d.code == code; });
+  }
+
+  Scene scene_;
+  MaskInterpreter interpreter_;
+};
+
+TEST_F(MaskInterpreterTest, LeavesMasksOfObjectsAlone) {
   for (int index = 0; index < 20; ++index) {
-    Frame frame = scene.MakeFrame(index);
+    Frame frame = scene_.MakeFrame(index);
     const cv::Mat before = frame.labels.clone();
-    interpreter.Interpret(true, &frame);
+    interpreter_.Interpret(true, &frame);
     EXPECT_EQ(cv::norm(before, frame.labels, cv::NORM_INF), 0);
     EXPECT_EQ(frame.instances.size(), static_cast<size_t>(kObjects));
     EXPECT_TRUE(frame.non_objects.empty());
   }
-  EXPECT_TRUE(interpreter.Diagnostics().empty());
+  EXPECT_TRUE(interpreter_.Diagnostics().empty());
 }
 
-TEST(MaskInterpreterTest, TheSurroundingsOfObjectsAreBackground) {
+TEST_F(MaskInterpreterTest, TheSurroundingsOfObjectsAreBackground) {
   for (const int reach_px : {25, 300}) {
     for (const char* name : {"dining table", "object"}) {
-      const Scene scene;
-      MaskInterpreter interpreter;
-      Frame frame;
-      for (int index = 0; index < 5; ++index) {
-        frame = scene.MakeFrame(index);
-        Scene::AddSurface(name, reach_px, &frame);
-        interpreter.Interpret(true, &frame);
-      }
+      interpreter_ = {};
+      const Frame frame = InterpretFrames(5, [&](Frame* f) { Scene::AddSurface(name, reach_px, f); });
       EXPECT_FALSE(HasInstance(frame, kSurface)) << reach_px;
       EXPECT_EQ(cv::countNonZero(frame.labels == kSurface), 0);
       EXPECT_TRUE(HasInstance(frame, 1));
       ASSERT_EQ(frame.non_objects.size(), 1u);
       EXPECT_EQ(frame.non_objects[0].class_name, name);
-      EXPECT_TRUE(HasDiagnostic(interpreter, "mask_is_background"));
+      EXPECT_TRUE(HasDiagnostic("mask_is_background"));
     }
   }
 }
 
 // A sofa with two cushions in front of a wall without a mask.
-TEST(MaskInterpreterTest, AnObjectThatSurroundsAFewOthersStays) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame;
-  for (int index = 0; index < 10; ++index) {
-    frame = scene.MakeFrame(index);
-    frame.labels.setTo(0, frame.labels > 2);
-    std::erase_if(frame.instances, [](const auto& i) { return i.label > 2; });
-    Scene::AddSurface("sofa", 20, &frame);
-    interpreter.Interpret(true, &frame);
-  }
+TEST_F(MaskInterpreterTest, AnObjectThatSurroundsAFewOthersStays) {
+  const Frame frame = InterpretFrames(10, [](Frame* f) {
+    f->labels.setTo(0, f->labels > 2);
+    std::erase_if(f->instances, [](const auto& i) { return i.label > 2; });
+    Scene::AddSurface("sofa", 20, f);
+  });
   EXPECT_TRUE(HasInstance(frame, kSurface));
 }
 
-TEST(MaskInterpreterTest, WhatMovesWithTheCameraIsNoObjectAndHidesWhatIsBehindIt) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame;
-  for (int index = 0; index < 40; ++index) {
-    frame = scene.MakeFrame(index);
-    Scene::AddGripper(&frame);
-    interpreter.Interpret(true, &frame);
+TEST_F(MaskInterpreterTest, ADiagnosticNamesAFewClassesOnly) {
+  for (int surface = 0; surface < 20; ++surface) {
+    InterpretFrames(6, [&](Frame* f) { Scene::AddSurface("table " + std::to_string(surface), 20, f); });
   }
-  EXPECT_FALSE(HasInstance(frame, kGripper));
-  EXPECT_EQ(frame.labels.at<uint16_t>(200, 150), kIgnoreLabel);
-  EXPECT_TRUE(HasDiagnostic(interpreter, "mask_moves_with_camera"));
+  const std::string text = interpreter_.Diagnostics().front().text;
+  EXPECT_NE(text.find("\"table 0\""), std::string::npos) << text;
+  EXPECT_NE(text.find(" and others "), std::string::npos) << text;
+  EXPECT_EQ(text.find("\"table 19\""), std::string::npos) << text;
 }
 
-TEST(MaskInterpreterTest, LateMasksOfWhatMovesWithTheCamera) {
-  const Scene scene;
-  MaskInterpreter interpreter;
+TEST_F(MaskInterpreterTest, WhatMovesWithTheCameraIsNoObjectAndHidesWhatIsBehindIt) {
+  const Frame frame = InterpretFrames(40, Scene::AddGripper);
+  EXPECT_FALSE(HasInstance(frame, kGripper));
+  EXPECT_EQ(frame.labels.at<uint16_t>(200, 150), kIgnoreLabel);
+  EXPECT_TRUE(HasDiagnostic("mask_moves_with_camera"));
+}
+
+TEST_F(MaskInterpreterTest, LateMasksOfWhatMovesWithTheCamera) {
   FrameMasks masks;
   for (int index = 0; index < 40; ++index) {
-    Frame frame = scene.MakeFrame(index);
+    Frame frame = scene_.MakeFrame(index);
     Scene::AddGripper(&frame);
     masks = {.frame_id = frame.frame_id, .labels = frame.labels, .instances = frame.instances};
     frame.has_masks = false;
     frame.labels = cv::Mat();
     frame.instances.clear();
-    interpreter.Interpret(true, &frame);
-    interpreter.Interpret(true, &masks);
+    interpreter_.Interpret(true, &frame);
+    interpreter_.Interpret(true, &masks);
   }
   EXPECT_EQ(masks.labels.at<uint16_t>(200, 150), kIgnoreLabel);
   ASSERT_EQ(masks.non_objects.size(), 1u);
 }
 
-TEST(MaskInterpreterTest, AGripperWithoutAMaskIsNoBackground) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame;
-  for (int index = 0; index < 40; ++index) {
-    frame = scene.MakeFrame(index);
-    const cv::Mat before = frame.labels.clone();
-    Scene::AddGripper(&frame);
-    frame.labels = before;
-    frame.instances.pop_back();
-    interpreter.Interpret(true, &frame);
-  }
+TEST_F(MaskInterpreterTest, AGripperWithoutAMaskIsNoBackground) {
+  const Frame frame = InterpretFrames(40, [](Frame* f) {
+    const cv::Mat before = f->labels.clone();
+    Scene::AddGripper(f);
+    f->labels = before;
+    f->instances.pop_back();
+  });
   EXPECT_EQ(frame.labels.at<uint16_t>(205, 150), kIgnoreLabel);
   EXPECT_EQ(frame.labels.at<uint16_t>(20, 20), 0);
   EXPECT_EQ(frame.labels.at<uint16_t>(200, 300), 0);
-  EXPECT_TRUE(HasDiagnostic(interpreter, "image_part_moves_with_camera"));
+  EXPECT_TRUE(HasDiagnostic("image_part_moves_with_camera"));
 }
 
-TEST(MaskInterpreterTest, AGripperOfACameraThatStandsStillIsNotJudged) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame;
-  for (int index = 0; index < 40; ++index) {
-    frame = scene.MakeFrame(0);
-    Scene::AddGripper(&frame);
-    interpreter.Interpret(true, &frame);
-  }
+TEST_F(MaskInterpreterTest, AGripperOfACameraThatStandsStillIsNotJudged) {
+  const Frame still = scene_.MakeFrame(0);
+  const Frame frame = InterpretFrames(40, [&](Frame* f) {
+    f->image_bgr = still.image_bgr.clone();
+    f->labels = still.labels.clone();
+    Scene::AddGripper(f);
+  });
   EXPECT_TRUE(HasInstance(frame, kGripper));
 }
 
 // The camera moves around an object in the middle of the image.
-TEST(MaskInterpreterTest, AnObjectThatStaysInTheMiddleOfTheImageStays) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame;
-  for (int index = 0; index < 40; ++index) {
-    frame = scene.MakeFrame(index);
-    frame.labels(cv::Rect(140, 60, 50, 100)).setTo(30);
-    frame.image_bgr(cv::Rect(140, 60, 50, 100)).setTo(cv::Scalar::all(128));
-    frame.instances.push_back({.label = 30, .class_name = "vase", .score = 1, .track_id = {}});
-    interpreter.Interpret(true, &frame);
-  }
+TEST_F(MaskInterpreterTest, AnObjectThatStaysInTheMiddleOfTheImageStays) {
+  const Frame frame = InterpretFrames(40, [](Frame* f) {
+    f->labels(cv::Rect(140, 60, 50, 100)).setTo(30);
+    f->image_bgr(cv::Rect(140, 60, 50, 100)).setTo(cv::Scalar::all(128));
+    f->instances.push_back({.label = 30, .class_name = "vase", .score = 1, .track_id = {}});
+  });
   EXPECT_TRUE(HasInstance(frame, 30));
 }
 
-TEST(MaskInterpreterTest, TheValue255IsIgnoredAmongOtherLabels) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  Frame frame = scene.MakeFrame(0);
-  frame.labels(cv::Rect(10, 10, 30, 30)).setTo(255);
-  frame.instances.push_back({.label = 255, .class_name = "object", .score = 1, .track_id = {}});
-  interpreter.Interpret(true, &frame);
+void AddVoid(const std::string& class_name, Frame* frame) {
+  frame->labels(cv::Rect(10, 10, 30, 30)).setTo(255);
+  frame->instances.push_back({.label = 255, .class_name = class_name, .score = 1, .track_id = {}});
+}
+
+TEST_F(MaskInterpreterTest, TheValue255IsIgnoredAmongOtherLabels) {
+  const Frame frame = InterpretFrames(1, [](Frame* f) { AddVoid("object", f); });
   EXPECT_EQ(frame.labels.at<uint16_t>(20, 20), kIgnoreLabel);
   EXPECT_FALSE(HasInstance(frame, 255));
-  EXPECT_TRUE(HasDiagnostic(interpreter, "mask_value_255_ignored"));
+  EXPECT_TRUE(HasDiagnostic("mask_value_255_ignored"));
 }
 
-TEST(MaskInterpreterTest, TheValue255IsAnObjectInBinaryMasks) {
-  const Scene scene;
-  MaskInterpreter interpreter;
-  for (int index = 0; index < 10; ++index) {
-    Frame frame = scene.MakeFrame(index);
-    frame.labels.setTo(255, frame.labels > 0);
-    frame.instances = {{.label = 255, .class_name = "object", .score = 1, .track_id = {}}};
-    interpreter.Interpret(true, &frame);
-    EXPECT_TRUE(HasInstance(frame, 255));
-  }
+TEST_F(MaskInterpreterTest, TheValue255IsAnObjectInBinaryMasks) {
+  const Frame frame = InterpretFrames(10, [](Frame* f) {
+    f->labels.setTo(255, f->labels > 0);
+    f->instances = {{.label = 255, .class_name = "object", .score = 1, .track_id = {}}};
+  });
+  EXPECT_TRUE(HasInstance(frame, 255));
 }
 
-TEST(MaskInterpreterTest, TheValue255IsAnObjectIfTheClientSaysSoOrIn16Bits) {
-  const Scene scene;
-  for (const bool eight_bit : {true, false}) {
-    MaskInterpreter interpreter;
-    Frame frame = scene.MakeFrame(0);
-    frame.labels(cv::Rect(10, 10, 30, 30)).setTo(255);
-    frame.instances.push_back({.label = 255, .class_name = eight_bit ? "mug" : "object", .score = 1, .track_id = {}});
-    interpreter.Interpret(eight_bit, &frame);
-    EXPECT_TRUE(HasInstance(frame, 255));
-  }
+TEST_F(MaskInterpreterTest, TheValue255IsAnObjectIfTheClientSaysSo) {
+  EXPECT_TRUE(HasInstance(InterpretFrames(1, [](Frame* f) { AddVoid("mug", f); }), 255));
+}
+
+TEST_F(MaskInterpreterTest, TheValue255IsAnObjectIn16Bits) {
+  Frame frame = scene_.MakeFrame(0);
+  AddVoid("object", &frame);
+  interpreter_.Interpret(/*eight_bit=*/false, &frame);
+  EXPECT_TRUE(HasInstance(frame, 255));
 }
 
 }  // namespace romap::masks::mask_interpreter_test

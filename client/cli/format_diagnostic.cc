@@ -1,8 +1,8 @@
-#include "client/files/format_diagnostic.h"
+#include "client/cli/format_diagnostic.h"
 
 #include <fmt/format.h>
 
-namespace romap::files {
+namespace romap::cli {
 
 std::string SeverityName(Severity severity) {
   switch (severity) {
@@ -27,4 +27,4 @@ std::string FormatDiagnostic(const Diagnostic& diagnostic) {
                      diagnostic.advice.empty() ? "" : "; ", diagnostic.advice);
 }
 
-}  // namespace romap::files
+}  // namespace romap::cli

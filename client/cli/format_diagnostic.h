@@ -4,7 +4,7 @@
 
 #include "common/diagnostic.h"
 
-namespace romap::files {
+namespace romap::cli {
 
 // "info", "warning" or "error".
 std::string SeverityName(Severity severity);
@@ -12,4 +12,4 @@ std::string SeverityName(Severity severity);
 // One line: "warning: frames_rejected (3 times, first in frame 17): <text>; <advice>".
 std::string FormatDiagnostic(const Diagnostic& diagnostic);
 
-}  // namespace romap::files
+}  // namespace romap::cli
