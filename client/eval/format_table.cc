@@ -54,6 +54,12 @@ std::string SurfaceCells(const Figures& figures) {
   return cells;
 }
 
+// `shape`: ShapeFigures, or the means of them.
+template <class Shape>
+std::string ShapeCells(const Shape& shape) {
+  return Cell(shape.accuracy_closed_cm) + Cell(shape.hollow_percent) + Cell(shape.normal_error_deg);
+}
+
 std::string IcpCells(const std::optional<IcpFigures>& icp) {
   if (!icp) return "";
   if (icp->failed) return Cell("failed") + Cell("-");
@@ -65,6 +71,7 @@ std::string ObjectsHead(const ObjectsReport& report) {
   for (const double threshold_cm : report.options.thresholds_cm) {
     head += Cell(fmt::format("<{}cm%", threshold_cm)) + Cell("seen");
   }
+  head += Cell("closed") + Cell("hollow%") + Cell("normal");
   if (report.options.alignment != Alignment::kNone) head += Cell("scale") + Cell("icp.rms");
   return head;
 }
@@ -81,12 +88,13 @@ std::string FormatTable(const ObjectsReport& report) {
   table.Add("object", "predicted", ObjectsHead(report));
   for (const ObjectRow& row : report.rows) {
     if (row.match) {
-      table.Add(row.object, row.match->predicted, SurfaceCells(row.match->figures) + IcpCells(row.match->icp));
+      table.Add(row.object, row.match->predicted,
+                SurfaceCells(row.match->figures) + ShapeCells(row.match->figures.shape) + IcpCells(row.match->icp));
     } else {
       table.Add(row.object, "MISSING", "");
     }
   }
-  table.Add("mean", CountOf(report.matched, report.rows.size()), SurfaceCells(report.mean));
+  table.Add("mean", CountOf(report.matched, report.rows.size()), SurfaceCells(report.mean) + ShapeCells(report.mean));
   text += table.ToString();
   if (!report.extra.empty()) {
     text += fmt::format("predicted meshes without a true object: {}\n", fmt::join(report.extra, ", "));

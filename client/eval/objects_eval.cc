@@ -12,6 +12,7 @@
 #include "client/files/tum.h"
 #include "common/angles.h"
 #include "common/assignment.h"
+#include "common/mesh_components.h"
 #include "common/statistics.h"
 
 namespace romap::eval {
@@ -25,8 +26,11 @@ constexpr double kInferredSource = 2;  // `source` of points that were inferred,
 struct Surface {
   std::string name;
   Points points;
-  std::vector<bool> seen;  // whether some camera saw the point, same length as points; true surfaces only
+  Points normals = {};         // as many as points, or none
+  std::vector<bool> seen;      // whether some camera saw the point, same length as points; true surfaces only
+  std::vector<bool> inferred;  // whether the point was not measured, same length as points; true surfaces only
   size_t faces = 0;
+  size_t components = 0;
 };
 
 // Axis-aligned box of a surface without the outermost percent of points on each side, which may be outliers.
@@ -59,37 +63,51 @@ absl::Status ValidateOptions(const ObjectsEvalOptions& options) {
   return absl::OkStatus();
 }
 
-// Removes the points of a cloud that were inferred and not measured.
-void RemoveInferredPoints(const std::vector<double>& source, Surface* surface) {
-  Surface kept{surface->name, {}, {}, surface->faces};
-  for (size_t k = 0; k < source.size(); ++k) {
-    if (source[k] == kInferredSource) continue;
-    kept.points.push_back(surface->points[k]);
-    kept.seen.push_back(surface->seen[k]);
+// The points that were measured and not inferred, without their normals.
+Surface WithoutInferred(const Surface& surface) {
+  Surface kept{.name = surface.name, .points = {}, .seen = {}, .inferred = {}, .faces = surface.faces};
+  for (size_t k = 0; k < surface.points.size(); ++k) {
+    if (surface.inferred[k]) continue;
+    kept.points.push_back(surface.points[k]);
+    kept.seen.push_back(surface.seen[k]);
   }
-  *surface = std::move(kept);
+  return kept;
 }
 
 absl::StatusOr<std::vector<Surface>> LoadSurfaces(const std::string& dir, const ObjectsEvalOptions& options,
-                                                  uint32_t seed, bool ignore_inferred) {
+                                                  uint32_t seed) {
   ROMAP_ASSIGN_OR_RETURN(const auto files, files::ReadMeshFolder(dir));
   std::vector<Surface> surfaces;
   for (const auto& [name, file] : files) {
-    Surface surface{name, {}, {}, file.mesh.triangles.size()};
-    ROMAP_ASSIGN_OR_RETURN(surface.points, SampleSurface(file.mesh, options.samples, seed, dir + "/" + name));
+    ROMAP_ASSIGN_OR_RETURN(OrientedPoints samples,
+                           SampleOrientedSurface(file.mesh, options.samples, seed, dir + "/" + name));
+    Surface surface{.name = name,
+                    .points = std::move(samples.points),
+                    .normals = std::move(samples.normals),
+                    .seen = {},
+                    .inferred = {},
+                    .faces = file.mesh.triangles.size(),
+                    .components = CountComponents(file.mesh)};
     for (Eigen::Vector3d& point : surface.points) point += file.origin;
     surface.seen.assign(surface.points.size(), true);
+    surface.inferred.assign(surface.points.size(), false);
     const auto seen = file.scalars.find("seen");
     const auto source = file.scalars.find("source");
     if (surface.faces == 0 && seen != file.scalars.end()) {
       std::transform(seen->second.begin(), seen->second.end(), surface.seen.begin(), [](double s) { return s > 0; });
     }
-    if (surface.faces == 0 && ignore_inferred && source != file.scalars.end())
-      RemoveInferredPoints(source->second, &surface);
-    if (surface.points.empty()) return InvalidArgument("{}/{}: all points are inferred", dir, name);
+    if (surface.faces == 0 && source != file.scalars.end()) {
+      std::transform(source->second.begin(), source->second.end(), surface.inferred.begin(),
+                     [](double s) { return s == kInferredSource; });
+    }
     surfaces.push_back(std::move(surface));
   }
   return surfaces;
+}
+
+void Move(const Sim3<World, World>& similarity, Surface* surface) {
+  surface->points = Transform(similarity, surface->points);
+  for (Eigen::Vector3d& normal : surface->normals) normal = similarity.rotation() * normal;
 }
 
 // Transforms all predicted surfaces to the ground-truth world by aligning the trajectories. Returns the scale.
@@ -99,7 +117,7 @@ absl::StatusOr<double> AlignByTrajectories(const ObjectsEvalOptions& options, st
   ROMAP_ASSIGN_OR_RETURN(const std::vector<files::StampedPose> truth, files::ReadTum(options.true_trajectory));
   ROMAP_ASSIGN_OR_RETURN(const TrajectoryFit fit,
                          AlignTrajectories(estimated, truth, options.trajectory_alignment, options.max_dt_s));
-  for (Surface& surface : *predicted) surface.points = Transform(fit.S_gt_est, surface.points);
+  for (Surface& surface : *predicted) Move(fit.S_gt_est, &surface);
   return fit.S_gt_est.scale();
 }
 
@@ -157,11 +175,11 @@ Points Subset(const Points& points, size_t count, std::mt19937_64* random) {
 
 // Aligns the predicted points with the true ones by ICP.
 IcpFigures AlignByIcp(const ObjectsEvalOptions& options, const Surface& truth, std::mt19937_64* random,
-                      Points* predicted) {
-  const Points source = Subset(*predicted, options.icp_points, random);
+                      Surface* predicted) {
+  const Points source = Subset(predicted->points, options.icp_points, random);
   const auto fit = Icp(source, truth.points, {.with_scale = options.alignment == Alignment::kSim3});
   if (!fit) return {.failed = true};
-  *predicted = Transform(fit->S_target_source, *predicted);
+  Move(fit->S_target_source, predicted);
   return {.failed = false,
           .scale = fit->S_target_source.scale(),
           .rotation_deg = Eigen::AngleAxisd(fit->S_target_source.rotation()).angle() * kDegPerRad,
@@ -202,7 +220,7 @@ std::optional<double> PercentBelow(const std::vector<double>& values_m, const st
 // are more and the prediction is a mesh.
 Surface CompletionPoints(const Surface& truth, size_t predicted_faces, size_t samples, std::mt19937_64* random) {
   if (truth.points.size() <= samples || predicted_faces == 0) return truth;
-  Surface subset{truth.name, {}, {}, truth.faces};
+  Surface subset{.name = truth.name, .points = {}, .seen = {}, .inferred = {}, .faces = truth.faces};
   std::vector<size_t> indices(truth.points.size()), chosen;
   std::iota(indices.begin(), indices.end(), size_t{0});
   std::sample(indices.begin(), indices.end(), std::back_inserter(chosen), samples, *random);
@@ -262,6 +280,10 @@ void AddMeans(ObjectsReport* report) {
   mean.accuracy_seen_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.accuracy_seen_cm; });
   mean.completion_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return Value(f.completion_cm); });
   mean.completion_seen_cm = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.completion_seen_cm; });
+  mean.accuracy_closed_cm =
+      MeanOverRows(rows, [](const SurfaceFigures& f) { return Value(f.shape.accuracy_closed_cm); });
+  mean.hollow_percent = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.shape.hollow_percent; });
+  mean.normal_error_deg = MeanOverRows(rows, [](const SurfaceFigures& f) { return f.shape.normal_error_deg; });
   for (size_t k = 0; k < report->options.thresholds_cm.size(); ++k) {
     ObjectsReport::Mean::MeanRatio ratio;
     ratio.threshold_cm = report->options.thresholds_cm[k];
@@ -281,9 +303,16 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
   ROMAP_RETURN_IF_ERROR(ValidateOptions(options));
   // Different seeds: with the same samples a mesh compared with itself would have zero error.
   ROMAP_ASSIGN_OR_RETURN(const std::vector<Surface> truth,
-                         LoadSurfaces(options.ground_truth_dir, options, options.seed + 1, options.ignore_inferred));
-  ROMAP_ASSIGN_OR_RETURN(std::vector<Surface> predicted,
-                         LoadSurfaces(options.predicted_dir, options, options.seed, /*ignore_inferred=*/false));
+                         LoadSurfaces(options.ground_truth_dir, options, options.seed + 1));
+  ROMAP_ASSIGN_OR_RETURN(std::vector<Surface> predicted, LoadSurfaces(options.predicted_dir, options, options.seed));
+  std::vector<Surface> measured = truth;  // accuracy and completion are measured against these points
+  if (options.ignore_inferred) {
+    std::transform(truth.begin(), truth.end(), measured.begin(), WithoutInferred);
+    for (const Surface& surface : measured) {
+      if (!surface.points.empty()) continue;
+      return InvalidArgument("{}/{}: all points are inferred", options.ground_truth_dir, surface.name);
+    }
+  }
   ObjectsReport report;
   report.options = options;
   ROMAP_ASSIGN_OR_RETURN(report.trajectory_scale, AlignByTrajectories(options, &predicted));
@@ -291,7 +320,7 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
   if (!options.dataset_dir.empty()) {
     ROMAP_ASSIGN_OR_RETURN(frames, SeenFrames::Load(options.dataset_dir, options.dataset_every));
   }
-  const std::vector<std::optional<Pair>> pairs = MatchSurfaces(truth, predicted, options.match_distance);
+  const std::vector<std::optional<Pair>> pairs = MatchSurfaces(measured, predicted, options.match_distance);
   std::mt19937_64 random(options.seed);
   std::vector<bool> used(predicted.size());
   for (size_t i = 0; i < truth.size(); ++i) {
@@ -305,8 +334,10 @@ absl::StatusOr<ObjectsReport> EvaluateObjects(const ObjectsEvalOptions& given) {
     match.center_distance_cm = kCmPerM * pairs[i]->center_distance_m;
     match.box_iou = pairs[i]->box_iou;
     match.faces = surface.faces;
-    if (options.alignment != Alignment::kNone) match.icp = AlignByIcp(options, truth[i], &random, &surface.points);
-    Measure(truth[i], surface.points, frames ? &*frames : nullptr, *label, options, &random, &match);
+    match.components = surface.components;
+    if (options.alignment != Alignment::kNone) match.icp = AlignByIcp(options, measured[i], &random, &surface);
+    Measure(measured[i], surface.points, frames ? &*frames : nullptr, *label, options, &random, &match);
+    match.figures.shape = MeasureShape({truth[i].points, truth[i].normals}, {surface.points, surface.normals});
     report.rows.back().match = std::move(match);
     used[pairs[i]->predicted] = true;
     ++report.matched;

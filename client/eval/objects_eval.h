@@ -7,14 +7,15 @@
 #include <vector>
 
 #include "client/eval/alignment.h"
+#include "client/eval/shape_eval.h"
 #include "common/status.h"
 
 namespace romap::eval {
 
 struct ObjectsEvalOptions {
   std::string predicted_dir;  // meshes (.ply, .obj) with any names
-  // True surfaces. Point clouds may have the vertex properties `seen` (0 or 1) and `source` (2 = inferred, not
-  // measured).
+  // True surfaces. Point clouds may have normals, and the vertex properties `seen` (0 or 1) and `source` (2 =
+  // inferred, not measured).
   std::string ground_truth_dir;
   Alignment alignment = Alignment::kSim3;  // per-object ICP
   std::vector<double> thresholds_cm{0.4, 1.0};
@@ -31,7 +32,7 @@ struct ObjectsEvalOptions {
   uint32_t seed = 0;
   double match_distance = 0.5;  // maximal center distance of a pair without overlap, in diagonals of the true box
   size_t icp_points = 20'000;
-  bool ignore_inferred = false;  // ignore true points with source = 2
+  bool ignore_inferred = false;  // ignore true points with source = 2; ShapeFigures always consider them
 };
 
 struct Ratio {
@@ -48,6 +49,7 @@ struct SurfaceFigures {
   double completion_cm = 0;  // mean distance from true points to the nearest predicted one
   std::optional<double> completion_seen_cm;
   std::vector<Ratio> ratios;  // completion ratio: percentage of true points closer than a threshold
+  ShapeFigures shape;
 };
 
 struct IcpFigures {
@@ -63,6 +65,7 @@ struct ObjectMatch {
   double center_distance_cm = 0;  // of the boxes, before ICP
   double box_iou = 0;             // of the axis-aligned boxes, before ICP
   size_t faces = 0;
+  size_t components = 0;
   double predicted_seen_share = 0;  // share of the predicted points that were seen
   double true_seen_share = 0;       // share of the true points that were seen
   std::optional<IcpFigures> icp;
@@ -80,6 +83,7 @@ struct ObjectsReport {
   // Means over the matched objects that have the figure.
   struct Mean {
     std::optional<double> accuracy_cm, accuracy_seen_cm, completion_cm, completion_seen_cm;
+    std::optional<double> accuracy_closed_cm, hollow_percent, normal_error_deg;  // see ShapeFigures
     struct MeanRatio {
       double threshold_cm = 0;
       std::optional<double> all_percent, seen_percent;

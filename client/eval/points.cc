@@ -29,27 +29,51 @@ std::vector<double> CumulativeAreas(const Mesh& mesh) {
   return areas;
 }
 
+// The unit normal at a point of a triangle, given by the weights of its corners.
+Eigen::Vector3d NormalAt(const Mesh& mesh, size_t triangle, const Eigen::Vector3d& weights) {
+  if (mesh.normals.empty()) {
+    const auto [a, b, c] = Corners(mesh, triangle);
+    return (b - a).cross(c - a).normalized();
+  }
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  for (int corner = 0; corner < 3; ++corner) {
+    normal += weights[corner] * mesh.normals[mesh.triangles[triangle][static_cast<size_t>(corner)]].cast<double>();
+  }
+  return normal.normalized();
+}
+
 }  // namespace
 
 absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t seed, const std::string& name) {
-  Points points;
+  ROMAP_ASSIGN_OR_RETURN(OrientedPoints samples, SampleOrientedSurface(mesh, count, seed, name));
+  return std::move(samples.points);
+}
+
+absl::StatusOr<OrientedPoints> SampleOrientedSurface(const Mesh& mesh, size_t count, uint32_t seed,
+                                                     const std::string& name) {
+  OrientedPoints samples;
   if (mesh.triangles.empty()) {
-    for (const Eigen::Vector3f& vertex : mesh.vertices) points.push_back(vertex.cast<double>());
-    return points;
+    for (const Eigen::Vector3f& vertex : mesh.vertices) samples.points.push_back(vertex.cast<double>());
+    for (const Eigen::Vector3f& normal : mesh.normals) samples.normals.push_back(normal.cast<double>().normalized());
+    return samples;
   }
   const std::vector<double> areas = CumulativeAreas(mesh);
   if (!(areas.back() > 0)) return InvalidArgument("{}: the mesh has no area", name);
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
-  points.reserve(count);
+  samples.points.reserve(count);
+  samples.normals.reserve(count);
   for (size_t k = 0; k < count; ++k) {
     const auto found = std::lower_bound(areas.begin(), areas.end(), uniform(random) * areas.back());
-    const auto [a, b, c] = Corners(mesh, std::min<size_t>(found - areas.begin(), areas.size() - 1));
+    const size_t triangle = std::min<size_t>(found - areas.begin(), areas.size() - 1);
+    const auto [a, b, c] = Corners(mesh, triangle);
     const double r1 = std::sqrt(uniform(random));  // the square root makes the density uniform over the triangle
     const double r2 = uniform(random);
-    points.push_back((1 - r1) * a + r1 * (1 - r2) * b + r1 * r2 * c);
+    const Eigen::Vector3d weights(1 - r1, r1 * (1 - r2), r1 * r2);
+    samples.points.push_back(weights[0] * a + weights[1] * b + weights[2] * c);
+    samples.normals.push_back(NormalAt(mesh, triangle, weights));
   }
-  return points;
+  return samples;
 }
 
 struct NearestIndex::Tree {

@@ -18,6 +18,17 @@ using Points = std::vector<Eigen::Vector3d>;
 // message.
 absl::StatusOr<Points> SampleSurface(const Mesh& mesh, size_t count, uint32_t seed, const std::string& name);
 
+// Points of a surface and its unit normals there, outward.
+struct OrientedPoints {
+  Points points;
+  Points normals;  // as many, or none if the normals are not known
+};
+
+// The same points with the normals: interpolated if the mesh has normals of its vertices, otherwise those of the
+// triangles. A point cloud has those of its file, or none.
+absl::StatusOr<OrientedPoints> SampleOrientedSurface(const Mesh& mesh, size_t count, uint32_t seed,
+                                                     const std::string& name);
+
 // The nearest neighbors of a list of query points.
 struct Neighbors {
   std::vector<uint32_t> index;   // into the points of the index

@@ -26,6 +26,13 @@ void AddSurface(const Figures& figures, Json* json) {
   }
 }
 
+template <class Shape>
+void AddShape(const Shape& shape, Json* json) {
+  (*json)["acc_closed_cm"] = OrNull(shape.accuracy_closed_cm);
+  (*json)["hollow_percent"] = OrNull(shape.hollow_percent);
+  (*json)["normal_error_deg"] = OrNull(shape.normal_error_deg);
+}
+
 Json RowToJson(const ObjectRow& row) {
   Json json = {{"object", row.object}};
   if (!row.match) {
@@ -37,6 +44,7 @@ Json RowToJson(const ObjectRow& row) {
   json["centroid_cm_before"] = match.center_distance_cm;
   json["box_iou_before"] = match.box_iou;
   json["faces"] = match.faces;
+  json["components"] = match.components;
   if (match.icp) {
     json["icp_failed"] = match.icp->failed;
     json["icp_scale"] = match.icp->scale;
@@ -47,6 +55,7 @@ Json RowToJson(const ObjectRow& row) {
   json["acc_seen_share"] = match.predicted_seen_share;
   json["gt_seen_share"] = match.true_seen_share;
   AddSurface(match.figures, &json);
+  AddShape(match.figures.shape, &json);
   return json;
 }
 
@@ -58,6 +67,7 @@ Json ToJson(const ObjectsReport& report) {
   for (const ObjectRow& row : report.rows) json["objects"].push_back(RowToJson(row));
   json["mean"] = Json::object();
   AddSurface(report.mean, &json["mean"]);
+  AddShape(report.mean, &json["mean"]);
   json["matched"] = report.matched;
   json["gt_objects"] = report.rows.size();
   json["extra"] = report.extra;

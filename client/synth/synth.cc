@@ -131,6 +131,7 @@ class SequenceMaker {
       const SurfacePoints& surface = *surfaces_[object.label - 1U];
       Mesh cloud;
       cloud.vertices = surface.positions_world();
+      cloud.normals = surface.normals_world();
       std::vector<double> seen(cloud.vertices.size());
       std::vector<double> source(cloud.vertices.size());
       for (size_t i = 0; i < seen.size(); ++i) {

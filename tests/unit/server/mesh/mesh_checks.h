@@ -3,12 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "common/mesh.h"
+#include "common/mesh_components.h"
 
 namespace romap::mesh {
 
@@ -20,22 +20,6 @@ struct Topology {
 
   bool IsClosedManifold() const { return bad_edges == 0 && bad_vertices == 0; }
 };
-
-inline size_t CountComponents(const Mesh& mesh) {
-  std::vector<uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](uint32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& [a, b, c] : mesh.triangles) {
-    parent[root(a)] = root(b);
-    parent[root(b)] = root(c);
-  }
-  size_t roots = 0;
-  for (uint32_t v = 0; v < parent.size(); ++v) roots += parent[v] == v;
-  return roots;
-}
 
 // Follows the triangle fan around each vertex: successor[v][p] is the vertex after p around v.
 inline Topology CheckTopology(const Mesh& mesh) {
