@@ -10,12 +10,14 @@
 #include "common/status.h"
 #include "common/thread_time.h"
 #include "server/mesh/confidence.h"
+#include "server/mesh/filtered_normals.h"
 #include "server/mesh/floaters.h"
 #include "server/mesh/grid_resolution.h"
 #include "server/mesh/hidden_space.h"
 #include "server/mesh/marching_cubes.h"
 #include "server/mesh/refine_vertices.h"
 #include "server/mesh/sample_field.h"
+#include "server/mesh/solid_cut.h"
 #include "server/mesh/surface_probe.h"
 #include "server/mesh/vertex_normals.h"
 #include "server/mesh/visibility.h"
@@ -96,7 +98,10 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
 
   VisibilityTester visibility(grid, LimitsOf(snapshot));
   VisibilityTester no_views(grid, {});
-  FillHiddenSpace(grid, config.fill_unseen ? visibility : no_views);
+  // The cut takes several times as long as the rest, so meshes of fields that still train do without it.
+  if (!config.fill_unseen || !snapshot.converged || !CutSolid(grid, snapshot)) {
+    FillHiddenSpace(grid, config.fill_unseen ? visibility : no_views);
+  }
   clock.EndPhase();
   if (config.cut_below_support) {
     const std::optional<float> base = FindVisibleBase(grid, visibility);
@@ -113,7 +118,11 @@ absl::StatusOr<Mesh> ExtractMesh(const FieldSnapshot& snapshot, const MeshConfig
   RefineVertices(grid, probe, surface);
   clock.EndPhase();
   Mesh mesh = std::move(surface.mesh);
-  SetVertexNormals(mesh);
+  if (snapshot.converged) {
+    SetFilteredNormals(mesh);
+  } else {
+    SetVertexNormals(mesh);
+  }
   clock.EndPhase();
   ColorVertices(probe, mesh);
   clock.EndPhase();

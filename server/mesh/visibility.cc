@@ -15,6 +15,20 @@ constexpr float kMaxSteps = 1e6f;
 
 }  // namespace
 
+std::vector<float> NodeOpticalDepths(const FieldGrid& grid, float surface_density_per_mu, float max_optical_depth) {
+  const float depth_at_surface = surface_density_per_mu * grid.spacing.minCoeff();
+  std::vector<float> optical_depth(grid.value.size(), 0.0f);
+  for (size_t i = 0; i < grid.value.size(); ++i) {
+    const float value = grid.value[i];
+    if (value > 0) {
+      optical_depth[i] = 2.0f * max_optical_depth;
+    } else if (value > kTransparent) {
+      optical_depth[i] = std::exp(value) * depth_at_surface;
+    }
+  }
+  return optical_depth;
+}
+
 VisibilityTester::VisibilityTester(const FieldGrid& grid, const VisibilityLimits& limits)
     : nodes_(grid.nodes),
       stride_y_(grid.StrideY()),
@@ -27,17 +41,8 @@ VisibilityTester::VisibilityTester(const FieldGrid& grid, const VisibilityLimits
     if (view.allFinite()) views_.push_back(view);
   }
   if (views_.empty()) return;
-  const float depth_at_surface = limits.surface_density_per_mu * step_mu_;
   visible_.assign(grid.value.size(), 0);
-  optical_depth_.assign(grid.value.size(), 0.0f);
-  for (size_t i = 0; i < grid.value.size(); ++i) {
-    const float value = grid.value[i];
-    if (value > 0) {
-      optical_depth_[i] = 2.0f * max_optical_depth_;
-    } else if (value > kTransparent) {
-      optical_depth_[i] = std::exp(value) * depth_at_surface;
-    }
-  }
+  optical_depth_ = NodeOpticalDepths(grid, limits.surface_density_per_mu, max_optical_depth_);
 }
 
 bool VisibilityTester::IsVisible(size_t node) {

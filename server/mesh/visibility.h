@@ -15,6 +15,10 @@ struct VisibilityLimits {
   float max_optical_depth = 0;                // a node at a larger optical depth from a view is invisible to it
 };
 
+// By node: the optical depth of one step of the smallest node spacing. Nodes above the surface's value are opaque: they
+// get twice `max_optical_depth`.
+std::vector<float> NodeOpticalDepths(const FieldGrid& grid, float surface_density_per_mu, float max_optical_depth);
+
 // Tests whether nodes or surface points of the grid are visible from the training views: whether the optical depth
 // along the straight line to some view is within the limit. Nodes above the surface's value are opaque. Rays are
 // sampled at steps of the smallest node spacing, each at the nearest node. The tester copies the values, so that the

@@ -1,10 +1,10 @@
 // Measures the time to extract a mesh from a trained field, by phase:
-//   mesh_bench [SEQUENCE] [--set nerf.FIELD=VALUE --set mesh.FIELD=VALUE ..] [--steps 200] [--repeats 7]
+//   mesh_bench [SEQUENCE] [--set nerf.FIELD=VALUE --set mesh.FIELD=VALUE ..] [--steps 200] [--repeats 7] [--final]
 // Trains each object of SEQUENCE (true cuboids, poses and masks; every fourth frame) or, without SEQUENCE, of a
 // synthetic world. Then extracts its mesh `repeats` times on one thread and reports the fastest run. "all nodes" is the
 // time to evaluate the field at all mesh.resolution^3 nodes of a cube, a lower bound for extraction without sparse
 // sampling; only the ratio to it is comparable between machines and runs. "signs" is the share of the nodes inside the
-// hull that sampling put on the wrong side of the surface.
+// hull that sampling put on the wrong side of the surface. --final: meshes as of a field whose training is complete.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -31,6 +31,7 @@ struct Options {
   std::vector<std::string> assignments;
   int steps = 200;
   int repeats = 7;
+  bool final = false;
   nerf::NerfConfig nerf;
   mesh::MeshConfig mesh;
 };
@@ -80,7 +81,8 @@ absl::Status BenchObject(const TrainingScene& scene, const files::ObjectRecord& 
   }
   if (field.views() == 0) return absl::OkStatus();
   field.Train(options.steps, 2);
-  const FieldSnapshot snapshot = field.Snapshot();
+  FieldSnapshot snapshot = field.Snapshot();
+  snapshot.converged = options.final;
 
   mesh::MeshStats best;
   double best_s = std::numeric_limits<double>::infinity();
@@ -122,6 +124,7 @@ int main(int argc, char** argv) {
   app.add_option("--set", options.assignments)->allow_extra_args(false);
   app.add_option("--steps", options.steps)->check(CLI::PositiveNumber);
   app.add_option("--repeats", options.repeats)->check(CLI::PositiveNumber);
+  app.add_flag("--final", options.final);
   CLI11_PARSE(app, argc, argv);
   return romap::measure::RunConfigured(options, romap::measure::Run);
 }

@@ -1,0 +1,133 @@
+#include "server/mesh/filtered_normals.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+namespace romap::mesh {
+namespace {
+
+constexpr int kPasses = 10;
+// Standard deviation of the difference of the unit normals of two triangles that counts as noise.
+constexpr float kNoise = 0.5f;
+
+// The triangles at each vertex.
+class VertexTriangles {
+ public:
+  explicit VertexTriangles(const Mesh& mesh) : first_(mesh.vertices.size() + 1, 0) {
+    for (const auto& triangle : mesh.triangles) {
+      for (const uint32_t vertex : triangle) ++first_[vertex + 1];
+    }
+    for (size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
+    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+    triangles_.resize(3 * mesh.triangles.size());
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+      for (const uint32_t vertex : mesh.triangles[t]) triangles_[next[vertex]++] = t;
+    }
+  }
+
+  const uint32_t* begin(size_t vertex) const { return triangles_.data() + first_[vertex]; }
+  const uint32_t* end(size_t vertex) const { return triangles_.data() + first_[vertex + 1]; }
+
+ private:
+  std::vector<uint32_t> first_;
+  std::vector<uint32_t> triangles_;
+};
+
+// The triangles of a mesh, as far as they depend on its vertices.
+struct TriangleShapes {
+  std::vector<Eigen::Vector3f> center, normal;
+  std::vector<float> area;
+};
+
+TriangleShapes ShapesOf(const Mesh& mesh) {
+  TriangleShapes shapes;
+  for (const auto& triangle : mesh.triangles) {
+    const Eigen::Vector3f& a = mesh.vertices[triangle[0]];
+    const Eigen::Vector3f& b = mesh.vertices[triangle[1]];
+    const Eigen::Vector3f& c = mesh.vertices[triangle[2]];
+    const Eigen::Vector3f cross = (b - a).cross(c - a);
+    const float length = cross.norm();
+    shapes.center.push_back((a + b + c) / 3.0f);
+    shapes.normal.push_back(length > 0 ? Eigen::Vector3f(cross / length) : Eigen::Vector3f::Zero().eval());
+    shapes.area.push_back(0.5f * length);
+  }
+  return shapes;
+}
+
+// About exp(-x) for x >= 0; several times faster than std::exp.
+float Falloff(float x) {
+  if (x > 8.0f) return 0;
+  const float y = 1.0f / (1.0f + x * (0.125f + x * (1.0f / 128.0f)));
+  const float y2 = y * y, y4 = y2 * y2;
+  return y4 * y4;
+}
+
+// Each triangle with the triangles that share a vertex with it.
+struct Neighborhoods {
+  std::vector<uint32_t> first = {0};  // by triangle: index of its first neighbor; one more than triangles
+  std::vector<uint32_t> neighbor = {};
+  std::vector<float> weight = {};  // by neighbor: of its area and distance
+};
+
+Neighborhoods FindNeighborhoods(const Mesh& mesh, const VertexTriangles& at_vertex, const TriangleShapes& shapes) {
+  Neighborhoods found;
+  std::vector<uint32_t> visited_by(mesh.triangles.size(), UINT32_MAX);
+  double sum_mu = 0;
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    visited_by[t] = t;
+    for (const uint32_t vertex : mesh.triangles[t]) {
+      for (const uint32_t* other = at_vertex.begin(vertex); other != at_vertex.end(vertex); ++other) {
+        if (visited_by[*other] == t) continue;
+        visited_by[*other] = t;
+        found.neighbor.push_back(*other);
+        found.weight.push_back((shapes.center[t] - shapes.center[*other]).norm());
+        sum_mu += found.weight.back();
+      }
+    }
+    found.first.push_back(static_cast<uint32_t>(found.neighbor.size()));
+  }
+  const double mean_mu = sum_mu / std::max<double>(1, static_cast<double>(found.neighbor.size()));
+  const float per_distance = mean_mu > 0 ? static_cast<float>(0.5 / (mean_mu * mean_mu)) : 0;
+  for (size_t k = 0; k < found.weight.size(); ++k) {
+    found.weight[k] = shapes.area[found.neighbor[k]] * Falloff(found.weight[k] * found.weight[k] * per_distance);
+  }
+  return found;
+}
+
+std::vector<Eigen::Vector3f> FilterNormals(const Mesh& mesh, const VertexTriangles& at_vertex,
+                                           const TriangleShapes& shapes) {
+  const Neighborhoods around = FindNeighborhoods(mesh, at_vertex, shapes);
+  constexpr float kPerDifference = 0.5f / (kNoise * kNoise);
+  std::vector<Eigen::Vector3f> normals = shapes.normal, filtered = normals;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    for (size_t t = 0; t < normals.size(); ++t) {
+      Eigen::Vector3f sum = shapes.area[t] * normals[t];
+      for (uint32_t k = around.first[t]; k < around.first[t + 1]; ++k) {
+        const Eigen::Vector3f& other = normals[around.neighbor[k]];
+        sum += around.weight[k] * Falloff((normals[t] - other).squaredNorm() * kPerDifference) * other;
+      }
+      const float length = sum.norm();
+      if (length > 0) filtered[t] = sum / length;
+    }
+    normals.swap(filtered);
+  }
+  return normals;
+}
+
+}  // namespace
+
+void SetFilteredNormals(Mesh& mesh) {
+  const VertexTriangles at_vertex(mesh);
+  const TriangleShapes shapes = ShapesOf(mesh);
+  const std::vector<Eigen::Vector3f> normals = FilterNormals(mesh, at_vertex, shapes);
+  mesh.normals.assign(mesh.vertices.size(), Eigen::Vector3f::UnitZ());
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (const uint32_t* t = at_vertex.begin(v); t != at_vertex.end(v); ++t) sum += shapes.area[*t] * normals[*t];
+    if (sum.norm() > 0) mesh.normals[v] = sum.normalized();
+  }
+}
+
+}  // namespace romap::mesh
