@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "server/texture/unwrap_mesh.h"
+
+namespace romap::texture {
+
+// A texel that shows a point of the surface (Object frame, map units).
+struct SurfaceTexel {
+  uint32_t index = 0;  // row * atlas_px + column
+  uint32_t face = 0;   // of the mesh
+  Eigen::Vector3f barycentric;
+  Eigen::Vector3f position;
+  Eigen::Vector3f normal;  // unit length, between that of the triangle and that interpolated from its vertices
+};
+
+// The texels whose centers are in a triangle, and those up to two texels beside a chart, which belong to the nearest
+// points of it: interpolation at the border of a chart reads them. In the order of `index`.
+std::vector<SurfaceTexel> FindSurfaceTexels(const TexturedMesh& textured);
+
+}  // namespace romap::texture
