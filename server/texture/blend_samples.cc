@@ -1,7 +1,9 @@
 #include "server/texture/blend_samples.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 namespace romap::texture {
 namespace {
@@ -14,11 +16,11 @@ constexpr float kMostDeviation = 30.0f;
 constexpr float kLeastLowDeviation = 5.0f;
 constexpr float kMostLowDeviation = 15.0f;
 
-using Values = std::array<float, BestSamples::kMost>;
+using Values = std::array<float, kMostSamples>;
 
 // The value at which half of the weight is reached. Few values: sorted by insertion.
 float WeightedMedian(const Values& values, const Values& weights, int count) {
-  std::array<std::pair<float, float>, BestSamples::kMost> sorted;
+  std::array<std::pair<float, float>, kMostSamples> sorted;
   float half = 0;
   for (int i = 0; i < count; ++i) {
     int at = i;
@@ -40,25 +42,18 @@ float Agreement(float deviation, float scale) {
 
 }  // namespace
 
-void BestSamples::Add(const ViewSample& sample) {
-  if (count == kMost && sample.weight <= samples[kMost - 1].weight) return;
-  int at = count < kMost ? count++ : kMost - 1;
-  for (; at > 0 && samples[at - 1].weight < sample.weight; --at) samples[at] = samples[at - 1];
-  samples[at] = sample;
-}
-
-Eigen::Array3f BlendSamples(const BestSamples& best, float best_view_power) {
-  const int count = best.count;
-  if (count == 1) return best.samples[0].color_bgr.max(0.0f).min(255.0f);
+Eigen::Array3f BlendSamples(std::span<const ViewSample> samples, float best_view_power) {
+  const auto count = static_cast<int>(samples.size());
+  if (count == 1) return samples[0].color_bgr.max(0.0f).min(255.0f);
   // Mild weights, so that a single view never decides.
   Values mild = {}, values = {}, deviations = {};
-  for (int i = 0; i < count; ++i) mild[i] = std::sqrt(best.samples[i].weight);
+  for (int i = 0; i < count; ++i) mild[i] = samples[i].weight;
   Eigen::Array3f median;
   for (int c = 0; c < 3; ++c) {
-    for (int i = 0; i < count; ++i) values[i] = best.samples[i].color_bgr[c];
+    for (int i = 0; i < count; ++i) values[i] = samples[i].color_bgr[c];
     median[c] = WeightedMedian(values, mild, count);
   }
-  for (int i = 0; i < count; ++i) deviations[i] = (best.samples[i].color_bgr - median).abs().maxCoeff();
+  for (int i = 0; i < count; ++i) deviations[i] = (samples[i].color_bgr - median).abs().maxCoeff();
   const float scale = std::clamp(1.5f * WeightedMedian(deviations, mild, count), kLeastDeviation, kMostDeviation);
   Values trust = {};
   float trust_sum = 0;
@@ -66,14 +61,14 @@ Eigen::Array3f BlendSamples(const BestSamples& best, float best_view_power) {
   for (int i = 0; i < count; ++i) {
     trust[i] = Agreement(deviations[i], scale);
     trust_sum += trust[i] * mild[i];
-    low += trust[i] * mild[i] * best.samples[i].low_bgr;
+    low += trust[i] * mild[i] * samples[i].low_bgr;
   }
   low /= trust_sum;
 
   // Low frequencies show what is wrong in the neighborhood of the point.
   float deviation_sum = 0;
   for (int i = 0; i < count; ++i) {
-    deviations[i] = (best.samples[i].low_bgr - low).abs().maxCoeff();
+    deviations[i] = (samples[i].low_bgr - low).abs().maxCoeff();
     deviation_sum += trust[i] * mild[i] * deviations[i];
   }
   const float low_scale = std::clamp(1.5f * deviation_sum / trust_sum, kLeastLowDeviation, kMostLowDeviation);
@@ -83,19 +78,19 @@ Eigen::Array3f BlendSamples(const BestSamples& best, float best_view_power) {
   for (int i = 0; i < count; ++i) {
     trust[i] *= Agreement(deviations[i], low_scale);
     trust_sum += trust[i] * mild[i];
-    low += trust[i] * mild[i] * best.samples[i].low_bgr;
-    largest = std::max(largest, trust[i] * best.samples[i].weight);
+    low += trust[i] * mild[i] * samples[i].low_bgr;
+    largest = std::max(largest, trust[i] * samples[i].weight);
   }
   low /= trust_sum;
 
   float best_sum = 0;
   Eigen::Array3f high = Eigen::Array3f::Zero();
   for (int i = 0; i < count; ++i) {
-    const float relative = trust[i] * best.samples[i].weight / largest;
+    const float relative = trust[i] * samples[i].weight / largest;
     if (relative < 0.3f) continue;  // negligible after the power
     const float weight = std::pow(relative, best_view_power);
     best_sum += weight;
-    high += weight * (best.samples[i].color_bgr - best.samples[i].low_bgr);
+    high += weight * (samples[i].color_bgr - samples[i].low_bgr);
   }
   return (low + high / best_sum).max(0.0f).min(255.0f);
 }

@@ -1,20 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
+#include <span>
 
 #include "server/texture/prepared_view.h"
 
 namespace romap::texture {
 
-// The samples of one point with the largest weights, in descending order.
-struct BestSamples {
-  static constexpr int kMost = 16;
-  std::array<ViewSample, kMost> samples;
-  int count = 0;
-
-  void Add(const ViewSample& sample);
-};
+inline constexpr int kMostSamples = 12;
 
 // The color of a point that several views show. Samples that are far from the weighted median color (highlights,
 // objects in front) are rejected. The low frequencies are the mean of all others, so that differences between views
@@ -24,7 +17,7 @@ struct BestSamples {
 // texturing of 3D reconstructions", ECCV 2014.
 //
 // `best_view_power`: exponent of the weights in the high frequencies; the larger it is, the fewer views contribute.
-// There must be at least one sample. Gray levels, 0..255.
-Eigen::Array3f BlendSamples(const BestSamples& best, float best_view_power);
+// There must be 1..kMostSamples samples, whose weights are > 0. Gray levels, 0..255.
+Eigen::Array3f BlendSamples(std::span<const ViewSample> samples, float best_view_power);
 
 }  // namespace romap::texture

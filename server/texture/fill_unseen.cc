@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <opencv2/core.hpp>
-#include <set>
-#include <utility>
 #include <vector>
+
+#include "server/texture/mesh_edges.h"
 
 namespace romap::texture {
 namespace {
@@ -18,20 +17,11 @@ constexpr int kSmoothingPasses = 60;
 // The difference between texture and vertex colors at the vertices. Vertices at the same position are one point.
 class ColorOffsets {
  public:
-  explicit ColorOffsets(const TexturedMesh& textured) : mesh_(textured.mesh), point_of_(mesh_.vertices.size()) {
-    std::vector<uint32_t> order(mesh_.vertices.size());
-    std::iota(order.begin(), order.end(), 0);
-    const auto key = [&](uint32_t v) {
-      return std::tuple(mesh_.vertices[v].x(), mesh_.vertices[v].y(), mesh_.vertices[v].z());
-    };
-    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
-    uint32_t points = 0;
-    for (size_t i = 0; i < order.size(); ++i) {
-      points += i > 0 && key(order[i]) != key(order[i - 1]);
-      point_of_[order[i]] = points;
-    }
-    offset_.assign(order.empty() ? 0 : points + 1, Eigen::Array3f::Zero());
-    weight_.assign(offset_.size(), 0.0f);
+  explicit ColorOffsets(const TexturedMesh& textured)
+      : mesh_(textured.mesh), point_of_(NumberByPosition(textured.mesh)) {
+    const size_t points = point_of_.empty() ? 0 : *std::max_element(point_of_.begin(), point_of_.end()) + 1;
+    offset_.assign(points, Eigen::Array3f::Zero());
+    weight_.assign(points, 0.0f);
   }
 
   Eigen::Array3f VertexColor(const SurfaceTexel& texel) const {
@@ -44,7 +34,9 @@ class ColorOffsets {
     return color_bgr;
   }
 
+  // Beside the charts, texels are ignored.
   void AddSeen(const SurfaceTexel& texel, const Eigen::Array3f& color_bgr) {
+    if (texel.barycentric.minCoeff() < 0) return;
     const Eigen::Array3f difference = color_bgr - VertexColor(texel);
     for (int i = 0; i < 3; ++i) {
       const uint32_t point = point_of_[mesh_.triangles[texel.face][i]];

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 namespace romap::texture {
 namespace {
@@ -42,6 +44,22 @@ std::vector<FaceNeighbors> FindFaceNeighbors(const std::vector<std::array<uint32
     begin = end;
   }
   return neighbors;
+}
+
+std::vector<uint32_t> NumberByPosition(const Mesh& mesh) {
+  std::vector<uint32_t> order(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](uint32_t v) {
+    return std::tuple(mesh.vertices[v].x(), mesh.vertices[v].y(), mesh.vertices[v].z());
+  };
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+  std::vector<uint32_t> numbers(mesh.vertices.size());
+  uint32_t number = 0;
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (i > 0 && key(order[i]) != key(order[i - 1])) ++number;
+    numbers[order[i]] = number;
+  }
+  return numbers;
 }
 
 FaceShapes::FaceShapes(const Mesh& mesh) {

@@ -18,6 +18,10 @@ using FaceNeighbors = std::array<uint32_t, 3>;
 // if the edge is not shared by exactly two triangles with opposite directions.
 std::vector<FaceNeighbors> FindFaceNeighbors(const std::vector<std::array<uint32_t, 3>>& triangles);
 
+// Numbers of the vertices by position: vertices at the same position, such as copies in several charts, have the same
+// number. The numbers begin at 0 without gaps.
+std::vector<uint32_t> NumberByPosition(const Mesh& mesh);
+
 // Unit normals of the triangles, outward for counter-clockwise triangles, and their areas [square map units].
 struct FaceShapes {
   std::vector<Eigen::Vector3f> normal;  // zero for a triangle without area

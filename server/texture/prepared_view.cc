@@ -10,14 +10,14 @@
 namespace romap::texture {
 namespace {
 
-constexpr float kMinCosine = 0.17f;  // 80 degrees
+constexpr float kMinCosine = 0.22f;  // 77 degrees
 // Pixels at the border of a mask mix the object with its background.
 constexpr float kInsideMask_px = 2.0f;
 // The weight increases over this distance from the border of the visible region, so that no seam is visible there.
 constexpr float kFeather_px = 6.0f;
-// A depth step of this many pixel sizes within 3 x 3 pixels is an edge in front of another surface. At 80 degrees, a
-// continuous surface has steps of 12 pixel sizes, but points there have no weight.
-constexpr float kDepthStep_px = 8.0f;
+// An edge in front of another surface: the depth differs by this many pixel sizes from that of a plane through the
+// neighbors. For a round surface that is viewed at 77 degrees, it differs by about 2 pixel sizes.
+constexpr float kDepthStep_px = 4.0f;
 // A point is hidden if it is behind the nearest depth by this many pixel sizes, in addition to the slope of its own
 // surface.
 constexpr float kHidden_px = 1.5f;
@@ -88,7 +88,7 @@ PreparedView::PreparedView(const TextureView& view, const Mesh& mesh)
   FilterImage();
 }
 
-PreparedView::Pixel PreparedView::Project(const Eigen::Vector3f& position) const {
+Eigen::Vector3f PreparedView::Project(const Eigen::Vector3f& position) const {
   const Eigen::Vector3f p = R_camera_object_ * position + t_camera_object_;
   const float per_depth = 1 / p.z();
   return {focal_px_.x() * p.x() * per_depth + principal_px_.x(), focal_px_.y() * p.y() * per_depth + principal_px_.y(),
@@ -102,10 +102,10 @@ void PreparedView::RenderDepth(const Mesh& mesh) {
   float extent_mu = 0;
   for (const Eigen::Vector3f& p : mesh.vertices) extent_mu = std::max(extent_mu, (p - mesh.vertices[0]).norm());
   for (const Eigen::Vector3f& p : mesh.vertices) {
-    const Pixel pixel = Project(p);
+    const Eigen::Vector3f pixel = Project(p);
     const bool is_valid =
-        pixel.depth_mu > kNear * extent_mu && std::abs(pixel.u) < kFarPixel && std::abs(pixel.v) < kFarPixel;
-    corners.push_back({pixel.u, pixel.v, 1 / pixel.depth_mu, is_valid});
+        pixel.z() > kNear * extent_mu && std::abs(pixel.x()) < kFarPixel && std::abs(pixel.y()) < kFarPixel;
+    corners.push_back({pixel.x(), pixel.y(), 1 / pixel.z(), is_valid});
   }
   for (const auto& [a, b, c] : mesh.triangles) {
     if (!corners[a].is_valid || !corners[b].is_valid || !corners[c].is_valid) continue;
@@ -119,19 +119,20 @@ void PreparedView::FindVisibleRegion(const cv::Mat& ray_kind) {
   cv::distanceTransform(is_object, distance_px, cv::DIST_L2, 3);
   cv::compare(distance_px, kInsideMask_px, inside_, cv::CMP_GE);
 
-  // Without a surface, the inverse depth is 0, which is not an edge in front of the object.
-  cv::Mat largest, smallest, with_surface = inverse_depth_.clone();
-  with_surface.setTo(1e30f, inverse_depth_ == 0);
-  const cv::Mat square = cv::Mat::ones(3, 3, CV_8UC1);
-  cv::dilate(inverse_depth_, largest, square);
-  cv::erode(with_surface, smallest, square);
-  nearest_depth_mu_.create(inverse_depth_.size(), CV_32FC1);
+  cv::Mat largest;
+  cv::dilate(inverse_depth_, largest, cv::Mat::ones(3, 3, CV_8UC1));
+  nearest_depth_mu_ = 1 / largest;
   const float pixel_size = 1 / focal_px_.minCoeff();  // at depth 1
-  for (int y = 0; y < is_object.rows; ++y) {
-    for (int x = 0; x < is_object.cols; ++x) {
-      const float nearest = 1 / largest.at<float>(y, x), farthest = 1 / smallest.at<float>(y, x);
-      nearest_depth_mu_.at<float>(y, x) = nearest;
-      if (largest.at<float>(y, x) > 0 && farthest - nearest > kDepthStep_px * pixel_size * nearest) {
+  for (int y = 1; y + 1 < is_object.rows; ++y) {
+    const auto *above = inverse_depth_.ptr<float>(y - 1), *row = inverse_depth_.ptr<float>(y),
+               *below = inverse_depth_.ptr<float>(y + 1);
+    for (int x = 1; x + 1 < is_object.cols; ++x) {
+      // The inverse depth of a plane is linear in the image. Where there is no surface, it is 0, which is not an edge.
+      const float limit = kDepthStep_px * pixel_size * row[x];
+      const auto is_step = [&](float before, float after) {
+        return before > 0 && after > 0 && std::abs(before - 2 * row[x] + after) > limit;
+      };
+      if (row[x] > 0 && (is_step(row[x - 1], row[x + 1]) || is_step(above[x], below[x]))) {
         is_object.at<uint8_t>(y, x) = 0;
       }
     }
@@ -170,9 +171,9 @@ void PreparedView::FilterImage() {
 }
 
 template <int c>
-Eigen::Array<float, c, 1> PreparedView::LookUpLow(const cv::Mat& low, const Pixel& pixel) const {
-  const float x = (pixel.u + 0.5f) * static_cast<float>(low.cols) / static_cast<float>(color_bgr_.cols) - 0.5f;
-  const float y = (pixel.v + 0.5f) * static_cast<float>(low.rows) / static_cast<float>(color_bgr_.rows) - 0.5f;
+Eigen::Array<float, c, 1> PreparedView::LookUpLow(const cv::Mat& low, const ViewedPoint& point) const {
+  const float x = (point.u_px + 0.5f) * static_cast<float>(low.cols) / static_cast<float>(color_bgr_.cols) - 0.5f;
+  const float y = (point.v_px + 0.5f) * static_cast<float>(low.rows) / static_cast<float>(color_bgr_.rows) - 0.5f;
   const int x0 = std::clamp(static_cast<int>(x), 0, std::max(low.cols - 2, 0));
   const int y0 = std::clamp(static_cast<int>(y), 0, std::max(low.rows - 2, 0));
   const float dx = std::clamp(x - static_cast<float>(x0), 0.0f, 1.0f);
@@ -185,29 +186,36 @@ Eigen::Array<float, c, 1> PreparedView::LookUpLow(const cv::Mat& low, const Pixe
          dy * ((1 - dx) * Values(lower) + dx * Values(lower + right));
 }
 
-ViewSample PreparedView::Look(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
-  ViewSample sample;
+ViewedPoint PreparedView::Find(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
+  ViewedPoint point;
   const Eigen::Vector3f to_camera = center_ - position;
   const float toward = normal.dot(to_camera);
-  if (!(toward > 0)) return sample;
+  if (!(toward > 0)) return point;
   const float cosine_squared = toward * toward / to_camera.squaredNorm();
-  if (cosine_squared < kMinCosine * kMinCosine) return sample;
-  const Pixel pixel = Project(position);
-  if (!(pixel.depth_mu > 0 && pixel.u >= 0 && pixel.v >= 0 && pixel.u < static_cast<float>(color_bgr_.cols - 1) &&
-        pixel.v < static_cast<float>(color_bgr_.rows - 1))) {
-    return sample;
+  if (cosine_squared < kMinCosine * kMinCosine) return point;
+  const Eigen::Vector3f pixel = Project(position);
+  if (!(pixel.z() > 0 && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < static_cast<float>(color_bgr_.cols - 1) &&
+        pixel.y() < static_cast<float>(color_bgr_.rows - 1))) {
+    return point;
   }
-  const int near_u = static_cast<int>(pixel.u + 0.5f), near_v = static_cast<int>(pixel.v + 0.5f);
+  const int near_u = static_cast<int>(pixel.x() + 0.5f), near_v = static_cast<int>(pixel.y() + 0.5f);
   const uint8_t feather = feather_.ptr<uint8_t>(near_v)[near_u];
-  if (feather == 0) return sample;
-  const float resolution = focal_px_.mean() / pixel.depth_mu;
+  if (feather == 0) return point;
+  point.resolution = focal_px_.mean() / pixel.z();
   const float slope = std::sqrt(std::max(1 - cosine_squared, 0.0f) / cosine_squared);
-  const float behind_px = (pixel.depth_mu - nearest_depth_mu_.ptr<float>(near_v)[near_u]) * resolution;
-  if (behind_px > kHidden_px + kHiddenSlope_px * slope) return sample;
-  sample.weight = cosine_squared * resolution * static_cast<float>(feather) / 255;
+  const float behind_px = (pixel.z() - nearest_depth_mu_.ptr<float>(near_v)[near_u]) * point.resolution;
+  if (behind_px > kHidden_px + kHiddenSlope_px * slope) return point;
+  point.weight = cosine_squared * point.resolution * static_cast<float>(feather) / 255;
+  point.u_px = pixel.x();
+  point.v_px = pixel.y();
+  return point;
+}
 
-  const int u0 = static_cast<int>(pixel.u), v0 = static_cast<int>(pixel.v);
-  const float du = pixel.u - static_cast<float>(u0), dv = pixel.v - static_cast<float>(v0);
+ViewSample PreparedView::Sample(const ViewedPoint& point) const {
+  ViewSample sample;
+  sample.weight = point.weight;
+  const int u0 = static_cast<int>(point.u_px), v0 = static_cast<int>(point.v_px);
+  const float du = point.u_px - static_cast<float>(u0), dv = point.v_px - static_cast<float>(v0);
   const uint8_t* upper = color_bgr_.ptr<uint8_t>(v0) + 3 * u0;
   const uint8_t* lower = color_bgr_.ptr<uint8_t>(v0 + 1) + 3 * u0;
   for (int c = 0; c < 3; ++c) {
@@ -215,15 +223,13 @@ ViewSample PreparedView::Look(const Eigen::Vector3f& position, const Eigen::Vect
     const float below = static_cast<float>(lower[c]) + du * static_cast<float>(lower[c + 3] - lower[c]);
     sample.color_bgr[c] = above + dv * (below - above);
   }
-  sample.low_bgr = LookUpLow<3>(low_bgr_, pixel);
+  sample.low_bgr = LookUpLow<3>(low_bgr_, point);
   return sample;
 }
 
-float PreparedView::SharpnessAt(const Eigen::Vector3f& position) const {
-  const Pixel pixel = Project(position);
-  const float resolution = focal_px_.mean() / pixel.depth_mu;
+float PreparedView::SharpnessAt(const ViewedPoint& point) const {
   // The Laplacian of a fine pattern decreases with the square of the resolution, that of an edge does not depend on it.
-  return LookUpLow<1>(low_energy_, pixel)[0] * resolution * resolution;
+  return LookUpLow<1>(low_energy_, point)[0] * point.resolution * point.resolution;
 }
 
 }  // namespace romap::texture

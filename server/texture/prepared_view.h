@@ -10,13 +10,20 @@
 
 namespace romap::texture {
 
-// What a view shows of a point of the surface.
-struct ViewSample {
+// A point of the surface in a view.
+struct ViewedPoint {
   // cos(angle between normal and viewing direction)^2 * resolution * feather; 0 if the view does not show the point.
-  // `resolution` is in pixels per map unit, `feather` decreases toward the border of the visible region.
+  // `feather` decreases toward the border of the visible region. The other values are set only if the weight is not 0.
   float weight = 0;
-  Eigen::Array3f color_bgr;  // gray levels
-  Eigen::Array3f low_bgr;    // the color of the surroundings: low frequencies of the image within the mask
+  float u_px = 0, v_px = 0;  // in the crop
+  float resolution = 0;      // pixels per map unit
+};
+
+// What a view shows at a point. Gray levels.
+struct ViewSample {
+  float weight = 0;
+  Eigen::Array3f color_bgr;
+  Eigen::Array3f low_bgr;  // of the surroundings: low frequencies of the image within the mask
 };
 
 // A view with what is needed to look up points of a mesh: a depth buffer of the mesh, the region where the object is
@@ -27,26 +34,25 @@ class PreparedView {
   PreparedView(const TextureView& view, const Mesh& mesh);
 
   // The point and its normal (unit length) are in the Object frame. Points that are hidden, less than two pixels inside
-  // the object's mask, beside an edge of a surface in front of another one, or viewed at more than 80 degrees have no
+  // the object's mask, beside an edge of a surface in front of another one, or viewed at more than 77 degrees have no
   // weight.
-  ViewSample Look(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const;
+  ViewedPoint Find(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const;
 
-  // Variance of the Laplacian around the point, per square of its resolution: compares the sharpness of views of the
-  // same surface (see common/image_sharpness.h). Only for points with weight.
-  float SharpnessAt(const Eigen::Vector3f& position) const;
+  // For points with weight.
+  ViewSample Sample(const ViewedPoint& point) const;
+  // Variance of the Laplacian around the point, times the square of its resolution: compares the sharpness of views of
+  // the same surface (see common/image_sharpness.h). For points with weight.
+  float SharpnessAt(const ViewedPoint& point) const;
 
  private:
-  struct Pixel {
-    float u, v;  // in the crop
-    float depth_mu;
-  };
-  Pixel Project(const Eigen::Vector3f& position) const;
+  // Pixel in the crop, and depth.
+  Eigen::Vector3f Project(const Eigen::Vector3f& position) const;
   void RenderDepth(const Mesh& mesh);
   void FindVisibleRegion(const cv::Mat& ray_kind);
   void FilterImage();
   // Bilinear interpolation of an image with fewer pixels than the crop; c channels of float.
   template <int c>
-  Eigen::Array<float, c, 1> LookUpLow(const cv::Mat& low, const Pixel& pixel) const;
+  Eigen::Array<float, c, 1> LookUpLow(const cv::Mat& low, const ViewedPoint& point) const;
 
   Eigen::Matrix3f R_camera_object_;
   Eigen::Vector3f t_camera_object_;

@@ -11,6 +11,9 @@ namespace romap::texture {
 namespace {
 
 constexpr int kBesideCharts_px = 2;
+constexpr int kTile_px = 32;
+constexpr int kMostSteps = 4;
+constexpr float kContinuedCosine = 0.87f;  // 30 degrees
 
 // Barycentric coordinates in one triangle of the atlas, in texels; the centers of texels have integer coordinates.
 class AtlasTriangle {
@@ -82,36 +85,87 @@ void GrowFaces(int side, std::vector<uint32_t>& face_at) {
   }
 }
 
-}  // namespace
+class TexelMaker {
+ public:
+  explicit TexelMaker(const TexturedMesh& textured)
+      : textured_(textured), shapes_(textured.mesh), in_chart_(FindFaceNeighbors(textured.mesh.triangles)) {
+    const std::vector<uint32_t> number = NumberByPosition(textured.mesh);
+    std::vector<std::array<uint32_t, 3>> joined = textured.mesh.triangles;
+    for (auto& triangle : joined) {
+      for (uint32_t& vertex : triangle) vertex = number[vertex];
+    }
+    in_mesh_ = FindFaceNeighbors(joined);
+  }
 
-std::vector<SurfaceTexel> FindSurfaceTexels(const TexturedMesh& textured) {
-  const Mesh& mesh = textured.mesh;
-  std::vector<uint32_t> face_at = RasterizeFaces(textured);
-  for (int i = 0; i < kBesideCharts_px; ++i) GrowFaces(textured.atlas_px, face_at);
-  const FaceShapes shapes(mesh);
-  std::vector<SurfaceTexel> texels;
-  texels.reserve(face_at.size() - static_cast<size_t>(std::count(face_at.begin(), face_at.end(), kNoFace)));
-  for (uint32_t index = 0; index < face_at.size(); ++index) {
-    const uint32_t face = face_at[index];
-    if (face == kNoFace) continue;
-    const auto side = static_cast<uint32_t>(textured.atlas_px);
+  // `face` is at the texel or near it.
+  SurfaceTexel Make(uint32_t face, int x, int y) const {
+    const Mesh& mesh = textured_.mesh;
+    face = NearestFace(face, x, y);
     SurfaceTexel texel;
-    texel.index = index;
     texel.face = face;
-    texel.barycentric = AtlasTriangle(textured, face)
-                            .Barycentric(static_cast<int>(index % side), static_cast<int>(index / side))
-                            .cwiseMax(0.0f);
-    texel.barycentric /= texel.barycentric.sum();
+    texel.index = static_cast<uint32_t>(y * textured_.atlas_px + x);
+    const Eigen::Vector3f in_plane = AtlasTriangle(textured_, face).Barycentric(x, y);
+    const Eigen::Vector3f on_edge = in_plane.cwiseMax(0.0f) / in_plane.cwiseMax(0.0f).sum();
+    texel.barycentric = IsContinued(face, in_plane) ? in_plane : on_edge;
     texel.position = Eigen::Vector3f::Zero();
     Eigen::Vector3f vertex_normal = Eigen::Vector3f::Zero();
     for (int i = 0; i < 3; ++i) {
       const uint32_t vertex = mesh.triangles[face][i];
       texel.position += texel.barycentric[i] * mesh.vertices[vertex];
-      if (!mesh.normals.empty()) vertex_normal += texel.barycentric[i] * mesh.normals[vertex];
+      if (!mesh.normals.empty()) vertex_normal += on_edge[i] * mesh.normals[vertex];
     }
     // Vertex normals are smooth but tilted at edges; triangle normals are noisy.
-    texel.normal = (vertex_normal + shapes.normal[face]).normalized();
-    texels.push_back(texel);
+    texel.normal = (vertex_normal + shapes_.normal[face]).normalized();
+    return texel;
+  }
+
+ private:
+  // Walks toward the texel within the chart.
+  uint32_t NearestFace(uint32_t face, int x, int y) const {
+    for (int step = 0; step < kMostSteps; ++step) {
+      int corner = 0;
+      if (AtlasTriangle(textured_, face).Barycentric(x, y).minCoeff(&corner) >= 0) break;
+      const uint32_t next = in_chart_[face][(corner + 1) % 3];  // across the edge opposite to the corner
+      if (next == kNoFace || !AtlasTriangle(textured_, next).HasArea()) break;
+      face = next;
+    }
+    return face;
+  }
+
+  // Whether the mesh goes on in about the same direction at a texel.
+  bool IsContinued(uint32_t face, const Eigen::Vector3f& in_plane) const {
+    for (int corner = 0; corner < 3; ++corner) {
+      if (in_plane[corner] >= 0) continue;
+      const uint32_t next = in_mesh_[face][(corner + 1) % 3];
+      if (next == kNoFace || shapes_.normal[face].dot(shapes_.normal[next]) < kContinuedCosine) return false;
+    }
+    return true;
+  }
+
+  const TexturedMesh& textured_;
+  const FaceShapes shapes_;
+  const std::vector<FaceNeighbors> in_chart_;
+  std::vector<FaceNeighbors> in_mesh_;  // across the borders of charts, too
+};
+
+}  // namespace
+
+std::vector<SurfaceTexel> FindSurfaceTexels(const TexturedMesh& textured) {
+  std::vector<uint32_t> face_at = RasterizeFaces(textured);
+  for (int i = 0; i < kBesideCharts_px; ++i) GrowFaces(textured.atlas_px, face_at);
+  const TexelMaker maker(textured);
+  std::vector<SurfaceTexel> texels;
+  texels.reserve(face_at.size() - static_cast<size_t>(std::count(face_at.begin(), face_at.end(), kNoFace)));
+  const auto side = textured.atlas_px;
+  for (int tile_y = 0; tile_y < side; tile_y += kTile_px) {
+    for (int tile_x = 0; tile_x < side; tile_x += kTile_px) {
+      for (int y = tile_y; y < std::min(tile_y + kTile_px, side); ++y) {
+        for (int x = tile_x; x < std::min(tile_x + kTile_px, side); ++x) {
+          const uint32_t face = face_at[static_cast<size_t>(y * side + x)];
+          if (face != kNoFace) texels.push_back(maker.Make(face, x, y));
+        }
+      }
+    }
   }
   return texels;
 }

@@ -35,11 +35,11 @@ std::vector<GainPoint> ObservePoints(std::span<const PreparedView> views, std::s
   for (size_t i = step / 2; i < texels.size(); i += step) {
     GainPoint point;
     for (uint32_t view = 0; view < views.size(); ++view) {
-      const ViewSample sample = views[view].Look(texels[i].position, texels[i].normal);
-      if (!(sample.weight > 0)) continue;
-      GainObservation observation{view, sample.weight, {}};
-      observation.log_value.head<3>() = sample.low_bgr.max(kDarkest).log();
-      observation.log_value[3] = 0.5f * std::log(views[view].SharpnessAt(texels[i].position) + kNoiseEnergy);
+      const ViewedPoint viewed = views[view].Find(texels[i].position, texels[i].normal);
+      if (!(viewed.weight > 0)) continue;
+      GainObservation observation{view, viewed.weight, {}};
+      observation.log_value.head<3>() = views[view].Sample(viewed).low_bgr.max(kDarkest).log();
+      observation.log_value[3] = 0.5f * std::log(views[view].SharpnessAt(viewed) + kNoiseEnergy);
       point.push_back(observation);
     }
     if (point.size() >= 2) points.push_back(std::move(point));
