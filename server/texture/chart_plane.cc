@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace romap::texture {
 namespace {
@@ -42,11 +43,35 @@ bool TrianglesOverlap(const ChartPlane::Triangle& a, const ChartPlane::Triangle&
 
 ChartPlane::ChartPlane(const Eigen::Vector3f& normal, float cell_mu) : projection_(normal), cell_mu_(cell_mu) {}
 
-ChartPlane::Cells ChartPlane::CellsOf(const Triangle& triangle) const {
-  const Eigen::Vector2d low = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]) / cell_mu_;
-  const Eigen::Vector2d high = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]) / cell_mu_;
-  return {static_cast<int32_t>(std::floor(low.x())), static_cast<int32_t>(std::floor(low.y())),
-          static_cast<int32_t>(std::floor(high.x())), static_cast<int32_t>(std::floor(high.y()))};
+template <class Visit>
+void ChartPlane::ForEachCell(const Triangle& triangle, const Visit& visit) const {
+  const Triangle p = {triangle[0] / cell_mu_, triangle[1] / cell_mu_, triangle[2] / cell_mu_};
+  const auto first_row = static_cast<int32_t>(std::floor(std::min({p[0].y(), p[1].y(), p[2].y()})));
+  const auto last_row = static_cast<int32_t>(std::floor(std::max({p[0].y(), p[1].y(), p[2].y()})));
+  for (int32_t row = first_row; row <= last_row; ++row) {
+    // The columns of the parts of the edges within the row. A long thin triangle touches few cells of its bounding box.
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector2d &from = p[i], along = p[(i + 1) % 3] - from;
+      double enter = 0, leave = 1;
+      if (along.y() != 0) {
+        const double a = (row - from.y()) / along.y(), b = (row + 1 - from.y()) / along.y();
+        enter = std::max(enter, std::min(a, b));
+        leave = std::min(leave, std::max(a, b));
+      } else if (from.y() < row || from.y() > row + 1) {
+        continue;
+      }
+      if (enter > leave) continue;
+      for (const double at : {enter, leave}) {
+        low = std::min(low, from.x() + at * along.x());
+        high = std::max(high, from.x() + at * along.x());
+      }
+    }
+    if (low > high) continue;
+    for (auto x = static_cast<int32_t>(std::floor(low)); x <= static_cast<int32_t>(std::floor(high)); ++x) {
+      if (!visit(CellKey(x, row))) return;
+    }
+  }
 }
 
 bool ChartPlane::TryAdd(const std::array<Eigen::Vector3f, 3>& triangle) {
@@ -54,30 +79,29 @@ bool ChartPlane::TryAdd(const std::array<Eigen::Vector3f, 3>& triangle) {
   for (int i = 0; i < 3; ++i) projected[i] = projection_(triangle[i]).cast<double>();
   const double area_mu2 = Cross(projected[1] - projected[0], projected[2] - projected[0]) / 2;
   if (!(area_mu2 < 0)) return false;
-  const Cells cells = CellsOf(projected);
-  for (int32_t y = cells.y0; y <= cells.y1; ++y) {
-    for (int32_t x = cells.x0; x <= cells.x1; ++x) {
-      const auto others = in_cell_.find(CellKey(x, y));
-      if (others == in_cell_.end()) continue;
-      for (const uint32_t other : others->second) {
-        if (TrianglesOverlap(projected, triangles_[other])) return false;
-      }
-    }
-  }
+  bool is_free = true;
+  ForEachCell(projected, [&](uint64_t cell) {
+    const auto others = in_cell_.find(cell);
+    if (others == in_cell_.end()) return true;
+    for (const uint32_t other : others->second) is_free = is_free && !TrianglesOverlap(projected, triangles_[other]);
+    return is_free;
+  });
+  if (!is_free) return false;
   const auto index = static_cast<uint32_t>(triangles_.size());
   triangles_.push_back(projected);
-  for (int32_t y = cells.y0; y <= cells.y1; ++y) {
-    for (int32_t x = cells.x0; x <= cells.x1; ++x) in_cell_[CellKey(x, y)].push_back(index);
-  }
+  ForEachCell(projected, [&](uint64_t cell) {
+    in_cell_[cell].push_back(index);
+    return true;
+  });
   return true;
 }
 
 void ChartPlane::ShrinkTo(size_t count) {
   while (triangles_.size() > count) {
-    const Cells cells = CellsOf(triangles_.back());
-    for (int32_t y = cells.y0; y <= cells.y1; ++y) {
-      for (int32_t x = cells.x0; x <= cells.x1; ++x) in_cell_[CellKey(x, y)].pop_back();
-    }
+    ForEachCell(triangles_.back(), [&](uint64_t cell) {
+      in_cell_[cell].pop_back();
+      return true;
+    });
     triangles_.pop_back();
   }
 }

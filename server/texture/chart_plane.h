@@ -39,15 +39,14 @@ class ChartPlane {
   size_t Count() const { return triangles_.size(); }
 
  private:
-  struct Cells {
-    int32_t x0, y0, x1, y1;
-  };
-  Cells CellsOf(const Triangle& triangle) const;
+  // Calls visit(cell) for the cells that a triangle touches, until it returns false.
+  template <class Visit>
+  void ForEachCell(const Triangle& triangle, const Visit& visit) const;
 
   PlaneProjection projection_;
   double cell_mu_;
   std::vector<Triangle> triangles_;
-  std::unordered_map<uint64_t, std::vector<uint32_t>> in_cell_;
+  std::unordered_map<uint64_t, std::vector<uint32_t>> in_cell_;  // indices of triangles
 };
 
 // Whether the interiors of two triangles have common points. Common parts that are thinner than 1e-5 of the triangles

@@ -18,6 +18,21 @@ namespace {
 constexpr int kNormalPasses = 2;
 // Triangles with a smaller share of the area have no area: their shape is that of rounding errors.
 constexpr float kNoAreaShare = 1e-10f;
+constexpr float kMostCells = 512;  // along the diagonal of the mesh
+
+// Of the grids of the charts: about the length of an edge, but large enough that even the longest triangle of a thin
+// mesh touches few cells.
+float CellSize(const Mesh& mesh, float total_area_mu2) {
+  if (mesh.triangles.empty()) return 1;
+  Eigen::Vector3f low = mesh.vertices[0], high = low;
+  for (const Eigen::Vector3f& p : mesh.vertices) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  const float size_mu = std::max(std::sqrt(2 * total_area_mu2 / static_cast<float>(mesh.triangles.size())),
+                                 (high - low).norm() / kMostCells);
+  return size_mu > 0 ? size_mu : 1;
+}
 
 class ChartBuilder {
  public:
@@ -28,11 +43,7 @@ class ChartBuilder {
         shapes_(mesh),
         smooth_(SmoothFaceNormals(neighbors_, shapes_, kNormalPasses)),
         chart_of_(mesh.triangles.size(), kNoCluster),
-        // A triangle has half the area of a parallelogram.
-        cell_mu_(
-            std::sqrt(2 * shapes_.total_area_mu2 / static_cast<float>(std::max<size_t>(mesh.triangles.size(), 1)))) {
-    if (!(cell_mu_ > 0)) cell_mu_ = 1;
-  }
+        cell_mu_(CellSize(mesh, shapes_.total_area_mu2)) {}
 
   std::vector<Chart> Build() {
     const NormalClusters clusters = ClusterNormals(mesh_, neighbors_, shapes_, smooth_, options_.max_angle_rad);
@@ -201,7 +212,7 @@ class ChartBuilder {
   const FaceShapes shapes_;
   const std::vector<Eigen::Vector3f> smooth_;  // smoothed normals of the triangles
   std::vector<uint32_t> chart_of_;             // of each triangle
-  float cell_mu_;
+  const float cell_mu_;
   std::vector<std::vector<uint32_t>> faces_of_cluster_;
   std::vector<Work> charts_;
 };

@@ -15,11 +15,16 @@ namespace {
 
 // Without views, the texture is no sharper than the vertex colors.
 constexpr int kAtlasWithoutViews_px = 256;
+// Larger coordinates could overflow.
+constexpr float kLargest_mu = 1e9f;
 
 absl::Status ValidateMesh(const Mesh& mesh) {
   if (mesh.triangles.empty()) return InvalidArgument("the mesh has no triangles, must have at least one");
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!mesh.vertices[i].allFinite()) return InvalidArgument("vertex {} of the mesh is not finite", i);
+    if (!(mesh.vertices[i].lpNorm<Eigen::Infinity>() <= kLargest_mu) || !mesh.vertices[i].allFinite()) {
+      return InvalidArgument("vertex {} of the mesh is at ({}, {}, {}), must be finite and within {} of the origin", i,
+                             mesh.vertices[i].x(), mesh.vertices[i].y(), mesh.vertices[i].z(), kLargest_mu);
+    }
   }
   for (size_t i = 0; i < mesh.triangles.size(); ++i) {
     for (const uint32_t vertex : mesh.triangles[i]) {

@@ -44,9 +44,9 @@ struct TexturedObject {
 // that of most views (third quartile at the object's center), if the atlas is large enough. Without views, it is a low
 // one, and the texture shows the vertex colors.
 //
-// INVALID_ARGUMENT: the mesh has no triangles, vertices that are not finite, triangles without vertices, or attributes
-// of another length than the vertices; a view is not valid (ValidateTextureView); an option is outside its range. The
-// message names the element. INTERNAL: the image cannot be encoded.
+// INVALID_ARGUMENT: the mesh has no triangles, vertices that are not finite or beyond 1e9, triangles without vertices,
+// or attributes of another length than the vertices; a view is not valid (ValidateTextureView); an option is outside
+// its range. The message names the element. INTERNAL: the image cannot be encoded.
 absl::StatusOr<TexturedObject> TextureMesh(const Mesh& mesh, std::span<const TextureView> views,
                                            const TextureOptions& options);
 

@@ -74,6 +74,28 @@ TEST(ChartsTest, ASurfaceAboveItselfIsDivided) {
   }
 }
 
+// A wire with triangles of its whole length: few cells, though its area is tiny.
+TEST(ChartsTest, LongThinTriangles) {
+  Mesh wire;
+  constexpr uint32_t kSides = 600;
+  const Eigen::Vector3f axis = Eigen::Vector3f(1, 1, 1).normalized();
+  const Eigen::Vector3f u = axis.unitOrthogonal(), v = axis.cross(u);
+  for (uint32_t i = 0; i < kSides; ++i) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / kSides;
+    const Eigen::Vector3f around = 0.001f * (std::cos(angle) * u + std::sin(angle) * v);
+    wire.vertices.push_back(around);
+    wire.vertices.push_back(around + axis);
+  }
+  for (uint32_t i = 0; i < kSides; ++i) {
+    const uint32_t a = 2 * i, b = 2 * ((i + 1) % kSides);
+    wire.triangles.push_back({a, b, b + 1});
+    wire.triangles.push_back({a, b + 1, a + 1});
+  }
+  const std::vector<Chart> charts = DivideIntoCharts(wire, {});
+  ExpectPartition(wire, charts);
+  EXPECT_LE(charts.size(), 8u);
+}
+
 TEST(ChartsTest, AnEmptyMeshHasNoCharts) { EXPECT_TRUE(DivideIntoCharts({}, {}).empty()); }
 
 }  // namespace romap::texture::charts_test

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <opencv2/core.hpp>
 #include <set>
 
@@ -99,17 +98,12 @@ void ExpectValid(const Mesh& mesh, const TexturedMesh& textured, size_t max_char
   EXPECT_EQ(CountOverlaps(textured), 0u);
   EXPECT_LE(CountCharts(textured), max_charts);
   const double share = atlas_px2 / textured.atlas_px / textured.atlas_px;
-  std::printf("%s: %zu triangles, %zu charts, atlas %d px, %.0f %% used\n", what, mesh.triangles.size(),
-              CountCharts(textured), textured.atlas_px, 100 * share);
   EXPECT_GT(share, 0.35);
 }
 
 TEST(UnwrapMeshTest, ChartsDoNotOverlap) {
   const auto check = [](const Mesh& mesh, size_t max_charts, const char* what) {
-    const auto start = std::chrono::steady_clock::now();
     const absl::StatusOr<TexturedMesh> textured = UnwrapMesh(mesh, {.max_atlas_px = 512});
-    std::printf("%.1f ms ",
-                std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
     ASSERT_TRUE(textured.ok()) << textured.status();
     EXPECT_EQ(textured->atlas_px, 512);
     ExpectValid(mesh, *textured, max_charts, what);
