@@ -10,9 +10,8 @@ namespace {
 
 constexpr double kThinOverlap = 1e-5;
 
-uint64_t CellKey(int32_t x, int32_t y) {
-  return (static_cast<uint64_t>(static_cast<uint32_t>(x)) << 32) | static_cast<uint32_t>(y);
-}
+// Far cells may have the same key, which costs time but is not wrong.
+uint64_t CellKey(int64_t x, int64_t y) { return (static_cast<uint64_t>(x) << 32) | static_cast<uint32_t>(y); }
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -46,19 +45,20 @@ ChartPlane::ChartPlane(const Eigen::Vector3f& normal, float cell_mu) : projectio
 template <class Visit>
 void ChartPlane::ForEachCell(const Triangle& triangle, const Visit& visit) const {
   const Triangle p = {triangle[0] / cell_mu_, triangle[1] / cell_mu_, triangle[2] / cell_mu_};
-  const auto first_row = static_cast<int32_t>(std::floor(std::min({p[0].y(), p[1].y(), p[2].y()})));
-  const auto last_row = static_cast<int32_t>(std::floor(std::max({p[0].y(), p[1].y(), p[2].y()})));
-  for (int32_t row = first_row; row <= last_row; ++row) {
+  const auto first_row = static_cast<int64_t>(std::floor(std::min({p[0].y(), p[1].y(), p[2].y()})));
+  const auto last_row = static_cast<int64_t>(std::floor(std::max({p[0].y(), p[1].y(), p[2].y()})));
+  for (int64_t row = first_row; row <= last_row; ++row) {
     // The columns of the parts of the edges within the row. A long thin triangle touches few cells of its bounding box.
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector2d &from = p[i], along = p[(i + 1) % 3] - from;
       double enter = 0, leave = 1;
       if (along.y() != 0) {
-        const double a = (row - from.y()) / along.y(), b = (row + 1 - from.y()) / along.y();
+        const double top = static_cast<double>(row) - from.y();
+        const double a = top / along.y(), b = (top + 1) / along.y();
         enter = std::max(enter, std::min(a, b));
         leave = std::min(leave, std::max(a, b));
-      } else if (from.y() < row || from.y() > row + 1) {
+      } else if (from.y() < static_cast<double>(row) || from.y() > static_cast<double>(row + 1)) {
         continue;
       }
       if (enter > leave) continue;
@@ -68,7 +68,7 @@ void ChartPlane::ForEachCell(const Triangle& triangle, const Visit& visit) const
       }
     }
     if (low > high) continue;
-    for (auto x = static_cast<int32_t>(std::floor(low)); x <= static_cast<int32_t>(std::floor(high)); ++x) {
+    for (auto x = static_cast<int64_t>(std::floor(low)); x <= static_cast<int64_t>(std::floor(high)); ++x) {
       if (!visit(CellKey(x, row))) return;
     }
   }

@@ -1,6 +1,7 @@
 #include "server/texture/texture_mesh.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
