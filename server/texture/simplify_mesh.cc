@@ -1,0 +1,101 @@
+#include "server/texture/simplify_mesh.h"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "server/texture/manifold.h"
+#include "server/texture/mesh_edges.h"
+
+namespace romap::texture {
+namespace {
+
+// If a simplified mesh cannot be made a manifold, less is collapsed, by this factor.
+constexpr float kRetryFactor = 1.5f;
+// An error that no collapse reaches, relative to the extent of the mesh.
+constexpr float kAnyError = 1e3f;
+// Runs of meshoptimizer, while each leaves at most this share of the triangles.
+constexpr int kMostRuns = 6;
+constexpr float kWorthwhile = 0.95f;
+// A closed surface has at least as many.
+constexpr size_t kFewestTriangles = 4;
+
+struct Collapsed {
+  std::vector<std::array<uint32_t, 3>> triangles;
+  float error_mu = 0;
+};
+
+Collapsed CollapseOnce(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<uint32_t, 3>> triangles,
+                       size_t fewest_triangles, float max_error_mu, float scale_mu) {
+  Collapsed result;
+  result.triangles.resize(triangles.size());
+  const float max_error = std::min(max_error_mu / scale_mu, kAnyError);
+  const size_t indices = meshopt_simplify(
+      result.triangles.data()->data(), triangles.data()->data(), triangles.size() * 3, vertices.data()->data(),
+      vertices.size(), sizeof(Eigen::Vector3f), fewest_triangles * 3, max_error, 0, &result.error_mu);
+  result.triangles.resize(indices / 3);
+  result.error_mu *= scale_mu;
+  return result;
+}
+
+// Repeated, because meshoptimizer stops early on flat regions, where most of the candidates would reverse a triangle.
+Collapsed Collapse(const Mesh& mesh, size_t fewest_triangles, float max_error_mu, float scale_mu) {
+  Collapsed result = CollapseOnce(mesh.vertices, mesh.triangles, fewest_triangles, max_error_mu, scale_mu);
+  for (int run = 1; run < kMostRuns && result.triangles.size() > fewest_triangles; ++run) {
+    const size_t before = result.triangles.size();
+    Collapsed next =
+        CollapseOnce(mesh.vertices, result.triangles, fewest_triangles, max_error_mu - result.error_mu, scale_mu);
+    next.error_mu += result.error_mu;
+    result = std::move(next);
+    if (static_cast<float>(result.triangles.size()) > kWorthwhile * static_cast<float>(before)) break;
+  }
+  return result;
+}
+
+Mesh WithTriangles(const Mesh& mesh, ManifoldTriangles&& manifold) {
+  Mesh result;
+  const auto copy = [&](const auto& from, auto& to) {
+    if (from.empty()) return;
+    to.reserve(manifold.source.size());
+    for (const uint32_t source : manifold.source) to.push_back(from[source]);
+  };
+  copy(mesh.vertices, result.vertices);
+  copy(mesh.colors, result.colors);
+  copy(mesh.confidence, result.confidence);
+  result.triangles = std::move(manifold.triangles);
+  SetAngleWeightedNormals(result);
+  return result;
+}
+
+}  // namespace
+
+Simplified SimplifyMesh(const Mesh& mesh, const SimplifyOptions& options) {
+  Simplified unchanged{mesh, 0.0f};
+  SetAngleWeightedNormals(unchanged.mesh);
+  if (mesh.triangles.size() <= kFewestTriangles) return unchanged;
+  const float scale_mu =
+      meshopt_simplifyScale(mesh.vertices.data()->data(), mesh.vertices.size(), sizeof(Eigen::Vector3f));
+  if (!(scale_mu > 0)) return unchanged;
+  auto max_triangles = static_cast<float>(std::clamp(options.max_triangles, kFewestTriangles, mesh.triangles.size()));
+  float max_error_mu = options.max_error_mu;
+  while (max_triangles < kRetryFactor * static_cast<float>(mesh.triangles.size())) {
+    Collapsed collapsed = Collapse(mesh, 0, max_error_mu, scale_mu);
+    if (static_cast<float>(collapsed.triangles.size()) > max_triangles) {
+      // From the original triangles, so that the error refers to them.
+      collapsed = Collapse(mesh, static_cast<size_t>(max_triangles), std::numeric_limits<float>::max(), scale_mu);
+    }
+    std::optional<ManifoldTriangles> manifold = MakeManifold(mesh.vertices, std::move(collapsed.triangles));
+    if (manifold.has_value() && !manifold->triangles.empty()) {
+      return {WithTriangles(mesh, std::move(*manifold)), collapsed.error_mu};
+    }
+    max_triangles *= kRetryFactor;
+    max_error_mu /= kRetryFactor;
+  }
+  return unchanged;
+}
+
+}  // namespace romap::texture

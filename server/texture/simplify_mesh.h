@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+
+#include "common/mesh.h"
+
+namespace romap::texture {
+
+struct SimplifyOptions {
+  size_t max_triangles = 8000;
+  // Edges are collapsed while the error stays below this distance, and further while the mesh has more than
+  // max_triangles. Map units, >= 0.
+  float max_error_mu = 0;
+};
+
+struct Simplified {
+  Mesh mesh;
+  // The largest distance by which a collapse moved the surface, estimated from quadrics [map units]: the root of the
+  // mean square distance between the new vertex and the planes of the triangles that it replaces.
+  float error_mu = 0;
+};
+
+// Simplifies a mesh by collapsing edges (M. Garland and P. S. Heckbert, "Surface simplification using quadric error
+// metrics", SIGGRAPH 1997; meshoptimizer). The vertices of the result are vertices of `mesh` and keep their colors and
+// confidence; their normals are computed from the new triangles. A closed manifold stays a closed manifold. Parts that
+// collapse to nothing are removed.
+//
+// The result may have more than max_triangles only if a collapse would make the surface non-manifold in a way that
+// copies of vertices cannot repair. A mesh that cannot be simplified at all, such as a single triangle, is returned
+// with new normals. Vertices must be finite and triangles must refer to them.
+Simplified SimplifyMesh(const Mesh& mesh, const SimplifyOptions& options);
+
+}  // namespace romap::texture
