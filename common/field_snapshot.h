@@ -38,12 +38,13 @@ struct SurfaceOptics {
   float raw_per_efold = 1;           // > 0
 };
 
-// The camera and the ray kinds of one training view.
+// The camera, the ray kinds and the colors of one training view.
 struct TrainingCamera {
   SE3<Camera, Object> T_camera_object;  // map units
   CameraModel camera;                   // of the full image, without distortion
   cv::Rect roi_px;                      // the crop in the full image; pixels outside it are unknown
   cv::Mat ray_kind;                     // CV_8UC1 of RayKind, size of roi_px
+  cv::Mat color_bgr = {};               // CV_8UC3, size of roi_px
 };
 
 // Bits over a regular grid of the box: cell (x, y, z) is at index (z * resolution + y) * resolution + x. The cells

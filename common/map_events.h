@@ -12,6 +12,7 @@
 #include "common/diagnostic.h"
 #include "common/geometry.h"
 #include "common/ids.h"
+#include "common/mesh.h"
 #include "common/pose_uncertainty.h"
 
 namespace romap {
@@ -70,6 +71,7 @@ struct MeshUpdate {
   uint32_t vertex_count = 0;
   uint32_t triangle_count = 0;
   std::string draco;  // Draco (edgebreaker) bytes; vertices in the mesh frame, map units; see common/mesh_codec.h
+  MeshTexture texture = {};  // final meshes only; the Draco mesh has texture coordinates then
 };
 
 struct ObjectRemoved {

@@ -29,6 +29,9 @@ absl::Status ValidateOptions(const DracoOptions& options) {
   if (options.normal_bits < 2 || options.normal_bits > 30) {
     return InvalidArgument("normal_bits must be 2..30, got {}", options.normal_bits);
   }
+  if (options.uv_bits < 2 || options.uv_bits > 30) {
+    return InvalidArgument("uv_bits must be 2..30, got {}", options.uv_bits);
+  }
   if (options.speed < 0 || options.speed > 10) return InvalidArgument("speed must be 0..10, got {}", options.speed);
   return absl::OkStatus();
 }
@@ -45,7 +48,11 @@ absl::Status ValidateMesh(const Mesh& mesh) {
   if (!mesh.colors.empty() && mesh.colors.size() != vertices) {
     return InvalidArgument("mesh has {} colors for {} vertices", mesh.colors.size(), vertices);
   }
+  if (!mesh.uv.empty() && mesh.uv.size() != vertices) {
+    return InvalidArgument("mesh has {} texture coordinates for {} vertices", mesh.uv.size(), vertices);
+  }
   for (size_t i = 0; i < vertices; ++i) {
+    if (!mesh.uv.empty() && !mesh.uv[i].allFinite()) return InvalidArgument("texture coordinate {} is not finite", i);
     if (!mesh.vertices[i].allFinite()) return InvalidArgument("vertex {} is not finite", i);
     if (!mesh.normals.empty() && !mesh.normals[i].allFinite()) return InvalidArgument("normal {} is not finite", i);
   }
@@ -58,12 +65,19 @@ absl::Status ValidateMesh(const Mesh& mesh) {
   return absl::OkStatus();
 }
 
-// One value of three components per vertex.
+// Number of components of one value.
+template <class Value>
+constexpr int ComponentsOf() {
+  return static_cast<int>(sizeof(Value) / sizeof(std::declval<Value>()[0]));
+}
+
+// One value per vertex.
 template <class Value>
 void AddAttribute(GeometryAttribute::Type type, draco::DataType data_type, const std::vector<Value>& values,
                   draco::Mesh& target) {
   GeometryAttribute description;
-  description.Init(type, nullptr, 3, data_type, /*normalized=*/data_type == draco::DT_UINT8, sizeof(Value),
+  description.Init(type, nullptr, ComponentsOf<Value>(), data_type, /*normalized=*/data_type == draco::DT_UINT8,
+                   sizeof(Value),
                    /*byte_offset=*/0);
   const int id = target.AddAttribute(description, /*identity_mapping=*/true, static_cast<uint32_t>(values.size()));
   for (size_t i = 0; i < values.size(); ++i) {
@@ -80,6 +94,7 @@ void FillDraco(const Mesh& mesh, draco::Mesh& target) {
   AddAttribute(GeometryAttribute::POSITION, draco::DT_FLOAT32, mesh.vertices, target);
   if (!mesh.normals.empty()) AddAttribute(GeometryAttribute::NORMAL, draco::DT_FLOAT32, mesh.normals, target);
   if (!mesh.colors.empty()) AddAttribute(GeometryAttribute::COLOR, draco::DT_UINT8, mesh.colors, target);
+  if (!mesh.uv.empty()) AddAttribute(GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, mesh.uv, target);
 }
 
 // Draco allocates memory for the counts in the header before it checks whether the stream is long enough, so the counts
@@ -119,10 +134,11 @@ absl::StatusOr<std::vector<Value>> ReadAttribute(const draco::Mesh& source, Geom
   std::vector<Value> values;
   const draco::PointAttribute* attribute = source.GetNamedAttribute(type);
   if (attribute == nullptr) return values;
-  if (attribute->num_components() != 3 || attribute->data_type() != data_type) {
-    return InvalidArgument("Draco mesh: {} has {} components of type {}; must be 3 of type {}",
+  if (attribute->num_components() != ComponentsOf<Value>() || attribute->data_type() != data_type) {
+    return InvalidArgument("Draco mesh: {} has {} components of type {}; must be {} of type {}",
                            GeometryAttribute::TypeToString(type), attribute->num_components(),
-                           static_cast<int>(attribute->data_type()), static_cast<int>(data_type));
+                           static_cast<int>(attribute->data_type()), ComponentsOf<Value>(),
+                           static_cast<int>(data_type));
   }
   values.resize(source.num_points());
   for (uint32_t i = 0; i < source.num_points(); ++i) {
@@ -140,6 +156,8 @@ absl::StatusOr<Mesh> FromDraco(const draco::Mesh& source) {
   ROMAP_ASSIGN_OR_RETURN(mesh.normals,
                          ReadAttribute<Eigen::Vector3f>(source, GeometryAttribute::NORMAL, draco::DT_FLOAT32));
   ROMAP_ASSIGN_OR_RETURN(mesh.colors, ReadAttribute<Rgb8>(source, GeometryAttribute::COLOR, draco::DT_UINT8));
+  ROMAP_ASSIGN_OR_RETURN(mesh.uv,
+                         ReadAttribute<Eigen::Vector2f>(source, GeometryAttribute::TEX_COORD, draco::DT_FLOAT32));
   for (uint32_t i = 0; i < source.num_faces(); ++i) {
     const draco::Mesh::Face& face = source.face(draco::FaceIndex(i));
     mesh.triangles.push_back({face[0].value(), face[1].value(), face[2].value()});
@@ -165,6 +183,7 @@ absl::StatusOr<std::string> EncodeDraco(const Mesh& mesh, const DracoOptions& op
     encoder.SetSpeedOptions(options.speed, options.speed);
     encoder.SetAttributeQuantization(GeometryAttribute::POSITION, options.position_bits);
     encoder.SetAttributeQuantization(GeometryAttribute::NORMAL, options.normal_bits);
+    encoder.SetAttributeQuantization(GeometryAttribute::TEX_COORD, options.uv_bits);
     draco::EncoderBuffer buffer;
     const draco::Status status = encoder.EncodeMeshToBuffer(source, &buffer);
     if (!status.ok()) return Internal("Draco encoder: {}", status.error_msg_string());

@@ -10,12 +10,14 @@ namespace romap {
 
 // Meshes as bytes of a Draco 2.2 stream with edgebreaker connectivity, the format of the viewer's DRACOLoader.
 // Coordinates are quantized: the error per axis is at most the longest side of the mesh / 2^(position_bits + 1); with
-// 14 bits 0.01 mm for a 30 cm object. Colors and the orientation of triangles are kept. The order of vertices and
+// 14 bits 0.01 mm for a 30 cm object. Colors and the orientation of triangles are kept; texture
+// coordinates are quantized like positions. The order of vertices and
 // triangles changes, and vertices without a triangle are dropped.
 struct DracoOptions {
   int position_bits = 14;  // per axis, 1..30
   int normal_bits = 8;     // per octahedral coordinate, 2..30; 8 bits are within 0.7 degrees
-  int speed = 5;           // 0 = smallest, 10 = fastest
+  int uv_bits = 13;  // per texture coordinate, 2..30; 13 bits are within an eighth of a texel of a 1024 px texture
+  int speed = 5;     // 0 = smallest, 10 = fastest
 };
 
 // Largest mesh that is encoded or decoded, so that a damaged size cannot exhaust memory.

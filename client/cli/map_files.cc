@@ -52,6 +52,7 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
         const SE3<World, Object> T_world_mesh =
             snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object);
         entry.mesh = *std::move(mesh);
+        if (!entry.mesh.uv.empty()) entry.texture = snapshot.mesh->texture;
         entry.S_world_mesh = {snapshot.object.mesh_scale, T_world_mesh.rotation(), T_world_mesh.translation()};
       } else {
         faults->push_back(
@@ -90,7 +91,7 @@ absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>&
     if (entry.mesh.triangles.empty()) continue;
     const std::string stem = (folder / entry.file_stem).string();
     ROMAP_RETURN_IF_ERROR(files::WriteWorldPly(stem + ".ply", entry.mesh, entry.S_world_mesh));
-    ROMAP_RETURN_IF_ERROR(files::WriteGlb(stem + ".glb", entry.mesh, entry.S_world_mesh));
+    ROMAP_RETURN_IF_ERROR(files::WriteGlb(stem + ".glb", entry.mesh, entry.S_world_mesh, entry.texture));
   }
   return files::WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
 }

@@ -16,6 +16,7 @@ struct MapObject {
   ObjectUpdate object;
   std::string file_stem;  // "<id>_<class>", with only characters that are safe in file names
   Mesh mesh;              // in its own frame, near its origin; empty if the object has no mesh
+  MeshTexture texture;    // of the mesh; may be empty
   Sim3<World, Object> S_world_mesh;
   double train_seconds = 0;  // of the mesh
   uint64_t steps = 0;        // training steps of the mesh

@@ -21,8 +21,12 @@ namespace {
 namespace fs = std::filesystem;
 constexpr size_t kCuboidFrames = 6;  // evenly spaced over the sequence
 
+// A texture that cannot be decoded is not drawn.
 render::MeshInstance InstanceOf(const MapObject& entry) {
-  return {.mesh = &entry.mesh, .id = 1, .S_world_mesh = entry.S_world_mesh};
+  cv::Mat texture_bgr;
+  SampleRange range;
+  if (!entry.texture.image.empty()) texture_bgr = DecodeColor(entry.texture.image, &range);
+  return {.mesh = &entry.mesh, .id = 1, .S_world_mesh = entry.S_world_mesh, .texture_bgr = texture_bgr};
 }
 
 // The frame in which the cuboid is largest; nullopt if it is never completely visible.

@@ -87,7 +87,33 @@ int AddColors(const Mesh& mesh, tinygltf::Model* model) {
   return index;
 }
 
-tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh) {
+// Stores the texture in the buffer, and uses it in the material.
+void AddTexture(const MeshTexture& texture, tinygltf::Material* material, tinygltf::Model* model) {
+  std::vector<unsigned char>& bytes = model->buffers.front().data;
+  tinygltf::BufferView view;
+  view.buffer = 0;
+  view.byteOffset = bytes.size();
+  view.byteLength = texture.image.size();
+  bytes.insert(bytes.end(), texture.image.begin(), texture.image.end());
+  while (bytes.size() % 4 != 0) bytes.push_back(0);
+  model->bufferViews.push_back(std::move(view));
+  tinygltf::Image image;
+  image.mimeType = texture.media_type;
+  image.bufferView = static_cast<int>(model->bufferViews.size()) - 1;
+  model->images.push_back(std::move(image));
+  tinygltf::Sampler sampler;
+  sampler.minFilter = TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_LINEAR;
+  sampler.magFilter = TINYGLTF_TEXTURE_FILTER_LINEAR;
+  sampler.wrapS = sampler.wrapT = TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
+  model->samplers.push_back(std::move(sampler));
+  tinygltf::Texture reference;
+  reference.sampler = 0;
+  reference.source = 0;
+  model->textures.push_back(std::move(reference));
+  material->pbrMetallicRoughness.baseColorTexture.index = 0;
+}
+
+tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh, const MeshTexture& texture) {
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "romap";
@@ -98,7 +124,14 @@ tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mes
   primitive.mode = mesh.triangles.empty() ? TINYGLTF_MODE_POINTS : TINYGLTF_MODE_TRIANGLES;
   primitive.attributes["POSITION"] = AddPositions(mesh, &model);
   if (!mesh.normals.empty()) primitive.attributes["NORMAL"] = AddNormals(mesh, &model);
-  if (!mesh.colors.empty()) primitive.attributes["COLOR_0"] = AddColors(mesh, &model);
+  const bool has_texture = !mesh.uv.empty() && !texture.image.empty();
+  if (has_texture) {
+    primitive.attributes["TEXCOORD_0"] =
+        AddArray<Eigen::Vector2f>(mesh.uv, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC2,
+                                  TINYGLTF_TARGET_ARRAY_BUFFER, mesh.uv.size(), &model);
+  } else if (!mesh.colors.empty()) {  // glTF would multiply them with the texture
+    primitive.attributes["COLOR_0"] = AddColors(mesh, &model);
+  }
   if (!mesh.triangles.empty()) {
     primitive.indices =
         AddArray<std::array<uint32_t, 3>>(mesh.triangles, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR,
@@ -113,6 +146,7 @@ tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mes
   material.doubleSided = true;
   material.pbrMetallicRoughness.metallicFactor = 0;
   material.pbrMetallicRoughness.roughnessFactor = 1;
+  if (has_texture) AddTexture(texture, &material, &model);
   model.materials.push_back(std::move(material));
 
   constexpr double kHalf = std::numbers::sqrt2 / 2;
@@ -139,14 +173,15 @@ tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mes
 
 }  // namespace
 
-absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const Sim3<World, Object>& S_world_mesh) {
+absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const Sim3<World, Object>& S_world_mesh,
+                      const MeshTexture& texture) {
   ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh, path));
   const auto fits = [&](size_t size) { return size == 0 || size == mesh.vertices.size(); };
-  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size())) {
-    return InvalidArgument("{}: {} normals and {} colors for {} vertices", path, mesh.normals.size(),
-                           mesh.colors.size(), mesh.vertices.size());
+  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size()) || !fits(mesh.uv.size())) {
+    return InvalidArgument("{}: {} normals, {} colors and {} texture coordinates for {} vertices", path,
+                           mesh.normals.size(), mesh.colors.size(), mesh.uv.size(), mesh.vertices.size());
   }
-  const tinygltf::Model model = ToModel(mesh, S_world_mesh);
+  const tinygltf::Model model = ToModel(mesh, S_world_mesh, texture);
   constexpr size_t kJsonReserve = 1 << 16;  // upper bound for the JSON chunk and the headers [bytes]
   if (model.buffers.front().data.size() + kJsonReserve > UINT32_MAX) {
     return InvalidArgument("{}: the mesh exceeds the 4 GiB limit of GLB", path);

@@ -20,8 +20,27 @@ struct MergedMeshes {
   std::vector<Eigen::Vector3f> normals;     // zero: use the triangle normal
   std::vector<Eigen::Vector3f> colors_bgr;  // 0..255; negative: no color
   std::vector<std::array<uint32_t, 3>> triangles;
-  std::vector<uint16_t> ids;  // per triangle
+  std::vector<uint16_t> ids;             // per triangle
+  std::vector<Eigen::Vector2f> uv;       // of textured meshes; otherwise zero
+  std::vector<const cv::Mat*> textures;  // per triangle, CV_8UC3; null: vertex colors
 };
+
+// The color of a texture between the centers of its texels.
+Eigen::Vector3f SampleTexture(const cv::Mat& texture_bgr, const Eigen::Vector2f& uv) {
+  const float x =
+      std::clamp(uv.x() * static_cast<float>(texture_bgr.cols) - 0.5f, 0.0f, static_cast<float>(texture_bgr.cols - 1));
+  const float y =
+      std::clamp(uv.y() * static_cast<float>(texture_bgr.rows) - 0.5f, 0.0f, static_cast<float>(texture_bgr.rows - 1));
+  const int left = static_cast<int>(x), top = static_cast<int>(y);
+  const int right = std::min(left + 1, texture_bgr.cols - 1), bottom = std::min(top + 1, texture_bgr.rows - 1);
+  const auto at = [&](int row, int col) {
+    const auto& bgr = texture_bgr.at<cv::Vec3b>(row, col);
+    return Eigen::Vector3f(bgr[0], bgr[1], bgr[2]);
+  };
+  const float along_x = x - static_cast<float>(left), along_y = y - static_cast<float>(top);
+  return (1 - along_y) * ((1 - along_x) * at(top, left) + along_x * at(top, right)) +
+         along_y * ((1 - along_x) * at(bottom, left) + along_x * at(bottom, right));
+}
 
 MergedMeshes Merge(std::span<const MeshInstance> meshes, const Eigen::Vector3d& origin_world) {
   MergedMeshes merged;
@@ -31,6 +50,7 @@ MergedMeshes Merge(std::span<const MeshInstance> meshes, const Eigen::Vector3d& 
     const auto base = static_cast<uint32_t>(merged.positions_world.size());
     const bool has_normals = mesh.normals.size() == mesh.vertices.size();
     const bool has_colors = mesh.colors.size() == mesh.vertices.size();
+    const bool has_texture = !instance.texture_bgr.empty() && mesh.uv.size() == mesh.vertices.size();
     for (size_t i = 0; i < mesh.vertices.size(); ++i) {
       const Eigen::Vector3d p_world = instance.S_world_mesh * mesh.vertices[i].cast<double>();
       merged.positions_world.emplace_back((p_world - origin_world).cast<float>());
@@ -38,11 +58,13 @@ MergedMeshes Merge(std::span<const MeshInstance> meshes, const Eigen::Vector3d& 
                                            : Eigen::Vector3f(Eigen::Vector3f::Zero()));
       merged.colors_bgr.push_back(has_colors ? Eigen::Vector3f(mesh.colors[i][2], mesh.colors[i][1], mesh.colors[i][0])
                                              : Eigen::Vector3f(Eigen::Vector3f::Constant(-1)));
+      merged.uv.push_back(has_texture ? mesh.uv[i] : Eigen::Vector2f(Eigen::Vector2f::Zero()));
     }
     for (const auto& [a, b, c] : mesh.triangles) {
       if (std::max({a, b, c}) >= mesh.vertices.size()) continue;
       merged.triangles.push_back({base + a, base + b, base + c});
       merged.ids.push_back(instance.id);
+      merged.textures.push_back(has_texture ? &instance.texture_bgr : nullptr);
     }
   }
   return merged;
@@ -64,6 +86,10 @@ Eigen::Vector3f ShadeBgr(const MergedMeshes& merged, int32_t triangle, const SE3
   const std::array<Eigen::Vector3f, 3> corners = {merged.positions_world[a], merged.positions_world[b],
                                                   merged.positions_world[c]};
   const Eigen::Vector3f weights = Barycentrics(corners, T_world_camera.translation(), ray_world);
+  if (paint == MeshPaint::kColored && merged.textures[triangle] != nullptr) {
+    return SampleTexture(*merged.textures[triangle],
+                         weights.x() * merged.uv[a] + weights.y() * merged.uv[b] + weights.z() * merged.uv[c]);
+  }
   const Eigen::Vector3f color =
       weights.x() * merged.colors_bgr[a] + weights.y() * merged.colors_bgr[b] + weights.z() * merged.colors_bgr[c];
   if (paint == MeshPaint::kColored && merged.colors_bgr[a].x() >= 0) return color;

@@ -11,7 +11,7 @@ namespace romap::render {
 
 enum class MeshPaint {
   kShaded,   // gray, lit from near the camera
-  kColored,  // unlit vertex colors; as kShaded for meshes without colors
+  kColored,  // unlit texture, or vertex colors; as kShaded for meshes without either
 };
 
 // A mesh to draw. Shading uses the vertex normals if the mesh has them, otherwise the triangle normals.
@@ -19,6 +19,7 @@ struct MeshInstance {
   const Mesh* mesh = nullptr;  // may be empty
   uint16_t id = 0;             // value in RenderedView::ids, > 0
   Sim3<World, Object> S_world_mesh = {};
+  cv::Mat texture_bgr = {};  // CV_8UC3; used if the mesh has `uv`
 };
 
 // A rendered view; all images have the size of the camera image.

@@ -250,6 +250,8 @@ v1::MeshUpdate ToProto(MeshUpdate update) {
   proto.set_vertex_count(update.vertex_count);
   proto.set_triangle_count(update.triangle_count);
   proto.set_draco(std::move(update.draco));
+  proto.set_texture(std::move(update.texture.image));
+  proto.set_texture_media_type(update.texture.media_type);
   return proto;
 }
 
@@ -264,6 +266,11 @@ absl::StatusOr<MeshUpdate> FromProto(v1::MeshUpdate proto, const std::string& wh
   update.vertex_count = proto.vertex_count();
   update.triangle_count = proto.triangle_count();
   update.draco = std::move(*proto.mutable_draco());
+  const std::string& media_type = proto.texture_media_type();
+  if (!proto.texture().empty() && media_type != "image/png" && media_type != "image/jpeg") {
+    return InvalidArgument("{}.texture_media_type: must be image/png or image/jpeg, got '{}'", where, media_type);
+  }
+  update.texture = {std::move(*proto.mutable_texture()), media_type};
   return update;
 }
 

@@ -15,10 +15,14 @@ struct MeshConfig {
   double min_component_share = 0.35;
   bool trim_unseen = false;
   double trim_confidence = 0.1;
+  bool texture = true;
+  int texture_triangles = 8000;
+  int texture_px = 1024;
 
   void Fields(ConfigFields& fields) {
     GridFields(fields);
     SurfaceFields(fields);
+    TextureFields(fields);
     fields.AddRules([this](ConfigRules& rules) { Validate(rules); });
   }
 
@@ -62,6 +66,17 @@ struct MeshConfig {
                {.help = "Remove surface that is invisible in all training views; the mesh is then open"});
     fields.Add("trim_confidence", &trim_confidence,
                {.min = 0, .max = 1, .help = "Minimum confidence of a vertex that trim_unseen keeps"});
+  }
+
+  void TextureFields(ConfigFields& fields) {
+    fields.Add("texture", &texture,
+               {.audience = Audience::kOperator,
+                .help = "Simplify the final mesh of an object, and give it a texture from the images; off: all "
+                        "triangles, with colors of the vertices"});
+    fields.Add("texture_triangles", &texture_triangles,
+               {.unit = "triangles", .min = 100, .max = 1000000, .help = "Maximum number of triangles of such a mesh"});
+    fields.Add("texture_px", &texture_px,
+               {.unit = "px", .min = 64, .max = 8192, .help = "Maximum width and height of a texture"});
   }
 };
 

@@ -227,7 +227,8 @@ FieldSnapshot ObjectField::Snapshot() const {
     snapshot.cameras.push_back({{T_camera_object.rotation(), S_new_first_.scale() * T_camera_object.translation()},
                                 view.camera,
                                 view.roi_px,
-                                view.ray_kind});
+                                view.ray_kind,
+                                view.color_bgr});
   }
   snapshot.field = std::make_shared<TrainedField>(field_.model().Clone(), box);
   return snapshot;

@@ -4,29 +4,11 @@
 
 #include <algorithm>
 
-#include "common/mesh_codec.h"
 #include "common/status.h"
 #include "common/thread_priority.h"
-#include "server/mesh/extract_mesh.h"
+#include "server/session/mesh_encoding.h"
 
 namespace romap::session {
-namespace {
-
-absl::StatusOr<MeshUpdate> ExtractAndEncode(const FieldSnapshot& snapshot, const mesh::MeshConfig& config) {
-  ROMAP_ASSIGN_OR_RETURN(const Mesh mesh, mesh::ExtractMesh(snapshot, config));
-  MeshUpdate update;
-  update.id = snapshot.object;
-  update.steps = snapshot.steps;
-  update.train_seconds = snapshot.train_seconds;
-  update.final = snapshot.converged;
-  update.vertex_count = static_cast<uint32_t>(mesh.vertices.size());
-  update.triangle_count = static_cast<uint32_t>(mesh.triangles.size());
-  ROMAP_ASSIGN_OR_RETURN(update.draco, EncodeDraco(mesh, DracoOptions{}));
-  return update;
-}
-
-}  // namespace
-
 Mesher::Mesher(const mesh::MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
   if (threading == Threading::kOwnThread) thread_ = std::thread([this] { Run(); });
 }
@@ -82,7 +64,7 @@ bool Mesher::IsIdle(SessionId session) const {
 
 void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
   try {
-    if (auto mesh = ExtractAndEncode(snapshot, config_); mesh.ok()) {
+    if (auto mesh = MakeMeshUpdate(snapshot, config_); mesh.ok()) {
       sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
     } else {
       // Normal early in training, when the field has no surface yet. A later snapshot will have one.

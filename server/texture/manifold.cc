@@ -157,8 +157,7 @@ void ForEachEdge(const std::vector<OrderedEdge>& edges, const Visit& visit) {
 
 }  // namespace
 
-std::optional<ManifoldTriangles> MakeManifold(std::span<const Eigen::Vector3f> vertices,
-                                              std::vector<Triangle> triangles) {
+ManifoldTriangles MakeManifold(std::span<const Eigen::Vector3f> vertices, std::vector<Triangle> triangles) {
   RemoveFlat(triangles);
   CornerSets corners(triangles.size() * 3);
   EdgePairing pairing(vertices, triangles, corners);
@@ -175,11 +174,9 @@ std::optional<ManifoldTriangles> MakeManifold(std::span<const Eigen::Vector3f> v
     }
     result.triangles[corner / 3][corner % 3] = vertex;
   }
-  bool is_manifold = true;
   ForEachEdge(SortedEdges(result.triangles), [&](std::span<const OrderedEdge> edges) {
-    is_manifold &= edges.size() == 1 || (edges.size() == 2 && edges[0].is_forward != edges[1].is_forward);
+    result.is_manifold &= edges.size() == 1 || (edges.size() == 2 && edges[0].is_forward != edges[1].is_forward);
   });
-  if (!is_manifold) return std::nullopt;
   return result;
 }
 

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +12,8 @@ namespace romap::texture {
 struct ManifoldTriangles {
   std::vector<std::array<uint32_t, 3>> triangles;
   std::vector<uint32_t> source;
+  // False if some edges still have more than two triangles, because both of their ends connect the same wedges.
+  bool is_manifold = true;
 };
 
 // Makes a manifold of triangles that were collapsed from one. Collapsing edges of thin parts leaves triangles without
@@ -21,9 +22,7 @@ struct ManifoldTriangles {
 // the solid (A. Guéziec et al., "Cutting and stitching: converting sets of polygons to manifold surfaces", TVCG 2001).
 // Vertices without triangles are dropped. A closed surface stays closed, because collapsing keeps as many half-edges of
 // each direction.
-//
-// nullopt: two triangles would still have the same directed edge.
-std::optional<ManifoldTriangles> MakeManifold(std::span<const Eigen::Vector3f> vertices,
-                                              std::vector<std::array<uint32_t, 3>> triangles);
+ManifoldTriangles MakeManifold(std::span<const Eigen::Vector3f> vertices,
+                               std::vector<std::array<uint32_t, 3>> triangles);
 
 }  // namespace romap::texture

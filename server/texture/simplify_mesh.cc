@@ -14,8 +14,6 @@
 namespace romap::texture {
 namespace {
 
-// If a simplified mesh cannot be made a manifold, less is collapsed, by this factor.
-constexpr float kRetryFactor = 1.5f;
 // An error that no collapse reaches, relative to the extent of the mesh.
 constexpr float kAnyError = 1e3f;
 // Runs of meshoptimizer, while each leaves at most this share of the triangles.
@@ -66,8 +64,9 @@ Mesh WithTriangles(const Mesh& mesh, ManifoldTriangles&& manifold) {
   copy(mesh.vertices, result.vertices);
   copy(mesh.colors, result.colors);
   copy(mesh.confidence, result.confidence);
+  copy(mesh.normals, result.normals);
   result.triangles = std::move(manifold.triangles);
-  SetAngleWeightedNormals(result);
+  if (result.normals.empty()) SetAngleWeightedNormals(result);
   return result;
 }
 
@@ -75,27 +74,20 @@ Mesh WithTriangles(const Mesh& mesh, ManifoldTriangles&& manifold) {
 
 Simplified SimplifyMesh(const Mesh& mesh, const SimplifyOptions& options) {
   Simplified unchanged{mesh, 0.0f};
-  SetAngleWeightedNormals(unchanged.mesh);
+  if (mesh.normals.empty()) SetAngleWeightedNormals(unchanged.mesh);
   if (mesh.triangles.size() <= kFewestTriangles) return unchanged;
   const float scale_mu =
       meshopt_simplifyScale(mesh.vertices.data()->data(), mesh.vertices.size(), sizeof(Eigen::Vector3f));
   if (!(scale_mu > 0)) return unchanged;
-  auto max_triangles = static_cast<float>(std::clamp(options.max_triangles, kFewestTriangles, mesh.triangles.size()));
-  float max_error_mu = options.max_error_mu;
-  while (max_triangles < kRetryFactor * static_cast<float>(mesh.triangles.size())) {
-    Collapsed collapsed = Collapse(mesh, 0, max_error_mu, scale_mu);
-    if (static_cast<float>(collapsed.triangles.size()) > max_triangles) {
-      // From the original triangles, so that the error refers to them.
-      collapsed = Collapse(mesh, static_cast<size_t>(max_triangles), std::numeric_limits<float>::max(), scale_mu);
-    }
-    std::optional<ManifoldTriangles> manifold = MakeManifold(mesh.vertices, std::move(collapsed.triangles));
-    if (manifold.has_value() && !manifold->triangles.empty()) {
-      return {WithTriangles(mesh, std::move(*manifold)), collapsed.error_mu};
-    }
-    max_triangles *= kRetryFactor;
-    max_error_mu /= kRetryFactor;
+  const size_t max_triangles = std::clamp(options.max_triangles, kFewestTriangles, mesh.triangles.size());
+  Collapsed collapsed = Collapse(mesh, 0, options.max_error_mu, scale_mu);
+  if (collapsed.triangles.size() > max_triangles) {
+    // From the original triangles, so that the error refers to them.
+    collapsed = Collapse(mesh, max_triangles, std::numeric_limits<float>::max(), scale_mu);
   }
-  return unchanged;
+  ManifoldTriangles manifold = MakeManifold(mesh.vertices, std::move(collapsed.triangles));
+  if (manifold.triangles.empty()) return unchanged;
+  return {WithTriangles(mesh, std::move(manifold)), collapsed.error_mu};
 }
 
 }  // namespace romap::texture

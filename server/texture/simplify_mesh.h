@@ -21,13 +21,11 @@ struct Simplified {
 };
 
 // Simplifies a mesh by collapsing edges (M. Garland and P. S. Heckbert, "Surface simplification using quadric error
-// metrics", SIGGRAPH 1997; meshoptimizer). The vertices of the result are vertices of `mesh` and keep their colors and
-// confidence; their normals are computed from the new triangles. A closed manifold stays a closed manifold. Parts that
-// collapse to nothing are removed.
-//
-// The result may have more than max_triangles only if a collapse would make the surface non-manifold in a way that
-// copies of vertices cannot repair. A mesh that cannot be simplified at all, such as a single triangle, is returned
-// with new normals. Vertices must be finite and triangles must refer to them.
+// metrics", SIGGRAPH 1997; meshoptimizer). The vertices of the result are vertices of `mesh` and keep their colors,
+// confidence and normals; normals that are absent are computed from the new triangles. A closed surface stays closed,
+// and a manifold stays one except at a few edges with four triangles, where collapsed thin parts touch. Parts that
+// collapse to nothing are removed. A mesh that cannot be simplified at all, such as a single triangle, is returned as
+// it is, with normals. Vertices must be finite and triangles must refer to them.
 Simplified SimplifyMesh(const Mesh& mesh, const SimplifyOptions& options);
 
 }  // namespace romap::texture

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 
 #include "common/status.h"
@@ -81,6 +83,33 @@ TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimeter) {
     EXPECT_GT(decoded.normals[k].dot(mesh.normals[original]), std::cos(0.7 * M_PI / 180));
     EXPECT_NEAR(decoded.normals[k].norm(), 1.0f, 1e-4f);
   }
+}
+
+// The color of a vertex identifies it, because the order of the vertices changes.
+TEST(MeshCodec, RoundTripKeepsTextureCoordinatesWithinAnEighthOfATexel) {
+  Mesh mesh = Torus(20, 0.1f, 0.04f, {0, 0, 0});
+  std::map<Rgb8, Eigen::Vector2f> uv;
+  for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.uv.emplace_back(static_cast<float>(i) / 400, 1 - static_cast<float>(i % 20) / 20);
+    uv[mesh.colors[i]] = mesh.uv[i];
+  }
+  const Mesh decoded = RoundTrip(mesh);
+  ASSERT_EQ(decoded.uv.size(), mesh.vertices.size());
+  for (size_t i = 0; i < decoded.uv.size(); ++i) {
+    EXPECT_LT((decoded.uv[i] - uv.at(decoded.colors[i])).cwiseAbs().maxCoeff(), 0.125f / 1024);
+  }
+}
+
+TEST(MeshCodec, VerticesAtTheSamePositionKeepTheirTextureCoordinates) {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  mesh.uv = {{0, 0}, {0.25f, 0}, {0, 0.25f}, {0.75f, 0.5f}, {0.5f, 0.75f}, {1, 1}};
+  mesh.triangles = {{0, 1, 2}, {3, 5, 4}};
+  const Mesh decoded = RoundTrip(mesh);
+  ASSERT_EQ(decoded.uv.size(), 6u);
+  EXPECT_EQ(std::count_if(decoded.vertices.begin(), decoded.vertices.end(),
+                          [](const auto& v) { return (v - Eigen::Vector3f(1, 0, 0)).norm() < 1e-3f; }),
+            2);
 }
 
 TEST(MeshCodec, RoundTripKeepsOrientation) {

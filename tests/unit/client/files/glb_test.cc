@@ -21,10 +21,10 @@ uint32_t WordAt(const std::string& bytes, size_t offset) {
 // A GLB file, parsed according to the specification.
 struct Glb {
   // Writes the mesh and reads the file.
-  explicit Glb(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh = {}) {
+  explicit Glb(const Mesh& mesh, const Sim3<World, Object>& S_world_mesh = {}, const MeshTexture& texture = {}) {
     const std::string path =
         ::testing::TempDir() + "romap_" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".glb";
-    EXPECT_OK(WriteGlb(path, mesh, S_world_mesh));
+    EXPECT_OK(WriteGlb(path, mesh, S_world_mesh, texture));
     const std::string bytes = ReadFile(path).value();
     std::filesystem::remove(path);
     EXPECT_EQ(bytes.substr(0, 4), "glTF");
@@ -87,6 +87,23 @@ TEST(GlbTest, StoresTheMeshAccordingToTheSpecification) {
   EXPECT_EQ(colors[0], 65535);
   EXPECT_NEAR(colors[2] / 65535.0, 0.5, 0.005) << "sRGB 188 is half of the maximum linear intensity";
   EXPECT_EQ(colors[3], 65535) << "opaque";
+}
+
+TEST(GlbTest, StoresTheTextureInsteadOfTheColors) {
+  Mesh mesh = Triangle();
+  mesh.uv = {{0, 0}, {0.5f, 0.25f}, {1, 1}};
+  const MeshTexture texture = {std::string("\x89PNG\0five", 9), "image/png"};
+  const Glb glb(mesh, {}, texture);
+  const auto& attributes = glb.document["meshes"][0]["primitives"][0]["attributes"];
+  EXPECT_FALSE(attributes.contains("COLOR_0"));
+  EXPECT_EQ(glb.Read<float>(attributes["TEXCOORD_0"], 2), (std::vector<float>{0, 0, 0.5f, 0.25f, 1, 1}));
+  const auto& material = glb.document["materials"][0]["pbrMetallicRoughness"];
+  const auto& reference = glb.document["textures"][material["baseColorTexture"]["index"].get<int>()];
+  const auto& image = glb.document["images"][reference["source"].get<int>()];
+  EXPECT_EQ(image["mimeType"], "image/png");
+  const auto& view = glb.document["bufferViews"][image["bufferView"].get<int>()];
+  EXPECT_EQ(glb.binary.substr(view["byteOffset"], view["byteLength"]), texture.image);
+  EXPECT_FALSE(Glb(mesh).document.contains("textures")) << "without a texture";
 }
 
 TEST(GlbTest, RotatesZUpToYUp) {

@@ -38,6 +38,18 @@ TEST(RenderMeshesTest, RendersColorDepthAndIdOfTheNearestMesh) {
   EXPECT_EQ(view.ids.at<uint16_t>(2, 2), 0);
 }
 
+// The left half of the texture is red, the right half is green.
+TEST(RenderMeshesTest, DrawsTheTextureInsteadOfTheColors) {
+  Mesh square = Square(0.25F, 2, Rgb8{1, 2, 3});
+  square.uv = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  cv::Mat texture(8, 8, CV_8UC3, cv::Scalar(0, 0, 255));
+  texture(cv::Rect(4, 0, 4, 8)).setTo(cv::Scalar(0, 255, 0));
+  const std::array<MeshInstance, 1> instances = {{{.mesh = &square, .id = 1, .texture_bgr = texture}}};
+  const RenderedView view = RenderMeshes(instances, SmallCamera(), {}, MeshPaint::kColored);
+  EXPECT_EQ(view.color_bgr.at<cv::Vec3b>(32, 26), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(view.color_bgr.at<cv::Vec3b>(32, 37), cv::Vec3b(0, 255, 0));
+}
+
 TEST(RenderMeshesTest, ShadesByNormalAndIgnoresColors) {
   // A roof whose ridge points toward the camera; the light comes from the upper left.
   Mesh roof;

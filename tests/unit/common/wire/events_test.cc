@@ -126,6 +126,7 @@ TEST(WireEvents, MeshUpdateRoundTrips) {
   mesh.vertex_count = 9;
   mesh.triangle_count = 10;
   mesh.draco = std::string("DRACO\0\xff", 7);
+  mesh.texture = {std::string("PNG\0\xff", 5), "image/png"};
   const MeshUpdate got = RoundTrip(mesh);
   EXPECT_EQ(got.id, mesh.id);
   EXPECT_EQ(got.revision, mesh.revision);
@@ -135,6 +136,17 @@ TEST(WireEvents, MeshUpdateRoundTrips) {
   EXPECT_EQ(got.vertex_count, mesh.vertex_count);
   EXPECT_EQ(got.triangle_count, mesh.triangle_count);
   EXPECT_EQ(got.draco, mesh.draco);
+  EXPECT_EQ(got.texture.image, mesh.texture.image);
+  EXPECT_EQ(got.texture.media_type, mesh.texture.media_type);
+}
+
+TEST(WireEvents, ATextureMustBeAPngOrJpegFile) {
+  v1::MeshUpdate proto;
+  proto.set_id(1);
+  proto.set_texture("<svg>");
+  proto.set_texture_media_type("image/svg+xml");
+  EXPECT_THAT(Message(FromProto(proto, "mesh").status()),
+              HasSubstr("mesh.texture_media_type: must be image/png or image/jpeg, got 'image/svg+xml'"));
 }
 
 TEST(WireEvents, RemovalAndMergeRoundTrip) {

@@ -31,11 +31,11 @@ Triangles TwoTetrahedra() {
 TEST(MakeManifoldTest, SeparatesSolidsThatShareAnEdge) {
   EXPECT_FALSE(IsClosedSurface(
       {.vertices = kVertices, .normals = {}, .colors = {}, .confidence = {}, .triangles = TwoTetrahedra()}));
-  const auto manifold = MakeManifold(kVertices, TwoTetrahedra());
-  ASSERT_TRUE(manifold.has_value());
-  EXPECT_EQ(manifold->triangles.size(), 8u);
-  EXPECT_EQ(manifold->source.size(), 8u);
-  EXPECT_TRUE(IsClosedSurface(ToMesh(kVertices, *manifold)));
+  const ManifoldTriangles manifold = MakeManifold(kVertices, TwoTetrahedra());
+  EXPECT_EQ(manifold.triangles.size(), 8u);
+  EXPECT_EQ(manifold.source.size(), 8u);
+  EXPECT_TRUE(manifold.is_manifold);
+  EXPECT_TRUE(IsClosedSurface(ToMesh(kVertices, manifold)));
 }
 
 TEST(MakeManifoldTest, RemovesFlatParts) {
@@ -43,27 +43,24 @@ TEST(MakeManifoldTest, RemovesFlatParts) {
   triangles.push_back({0, 4, 5});
   triangles.push_back({5, 4, 0});
   triangles.push_back({1, 1, 2});
-  const auto manifold = MakeManifold(kVertices, triangles);
-  ASSERT_TRUE(manifold.has_value());
-  EXPECT_EQ(manifold->triangles.size(), 4u);
-  EXPECT_EQ(manifold->source.size(), 4u);
-  EXPECT_TRUE(IsClosedSurface(ToMesh(kVertices, *manifold)));
+  const ManifoldTriangles manifold = MakeManifold(kVertices, triangles);
+  EXPECT_EQ(manifold.triangles.size(), 4u);
+  EXPECT_EQ(manifold.source.size(), 4u);
+  EXPECT_TRUE(IsClosedSurface(ToMesh(kVertices, manifold)));
 }
 
 TEST(MakeManifoldTest, KeepsAnOpenSurfaceOpen) {
-  const auto manifold = MakeManifold(kVertices, {{0, 1, 2}, {0, 2, 3}});
-  ASSERT_TRUE(manifold.has_value());
-  EXPECT_EQ(manifold->triangles.size(), 2u);
-  EXPECT_EQ(manifold->source.size(), 4u);
+  const ManifoldTriangles manifold = MakeManifold(kVertices, {{0, 1, 2}, {0, 2, 3}});
+  EXPECT_EQ(manifold.triangles.size(), 2u);
+  EXPECT_EQ(manifold.source.size(), 4u);
 }
 
 TEST(MakeManifoldTest, ATriangleThatOccursTwiceGetsItsOwnVertices) {
   Triangles triangles = Tetrahedron(0, 1, 2, 3);
   triangles.push_back(triangles[0]);
-  const auto manifold = MakeManifold(kVertices, triangles);
-  ASSERT_TRUE(manifold.has_value());
-  EXPECT_EQ(manifold->triangles.size(), 5u);
-  EXPECT_GE(manifold->source.size(), 6u);
+  const ManifoldTriangles manifold = MakeManifold(kVertices, triangles);
+  EXPECT_EQ(manifold.triangles.size(), 5u);
+  EXPECT_GE(manifold.source.size(), 6u);
 }
 
 }  // namespace romap::texture::manifold_test

@@ -45,21 +45,23 @@ TEST(SimplifyMeshTest, ReducesToTheNumberOfTrianglesWhateverTheError) {
   EXPECT_TRUE(IsClosedSurface(simplified.mesh));
 }
 
-TEST(SimplifyMeshTest, KeepsTheAttributesOfTheVerticesAndComputesNormals) {
+TEST(SimplifyMeshTest, KeepsTheAttributesOfTheVertices) {
   Mesh mesh = SphereMesh(20);
   for (const Eigen::Vector3f& p : mesh.vertices) {
     mesh.colors.push_back({static_cast<uint8_t>(100 + 100 * p.x()), static_cast<uint8_t>(100 + 100 * p.y()), 7});
     mesh.confidence.push_back(0.5f + 0.4f * p.z());
   }
-  mesh.normals.assign(mesh.vertices.size(), Eigen::Vector3f::UnitX());
-  const Mesh result = SimplifyMesh(mesh, {.max_triangles = 400, .max_error_mu = 0.0f}).mesh;
+  const SimplifyOptions options = {.max_triangles = 400, .max_error_mu = 0.0f};
+  for (const Eigen::Vector3f& normal : SimplifyMesh(mesh, options).mesh.normals) EXPECT_NEAR(normal.norm(), 1, 1e-5);
+  for (const Eigen::Vector3f& p : mesh.vertices) mesh.normals.push_back(-p.normalized());
+  const Mesh result = SimplifyMesh(mesh, options).mesh;
   ASSERT_EQ(result.colors.size(), result.vertices.size());
   ASSERT_EQ(result.confidence.size(), result.vertices.size());
   ASSERT_EQ(result.normals.size(), result.vertices.size());
   for (size_t i = 0; i < result.vertices.size(); ++i) {
     EXPECT_EQ(result.colors[i][0], static_cast<uint8_t>(100 + 100 * result.vertices[i].x()));
     EXPECT_EQ(result.confidence[i], 0.5f + 0.4f * result.vertices[i].z());
-    EXPECT_GT(result.normals[i].dot(result.vertices[i]), 0.95f);
+    EXPECT_EQ(result.normals[i], -result.vertices[i].normalized());
   }
 }
 

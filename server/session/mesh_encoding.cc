@@ -1,0 +1,73 @@
+#include "server/session/mesh_encoding.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "common/mesh_codec.h"
+#include "common/status.h"
+#include "server/mesh/extract_mesh.h"
+#include "server/texture/texture_mesh.h"
+
+namespace romap::session {
+namespace {
+
+// More views cost more time, but hardly improve a texture.
+constexpr size_t kMaxTextureViews = 48;
+
+std::vector<texture::TextureView> TextureViewsOf(const FieldSnapshot& snapshot) {
+  std::vector<texture::TextureView> views;
+  const size_t all = snapshot.cameras.size();
+  const size_t count = std::min(kMaxTextureViews, all);
+  for (size_t k = 0; k < count; ++k) {
+    const TrainingCamera& camera = snapshot.cameras[k * all / count];
+    texture::TextureView view{.T_camera_object = camera.T_camera_object,
+                              .camera = camera.camera,
+                              .roi_px = camera.roi_px,
+                              .color_bgr = camera.color_bgr,
+                              .ray_kind = camera.ray_kind};
+    if (texture::ValidateTextureView(view).ok()) views.push_back(std::move(view));
+  }
+  return views;
+}
+
+// Replaces the mesh by a simpler one with a texture.
+absl::Status AddTexture(const FieldSnapshot& snapshot, const mesh::MeshConfig& config, Mesh* mesh,
+                        MeshTexture* texture) {
+  const std::vector<texture::TextureView> views = TextureViewsOf(snapshot);
+  if (views.empty()) return FailedPrecondition("no view shows the object");
+  texture::TextureOptions options;
+  options.max_triangles = static_cast<size_t>(config.texture_triangles);
+  options.max_atlas_px = config.texture_px;
+  ROMAP_ASSIGN_OR_RETURN(texture::TexturedObject textured, texture::TextureMesh(*mesh, views, options));
+  *mesh = std::move(textured.textured.mesh);
+  mesh->uv = std::move(textured.textured.uv);
+  texture->image.assign(textured.image.begin(), textured.image.end());
+  texture->media_type = std::move(textured.media_type);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<MeshUpdate> MakeMeshUpdate(const FieldSnapshot& snapshot, const mesh::MeshConfig& config) {
+  ROMAP_ASSIGN_OR_RETURN(Mesh mesh, mesh::ExtractMesh(snapshot, config));
+  MeshUpdate update;
+  update.id = snapshot.object;
+  update.steps = snapshot.steps;
+  update.train_seconds = snapshot.train_seconds;
+  update.final = snapshot.converged;
+  if (snapshot.converged && config.texture) {
+    const absl::Status status = AddTexture(snapshot, config, &mesh, &update.texture);
+    if (!status.ok()) {
+      spdlog::info("{}: the final mesh has no texture: {}", snapshot.object.ToString(), Message(status));
+    }
+  }
+  update.vertex_count = static_cast<uint32_t>(mesh.vertices.size());
+  update.triangle_count = static_cast<uint32_t>(mesh.triangles.size());
+  ROMAP_ASSIGN_OR_RETURN(update.draco, EncodeDraco(mesh, DracoOptions{}));
+  return update;
+}
+
+}  // namespace romap::session
