@@ -40,9 +40,8 @@ ViewDepth::ViewDepth(const FieldGrid& grid, const std::vector<float>& optical_de
       const Eigen::Vector2f pixel = PixelAt(x, y);
       const std::optional<RayKind> kind = KindAt(view, pixel.x(), pixel.y());
       if (!kind || *kind == RayKind::kOccluder) continue;
-      float distance = March(grid, optical_depth, max_optical_depth, DirectionAt(x, y));
-      if (distance == kNothingMet && *kind == RayKind::kObject) distance = kUnknownDistance;
-      distance_mu_[static_cast<size_t>(y * size_.x() + x)] = distance;
+      distance_mu_[static_cast<size_t>(y * size_.x() + x)] =
+          March(grid, optical_depth, max_optical_depth, DirectionAt(x, y));
     }
   }
 }

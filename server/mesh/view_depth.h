@@ -13,9 +13,8 @@ class ViewDepth {
  public:
   // Where a point lies on the ray of its pixel.
   enum class Relation {
-    kUnknown,  // outside the crop, behind an occluder, or its pixel contradicts the field: it shows the object, but the
-               // ray meets no surface
-    kInFront,  // before the first surface: the view sees that it is empty
+    kUnknown,  // outside the crop, or its pixel shows an occluder
+    kInFront,  // before the first surface, or the ray meets none: the view sees that it is empty
     kBehind,   // in or behind the first surface
   };
 

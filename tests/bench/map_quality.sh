@@ -6,7 +6,8 @@
 #
 # The environment variable POSES=none tracks the camera from the images. Without SEQUENCE, renders three synthetic
 # sequences (150 frames, five objects, seeds 1 to 3) in OUT_DIR. The figures are means over the objects, for the surface
-# visible to at least one camera; distances are in cm.
+# visible to at least one camera; distances are in cm. Closed, hollow and normals compare with the whole surface,
+# undersides included (client/README.md, Evaluation).
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 build=$1 out=$2
@@ -32,8 +33,8 @@ for _ in $(seq 100); do
 done
 [ -n "$address" ] || { echo "romap-server did not listen within 10 s" >&2; cat "$out/server.out" "$out/server.err" >&2; exit 1; }
 
-echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | first cuboid, mesh (slowest) | training after the last frame | frames dropped | peak memory of server, client |'
-echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
+echo '| sequence | objects found | cuboid IoU | accuracy | completion | < 0.4 cm | < 1 cm | closed | hollow | normals | first cuboid, mesh (slowest) | training after the last frame | frames dropped | peak memory of server, client |'
+echo '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |'
 for sequence in "${sequences[@]}"; do
   name=$(basename "$sequence")
   "$romap" run "$sequence" --server "$address" --realtime --permute-labels 1 \
@@ -42,8 +43,8 @@ for sequence in "${sequences[@]}"; do
     / rejected, .* dropped\)/ { dropped = $7; for (i = 1; i < NF; ++i) if ($i == "took") training = $(i + 1) }
     /^peak memory:/ { memory = $4 " MiB, " $7 " MiB" }
     /^[0-9]+_/ && / s +[0-9]+ +[0-9.]+ s +[0-9.]+ s$/ { if ($(NF-3) > cuboid) cuboid = $(NF-3); if ($(NF-1) > mesh) mesh = $(NF-1) }
-    /^mean/ && !found { found = $2 " of " $4; acc = $6; comp = $8; r04 = $10; r1 = $12; next }
+    /^mean/ && !found { found = $2 " of " $4; acc = $6; comp = $8; r04 = $10; r1 = $12; closed = $13; hollow = $14; normal = $15; next }
     /^mean / && NF <= 8 { iou = $5 }
-    END { printf "| %s | %s | %.2f | %.3f | %.3f | %.1f %% | %.1f %% | %.2f s, %.2f s | %s s | %s | %s |\n",
-                 name, found, iou, acc, comp, r04, r1, cuboid, mesh, training, dropped, memory }' "$out/$name.txt"
+    END { printf "| %s | %s | %.2f | %.3f | %.3f | %.1f %% | %.1f %% | %.3f | %s %% | %s deg | %.2f s, %.2f s | %s s | %s | %s |\n",
+                 name, found, iou, acc, comp, r04, r1, closed, hollow, normal, cuboid, mesh, training, dropped, memory }' "$out/$name.txt"
 done

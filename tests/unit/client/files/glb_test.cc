@@ -144,7 +144,7 @@ TEST(GlbTest, RejectsInvalidMeshes) {
   EXPECT_CODE(WriteGlb(path, Mesh()), absl::StatusCode::kInvalidArgument);
   Mesh mesh = Triangle();
   mesh.normals.pop_back();
-  EXPECT_EQ(Message(WriteGlb(path, mesh)), path + ": 2 normals and 3 colors for 3 vertices");
+  EXPECT_EQ(Message(WriteGlb(path, mesh)), path + ": 2 normals, 3 colors and 0 texture coordinates for 3 vertices");
   mesh = Triangle();
   mesh.triangles[0][1] = 3;
   EXPECT_CODE(WriteGlb(path, mesh), absl::StatusCode::kInvalidArgument);

@@ -43,11 +43,13 @@ TEST_F(ViewDepthTest, NothingIsKnownOutsideTheCropAndBehindTheCamera) {
   EXPECT_EQ(depth.Relate({0, 0, -4}), Relation::kUnknown);
 }
 
-TEST_F(ViewDepthTest, ARayThatMeetsNothingIsEmptyOnlyWhereTheMaskShowsBackground) {
+// A mask that is larger than the object does not make the space around it solid.
+TEST_F(ViewDepthTest, ARayThatMeetsNothingIsEmpty) {
   const Eigen::Vector3f beside_sphere(0.8f, 0.8f, 0);
-  EXPECT_EQ(Make().Relate(beside_sphere), Relation::kUnknown);
-  Paint(RayKind::kBackground);
-  EXPECT_EQ(Make().Relate(beside_sphere), Relation::kInFront);
+  for (const RayKind kind : {RayKind::kObject, RayKind::kBackground}) {
+    Paint(kind);
+    EXPECT_EQ(Make().Relate(beside_sphere), Relation::kInFront);
+  }
 }
 
 TEST_F(ViewDepthTest, NothingIsKnownBehindAnOccluder) {
