@@ -15,7 +15,7 @@ namespace romap::session {
 namespace {
 
 // More views cost more time, but hardly improve a texture.
-constexpr size_t kMaxTextureViews = 48;
+constexpr size_t kMaxTextureViews = 24;
 
 std::vector<texture::TextureView> TextureViewsOf(const FieldSnapshot& snapshot) {
   std::vector<texture::TextureView> views;

@@ -9,6 +9,15 @@
 #include "server/session/mesh_encoding.h"
 
 namespace romap::session {
+namespace {
+
+// Pause after which a session is considered to send no more snapshots. Longer than the interval of its snapshots.
+constexpr std::chrono::milliseconds kQuiet{1500};
+// A final mesh of a session that never pauses waits no longer.
+constexpr std::chrono::seconds kMaxFinalWait{20};
+
+}  // namespace
+
 Mesher::Mesher(const mesh::MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
   if (threading == Threading::kOwnThread) thread_ = std::thread([this] { Run(); });
 }
@@ -32,6 +41,7 @@ Mesher::SessionId Mesher::AddSession(Sink sink) {
 void Mesher::RemoveSession(SessionId session) {
   std::unique_lock lock(mutex_);
   sinks_.erase(session);
+  last_offer_.erase(session);
   std::erase_if(waiting_, [&](const auto& entry) { return entry.first.first == session; });
   changed_.wait(lock, [&] { return busy_session_ != session; });
 }
@@ -46,7 +56,11 @@ void Mesher::Offer(SessionId session, FieldSnapshot snapshot) {
     return;
   }
   WaitingSnapshot& slot = waiting_[{session, snapshot.object}];
-  if (slot.ticket == 0) slot.ticket = next_ticket_++;
+  last_offer_[session] = Clock::now();
+  if (slot.ticket == 0) {
+    slot.ticket = next_ticket_++;
+    slot.since = Clock::now();
+  }
   slot.snapshot = std::move(snapshot);
   changed_.notify_all();
 }
@@ -76,15 +90,33 @@ void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
   }
 }
 
+// When a waiting snapshot may be meshed.
+Mesher::Clock::time_point Mesher::DueTime(const Waiting::value_type& entry) const {
+  const WaitingSnapshot& waiting = entry.second;
+  if (!waiting.snapshot.converged || !config_.texture) return waiting.since;
+  return std::min(last_offer_.at(entry.first.first) + kQuiet, waiting.since + kMaxFinalWait);
+}
+
+// Meshes without a texture are due at once. `waiting_` must not be empty.
+Mesher::Waiting::iterator Mesher::FirstDue() {
+  const Clock::time_point now = Clock::now();
+  return std::min_element(waiting_.begin(), waiting_.end(), [&](const auto& a, const auto& b) {
+    const Clock::time_point due_a = std::max(now, DueTime(a)), due_b = std::max(now, DueTime(b));
+    return due_a != due_b ? due_a < due_b : a.second.ticket < b.second.ticket;
+  });
+}
+
 void Mesher::Run() {
   LowerThreadPriority(kTrainingNice);
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [&] { return stopping_ || !waiting_.empty(); });
     if (stopping_) return;
-    const auto oldest = std::min_element(waiting_.begin(), waiting_.end(), [](const auto& a, const auto& b) {
-      return a.second.ticket < b.second.ticket;
-    });
+    const auto oldest = FirstDue();
+    if (const Clock::time_point due = DueTime(*oldest); due > Clock::now()) {
+      changed_.wait_until(lock, due);  // or until another snapshot arrives
+      continue;
+    }
     busy_session_ = oldest->first.first;
     const Sink sink = sinks_.at(busy_session_);
     const FieldSnapshot snapshot = std::move(oldest->second.snapshot);

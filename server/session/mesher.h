@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -16,7 +17,8 @@
 namespace romap::session {
 
 // The server's mesh thread: converts the field snapshots of all sessions to Draco meshes, oldest first. Per object only
-// the newest snapshot waits. Thread-safe.
+// the newest snapshot waits. A mesh with a texture takes many times as long as one without, so final meshes wait until
+// their session sends no other snapshots. Thread-safe.
 class Mesher {
  public:
   using SessionId = uint64_t;
@@ -41,13 +43,18 @@ class Mesher {
   bool IsIdle(SessionId session) const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   using Key = std::pair<SessionId, ObjectId>;
   struct WaitingSnapshot {
     uint64_t ticket = 0;  // order of arrival of the object's first waiting snapshot
+    Clock::time_point since = {};
     FieldSnapshot snapshot;
   };
+  using Waiting = std::map<Key, WaitingSnapshot>;
 
   void Run();
+  Clock::time_point DueTime(const Waiting::value_type& entry) const;
+  Waiting::iterator FirstDue();
   void MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const;
 
   const mesh::MeshConfig config_;
@@ -55,7 +62,8 @@ class Mesher {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<SessionId, Sink> sinks_;
-  std::map<Key, WaitingSnapshot> waiting_;
+  std::map<SessionId, Clock::time_point> last_offer_;
+  Waiting waiting_;
   SessionId next_session_ = 1;
   uint64_t next_ticket_ = 1;
   SessionId busy_session_ = 0;  // whose snapshot the thread is meshing; 0 = none

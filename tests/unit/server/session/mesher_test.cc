@@ -92,6 +92,23 @@ TEST(MesherTest, RemovedSessionsReceiveNoMeshes) {
   EXPECT_TRUE(mesher.IsIdle(session));
 }
 
+// A final mesh waits for a pause of its session, a mesh of a field that still trains does not.
+TEST(MesherTest, FinalMeshesComeAfterOtherMeshes) {
+  Mesher mesher(CoarseMeshes());
+  Received received;
+  const Mesher::SessionId session = mesher.AddSession(received.Sink());
+  FieldSnapshot final = BallSnapshot(1, 100);
+  final.converged = true;
+  mesher.Offer(session, final);
+  mesher.Offer(session, BallSnapshot(2, 10));
+  ASSERT_TRUE(testing_support::Eventually([&] { return mesher.IsIdle(session); }));
+  const std::vector<MeshUpdate> meshes = received.meshes();
+  ASSERT_EQ(meshes.size(), 2u);
+  EXPECT_EQ(meshes[0].id, ObjectId{2});
+  EXPECT_EQ(meshes[1].id, ObjectId{1});
+  EXPECT_TRUE(meshes[1].final);
+}
+
 // The mesh thread is blocked in the sink of another session while snapshots arrive.
 TEST(MesherTest, OnlyTheNewestSnapshotOfAnObjectWaits) {
   Received received;
