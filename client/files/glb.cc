@@ -12,6 +12,7 @@
 
 #include "client/files/mesh_file.h"
 #include "client/files/text_file.h"
+#include "common/mesh_faces.h"
 
 namespace romap::files {
 namespace {
@@ -51,15 +52,11 @@ uint16_t LinearFromSrgb(uint8_t value) {
 }
 
 int AddPositions(const Mesh& mesh, tinygltf::Model* model) {
-  Eigen::Vector3f low = mesh.vertices.front(), high = low;
-  for (const Eigen::Vector3f& vertex : mesh.vertices) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
+  const Eigen::AlignedBox3f bounds = BoundsOf(mesh);
   const int index = AddArray<Eigen::Vector3f>(mesh.vertices, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3,
                                               TINYGLTF_TARGET_ARRAY_BUFFER, mesh.vertices.size(), model);
-  model->accessors[index].minValues.assign(low.data(), low.data() + 3);
-  model->accessors[index].maxValues.assign(high.data(), high.data() + 3);
+  model->accessors[index].minValues.assign(bounds.min().data(), bounds.min().data() + 3);
+  model->accessors[index].maxValues.assign(bounds.max().data(), bounds.max().data() + 3);
   return index;
 }
 

@@ -50,6 +50,7 @@ find_package(TinyGLTF CONFIG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
 find_package(utf8cpp CONFIG REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
+pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)
 
 # OpenCV's headers cause warnings under C++20, so they are included as system headers.
 add_library(romap_opencv INTERFACE)

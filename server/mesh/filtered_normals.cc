@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/mesh_faces.h"
+
 namespace romap::mesh {
 namespace {
 
@@ -35,27 +37,6 @@ class VertexTriangles {
   std::vector<uint32_t> triangles_;
 };
 
-// The triangles of a mesh, as far as they depend on its vertices.
-struct TriangleShapes {
-  std::vector<Eigen::Vector3f> center, normal;
-  std::vector<float> area;
-};
-
-TriangleShapes ShapesOf(const Mesh& mesh) {
-  TriangleShapes shapes;
-  for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3f& a = mesh.vertices[triangle[0]];
-    const Eigen::Vector3f& b = mesh.vertices[triangle[1]];
-    const Eigen::Vector3f& c = mesh.vertices[triangle[2]];
-    const Eigen::Vector3f cross = (b - a).cross(c - a);
-    const float length = cross.norm();
-    shapes.center.push_back((a + b + c) / 3.0f);
-    shapes.normal.push_back(length > 0 ? Eigen::Vector3f(cross / length) : Eigen::Vector3f::Zero().eval());
-    shapes.area.push_back(0.5f * length);
-  }
-  return shapes;
-}
-
 // About exp(-x) for x >= 0; several times faster than std::exp.
 float Falloff(float x) {
   if (x > 8.0f) return 0;
@@ -71,7 +52,7 @@ struct Neighborhoods {
   std::vector<float> weight = {};  // by neighbor: of its area and distance
 };
 
-Neighborhoods FindNeighborhoods(const Mesh& mesh, const VertexTriangles& at_vertex, const TriangleShapes& shapes) {
+Neighborhoods FindNeighborhoods(const Mesh& mesh, const VertexTriangles& at_vertex, const FaceShapes& shapes) {
   Neighborhoods found;
   std::vector<uint32_t> visited_by(mesh.triangles.size(), UINT32_MAX);
   double sum_mu = 0;
@@ -91,19 +72,19 @@ Neighborhoods FindNeighborhoods(const Mesh& mesh, const VertexTriangles& at_vert
   const double mean_mu = sum_mu / std::max<double>(1, static_cast<double>(found.neighbor.size()));
   const float per_distance = mean_mu > 0 ? static_cast<float>(0.5 / (mean_mu * mean_mu)) : 0;
   for (size_t k = 0; k < found.weight.size(); ++k) {
-    found.weight[k] = shapes.area[found.neighbor[k]] * Falloff(found.weight[k] * found.weight[k] * per_distance);
+    found.weight[k] = shapes.area_mu2[found.neighbor[k]] * Falloff(found.weight[k] * found.weight[k] * per_distance);
   }
   return found;
 }
 
 std::vector<Eigen::Vector3f> FilterNormals(const Mesh& mesh, const VertexTriangles& at_vertex,
-                                           const TriangleShapes& shapes) {
+                                           const FaceShapes& shapes) {
   const Neighborhoods around = FindNeighborhoods(mesh, at_vertex, shapes);
   constexpr float kPerDifference = 0.5f / (kNoise * kNoise);
   std::vector<Eigen::Vector3f> normals = shapes.normal, filtered = normals;
   for (int pass = 0; pass < kPasses; ++pass) {
     for (size_t t = 0; t < normals.size(); ++t) {
-      Eigen::Vector3f sum = shapes.area[t] * normals[t];
+      Eigen::Vector3f sum = shapes.area_mu2[t] * normals[t];
       for (uint32_t k = around.first[t]; k < around.first[t + 1]; ++k) {
         const Eigen::Vector3f& other = normals[around.neighbor[k]];
         sum += around.weight[k] * Falloff((normals[t] - other).squaredNorm() * kPerDifference) * other;
@@ -120,12 +101,12 @@ std::vector<Eigen::Vector3f> FilterNormals(const Mesh& mesh, const VertexTriangl
 
 void SetFilteredNormals(Mesh& mesh) {
   const VertexTriangles at_vertex(mesh);
-  const TriangleShapes shapes = ShapesOf(mesh);
+  const FaceShapes shapes(mesh);
   const std::vector<Eigen::Vector3f> normals = FilterNormals(mesh, at_vertex, shapes);
   mesh.normals.assign(mesh.vertices.size(), Eigen::Vector3f::UnitZ());
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    for (const uint32_t* t = at_vertex.begin(v); t != at_vertex.end(v); ++t) sum += shapes.area[*t] * normals[*t];
+    for (const uint32_t* t = at_vertex.begin(v); t != at_vertex.end(v); ++t) sum += shapes.area_mu2[*t] * normals[*t];
     if (sum.norm() > 0) mesh.normals[v] = sum.normalized();
   }
 }

@@ -17,18 +17,13 @@ namespace {
 // More views cost more time, but hardly improve a texture.
 constexpr size_t kMaxTextureViews = 24;
 
-std::vector<texture::TextureView> TextureViewsOf(const FieldSnapshot& snapshot) {
-  std::vector<texture::TextureView> views;
+std::vector<TrainingCamera> TextureViewsOf(const FieldSnapshot& snapshot) {
+  std::vector<TrainingCamera> views;
   const size_t all = snapshot.cameras.size();
   const size_t count = std::min(kMaxTextureViews, all);
   for (size_t k = 0; k < count; ++k) {
-    const TrainingCamera& camera = snapshot.cameras[k * all / count];
-    texture::TextureView view{.T_camera_object = camera.T_camera_object,
-                              .camera = camera.camera,
-                              .roi_px = camera.roi_px,
-                              .color_bgr = camera.color_bgr,
-                              .ray_kind = camera.ray_kind};
-    if (texture::ValidateTextureView(view).ok()) views.push_back(std::move(view));
+    const TrainingCamera& view = snapshot.cameras[k * all / count];
+    if (texture::ValidateTextureView(view).ok()) views.push_back(view);
   }
   return views;
 }
@@ -36,16 +31,14 @@ std::vector<texture::TextureView> TextureViewsOf(const FieldSnapshot& snapshot) 
 // Replaces the mesh by a simpler one with a texture.
 absl::Status AddTexture(const FieldSnapshot& snapshot, const mesh::MeshConfig& config, Mesh* mesh,
                         MeshTexture* texture) {
-  const std::vector<texture::TextureView> views = TextureViewsOf(snapshot);
+  const std::vector<TrainingCamera> views = TextureViewsOf(snapshot);
   if (views.empty()) return FailedPrecondition("no view shows the object");
   texture::TextureOptions options;
   options.max_triangles = static_cast<size_t>(config.texture_triangles);
   options.max_atlas_px = config.texture_px;
   ROMAP_ASSIGN_OR_RETURN(texture::TexturedObject textured, texture::TextureMesh(*mesh, views, options));
   *mesh = std::move(textured.textured.mesh);
-  mesh->uv = std::move(textured.textured.uv);
-  texture->image.assign(textured.image.begin(), textured.image.end());
-  texture->media_type = std::move(textured.media_type);
+  *texture = std::move(textured.texture);
   return absl::OkStatus();
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kTexelsPerTask = 4096;
 
-std::vector<PreparedView> PrepareViews(std::span<const TextureView> views, const Mesh& mesh) {
+std::vector<PreparedView> PrepareViews(std::span<const TrainingCamera> views, const Mesh& mesh) {
   std::vector<std::optional<PreparedView>> prepared(views.size());
   ParallelFor(views.size(), [&](size_t i) {
     if (ValidateTextureView(views[i]).ok()) prepared[i].emplace(views[i], mesh);
@@ -55,7 +55,8 @@ class BestViews {
 
 }  // namespace
 
-BakedTexture BakeTexture(const TexturedMesh& textured, std::span<const TextureView> views, const BakeOptions& options) {
+BakedTexture BakeTexture(const TexturedMesh& textured, std::span<const TrainingCamera> views,
+                         const BakeOptions& options) {
   BakedTexture texture;
   texture.color_bgr = cv::Mat(textured.atlas_px, textured.atlas_px, CV_8UC3, cv::Scalar::all(128));
   texture.seen = cv::Mat::zeros(textured.atlas_px, textured.atlas_px, CV_8UC1);

@@ -25,6 +25,7 @@ struct BakedTexture {
 //
 // Views that are not valid (ValidateTextureView) are ignored. Without valid views, the texture shows the vertex colors.
 // Uses the threads of oneTBB; the result does not depend on their number.
-BakedTexture BakeTexture(const TexturedMesh& textured, std::span<const TextureView> views, const BakeOptions& options);
+BakedTexture BakeTexture(const TexturedMesh& textured, std::span<const TrainingCamera> views,
+                         const BakeOptions& options);
 
 }  // namespace romap::texture

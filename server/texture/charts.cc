@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "common/mesh_faces.h"
 #include "server/texture/chart_plane.h"
 #include "server/texture/mesh_edges.h"
 #include "server/texture/normal_clusters.h"
@@ -24,13 +25,8 @@ constexpr float kMostCells = 512;  // along the diagonal of the mesh
 // mesh touches few cells.
 float CellSize(const Mesh& mesh, float total_area_mu2) {
   if (mesh.triangles.empty()) return 1;
-  Eigen::Vector3f low = mesh.vertices[0], high = low;
-  for (const Eigen::Vector3f& p : mesh.vertices) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
   const float size_mu = std::max(std::sqrt(2 * total_area_mu2 / static_cast<float>(mesh.triangles.size())),
-                                 (high - low).norm() / kMostCells);
+                                 BoundsOf(mesh).diagonal().norm() / kMostCells);
   return size_mu > 0 ? size_mu : 1;
 }
 

@@ -5,8 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <utility>
+
+#include "common/disjoint_sets.h"
 
 namespace romap::texture {
 namespace {
@@ -60,25 +61,12 @@ struct OrderedEdge {
   bool is_forward;  // from `low` to `high`
 };
 
-class CornerSets {
- public:
-  explicit CornerSets(size_t corners) : parent_(corners) { std::iota(parent_.begin(), parent_.end(), 0); }
-  uint32_t Root(uint32_t corner) {
-    while (parent_[corner] != corner) corner = parent_[corner] = parent_[parent_[corner]];
-    return corner;
-  }
-  void Join(uint32_t a, uint32_t b) { parent_[Root(a)] = Root(b); }
-
- private:
-  std::vector<uint32_t> parent_;
-};
-
 uint32_t NextCorner(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 
 // Pairs the half-edges of one edge and joins the corners at their ends.
 class EdgePairing {
  public:
-  EdgePairing(std::span<const Eigen::Vector3f> vertices, std::span<const Triangle> triangles, CornerSets& corners)
+  EdgePairing(std::span<const Eigen::Vector3f> vertices, std::span<const Triangle> triangles, DisjointSets& corners)
       : vertices_(vertices), triangles_(triangles), corners_(corners) {}
 
   void Pair(std::span<const OrderedEdge> edges) {
@@ -126,7 +114,7 @@ class EdgePairing {
 
   std::span<const Eigen::Vector3f> vertices_;
   std::span<const Triangle> triangles_;
-  CornerSets& corners_;
+  DisjointSets& corners_;
 };
 
 std::vector<OrderedEdge> SortedEdges(const std::vector<Triangle>& triangles) {
@@ -159,7 +147,7 @@ void ForEachEdge(const std::vector<OrderedEdge>& edges, const Visit& visit) {
 
 ManifoldTriangles MakeManifold(std::span<const Eigen::Vector3f> vertices, std::vector<Triangle> triangles) {
   RemoveFlat(triangles);
-  CornerSets corners(triangles.size() * 3);
+  DisjointSets corners(triangles.size() * 3);
   EdgePairing pairing(vertices, triangles, corners);
   ForEachEdge(SortedEdges(triangles), [&](std::span<const OrderedEdge> edges) { pairing.Pair(edges); });
 

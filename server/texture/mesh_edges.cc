@@ -6,6 +6,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "common/mesh_faces.h"
+
 namespace romap::texture {
 namespace {
 
@@ -60,20 +62,6 @@ std::vector<uint32_t> NumberByPosition(const Mesh& mesh) {
     numbers[order[i]] = number;
   }
   return numbers;
-}
-
-FaceShapes::FaceShapes(const Mesh& mesh) {
-  normal.reserve(mesh.triangles.size());
-  area_mu2.reserve(mesh.triangles.size());
-  double total = 0;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Eigen::Vector3f cross = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    const float length = cross.norm();
-    normal.push_back(length > 0 ? Eigen::Vector3f(cross / length) : Eigen::Vector3f::Zero());
-    area_mu2.push_back(length / 2);
-    total += length / 2;
-  }
-  total_area_mu2 = static_cast<float>(total);
 }
 
 void SetAngleWeightedNormals(Mesh& mesh) {

@@ -22,15 +22,6 @@ std::vector<FaceNeighbors> FindFaceNeighbors(const std::vector<std::array<uint32
 // number. The numbers begin at 0 without gaps.
 std::vector<uint32_t> NumberByPosition(const Mesh& mesh);
 
-// Unit normals of the triangles, outward for counter-clockwise triangles, and their areas [square map units].
-struct FaceShapes {
-  std::vector<Eigen::Vector3f> normal;  // zero for a triangle without area
-  std::vector<float> area_mu2;
-  float total_area_mu2 = 0;
-
-  explicit FaceShapes(const Mesh& mesh);
-};
-
 // Sets unit vertex normals: the mean of the adjacent triangles' normals, weighted by the angle at the vertex, because
 // the sizes of the triangles of a simplified mesh differ widely. Source: G. Thürmer and C. A. Wüthrich, "Computing
 // vertex normals from polygonal facets", Journal of Graphics Tools 1998.

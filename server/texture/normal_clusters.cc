@@ -69,14 +69,14 @@ class ClusterGrower {
       Sums& of = sums[of_face[face]];
       of.area += shapes_.area_mu2[face];
       of.normal += shapes_.area_mu2[face] * normals_[face];
-      of.center += shapes_.area_mu2[face] * Center(face);
+      of.center += shapes_.area_mu2[face] * shapes_.center[face];
     }
     for (uint32_t face = 0; face < of_face.size(); ++face) {
       if (of_face[face] == kNoCluster) continue;
       Sums& of = sums[of_face[face]];
       if (of.area < kMinCenterShare * shapes_.total_area_mu2 || !(of.area > 0)) continue;
       const float cost = 1 - normals_[face].dot(of.normal.normalized()) +
-                         kDistanceCost * (Center(face) - of.center / of.area).squaredNorm() / of.area;
+                         kDistanceCost * (shapes_.center[face] - of.center / of.area).squaredNorm() / of.area;
       if (cost < of.least_cost) std::tie(of.least_cost, of.best) = std::tie(cost, face);
     }
     std::vector<uint32_t> centers;
@@ -99,7 +99,7 @@ class ClusterGrower {
     std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> open;
     const auto push = [&](uint32_t face, uint32_t cluster) {
       const float cost = 1 - normals_[face].dot(normal_[cluster]) +
-                         kDistanceCost * (Center(face) - center_[cluster]).squaredNorm() / area_[cluster];
+                         kDistanceCost * (shapes_.center[face] - center_[cluster]).squaredNorm() / area_[cluster];
       open.emplace(cost, face, cluster);
     };
     std::vector<uint32_t> of_face(mesh_.triangles.size(), kNoCluster);
@@ -119,11 +119,6 @@ class ClusterGrower {
   size_t Clusters() const { return clusters_; }
 
  private:
-  Eigen::Vector3f Center(uint32_t face) const {
-    const auto& [a, b, c] = mesh_.triangles[face];
-    return (mesh_.vertices[a] + mesh_.vertices[b] + mesh_.vertices[c]) / 3.0f;
-  }
-
   const Mesh& mesh_;
   const std::vector<FaceNeighbors>& neighbors_;
   const FaceShapes& shapes_;

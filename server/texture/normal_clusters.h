@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/mesh.h"
+#include "common/mesh_faces.h"
 #include "server/texture/mesh_edges.h"
 
 namespace romap::texture {

@@ -75,7 +75,7 @@ cv::Mat MaskedMean(const cv::Mat& masked, const cv::Mat& low_mask) {
 
 }  // namespace
 
-PreparedView::PreparedView(const TextureView& view, const Mesh& mesh)
+PreparedView::PreparedView(const TrainingCamera& view, const Mesh& mesh)
     : R_camera_object_(view.T_camera_object.RotationMatrix().cast<float>()),
       t_camera_object_(view.T_camera_object.translation().cast<float>()),
       center_(view.T_camera_object.Inverse().translation().cast<float>()),

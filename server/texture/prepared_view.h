@@ -31,7 +31,7 @@ struct ViewSample {
 class PreparedView {
  public:
   // The view must be valid (ValidateTextureView). It may share its pixels.
-  PreparedView(const TextureView& view, const Mesh& mesh);
+  PreparedView(const TrainingCamera& view, const Mesh& mesh);
 
   // The point and its normal (unit length) are in the Object frame. Points that are hidden, less than two pixels inside
   // the object's mask, beside an edge of a surface in front of another one, or viewed at more than 77 degrees have no

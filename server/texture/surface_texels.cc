@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/mesh_faces.h"
 #include "server/texture/mesh_edges.h"
 
 namespace romap::texture {
@@ -20,7 +21,7 @@ class AtlasTriangle {
  public:
   AtlasTriangle(const TexturedMesh& textured, uint32_t face) {
     for (int i = 0; i < 3; ++i) {
-      corner_[i] = textured.uv[textured.mesh.triangles[face][i]] * static_cast<float>(textured.atlas_px) -
+      corner_[i] = textured.mesh.uv[textured.mesh.triangles[face][i]] * static_cast<float>(textured.atlas_px) -
                    Eigen::Vector2f::Constant(0.5f);
     }
     const Eigen::Vector2f u = corner_[1] - corner_[0], v = corner_[2] - corner_[0];

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <utility>
 
+#include "common/mesh_faces.h"
 #include "common/statistics.h"
 #include "common/status.h"
 #include "server/texture/bake_texture.h"
@@ -57,21 +58,10 @@ absl::Status ValidateTextureOptions(const TextureOptions& options) {
   return absl::OkStatus();
 }
 
-struct Bounds {
-  Eigen::Vector3f low, high;
-
-  explicit Bounds(const Mesh& mesh) : low(mesh.vertices[0]), high(low) {
-    for (const Eigen::Vector3f& p : mesh.vertices) {
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-  }
-};
-
 // Pixels per map unit that three quarters of the views have at most; 0: no view shows the center.
-float ResolutionOfViews(std::span<const TextureView> views, const Eigen::Vector3f& center) {
+float ResolutionOfViews(std::span<const TrainingCamera> views, const Eigen::Vector3f& center) {
   std::vector<double> resolutions;
-  for (const TextureView& view : views) {
+  for (const TrainingCamera& view : views) {
     const double depth_mu = (view.T_camera_object * center.cast<double>()).z();
     if (depth_mu > 0) resolutions.push_back((view.camera.fx_px + view.camera.fy_px) / 2 / depth_mu);
   }
@@ -79,22 +69,26 @@ float ResolutionOfViews(std::span<const TextureView> views, const Eigen::Vector3
 }
 
 absl::Status EncodeImage(const cv::Mat& image_bgr, const TextureOptions& options, TexturedObject& object) {
-  object.media_type = options.use_png ? "image/png" : "image/jpeg";
+  MeshTexture& texture = object.texture;
+  texture.media_type = options.use_png ? "image/png" : "image/jpeg";
+  std::vector<uint8_t> bytes;
   const std::vector<int> parameters =
       options.use_png ? std::vector<int>{} : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, options.jpeg_quality};
-  if (!cv::imencode(options.use_png ? ".png" : ".jpg", image_bgr, object.image, parameters)) {
+  if (!cv::imencode(options.use_png ? ".png" : ".jpg", image_bgr, bytes, parameters)) {
     return Internal("a texture of {} x {} px cannot be encoded as {}", image_bgr.cols, image_bgr.rows,
-                    object.media_type);
+                    texture.media_type);
   }
+  texture.image.assign(bytes.begin(), bytes.end());
   return absl::OkStatus();
 }
 
 double ShareSeen(const TexturedMesh& textured, const cv::Mat& seen) {
   double area = 0, seen_area = 0;
   for (const auto& [a, b, c] : textured.mesh.triangles) {
-    const Eigen::Vector2f u = textured.uv[b] - textured.uv[a], v = textured.uv[c] - textured.uv[a];
+    const Eigen::Vector2f u = textured.mesh.uv[b] - textured.mesh.uv[a], v = textured.mesh.uv[c] - textured.mesh.uv[a];
     const double face_area = std::abs(u.x() * v.y() - u.y() * v.x());
-    const Eigen::Vector2f at = (textured.uv[a] + textured.uv[b] + textured.uv[c]) / 3 * static_cast<float>(seen.cols);
+    const Eigen::Vector2f at =
+        (textured.mesh.uv[a] + textured.mesh.uv[b] + textured.mesh.uv[c]) / 3 * static_cast<float>(seen.cols);
     area += face_area;
     if (seen.at<uint8_t>(std::min(static_cast<int>(at.y()), seen.rows - 1),
                          std::min(static_cast<int>(at.x()), seen.cols - 1)) != 0) {
@@ -118,18 +112,18 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-absl::StatusOr<TexturedObject> TextureValidMesh(const Mesh& mesh, std::span<const TextureView> views,
+absl::StatusOr<TexturedObject> TextureValidMesh(const Mesh& mesh, std::span<const TrainingCamera> views,
                                                 const TextureOptions& options) {
   TexturedObject object;
   Stopwatch stopwatch;
-  const Bounds bounds(mesh);
-  const float max_error_mu = options.max_error_share * (bounds.high - bounds.low).norm();
+  const Eigen::AlignedBox3f bounds = BoundsOf(mesh);
+  const float max_error_mu = options.max_error_share * bounds.diagonal().norm();
   const Simplified simplified =
       SimplifyMesh(mesh, {.max_triangles = options.max_triangles, .max_error_mu = max_error_mu});
   object.error_mu = simplified.error_mu;
   object.times.simplify_s = stopwatch.Lap();
 
-  const float resolution = ResolutionOfViews(views, (bounds.low + bounds.high) / 2);
+  const float resolution = ResolutionOfViews(views, bounds.center());
   const UnwrapOptions unwrap = {
       .max_atlas_px = resolution > 0 ? options.max_atlas_px : std::min(options.max_atlas_px, kAtlasWithoutViews_px),
       .texels_per_mu = resolution * options.texels_per_pixel};
@@ -147,7 +141,7 @@ absl::StatusOr<TexturedObject> TextureValidMesh(const Mesh& mesh, std::span<cons
 
 }  // namespace
 
-absl::StatusOr<TexturedObject> TextureMesh(const Mesh& mesh, std::span<const TextureView> views,
+absl::StatusOr<TexturedObject> TextureMesh(const Mesh& mesh, std::span<const TrainingCamera> views,
                                            const TextureOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh));
   for (size_t i = 0; i < views.size(); ++i) {

@@ -33,11 +33,10 @@ struct TextureTimes {
 // A mesh with its texture as a file.
 struct TexturedObject {
   TexturedMesh textured;
-  std::vector<uint8_t> image;  // PNG or JPEG, 8 bits, RGB
-  std::string media_type;      // image/png or image/jpeg
-  float error_mu = 0;          // Simplified::error_mu
-  double seen_share = 0;       // share of the texels of the surface that a view shows
-  TextureTimes times;          // wall time
+  MeshTexture texture;    // 8 bits, RGB
+  float error_mu = 0;     // Simplified::error_mu
+  double seen_share = 0;  // share of the texels of the surface that a view shows
+  TextureTimes times;     // wall time
 };
 
 // Simplifies a mesh (Object frame), unwraps it and colors its texture from the views. The resolution of the texture is
@@ -47,7 +46,7 @@ struct TexturedObject {
 // INVALID_ARGUMENT: the mesh has no triangles, vertices that are not finite or beyond 1e9, triangles without vertices,
 // or attributes of another length than the vertices; a view is not valid (ValidateTextureView); an option is outside
 // its range. The message names the element. INTERNAL: the image cannot be encoded.
-absl::StatusOr<TexturedObject> TextureMesh(const Mesh& mesh, std::span<const TextureView> views,
+absl::StatusOr<TexturedObject> TextureMesh(const Mesh& mesh, std::span<const TrainingCamera> views,
                                            const TextureOptions& options);
 
 }  // namespace romap::texture

@@ -7,7 +7,7 @@
 
 namespace romap::texture {
 
-absl::Status ValidateTextureView(const TextureView& view) {
+absl::Status ValidateTextureView(const TrainingCamera& view) {
   if (!view.T_camera_object.IsFinite()) return InvalidArgument("the pose is not finite");
   const CameraModel& camera = view.camera;
   if (!(camera.fx_px > 0 && camera.fy_px > 0) || !std::isfinite(camera.fx_px + camera.fy_px) ||

@@ -182,7 +182,7 @@ absl::StatusOr<TexturedMesh> UnwrapMesh(const Mesh& mesh, const UnwrapOptions& o
       if (!mesh.normals.empty()) result.mesh.normals.push_back(mesh.normals[vertex]);
       if (!mesh.colors.empty()) result.mesh.colors.push_back(mesh.colors[vertex]);
       if (!mesh.confidence.empty()) result.mesh.confidence.push_back(mesh.confidence[vertex]);
-      result.uv.push_back(packer.AtlasPosition_px(i, j) / static_cast<float>(result.atlas_px));
+      result.mesh.uv.push_back(packer.AtlasPosition_px(i, j) / static_cast<float>(result.atlas_px));
     }
   }
   return result;

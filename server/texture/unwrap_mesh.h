@@ -9,13 +9,10 @@
 
 namespace romap::texture {
 
-// A mesh with texture coordinates. Vertices on the borders of charts occur once per chart, at the same position.
+// A mesh with texture coordinates (Mesh::uv) and the size of its texture. Vertices on the borders of charts occur once
+// per chart, at the same position. The center of texel (x, y) is at ((x + 0.5) / atlas_px, (y + 0.5) / atlas_px).
 struct TexturedMesh {
-  Mesh mesh;  // Object frame
-  // Of each vertex, in [0, 1]: u to the right, v down, as in the rows of an image; (0, 0) is the upper left corner of
-  // the first texel, so the center of texel (x, y) is at ((x + 0.5) / atlas_px, (y + 0.5) / atlas_px). This is the
-  // convention of glTF.
-  std::vector<Eigen::Vector2f> uv;
+  Mesh mesh;         // Object frame
   int atlas_px = 0;  // width and height of the texture
 };
 

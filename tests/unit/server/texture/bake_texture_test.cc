@@ -26,10 +26,10 @@ const TexturedMesh& Sphere() {
 }
 
 // Views of the sphere; the pixels are copies that a test may change.
-std::vector<TextureView> SphereViews() {
-  static const std::vector<TextureView> photos = PhotographAll(PosesAround(24, 5, 0), SolidSphere(), Checker());
-  std::vector<TextureView> views = photos;
-  for (TextureView& view : views) {
+std::vector<TrainingCamera> SphereViews() {
+  static const std::vector<TrainingCamera> photos = PhotographAll(PosesAround(24, 5, 0), SolidSphere(), Checker());
+  std::vector<TrainingCamera> views = photos;
+  for (TrainingCamera& view : views) {
     view.color_bgr = view.color_bgr.clone();
     view.ray_kind = view.ray_kind.clone();
   }
@@ -42,7 +42,7 @@ const BakedTexture& CleanTexture() {
 }
 
 double PsnrOfSphere(const BakedTexture& texture) {
-  static const std::vector<TextureView> held_out = PhotographAll(PosesAround(4, 5, 0.31), SolidSphere(), Checker());
+  static const std::vector<TrainingCamera> held_out = PhotographAll(PosesAround(4, 5, 0.31), SolidSphere(), Checker());
   return PsnrOfViews(Sphere().mesh, ColorOfTexture(Sphere(), texture.color_bgr), held_out);
 }
 
@@ -69,7 +69,7 @@ TEST(BakeTextureTest, ViewsAroundTheObjectShowAllOfIt) {
 
 TEST(BakeTextureTest, AHighlightInOneViewDoesNotChangeTheTexture) {
   for (const size_t changed : {3u, 12u, 20u}) {
-    std::vector<TextureView> views = SphereViews();
+    std::vector<TrainingCamera> views = SphereViews();
     cv::circle(views[changed].color_bgr, {100, 100}, 25, cv::Scalar(255, 255, 255), cv::FILLED);
     const BakedTexture texture = BakeTexture(Sphere(), views, {});
     const double share = ShareChanged(texture.color_bgr, CleanTexture().color_bgr, 25);
@@ -79,7 +79,7 @@ TEST(BakeTextureTest, AHighlightInOneViewDoesNotChangeTheTexture) {
 }
 
 TEST(BakeTextureTest, AnObjectInFrontInOneViewDoesNotChangeTheTexture) {
-  std::vector<TextureView> views = SphereViews();
+  std::vector<TrainingCamera> views = SphereViews();
   cv::rectangle(views[12].color_bgr, {20, 80, 160, 30}, cv::Scalar(30, 160, 30), cv::FILLED);
   const BakedTexture texture = BakeTexture(Sphere(), views, {});
   const double share = ShareChanged(texture.color_bgr, CleanTexture().color_bgr, 25);
@@ -89,8 +89,8 @@ TEST(BakeTextureTest, AnObjectInFrontInOneViewDoesNotChangeTheTexture) {
 
 // Pixels that the mask assigns to another object are not used, whatever they show.
 TEST(BakeTextureTest, PixelsOutsideTheMaskAreNotUsed) {
-  std::vector<TextureView> views = SphereViews();
-  for (TextureView& view : views) {
+  std::vector<TrainingCamera> views = SphereViews();
+  for (TrainingCamera& view : views) {
     const cv::Rect box(90, 20, 40, 160);
     cv::rectangle(view.color_bgr, box, cv::Scalar(255, 0, 255), cv::FILLED);
     view.ray_kind(box).setTo(static_cast<int>(RayKind::kOccluder));
@@ -104,7 +104,7 @@ TEST(BakeTextureTest, PixelsOutsideTheMaskAreNotUsed) {
 
 TEST(BakeTextureTest, ExposureDifferencesLeaveNoSeams) {
   constexpr double kDark = 0.85;  // no color is saturated
-  std::vector<TextureView> views = SphereViews();
+  std::vector<TrainingCamera> views = SphereViews();
   for (size_t i = 0; i < views.size(); ++i) {
     const double x = static_cast<double>(i);
     const cv::Scalar gain(1 + 0.2 * std::sin(7 * x), 1 + 0.2 * std::sin(7 * x + 0.3), 1 + 0.2 * std::sin(7 * x - 0.3));
@@ -157,7 +157,7 @@ TEST(BakeTextureTest, BordersOfChartsAreNotVisible) {
       for (const double share : {0.0, 0.25, 0.5, 0.75}) {
         const auto at = [&](uint32_t from, uint32_t to) {
           const Eigen::Vector2d uv =
-              (1 - share) * sphere.uv[from].cast<double>() + share * sphere.uv[to].cast<double>();
+              (1 - share) * sphere.mesh.uv[from].cast<double>() + share * sphere.mesh.uv[to].cast<double>();
           return TextureAt(texture.color_bgr, uv);
         };
         differences.push_back((at(a, b) - at(other->second.second, other->second.first)).abs().maxCoeff());
@@ -170,12 +170,12 @@ TEST(BakeTextureTest, BordersOfChartsAreNotVisible) {
 }
 
 TEST(BakeTextureTest, BlurredViewsDoNotBlurTheTexture) {
-  std::vector<TextureView> views = SphereViews();
+  std::vector<TrainingCamera> views = SphereViews();
   for (size_t i = 0; i < views.size(); ++i) {
     if (i % 3 != 0) cv::GaussianBlur(views[i].color_bgr, views[i].color_bgr, {0, 0}, 2.5);
   }
   const double psnr = PsnrOfSphere(BakeTexture(Sphere(), views, {}));
-  for (TextureView& view : views) cv::GaussianBlur(view.color_bgr, view.color_bgr, {0, 0}, 2.5);
+  for (TrainingCamera& view : views) cv::GaussianBlur(view.color_bgr, view.color_bgr, {0, 0}, 2.5);
   const double all_blurred = PsnrOfSphere(BakeTexture(Sphere(), views, {}));
   EXPECT_GE(psnr, all_blurred + 4);
 }
@@ -199,7 +199,7 @@ TEST(BakeTextureTest, HiddenSurfacesAreNotColoredByThoseInFront) {
   for (const auto& [a, b, c] : small.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
   SetAngleWeightedNormals(mesh);
   const TexturedMesh textured = *UnwrapMesh(mesh, {.texels_per_mu = 80});
-  const std::vector<TextureView> views = PhotographAll(PosesAround(24, 5, 0), both, color);
+  const std::vector<TrainingCamera> views = PhotographAll(PosesAround(24, 5, 0), both, color);
   const BakedTexture texture = BakeTexture(textured, views, {});
   size_t seen = 0, wrong = 0;
   for (const SurfaceTexel& texel : FindSurfaceTexels(textured)) {
@@ -217,7 +217,7 @@ TEST(BakeTextureTest, TheUnseenSideIsFlaggedAndContinuesTheColors) {
   TexturedMesh textured = Sphere();
   const Eigen::Array3d vertex_bgr(60, 120, 140), true_bgr(90, 150, 170);
   for (size_t i = 0; i < textured.mesh.vertices.size(); ++i) textured.mesh.colors.push_back({140, 120, 60});
-  std::vector<TextureView> views;
+  std::vector<TrainingCamera> views;
   for (int i = 0; i < 8; ++i) {
     const double angle = i * std::numbers::pi / 4;
     views.push_back(Photograph(LookAtOrigin({2 * std::cos(angle), 2 * std::sin(angle), 4.5}), SolidSphere(),
@@ -243,7 +243,7 @@ TEST(BakeTextureTest, WithoutViewsTheTextureShowsTheVertexColors) {
                                     static_cast<uint8_t>(128 + 100 * p.z())});
   }
   // Views that cannot be used are the same as no views.
-  std::vector<TextureView> unusable(6, SphereViews()[0]);
+  std::vector<TrainingCamera> unusable(6, SphereViews()[0]);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   unusable[0].T_camera_object = SE3<Camera, Object>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, nan, 0));
   unusable[1].camera.fx_px = nan;
@@ -252,7 +252,7 @@ TEST(BakeTextureTest, WithoutViewsTheTextureShowsTheVertexColors) {
   unusable[4].T_camera_object =
       SE3<Camera, Object>(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, -5));                          // behind
   unusable[5].T_camera_object = SE3<Camera, Object>(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero());  // inside
-  for (const std::vector<TextureView>& views : {std::vector<TextureView>(), unusable}) {
+  for (const std::vector<TrainingCamera>& views : {std::vector<TrainingCamera>(), unusable}) {
     const BakedTexture texture = BakeTexture(textured, views, {});
     EXPECT_EQ(cv::countNonZero(texture.seen), 0);
     for (const SurfaceTexel& texel : FindSurfaceTexels(textured)) {

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "common/mesh_faces.h"
 #include "server/texture/chart_plane.h"
 #include "server/texture/mesh_edges.h"
 #include "tests/unit/server/texture/texture_scenes.h"

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/mesh_faces.h"
 #include "tests/unit/server/texture/texture_scenes.h"
 
 namespace romap::texture::mesh_edges_test {

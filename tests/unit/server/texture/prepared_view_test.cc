@@ -10,7 +10,7 @@ namespace romap::texture::prepared_view_test {
 // The color is the position: (p + 1) * 100.
 const SolidTexture kPositions = [](const Eigen::Vector3d& p) { return (p.array() + 1) * 100; };
 
-TextureView FrontView() { return Photograph(LookAtOrigin({5, 0, 0}), SolidSphere(), kPositions); }
+TrainingCamera FrontView() { return Photograph(LookAtOrigin({5, 0, 0}), SolidSphere(), kPositions); }
 
 TEST(PreparedViewTest, ColorsAreThoseOfThePoint) {
   const PreparedView view(FrontView(), SphereMesh(24));
@@ -56,7 +56,7 @@ TEST(PreparedViewTest, HiddenPointsHaveNoWeight) {
 }
 
 TEST(PreparedViewTest, OnlyPixelsInsideTheMaskCount) {
-  TextureView photo = FrontView();
+  TrainingCamera photo = FrontView();
   photo.ray_kind(cv::Rect(0, 0, 100, 200)).setTo(static_cast<int>(RayKind::kOccluder));
   const PreparedView view(photo, SphereMesh(24));
   // The camera looks along -x, so +y is to the right; 100 px per unit at the front.

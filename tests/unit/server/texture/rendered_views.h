@@ -87,9 +87,9 @@ inline std::vector<SE3<Camera, Object>> PosesAround(int count, double distance_m
 inline constexpr int kCrop_px = 200;
 
 // A view with 200 x 200 px; each pixel is the mean of 3 x 3 rays.
-inline TextureView Photograph(const SE3<Camera, Object>& T_camera_object, const SolidShape& shape,
-                              const SolidTexture& color) {
-  TextureView view{T_camera_object, TestCamera(), cv::Rect(220, 140, kCrop_px, kCrop_px), {}, {}};
+inline TrainingCamera Photograph(const SE3<Camera, Object>& T_camera_object, const SolidShape& shape,
+                                 const SolidTexture& color) {
+  TrainingCamera view{T_camera_object, TestCamera(), cv::Rect(220, 140, kCrop_px, kCrop_px), {}, {}};
   view.color_bgr.create(kCrop_px, kCrop_px, CV_8UC3);
   view.ray_kind.create(kCrop_px, kCrop_px, CV_8UC1);
   const SE3<Object, Camera> T_object_camera = T_camera_object.Inverse();
@@ -113,9 +113,9 @@ inline TextureView Photograph(const SE3<Camera, Object>& T_camera_object, const 
   return view;
 }
 
-inline std::vector<TextureView> PhotographAll(const std::vector<SE3<Camera, Object>>& poses, const SolidShape& shape,
-                                              const SolidTexture& color) {
-  std::vector<TextureView> views;
+inline std::vector<TrainingCamera> PhotographAll(const std::vector<SE3<Camera, Object>>& poses, const SolidShape& shape,
+                                                 const SolidTexture& color) {
+  std::vector<TrainingCamera> views;
   for (const auto& pose : poses) views.push_back(Photograph(pose, shape, color));
   return views;
 }
@@ -142,7 +142,8 @@ using MeshColor = std::function<Eigen::Array3d(size_t, const Eigen::Vector3d&)>;
 inline MeshColor ColorOfTexture(const TexturedMesh& textured, const cv::Mat& texture_bgr) {
   return [&textured, texture_bgr](size_t face, const Eigen::Vector3d& barycentric) {
     Eigen::Vector2d uv = Eigen::Vector2d::Zero();
-    for (int i = 0; i < 3; ++i) uv += barycentric[i] * textured.uv[textured.mesh.triangles[face][i]].cast<double>();
+    for (int i = 0; i < 3; ++i)
+      uv += barycentric[i] * textured.mesh.uv[textured.mesh.triangles[face][i]].cast<double>();
     return TextureAt(texture_bgr, uv);
   };
 }
@@ -157,7 +158,7 @@ inline MeshColor ColorOfVertices(const Mesh& mesh, const SolidTexture& color) {
 }
 
 // Renders a mesh from the pose of a view, with 3 x 3 samples per pixel. CV_32FC3; NaN where no sample hits.
-inline cv::Mat RenderMesh(const Mesh& mesh, const TextureView& view, const MeshColor& color) {
+inline cv::Mat RenderMesh(const Mesh& mesh, const TrainingCamera& view, const MeshColor& color) {
   constexpr int kSamples = 3, kSide = kCrop_px * kSamples;
   std::vector<double> nearest(kSide * kSide, std::numeric_limits<double>::infinity());
   std::vector<std::pair<size_t, Eigen::Vector3d>> hit(nearest.size());
@@ -207,10 +208,10 @@ inline cv::Mat RenderMesh(const Mesh& mesh, const TextureView& view, const MeshC
 }
 
 // Over all pixels of the object that the mesh covers, except those at the border of the mask.
-inline double PsnrOfViews(const Mesh& mesh, const MeshColor& color, const std::vector<TextureView>& views) {
+inline double PsnrOfViews(const Mesh& mesh, const MeshColor& color, const std::vector<TrainingCamera>& views) {
   double sum = 0;
   size_t count = 0;
-  for (const TextureView& view : views) {
+  for (const TrainingCamera& view : views) {
     const cv::Mat image = RenderMesh(mesh, view, color);
     for (int y = 1; y + 1 < image.rows; ++y) {
       for (int x = 1; x + 1 < image.cols; ++x) {

@@ -36,7 +36,7 @@ TEST(SurfaceTexelsTest, PositionsAreThoseOfTheTextureCoordinates) {
     Eigen::Vector2f uv = Eigen::Vector2f::Zero();
     Eigen::Vector3f position = Eigen::Vector3f::Zero();
     for (int i = 0; i < 3; ++i) {
-      uv += texel.barycentric[i] * textured.uv[textured.mesh.triangles[texel.face][i]];
+      uv += texel.barycentric[i] * textured.mesh.uv[textured.mesh.triangles[texel.face][i]];
       position += texel.barycentric[i] * textured.mesh.vertices[textured.mesh.triangles[texel.face][i]];
     }
     ASSERT_LT((position - texel.position).norm(), 1e-5f);

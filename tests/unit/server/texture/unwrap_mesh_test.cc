@@ -16,7 +16,7 @@ namespace romap::texture::unwrap_mesh_test {
 ChartPlane::Triangle InAtlas(const TexturedMesh& textured, size_t face) {
   ChartPlane::Triangle triangle;
   for (int i = 0; i < 3; ++i) {
-    triangle[i] = textured.uv[textured.mesh.triangles[face][i]].cast<double>() * textured.atlas_px;
+    triangle[i] = textured.mesh.uv[textured.mesh.triangles[face][i]].cast<double>() * textured.atlas_px;
   }
   return triangle;
 }
@@ -77,7 +77,7 @@ size_t CountCharts(const TexturedMesh& textured) {
 void ExpectValid(const Mesh& mesh, const TexturedMesh& textured, size_t max_charts, const char* what) {
   SCOPED_TRACE(what);
   ASSERT_EQ(textured.mesh.triangles.size(), mesh.triangles.size());
-  ASSERT_EQ(textured.uv.size(), textured.mesh.vertices.size());
+  ASSERT_EQ(textured.mesh.uv.size(), textured.mesh.vertices.size());
   double atlas_px2 = 0;
   size_t reversed = 0;
   for (size_t face = 0; face < mesh.triangles.size(); ++face) {
@@ -91,7 +91,7 @@ void ExpectValid(const Mesh& mesh, const TexturedMesh& textured, size_t max_char
     atlas_px2 += std::abs(SignedArea(InAtlas(textured, face)));
   }
   EXPECT_EQ(reversed, 0u);
-  for (const Eigen::Vector2f& uv : textured.uv) {
+  for (const Eigen::Vector2f& uv : textured.mesh.uv) {
     EXPECT_GE(uv.minCoeff(), 0.0f);
     EXPECT_LE(uv.maxCoeff(), 1.0f);
   }
@@ -154,15 +154,15 @@ TEST(UnwrapMeshTest, ChartsAreApart) {
     }
     ++charts;
   }
-  std::vector<int> chart_of_vertex(textured.uv.size(), -1);
+  std::vector<int> chart_of_vertex(textured.mesh.uv.size(), -1);
   for (size_t face = 0; face < neighbors.size(); ++face) {
     for (const uint32_t v : textured.mesh.triangles[face]) chart_of_vertex[v] = chart[face];
   }
   float nearest_px = 1e9f;
-  for (size_t a = 0; a < textured.uv.size(); ++a) {
+  for (size_t a = 0; a < textured.mesh.uv.size(); ++a) {
     for (size_t b = 0; b < a; ++b) {
       if (chart_of_vertex[a] == chart_of_vertex[b]) continue;
-      nearest_px = std::min(nearest_px, (textured.uv[a] - textured.uv[b]).lpNorm<Eigen::Infinity>() *
+      nearest_px = std::min(nearest_px, (textured.mesh.uv[a] - textured.mesh.uv[b]).lpNorm<Eigen::Infinity>() *
                                             static_cast<float>(textured.atlas_px));
     }
   }
@@ -179,7 +179,7 @@ TEST(UnwrapMeshTest, DegenerateMeshes) {
   triangle.triangles = {{0, 1, 2}};
   const absl::StatusOr<TexturedMesh> one = UnwrapMesh(triangle, {.max_atlas_px = 128});
   ASSERT_TRUE(one.ok());
-  EXPECT_EQ(one->uv.size(), 3u);
+  EXPECT_EQ(one->mesh.uv.size(), 3u);
   EXPECT_LT(SignedArea(InAtlas(*one, 0)), -3000);
   Mesh flat = triangle;  // without area
   flat.vertices[2] = {2, 0, 0};

@@ -11,11 +11,11 @@ namespace romap::texture::view_gains_test {
 
 struct Scene {
   TexturedMesh textured = *UnwrapMesh(SphereMesh(16), {.texels_per_mu = 40});
-  std::vector<TextureView> views = PhotographAll(PosesAround(12, 5, 0), SolidSphere(), Checker());
+  std::vector<TrainingCamera> views = PhotographAll(PosesAround(12, 5, 0), SolidSphere(), Checker());
 
   std::vector<ViewGain> Estimate() const {
     std::vector<PreparedView> prepared;
-    for (const TextureView& view : views) prepared.emplace_back(view, textured.mesh);
+    for (const TrainingCamera& view : views) prepared.emplace_back(view, textured.mesh);
     return EstimateViewGains(prepared, FindSurfaceTexels(textured));
   }
 };
