@@ -18,8 +18,8 @@ namespace {
 // face between two nodes.
 constexpr float kReferenceNodes = 64.0f;
 constexpr float kFaceCost = 1.0f;
-constexpr float kSeenEmptyCost = 5.0f;  // of a solid node that all views see to be empty
-constexpr float kUnseenCost = 4.0f;     // of an empty node that no view sees to be empty
+constexpr float kSeenEmptyCost = 5.0f;  // of a solid node that all views observe as empty
+constexpr float kUnseenCost = 4.0f;     // of an empty node that no view observes as empty
 constexpr float kDetailDepth = 2.0f;    // nodes behind the cut where the field defines the surface
 
 // Node spacing relative to that of the reference.

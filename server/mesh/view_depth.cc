@@ -11,7 +11,7 @@ namespace romap::mesh {
 namespace {
 
 constexpr float kUnknownDistance = std::numeric_limits<float>::quiet_NaN();
-constexpr float kNothingMet = std::numeric_limits<float>::infinity();
+constexpr float kNoSurface = std::numeric_limits<float>::infinity();
 constexpr float kMinDepth_mu = 1e-6f;
 constexpr float kMaxDistance_nodes = 1e5f;  // beyond, single precision cannot tell nodes apart
 constexpr int kMaxSide = 512;               // of the depth image, for a camera inside the box
@@ -46,7 +46,7 @@ ViewDepth::ViewDepth(const FieldGrid& grid, const std::vector<float>& optical_de
   }
 }
 
-// The distance at which the ray meets the surface.
+// The distance at which the ray hits the surface.
 float ViewDepth::March(const FieldGrid& grid, const std::vector<float>& optical_depth, float max_optical_depth,
                        const Eigen::Vector3f& direction_object) const {
   const float step_mu = grid.spacing.minCoeff();
@@ -56,7 +56,7 @@ float ViewDepth::March(const FieldGrid& grid, const std::vector<float>& optical_
   float enter = 0, leave = std::numeric_limits<float>::max();
   for (int axis = 0; axis < 3; ++axis) {
     if (std::abs(per_mu[axis]) < 1e-12f) {
-      if (start[axis] < 1 || start[axis] > last[axis]) return kNothingMet;
+      if (start[axis] < 1 || start[axis] > last[axis]) return kNoSurface;
       continue;
     }
     const float a = (1.0f - start[axis]) / per_mu[axis], b = (last[axis] - start[axis]) / per_mu[axis];
@@ -70,7 +70,7 @@ float ViewDepth::March(const FieldGrid& grid, const std::vector<float>& optical_
         optical_depth[grid.Index(static_cast<int>(node.x()), static_cast<int>(node.y()), static_cast<int>(node.z()))];
     if (depth > max_optical_depth) return distance;
   }
-  return kNothingMet;
+  return kNoSurface;
 }
 
 Eigen::Vector2f ViewDepth::PixelAt(int x, int y) const {

@@ -14,11 +14,11 @@ class ViewDepth {
   // Where a point lies on the ray of its pixel.
   enum class Relation {
     kUnknown,  // outside the crop, or its pixel shows an occluder
-    kInFront,  // before the first surface, or the ray meets none: the view sees that it is empty
+    kInFront,  // before the first surface, or the ray hits none: the view observes empty space
     kBehind,   // in or behind the first surface
   };
 
-  // `optical_depth`: of one step of the smallest node spacing at each node (NodeOpticalDepths). A ray has met the
+  // `optical_depth`: of one step of the smallest node spacing at each node (NodeOpticalDepths). A ray hits the
   // surface where its optical depth exceeds `max_optical_depth`.
   ViewDepth(const FieldGrid& grid, const std::vector<float>& optical_depth, float max_optical_depth,
             const TrainingCamera& view);
@@ -37,7 +37,7 @@ class ViewDepth {
   Eigen::Vector2f focal_px_, center_px_, low_px_;  // of the full image; `low_px_`: corner of the crop
   float stride_px_ = 1;                            // of the full image, per pixel of the depth image
   Eigen::Vector2i size_ = Eigen::Vector2i::Zero();
-  std::vector<float> distance_mu_;  // from the camera; NaN: unknown, infinite: the ray meets nothing
+  std::vector<float> distance_mu_;  // from the camera; NaN: unknown, infinite: the ray hits no surface
 };
 
 }  // namespace romap::mesh

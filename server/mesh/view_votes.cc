@@ -9,7 +9,7 @@ namespace romap::mesh {
 namespace {
 
 constexpr size_t kMaxViews = 32;
-// A ray has met the surface at this optical depth. Higher than for a point that counts as visible, because haze that is
+// A ray hits the surface at this optical depth. Higher than for a point that counts as visible, because haze that is
 // left in the inside of cups hides less then.
 constexpr float kOpticalDepthAtSurface = 0.3f;
 

@@ -10,12 +10,12 @@
 
 namespace romap::mesh {
 
-// What the training views say about one node.
+// The observations of one node by the training views.
 struct ViewVotes {
-  uint8_t views = 0;  // that know something about the node
-  uint8_t empty = 0;  // of these, that see that it is empty
+  uint8_t views = 0;  // whose depth image covers the node
+  uint8_t empty = 0;  // of these, the views that observe it as empty
 
-  // 0..1; 0 if no view knows anything.
+  // 0..1; 0 if no depth image covers the node.
   float EmptyShare() const { return views == 0 ? 0.0f : static_cast<float>(empty) / static_cast<float>(views); }
 };
 

@@ -79,7 +79,7 @@ TEST_F(SolidCutTest, ThinPartsAndTheirSurroundingsStay) {
   }
 }
 
-TEST_F(SolidCutTest, WithoutViewsNothingIsKnown) {
+TEST_F(SolidCutTest, WithoutViewsTheGridIsUnchanged) {
   FieldSnapshot snapshot = WithViews(Sphere(0.5f));
   snapshot.cameras.clear();
   FieldGrid grid = Sample(snapshot);

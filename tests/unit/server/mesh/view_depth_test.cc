@@ -34,7 +34,7 @@ TEST_F(ViewDepthTest, PointsBeforeAndBehindTheSurface) {
   EXPECT_EQ(depth.Relate({0, 0, 0.9f}), Relation::kBehind);
 }
 
-TEST_F(ViewDepthTest, NothingIsKnownOutsideTheCropAndBehindTheCamera) {
+TEST_F(ViewDepthTest, PointsOutsideTheCropOrBehindTheCameraAreUnknown) {
   view_.roi_px = {150, 150, 100, 100};
   view_.ray_kind = cv::Mat(100, 100, CV_8UC1, cv::Scalar(static_cast<int>(RayKind::kObject)));
   const ViewDepth depth = Make();
@@ -44,7 +44,7 @@ TEST_F(ViewDepthTest, NothingIsKnownOutsideTheCropAndBehindTheCamera) {
 }
 
 // A mask that is larger than the object does not make the space around it solid.
-TEST_F(ViewDepthTest, ARayThatMeetsNothingIsEmpty) {
+TEST_F(ViewDepthTest, SpaceOnARayThatHitsNoSurfaceIsEmpty) {
   const Eigen::Vector3f beside_sphere(0.8f, 0.8f, 0);
   for (const RayKind kind : {RayKind::kObject, RayKind::kBackground}) {
     Paint(kind);
@@ -52,12 +52,12 @@ TEST_F(ViewDepthTest, ARayThatMeetsNothingIsEmpty) {
   }
 }
 
-TEST_F(ViewDepthTest, NothingIsKnownBehindAnOccluder) {
+TEST_F(ViewDepthTest, PointsOnTheRayOfAnOccluderAreUnknown) {
   Paint(RayKind::kOccluder);
   EXPECT_EQ(Make().Relate({0, 0, -0.9f}), Relation::kUnknown);
 }
 
-TEST_F(ViewDepthTest, ViewsThatAreNotFiniteKnowNothing) {
+TEST_F(ViewDepthTest, PointsAreUnknownIfThePoseIsNotFinite) {
   view_.T_camera_object = {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Constant(NAN)};
   EXPECT_EQ(Make().Relate({0, 0, -0.9f}), Relation::kUnknown);
 }

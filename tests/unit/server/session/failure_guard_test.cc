@@ -29,7 +29,7 @@ TEST(FailureGuardTest, TooManyFailuresInARowAreThrown) {
   EXPECT_THROW(static_cast<void>(guard.Run(Throw)), std::runtime_error);
 }
 
-TEST(FailureGuardTest, ASuccessBeginsANewRow) {
+TEST(FailureGuardTest, ASuccessResetsTheCount) {
   FailureGuard guard(2);
   for (int i = 0; i < 10; ++i) {
     EXPECT_FALSE(guard.Run(Throw).ok());
