@@ -46,7 +46,10 @@ ObjectOutput ObjectMapper::ObserveFrame(const TrackedFrame& tracked) {
   current_ = {};
   ObjectOutput output;
   if (tracked.contradicted_since_frame != 0) output = RemoveContradicted(tracked);
-  if (!tracked.frame || !HasUsablePose(tracked.state, tracked.T_world_camera)) return output;
+  if (!tracked.frame) return output;
+  const bool has_pose = HasUsablePose(tracked.state, tracked.T_world_camera);
+  if (!tracked.frame->instances.empty()) confirmation_.CountMaskedFrame(has_pose);
+  if (!has_pose) return output;
   SetMap(tracked.map);
   history_.Add(tracked);
   // If no detector ran on a frame, the frame is no evidence that objects are missing.
@@ -93,6 +96,7 @@ ObjectOutput ObjectMapper::ObserveKeyframe(const KeyframeView& view) {
 ObjectOutput ObjectMapper::ObserveLateMasks(const FrameMasks& masks) {
   current_ = {};
   auto masked = history_.AddLateMasks(masks);
+  if (!masks.instances.empty()) confirmation_.CountMaskedFrame(/*has_pose=*/masked.has_value());
   if (!masked) {
     spdlog::debug("objects: late masks of frame {} ignored", masks.frame_id);
     return {};
@@ -138,6 +142,7 @@ void ObjectMapper::FinishMap(ObjectOutput* output) {
   fitter_.FitAll(frame_index_, publisher_.ConfirmedCuboids(store_), &store_);
   Confirm(keys);
   MergeDuplicates(output);
+  ReportConfirmation();
   Prune([](const Landmark& landmark) { return DecidePruningAtFinish(landmark.state); }, output);
   PublishChanges(keys, output);
   for (const auto& landmark : store_.landmarks()) {
@@ -145,6 +150,21 @@ void ObjectMapper::FinishMap(ObjectOutput* output) {
       publisher_.Publish(*landmark, When::kAlways, store_, output);
     }
   }
+}
+
+void ObjectMapper::ReportConfirmation() {
+  for (const auto& landmark : store_.landmarks()) {
+    if (landmark->state == ObjectState::kProvisional) {
+      confirmation_.AddUnconfirmed(DecideConfirmation(landmark->evidence, landmark->geometry, config_).reason);
+    } else {
+      confirmation_.AddConfirmed();
+    }
+  }
+}
+
+std::vector<Diagnostic> ObjectMapper::Diagnostics() const {
+  const auto diagnostic = confirmation_.Check(config_);
+  return diagnostic ? std::vector<Diagnostic>{*diagnostic} : std::vector<Diagnostic>{};
 }
 
 ObjectOutput ObjectMapper::ObserveMaskedFrame(const TrackedFrame& tracked) {

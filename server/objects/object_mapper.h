@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/diagnostic.h"
 #include "common/stage_messages.h"
 #include "server/objects/association.h"
+#include "server/objects/confirmation_report.h"
 #include "server/objects/frame_detections.h"
 #include "server/objects/frame_history.h"
 #include "server/objects/landmark_store.h"
@@ -46,6 +48,8 @@ class ObjectMapper {
   ObjectOutput Correct(const MapCorrection& correction);
   // Call after the last frame. Performs the last fits and publishes all pending views and corrections.
   ObjectOutput Finish();
+  // Call after Finish().
+  std::vector<Diagnostic> Diagnostics() const;
 
  private:
   void SetMap(SparseMapId map);
@@ -68,6 +72,7 @@ class ObjectMapper {
   void PublishChanges(const std::vector<LandmarkKey>& keys, ObjectOutput* output);
 
   void FinishMap(ObjectOutput* output);
+  void ReportConfirmation();
 
   template <class DecisionFunction>
   void Prune(const DecisionFunction& decide, ObjectOutput* output);
@@ -79,6 +84,7 @@ class ObjectMapper {
   FrameHistory history_;
   SceneDepth scene_depth_;
   FrameDetections current_;
+  ConfirmationReport confirmation_;
   uint64_t frame_index_ = 0;  // of frames with pose and masks
 };
 

@@ -157,6 +157,7 @@ void Pipeline::FinishMapping() {
   Correct(sparse_mapper_.Finish());
   diagnostics_->SetConditions("slam", sparse_mapper_.Diagnostics());
   Publish(object_mapper_.Finish());
+  diagnostics_->SetConditions("objects", object_mapper_.Diagnostics());
   pool_->Finish(pool_session_);
 }
 
