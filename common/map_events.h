@@ -62,6 +62,19 @@ struct ObjectUpdate {
   SparseMapId map_id = {};
 };
 
+// Where a camera would see most of the surface of an object that has been observed badly so far.
+struct NextView {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // mesh frame: from the object to the camera, unit length
+  double gain = 0;                                      // share of the surface that is badly observed and visible there
+};
+
+// A simpler version of a mesh.
+struct MeshLevel {
+  std::string draco;  // as MeshUpdate::draco, with the same frame and texture
+  uint32_t triangle_count = 0;
+  double error_mu = 0;  // about the largest distance between its surface and that of the mesh
+};
+
 struct MeshUpdate {
   ObjectId id;
   uint64_t revision = 0;     // of the object; the highest one is current
@@ -71,7 +84,9 @@ struct MeshUpdate {
   uint32_t vertex_count = 0;
   uint32_t triangle_count = 0;
   std::string draco;  // Draco (edgebreaker) bytes; vertices in the mesh frame, map units; see common/mesh_codec.h
-  MeshTexture texture = {};  // final meshes only; the Draco mesh has texture coordinates then
+  MeshTexture texture = {};            // final meshes only; the Draco mesh has texture coordinates then
+  std::vector<MeshLevel> levels = {};  // final meshes only; each has about a quarter of the triangles of the one before
+  std::optional<NextView> next_view = {};  // nullopt: no view would add much
 };
 
 struct ObjectRemoved {

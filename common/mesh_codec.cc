@@ -5,6 +5,9 @@
 #include <draco/core/varint_decoding.h>
 #include <draco/mesh/mesh.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <exception>
 #include <memory>
 #include <utility>
@@ -48,6 +51,9 @@ absl::Status ValidateMesh(const Mesh& mesh) {
   if (!mesh.colors.empty() && mesh.colors.size() != vertices) {
     return InvalidArgument("mesh has {} colors for {} vertices", mesh.colors.size(), vertices);
   }
+  if (!mesh.confidence.empty() && mesh.confidence.size() != vertices) {
+    return InvalidArgument("mesh has {} confidences for {} vertices", mesh.confidence.size(), vertices);
+  }
   if (!mesh.uv.empty() && mesh.uv.size() != vertices) {
     return InvalidArgument("mesh has {} texture coordinates for {} vertices", mesh.uv.size(), vertices);
   }
@@ -85,6 +91,17 @@ void AddAttribute(GeometryAttribute::Type type, draco::DataType data_type, const
   }
 }
 
+using ConfidenceByte = std::array<uint8_t, 1>;  // 0..255 for 0..1
+
+std::vector<ConfidenceByte> ToBytes(const std::vector<float>& confidence) {
+  std::vector<ConfidenceByte> bytes;
+  bytes.reserve(confidence.size());
+  for (const float value : confidence) {
+    bytes.push_back({static_cast<uint8_t>(std::lround(255 * std::clamp(value, 0.0F, 1.0F)))});
+  }
+  return bytes;
+}
+
 void FillDraco(const Mesh& mesh, draco::Mesh& target) {
   target.set_num_points(static_cast<uint32_t>(mesh.vertices.size()));
   for (const auto& triangle : mesh.triangles) {
@@ -95,6 +112,9 @@ void FillDraco(const Mesh& mesh, draco::Mesh& target) {
   if (!mesh.normals.empty()) AddAttribute(GeometryAttribute::NORMAL, draco::DT_FLOAT32, mesh.normals, target);
   if (!mesh.colors.empty()) AddAttribute(GeometryAttribute::COLOR, draco::DT_UINT8, mesh.colors, target);
   if (!mesh.uv.empty()) AddAttribute(GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, mesh.uv, target);
+  if (!mesh.confidence.empty()) {
+    AddAttribute(GeometryAttribute::GENERIC, draco::DT_UINT8, ToBytes(mesh.confidence), target);
+  }
 }
 
 // Draco allocates memory for the counts in the header before it checks whether the stream is long enough, so the counts
@@ -158,6 +178,9 @@ absl::StatusOr<Mesh> FromDraco(const draco::Mesh& source) {
   ROMAP_ASSIGN_OR_RETURN(mesh.colors, ReadAttribute<Rgb8>(source, GeometryAttribute::COLOR, draco::DT_UINT8));
   ROMAP_ASSIGN_OR_RETURN(mesh.uv,
                          ReadAttribute<Eigen::Vector2f>(source, GeometryAttribute::TEX_COORD, draco::DT_FLOAT32));
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<ConfidenceByte> confidence,
+                         ReadAttribute<ConfidenceByte>(source, GeometryAttribute::GENERIC, draco::DT_UINT8));
+  for (const ConfidenceByte& byte : confidence) mesh.confidence.push_back(static_cast<float>(byte[0]) / 255.0F);
   for (uint32_t i = 0; i < source.num_faces(); ++i) {
     const draco::Mesh::Face& face = source.face(draco::FaceIndex(i));
     mesh.triangles.push_back({face[0].value(), face[1].value(), face[2].value()});

@@ -252,6 +252,16 @@ v1::MeshUpdate ToProto(MeshUpdate update) {
   proto.set_draco(std::move(update.draco));
   proto.set_texture(std::move(update.texture.image));
   proto.set_texture_media_type(update.texture.media_type);
+  for (MeshLevel& level : update.levels) {
+    v1::MeshLevel& added = *proto.add_levels();
+    added.set_draco(std::move(level.draco));
+    added.set_triangle_count(level.triangle_count);
+    added.set_error_mu(level.error_mu);
+  }
+  if (update.next_view) {
+    *proto.mutable_next_view()->mutable_direction() = ToProto(update.next_view->direction);
+    proto.mutable_next_view()->set_gain(update.next_view->gain);
+  }
   return proto;
 }
 
@@ -271,6 +281,17 @@ absl::StatusOr<MeshUpdate> FromProto(v1::MeshUpdate proto, const std::string& wh
     return InvalidArgument("{}.texture_media_type: must be image/png or image/jpeg, got '{}'", where, media_type);
   }
   update.texture = {std::move(*proto.mutable_texture()), media_type};
+  for (v1::MeshLevel& level : *proto.mutable_levels()) {
+    ROMAP_RETURN_IF_ERROR(CheckFinite(level.error_mu(), where + ".levels.error_mu"));
+    update.levels.push_back({std::move(*level.mutable_draco()), level.triangle_count(), level.error_mu()});
+  }
+  if (proto.has_next_view()) {
+    NextView& next_view = update.next_view.emplace();
+    ROMAP_ASSIGN_OR_RETURN(next_view.direction,
+                           VectorFromProto(proto.next_view().direction(), where + ".next_view.direction"));
+    ROMAP_RETURN_IF_ERROR(CheckFinite(proto.next_view().gain(), where + ".next_view.gain"));
+    next_view.gain = proto.next_view().gain();
+  }
   return update;
 }
 

@@ -9,6 +9,8 @@
 #include "common/mesh_codec.h"
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
+#include "server/mesh/next_view.h"
+#include "server/texture/simplify_mesh.h"
 #include "server/texture/texture_mesh.h"
 
 namespace romap::session {
@@ -51,6 +53,7 @@ absl::StatusOr<MeshUpdate> MakeMeshUpdate(const FieldSnapshot& snapshot, const m
   update.steps = snapshot.steps;
   update.train_seconds = snapshot.train_seconds;
   update.final = snapshot.converged;
+  update.next_view = mesh::FindNextView(mesh);  // first, because simplification leaves vertices unevenly spread
   if (snapshot.converged && config.texture) {
     const absl::Status status = AddTexture(snapshot, config, &mesh, &update.texture);
     if (!status.ok()) {
@@ -60,6 +63,12 @@ absl::StatusOr<MeshUpdate> MakeMeshUpdate(const FieldSnapshot& snapshot, const m
   update.vertex_count = static_cast<uint32_t>(mesh.vertices.size());
   update.triangle_count = static_cast<uint32_t>(mesh.triangles.size());
   ROMAP_ASSIGN_OR_RETURN(update.draco, EncodeDraco(mesh, DracoOptions{}));
+  if (snapshot.converged) {
+    for (const texture::Simplified& level : texture::MakeLevels(mesh)) {
+      ROMAP_ASSIGN_OR_RETURN(std::string draco, EncodeDraco(level.mesh, DracoOptions{}));
+      update.levels.push_back({std::move(draco), static_cast<uint32_t>(level.mesh.triangles.size()), level.error_mu});
+    }
+  }
   return update;
 }
 

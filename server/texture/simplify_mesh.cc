@@ -21,6 +21,10 @@ constexpr int kMostRuns = 6;
 constexpr float kWorthwhile = 0.95f;
 // A closed surface has at least as many.
 constexpr size_t kFewestTriangles = 4;
+constexpr size_t kMaxLevels = 2;
+constexpr size_t kLevelFactor = 4;
+constexpr size_t kFewestLevelTriangles = 200;
+constexpr float kMostOfLevel = 0.6f;
 
 struct Collapsed {
   std::vector<std::array<uint32_t, 3>> triangles;
@@ -65,6 +69,7 @@ Mesh WithTriangles(const Mesh& mesh, ManifoldTriangles&& manifold) {
   copy(mesh.colors, result.colors);
   copy(mesh.confidence, result.confidence);
   copy(mesh.normals, result.normals);
+  copy(mesh.uv, result.uv);
   result.triangles = std::move(manifold.triangles);
   if (result.normals.empty()) SetAngleWeightedNormals(result);
   return result;
@@ -88,6 +93,19 @@ Simplified SimplifyMesh(const Mesh& mesh, const SimplifyOptions& options) {
   ManifoldTriangles manifold = MakeManifold(mesh.vertices, std::move(collapsed.triangles));
   if (manifold.triangles.empty()) return unchanged;
   return {WithTriangles(mesh, std::move(manifold)), collapsed.error_mu};
+}
+
+std::vector<Simplified> MakeLevels(const Mesh& mesh) {
+  std::vector<Simplified> levels;
+  size_t triangles = mesh.triangles.size();
+  while (levels.size() < kMaxLevels && triangles / kLevelFactor >= kFewestLevelTriangles) {
+    Simplified level = SimplifyMesh(mesh, {.max_triangles = triangles / kLevelFactor});
+    // Seams of the texture and thin parts limit what can be collapsed.
+    if (static_cast<float>(level.mesh.triangles.size()) > kMostOfLevel * static_cast<float>(triangles)) break;
+    triangles = level.mesh.triangles.size();
+    levels.push_back(std::move(level));
+  }
+  return levels;
 }
 
 }  // namespace romap::texture

@@ -69,6 +69,18 @@ std::string DecodeError(const std::string& bytes) {
   return Message(status);
 }
 
+TEST(MeshCodec, ConfidenceIsKeptToAByte) {
+  Mesh mesh = Torus(12, 1, 0.3F, Eigen::Vector3f::Zero());
+  for (const Eigen::Vector3f& p : mesh.vertices) mesh.confidence.push_back(0.5F + 0.3F * p.x());
+  const Mesh decoded = RoundTrip(mesh);
+  ASSERT_EQ(decoded.confidence.size(), decoded.vertices.size());
+  for (size_t i = 0; i < decoded.vertices.size(); ++i) {
+    EXPECT_NEAR(decoded.confidence[i], std::clamp(0.5F + 0.3F * decoded.vertices[i].x(), 0.0F, 1.0F), 0.003F);
+  }
+  mesh.confidence.pop_back();
+  EXPECT_THAT(EncodeError(mesh), HasSubstr("mesh has 143 confidences for 144 vertices"));
+}
+
 TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimeter) {
   const Mesh mesh = Torus(40, 0.1f, 0.05f, {0.4f, -0.2f, 0.1f});  // 30 cm across
   const Mesh decoded = RoundTrip(mesh);

@@ -127,6 +127,8 @@ TEST(WireEvents, MeshUpdateRoundTrips) {
   mesh.triangle_count = 10;
   mesh.draco = std::string("DRACO\0\xff", 7);
   mesh.texture = {std::string("PNG\0\xff", 5), "image/png"};
+  mesh.levels = {{.draco = "level 1", .triangle_count = 3, .error_mu = 0.5}, {.draco = "level 2"}};
+  mesh.next_view = {.direction = {0.6, 0, 0.8}, .gain = 0.25};
   const MeshUpdate got = RoundTrip(mesh);
   EXPECT_EQ(got.id, mesh.id);
   EXPECT_EQ(got.revision, mesh.revision);
@@ -138,6 +140,14 @@ TEST(WireEvents, MeshUpdateRoundTrips) {
   EXPECT_EQ(got.draco, mesh.draco);
   EXPECT_EQ(got.texture.image, mesh.texture.image);
   EXPECT_EQ(got.texture.media_type, mesh.texture.media_type);
+  ASSERT_EQ(got.levels.size(), 2u);
+  EXPECT_EQ(got.levels[0].draco, "level 1");
+  EXPECT_EQ(got.levels[0].triangle_count, 3u);
+  EXPECT_EQ(got.levels[0].error_mu, 0.5);
+  EXPECT_EQ(got.levels[1].draco, "level 2");
+  ASSERT_TRUE(got.next_view.has_value());
+  EXPECT_EQ(got.next_view->direction, mesh.next_view->direction);
+  EXPECT_EQ(got.next_view->gain, 0.25);
 }
 
 TEST(WireEvents, ATextureMustBeAPngOrJpegFile) {
