@@ -26,9 +26,18 @@ constexpr float kCutSlope = 4.0f;
 // Only about this many triangles of a larger mesh are used.
 constexpr size_t kEnoughTriangles = 6000;
 
+// A round bottom: the lower half of the visible surface determines how its normals turn; those that point upward belong
+// to something else. The turn must explain this share of their variance, and at the lowest visible height they must
+// point clearly downward.
+constexpr float kMaxRoundNormalZ = 0.3f;
+constexpr double kMinTurnShare = 0.5;
+constexpr double kRoundNormalZ = -0.35;
+constexpr float kMaxBelow = 0.4f;  // of the visible height; 0.2 for a sphere that is seen from 35 degrees above
+
 struct SurfacePatch {
-  float height;  // z, map units
-  double area;   // any unit
+  float height;    // z, map units
+  float normal_z;  // of the unit normal
+  double area;     // any unit
 };
 
 // The height below which `kShareBelow` of the area lies, from a histogram that is finer than the grid.
@@ -44,6 +53,34 @@ float LowHeight(const FieldGrid& grid, const std::vector<SurfacePatch>& patches,
   size_t bin = 0;
   while (bin + 1 < area.size() && (below += area[bin]) < kShareBelow * total_area) ++bin;
   return grid.origin.z() + (static_cast<float>(bin) + 0.5f) * bin_mu;
+}
+
+// Where a round bottom ends below the lowest visible height: a line through the z of the normals over the height
+// reaches -1 there. `base_mu` if the bottom is not round.
+float RoundBottom(const std::vector<SurfacePatch>& patches, float base_mu) {
+  float top_mu = base_mu;
+  for (const SurfacePatch& patch : patches) top_mu = std::max(top_mu, patch.height);
+  double sum = 0, z = 0, n = 0, zz = 0, zn = 0, nn = 0;
+  for (const SurfacePatch& patch : patches) {
+    if (patch.height > 0.5f * (base_mu + top_mu) || patch.normal_z > kMaxRoundNormalZ) continue;
+    const double height = patch.height - base_mu;
+    sum += patch.area;
+    z += patch.area * height;
+    n += patch.area * patch.normal_z;
+    zz += patch.area * height * height;
+    zn += patch.area * height * patch.normal_z;
+    nn += patch.area * patch.normal_z * patch.normal_z;
+  }
+  if (!(sum > 0)) return base_mu;
+  const double z_variance = zz / sum - z / sum * (z / sum);
+  const double n_variance = nn / sum - n / sum * (n / sum);
+  const double covariance = zn / sum - z / sum * (n / sum);
+  if (!(covariance > 0) || covariance * covariance < kMinTurnShare * z_variance * n_variance) return base_mu;
+  const double slope = covariance / z_variance;
+  const double normal_at_base = n / sum - slope * (z / sum);
+  if (normal_at_base > kRoundNormalZ) return base_mu;
+  const auto below_mu = static_cast<float>((1 + std::max(normal_at_base, -1.0)) / slope);
+  return below_mu > kMaxBelow * (top_mu - base_mu) ? base_mu : base_mu - below_mu;
 }
 
 // Whether a vertex lies between two nodes with unedited field values.
@@ -75,12 +112,12 @@ std::optional<float> FindVisibleBase(const FieldGrid& grid, VisibilityTester& vi
     const Eigen::Vector3f center = (p + mesh.vertices[b] + mesh.vertices[c]) / 3.0f;
     // The tested point is one node outside the surface, so that nodes inside the surface do not hide it.
     if (!visibility.IsSurfaceVisible(grid.ToNode(center) + normal, normal, kMinCosine)) continue;
-    visible.push_back({center.z(), area});
+    visible.push_back({center.z(), normal.z(), area});
     visible_area += area;
     if (std::abs(normal.z()) < kMaxWallNormalZ) wall_area += area;
   }
   if (visible.empty() || wall_area < kMinWallShare * visible_area) return std::nullopt;
-  return LowHeight(grid, visible, visible_area);
+  return RoundBottom(visible, LowHeight(grid, visible, visible_area));
 }
 
 void CutBelow(FieldGrid& grid, float height) {

@@ -194,6 +194,35 @@ TEST(ExtractMesh, EndsAtTheLowestVisibleHeight) {
   EXPECT_LT(lowest(Extract(snapshot, config)), -0.7f);
 }
 
+// Its lowest part turns away from the views above. Where they show nothing, the hull is the only limit.
+TEST(ExtractMesh, ARoundBottomIsKept) {
+  FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));
+  for (int i = 0; i < 24; ++i) {
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 12), 4 * std::sin(i * kPi / 12), 2.5}));
+  }
+  const Mesh mesh = Extract(snapshot);
+  float lowest = 1e9f;
+  for (const Eigen::Vector3f& p : mesh.vertices) lowest = std::min(lowest, p.z());
+  EXPECT_NEAR(lowest, -0.6f, 0.06f);
+  EXPECT_NEAR(Volume(mesh), 4.0 / 3.0 * kPi * 0.216, 0.03 * 0.905);
+}
+
+// A cone that stands on its tip: its normals point downward, but do not turn, so nothing is known below the lowest part
+// that the views show.
+TEST(ExtractMesh, AnInclinedWallIsNoRoundBottom) {
+  const InsideDistance cone = [](const Eigen::Vector3f& p) {  // cut at z = -0.5, radius 0.2 there
+    return std::min({0.92f * (0.2f + 0.42f * (p.z() + 0.5f) - p.head<2>().norm()), 0.5f - p.z(), p.z() + 0.5f});
+  };
+  FieldSnapshot snapshot = SnapshotOf(cone);
+  for (int i = 0; i < 24; ++i) {
+    snapshot.cameras.push_back(ViewFrom({4 * std::cos(i * kPi / 12), 4 * std::sin(i * kPi / 12), 2.0}));
+  }
+  float lowest = 1e9f;
+  for (const Eigen::Vector3f& p : Extract(snapshot).vertices) lowest = std::min(lowest, p.z());
+  EXPECT_GT(lowest, -0.52f);
+  EXPECT_LT(lowest, -0.43f);
+}
+
 TEST(ExtractMesh, AVisibleUndersideIsNotCut) {
   FieldSnapshot snapshot = SnapshotOf(Sphere(0.6f));
   const double whole = Volume(Extract(snapshot));
