@@ -9,16 +9,9 @@
 #include "server/session/mesh_encoding.h"
 
 namespace romap::session {
-namespace {
 
-// Pause after which a session is considered to send no more snapshots. Longer than the interval of its snapshots.
-constexpr std::chrono::milliseconds kQuiet{1500};
-// A final mesh of a session that never pauses waits no longer.
-constexpr std::chrono::seconds kMaxFinalWait{20};
-
-}  // namespace
-
-Mesher::Mesher(const mesh::MeshConfig& config, Threading threading) : config_(config), threading_(threading) {
+Mesher::Mesher(const mesh::MeshConfig& config, Threading threading, Waits waits)
+    : config_(config), threading_(threading), waits_(waits) {
   if (threading == Threading::kOwnThread) thread_ = std::thread([this] { Run(); });
 }
 
@@ -94,7 +87,7 @@ void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
 Mesher::Clock::time_point Mesher::DueTime(const Waiting::value_type& entry) const {
   const WaitingSnapshot& waiting = entry.second;
   if (!waiting.snapshot.converged || !config_.texture) return waiting.since;
-  return std::min(last_offer_.at(entry.first.first) + kQuiet, waiting.since + kMaxFinalWait);
+  return std::min(last_offer_.at(entry.first.first) + waits_.quiet, waiting.since + waits_.longest);
 }
 
 // Meshes without a texture are due at once. `waiting_` must not be empty.

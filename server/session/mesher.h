@@ -29,7 +29,17 @@ class Mesher {
     kCaller,  // Offer() makes the mesh before it returns
   };
 
-  explicit Mesher(const mesh::MeshConfig& config, Threading threading = Threading::kOwnThread);
+  // When final meshes are made.
+  struct Waits {
+    // After this pause a session is considered to send no more snapshots. Longer than the interval of its snapshots.
+    std::chrono::milliseconds quiet{1500};
+    // A final mesh of a session that never pauses waits no longer.
+    std::chrono::milliseconds longest{20'000};
+  };
+
+  explicit Mesher(const mesh::MeshConfig& config, Threading threading = Threading::kOwnThread)
+      : Mesher(config, threading, Waits{}) {}
+  Mesher(const mesh::MeshConfig& config, Threading threading, Waits waits);
   ~Mesher();
 
   SessionId AddSession(Sink sink);
@@ -59,6 +69,7 @@ class Mesher {
 
   const mesh::MeshConfig config_;
   const Threading threading_;
+  const Waits waits_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::map<SessionId, Sink> sinks_;

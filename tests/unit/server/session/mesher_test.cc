@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <future>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -110,6 +113,27 @@ TEST(MesherTest, FinalMeshesComeAfterOtherMeshes) {
 }
 
 // The mesh thread is blocked in the sink of another session while snapshots arrive.
+// Another object of the session sends snapshots all the time.
+TEST(MesherTest, AFinalMeshDoesNotWaitForever) {
+  Mesher mesher(CoarseMeshes(), Mesher::Threading::kOwnThread,
+                {.quiet = std::chrono::hours(1), .longest = std::chrono::milliseconds(100)});
+  Received received;
+  const Mesher::SessionId session = mesher.AddSession(received.Sink());
+  FieldSnapshot final_snapshot = BallSnapshot(1, 40);
+  final_snapshot.converged = true;
+  mesher.Offer(session, final_snapshot);
+  const auto has_final = [&] {
+    const std::vector<MeshUpdate> meshes = received.meshes();
+    return std::any_of(meshes.begin(), meshes.end(), [](const MeshUpdate& mesh) { return mesh.final; });
+  };
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  for (uint64_t steps = 1; !has_final() && std::chrono::steady_clock::now() < deadline; ++steps) {
+    mesher.Offer(session, BallSnapshot(2, steps));
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(has_final());
+}
+
 TEST(MesherTest, OnlyTheNewestSnapshotOfAnObjectWaits) {
   Received received;
   std::promise<void> entered, release;
