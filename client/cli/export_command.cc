@@ -16,6 +16,7 @@ struct ExportOptions {
   ServiceOptions service;
   std::string session;
   std::string out;
+  MapFileOptions map_files;
 };
 
 absl::Status RunExport(const ExportOptions& options) {
@@ -24,7 +25,7 @@ absl::Status RunExport(const ExportOptions& options) {
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
   for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", fault);
-  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
 
   const std::vector<files::StampedPose> trajectory = TrajectoryOf(snapshot);
   ROMAP_RETURN_IF_ERROR(
@@ -41,6 +42,7 @@ void AddExportCommand(CLI::App& app, Command* chosen) {
   CLI::App* command = app.add_subcommand("export", "Write the current map of a session to files");
   command->add_option("session", options->session, "Session ID (see romap sessions)")->required();
   command->add_option("--out", options->out, "Output folder")->required();
+  options->map_files.AddTo(*command);
   options->service.AddTo(*command, /*offer_local=*/false);
   command->callback([options, chosen] { *chosen = [options] { return RunExport(*options); }; });
 }

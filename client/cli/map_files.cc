@@ -2,11 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <iterator>
+#include <string_view>
 #include <utility>
 
 #include "client/files/glb.h"
+#include "client/files/obj_write.h"
 #include "client/files/objects_yaml.h"
 #include "client/files/ply.h"
 #include "client/files/text_file.h"
@@ -25,13 +29,16 @@ std::string FileStem(const ObjectUpdate& object) {
   return stem;
 }
 
+// Of meshes, and of the materials and textures beside them.
+constexpr std::string_view kMeshExtensions[] = {".ply", ".glb", ".obj", ".mtl", ".jpg", ".png"};
+
 // Creates a folder and removes the meshes in it.
 absl::Status MakeMeshFolder(const fs::path& folder) {
   ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder.string()));
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const fs::path extension = entry.path().extension();
-    if (extension == ".ply" || extension == ".glb") fs::remove(entry.path(), error);
+    const std::string extension = entry.path().extension().string();
+    if (std::ranges::find(kMeshExtensions, extension) != std::end(kMeshExtensions)) fs::remove(entry.path(), error);
   }
   return absl::OkStatus();
 }
@@ -48,6 +55,7 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
     if (snapshot.mesh) {
       entry.train_seconds = snapshot.mesh->train_seconds;
       entry.steps = snapshot.mesh->steps;
+      entry.next_view = snapshot.mesh->next_view;
       if (auto mesh = DecodeDraco(snapshot.mesh->draco); mesh.ok()) {
         const SE3<World, Object> T_world_mesh =
             snapshot.object.T_world_mesh.value_or(snapshot.object.cuboid.T_world_object);
@@ -75,7 +83,12 @@ std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
   return trajectory;
 }
 
-absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects) {
+void MapFileOptions::AddTo(CLI::App& command) {
+  command.add_flag("--obj", obj, "Write an OBJ file with material and texture for each object, too");
+}
+
+absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects,
+                           const MapFileOptions& options) {
   const fs::path folder = fs::path(dir) / "objects";
   ROMAP_RETURN_IF_ERROR(MakeMeshFolder(folder));
   files::ObjectsYaml cuboids;
@@ -92,6 +105,9 @@ absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>&
     const std::string stem = (folder / entry.file_stem).string();
     ROMAP_RETURN_IF_ERROR(files::WriteWorldPly(stem + ".ply", entry.mesh, entry.S_world_mesh));
     ROMAP_RETURN_IF_ERROR(files::WriteGlb(stem + ".glb", entry.mesh, entry.S_world_mesh, entry.texture));
+    if (options.obj) {
+      ROMAP_RETURN_IF_ERROR(files::WriteObj(stem + ".obj", entry.mesh, entry.S_world_mesh, entry.texture));
+    }
   }
   return files::WriteObjects((fs::path(dir) / "cuboids.json").string(), cuboids);
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,7 @@ struct MapObject {
   Sim3<World, Object> S_world_mesh;
   double train_seconds = 0;  // of the mesh
   uint64_t steps = 0;        // training steps of the mesh
+  std::optional<NextView> next_view = {};
 };
 
 // Decodes the meshes of all objects that are not provisional. If a mesh cannot be decoded, the object gets an empty
@@ -29,8 +32,15 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
 // The camera trajectory of a map, in order of frames.
 std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
 
+struct MapFileOptions {
+  bool obj = false;  // OBJ files with material and texture, too
+
+  void AddTo(CLI::App& command);
+};
+
 // Writes objects/<id>_<class>.ply and .glb (World frame, map units) and cuboids.json in `dir`. Creates the folders and
 // removes the meshes of an earlier run. Errors as WriteFile.
-absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects);
+absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects,
+                           const MapFileOptions& options = {});
 
 }  // namespace romap::cli

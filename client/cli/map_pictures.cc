@@ -5,29 +5,20 @@
 #include <algorithm>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "client/cli/cuboid_outline.h"
+#include "client/cli/frame_image.h"
 #include "client/cli/mapped_frames.h"
+#include "client/cli/mesh_instance.h"
 #include "client/files/text_file.h"
 #include "client/pictures/pictures.h"
-#include "common/color_image.h"
-#include "common/lens.h"
 
 namespace romap::cli {
 namespace {
 
 namespace fs = std::filesystem;
 constexpr size_t kCuboidFrames = 6;  // evenly spaced over the sequence
-
-// A texture that cannot be decoded is not drawn.
-render::MeshInstance InstanceOf(const MapObject& entry) {
-  cv::Mat texture_bgr;
-  SampleRange range;
-  if (!entry.texture.image.empty()) texture_bgr = DecodeColor(entry.texture.image, &range);
-  return {.mesh = &entry.mesh, .id = 1, .S_world_mesh = entry.S_world_mesh, .texture_bgr = texture_bgr};
-}
 
 // The frame in which the cuboid is largest; nullopt if it is never completely visible.
 std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
@@ -42,20 +33,6 @@ std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& came
     }
   }
   return best;
-}
-
-absl::StatusOr<cv::Mat> LoadImage(const files::Sequence& sequence, size_t index) {
-  std::vector<files::UnreadableFile> unreadable;  // the picture needs neither mask nor depth
-  ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.LoadReadable(index, &unreadable));
-  SampleRange range;
-  const cv::Mat image = DecodeColor(frame.image, &range);
-  if (image.empty()) return InvalidArgument("{}: the image is damaged", sequence.paths(index).image);
-  if (!sequence.camera().HasDistortion()) return image;
-  // The poses and cuboids of the map refer to undistorted images.
-  const UndistortionMaps maps = MakeUndistortionMaps(sequence.camera());
-  cv::Mat undistorted;
-  cv::remap(image, undistorted, maps.xy, maps.fraction, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-  return undistorted;
 }
 
 // The extension of `path` selects the format.
@@ -82,10 +59,10 @@ absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& seq
     updates.push_back(entry.object);
     const std::optional<PosedFrame> view = BestView(entry.object.cuboid, camera, frames);
     if (!view) continue;
-    ROMAP_ASSIGN_OR_RETURN(const cv::Mat image, LoadImage(sequence, view->index));
-    ROMAP_RETURN_IF_ERROR(WriteImage(
-        folder / (entry.file_stem + ".png"),
-        pictures::DrawMeshBesideView(InstanceOf(entry), image, camera, view->T_world_camera, &entry.object.cuboid)));
+    ROMAP_ASSIGN_OR_RETURN(const FrameImage image, LoadFrameImage(sequence, view->index));
+    ROMAP_RETURN_IF_ERROR(WriteImage(folder / (entry.file_stem + ".png"),
+                                     pictures::DrawMeshBesideView(InstanceOf(entry), image.color_bgr, camera,
+                                                                  view->T_world_camera, &entry.object.cuboid)));
   }
   std::vector<render::MeshInstance> meshes;
   for (const MapObject& entry : objects) meshes.push_back(InstanceOf(entry));
@@ -104,10 +81,10 @@ absl::Status WriteCuboidPictures(const std::string& folder, const files::Sequenc
   const size_t count = std::min(kCuboidFrames, frames.size());
   for (size_t i = 0; i < count; ++i) {
     const PosedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
-    ROMAP_ASSIGN_OR_RETURN(cv::Mat image, LoadImage(sequence, frame.index));
-    pictures::DrawCuboids(image, sequence.camera(), frame.T_world_camera, objects);
+    ROMAP_ASSIGN_OR_RETURN(FrameImage image, LoadFrameImage(sequence, frame.index));
+    pictures::DrawCuboids(image.color_bgr, sequence.camera(), frame.T_world_camera, objects);
     const std::string name = fmt::format("cuboids_{:06d}.jpg", frame.index + 1);
-    ROMAP_RETURN_IF_ERROR(WriteImage(fs::path(folder) / name, image));
+    ROMAP_RETURN_IF_ERROR(WriteImage(fs::path(folder) / name, image.color_bgr));
   }
   return absl::OkStatus();
 }

@@ -27,6 +27,7 @@ struct ReplayOptions {
   std::string out;
   bool threads = false;
   ServiceOptions service;
+  MapFileOptions map_files;
 };
 
 // Sends all records and waits until the map is finished. Discards the events, because the map is exported afterwards.
@@ -87,7 +88,7 @@ nlohmann::json ToJson(const wire::Recording& recording, const Statistics& statis
 absl::Status WriteResult(const ReplayOptions& options, const wire::Recording& recording, const MapSnapshot& snapshot) {
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
-  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
   ROMAP_RETURN_IF_ERROR(
       files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), TrajectoryOf(snapshot)));
   const nlohmann::json summary = ToJson(recording, snapshot.statistics, objects, faults);
@@ -128,6 +129,7 @@ void AddReplayCommand(CLI::App& app, Command* chosen) {
   command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory and summary")->required();
   command->add_flag("--threads", options->threads,
                     "Use multiple threads like a server: faster, but results vary slightly between runs");
+  options->map_files.AddTo(*command);
   command->add_option("--config", options->service.config_file, "YAML configuration file");
   command->add_option("--set", options->service.settings, "Set a configuration value, section.field=value; repeatable");
   command->callback([options, chosen] { *chosen = [options] { return RunReplay(*options); }; });

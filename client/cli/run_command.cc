@@ -13,6 +13,7 @@
 #include "client/cli/run_summary.h"
 #include "client/cli/sequence_arguments.h"
 #include "client/cli/service_options.h"
+#include "client/cli/texture_fidelity.h"
 #include "client/eval/eval.h"
 #include "client/eval/run_record.h"
 #include "client/files/pose_uncertainty_file.h"
@@ -29,6 +30,7 @@ struct RunOptions {
   std::string out;
   StreamOptions stream;
   ServiceOptions service;
+  MapFileOptions map_files;
   bool no_pictures = false;
   int64_t permute_labels_seed = -1;
 };
@@ -73,6 +75,35 @@ void Evaluate(const RunOptions& options, const eval::RunRecord& record, const fi
   if (!text.empty()) fmt::print("\ncomparison with the ground truth of {}:\n{}", options.sequence.dir, text);
 }
 
+// Compares the meshes with the frames that were held out. They need poses in the world of the map.
+void CompareTextures(const RunOptions& options, const files::Sequence& sequence, const std::vector<MapObject>& objects,
+                     nlohmann::json& summary) {
+  if (options.stream.hold_out == 0) return;
+  if (options.stream.pose_use != PoseUse::kGiven) {
+    fmt::print("colors of the meshes not measured: --hold-out needs --poses given\n");
+    return;
+  }
+  const std::vector<size_t> frames = HeldOutFrames(sequence, options.stream);
+  const std::vector<TextureFidelity> textures = MeasureTextures(objects, sequence, frames);
+  const std::optional<double> mean_db = MeanPsnr_db(textures);
+  nlohmann::json list = nlohmann::json::array();
+  std::string text;
+  for (const TextureFidelity& texture : textures) {
+    list.push_back({{"name", texture.object},
+                    {"psnr_db", texture.psnr_db},
+                    {"frames", texture.frames},
+                    {"pixels", texture.pixels}});
+    text += fmt::format("{}{} {:.1f}", text.empty() ? "" : ", ", texture.object, texture.psnr_db);
+  }
+  summary["textures"] = {{"mean_psnr_db", mean_db ? nlohmann::json(*mean_db) : nullptr}, {"objects", list}};
+  if (!mean_db) {
+    fmt::print("colors of the meshes not measured: no object is visible in the {} frames held out\n", frames.size());
+    return;
+  }
+  fmt::print("colors of the meshes in {} frames held out: PSNR {:.1f} dB (mean of {})\n", frames.size(), *mean_db,
+             text);
+}
+
 absl::Status RunSequence(const RunOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(files::SequenceOptions sequence_options, options.sequence.FileOptions());
   if (options.permute_labels_seed >= 0) sequence_options.permute_labels_seed = options.permute_labels_seed;
@@ -86,7 +117,7 @@ absl::Status RunSequence(const RunOptions& options) {
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
   const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
-  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects));
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
   ROMAP_RETURN_IF_ERROR(files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), trajectory));
   RunSummary summary = Summarize(sequence, result, collector, objects);
   summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
@@ -96,6 +127,7 @@ absl::Status RunSequence(const RunOptions& options) {
   nlohmann::json json = ToJson(summary);
   if (options.stream.keep_session) json["session"] = result.session_id;
   Evaluate(options, RecordOf(options, result, collector), sequence, json);
+  CompareTextures(options, sequence, objects, json);
   ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
   fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
   if (options.stream.keep_session) fmt::print("session {} remains on the server\n", result.session_id);
@@ -150,9 +182,14 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
                    "Maximum wait for training after the last frame [s]")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command
+      ->add_option("--hold-out", options->stream.hold_out,
+                   "Do not send every N-th frame, and compare the colors of the meshes with these frames; 0 = send all")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--name", options->stream.session_name, "Display name of the session");
   command->add_flag("--keep-session", options->stream.keep_session, "Do not delete the session from the server");
   command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
+  options->map_files.AddTo(*command);
   command->callback([options, chosen] {
     options->sequence.SetPoseUse(&options->stream);
     *chosen = [options] { return RunSequence(*options); };

@@ -26,6 +26,11 @@ constexpr double kTrainingAfterInterrupt_s = 3;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+bool IsHeldOut(const StreamOptions& options, size_t frame) {
+  if (options.hold_out == 0) return false;
+  return (frame - options.first_frame) / options.stride % options.hold_out == options.hold_out / 2;
+}
+
 // Loads and sends frames on a separate thread, because Send() blocks while the server applies back pressure.
 class Sender {
  public:
@@ -54,10 +59,21 @@ class Sender {
   const absl::Status& status() const { return status_; }
   // Valid after Join().
   const UnreadableFiles& unreadable() const { return unreadable_; }
+  // Ids of frames.
+  std::vector<uint64_t> Skipped() const {
+    std::vector<uint64_t> skipped = unreadable_.skipped_frames();
+    skipped.insert(skipped.end(), held_out_.begin(), held_out_.end());
+    std::sort(skipped.begin(), skipped.end());
+    return skipped;
+  }
 
  private:
   absl::Status Run() {
     for (size_t i = options_.first_frame; i < end_ && !stop_ && !Interrupted(); i += options_.stride) {
+      if (IsHeldOut(options_, i)) {
+        held_out_.push_back(i + 1);
+        continue;
+      }
       ROMAP_ASSIGN_OR_RETURN(std::optional<FrameInput> frame, Load(i));
       if (!frame) continue;
       ROMAP_RETURN_IF_ERROR(SendMasksDueBy(frame->timestamp_ns));
@@ -108,6 +124,7 @@ class Sender {
   std::mutex& collector_mutex_;
   const size_t end_;  // of the frames to send
   UnreadableFiles unreadable_;
+  std::vector<uint64_t> held_out_;  // ids of frames
   MaskSchedule schedule_{options_.mask_rate_hz, options_.mask_delay_s};
   const Clock::time_point start_ = Clock::now();
   std::atomic<bool> stop_ = false;
@@ -150,7 +167,7 @@ class Run {
     const absl::Status status = AwaitAcknowledgements(sender);
     sender.Join();
     result_.diagnostics = sender.unreadable().Diagnostics();
-    result_.skipped_frames = sender.unreadable().skipped_frames();
+    result_.skipped_frames = sender.Skipped();
     return status;
   }
 
@@ -223,7 +240,8 @@ class Run {
 
   size_t TotalFrames() const {
     const size_t frames = sequence_.size() - std::min(sequence_.size(), options_.first_frame);
-    return (std::min(options_.frame_count, frames) + options_.stride - 1) / options_.stride;
+    return (std::min(options_.frame_count, frames) + options_.stride - 1) / options_.stride -
+           HeldOutFrames(sequence_, options_).size();
   }
 
   void ShowFrames() {
@@ -253,6 +271,15 @@ class Run {
 };
 
 }  // namespace
+
+std::vector<size_t> HeldOutFrames(const files::Sequence& sequence, const StreamOptions& options) {
+  const size_t end = std::min(sequence.size(), options.first_frame + std::min(options.frame_count, sequence.size()));
+  std::vector<size_t> frames;
+  for (size_t i = options.first_frame; i < end; i += options.stride) {
+    if (IsHeldOut(options, i)) frames.push_back(i);
+  }
+  return frames;
+}
 
 absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector) {

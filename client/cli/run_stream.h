@@ -24,6 +24,7 @@ struct StreamOptions {
   size_t first_frame = 0;
   size_t frame_count = SIZE_MAX;  // from the first frame on, sent or not
   size_t stride = 1;              // send every `stride`-th of these
+  size_t hold_out = 0;            // do not send one of this number of frames, see HeldOutFrames(); 0: send all
   double max_training_s = 600;    // maximum wait for training after the last frame
   bool keep_session = false;      // do not delete the session
 };
@@ -39,8 +40,11 @@ struct StreamResult {
   double mapping_s = 0;                  // from the first sent frame to the last acknowledgement
   double training_s = 0;                 // from then to the end of training
   std::vector<Diagnostic> diagnostics;   // about files that could not be read
-  std::vector<uint64_t> skipped_frames;  // ids of the frames whose image could not be read
+  std::vector<uint64_t> skipped_frames;  // ids of the frames whose image could not be read, or that are held out
 };
+
+// Indices of the frames that StreamOptions::hold_out keeps back, evenly spread. Textures are compared with them.
+std::vector<size_t> HeldOutFrames(const files::Sequence& sequence, const StreamOptions& options);
 
 // Streams a sequence to a mapping service and collects the map: creates a session, sends every frame, waits for all
 // acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early.

@@ -49,6 +49,20 @@ std::string FormatObjects(const std::vector<RunSummary::Object>& objects) {
   return objects.empty() ? text + "(no objects mapped)\n" : text;
 }
 
+// The view that would add most to the map. Empty if none would add much.
+std::string FormatNextView(const std::vector<RunSummary::Object>& objects) {
+  constexpr double kMinStatedGain = 0.05;
+  const RunSummary::Object* best = nullptr;
+  for (const RunSummary::Object& object : objects) {
+    if (object.next_view_world && (best == nullptr || object.next_view_gain > best->next_view_gain)) best = &object;
+  }
+  if (best == nullptr || best->next_view_gain < kMinStatedGain) return "";
+  return fmt::format(
+      "next view: {} from its side ({}), where {:.0f} % of its surface is visible that was observed "
+      "badly\n",
+      best->name, FormatVector(*best->next_view_world, " ", 2), 100 * best->next_view_gain);
+}
+
 }  // namespace
 
 RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
@@ -94,6 +108,10 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
     object.train_s = entry.train_seconds;
     object.vertices = entry.mesh.vertices.size();
     object.triangles = entry.mesh.triangles.size();
+    if (entry.next_view) {
+      object.next_view_world = entry.S_world_mesh.rotation() * entry.next_view->direction;
+      object.next_view_gain = entry.next_view->gain;
+    }
     const MapCollector::Arrival arrival = collector.ArrivalOf(entry.object.id);
     if (const auto it = trackable.find(entry.object.id); it != trackable.end()) {
       const double trackable_s = collector.SentAt_s(it->second + 1);  // frame ids count from 1
@@ -119,7 +137,9 @@ nlohmann::json ToJson(const RunSummary& summary) {
                        {"vertices", object.vertices},
                        {"triangles", object.triangles},
                        {"first_cuboid_s", object.first_cuboid_s},
-                       {"first_mesh_s", object.first_mesh_s}});
+                       {"first_mesh_s", object.first_mesh_s},
+                       {"next_view_world", object.next_view_world ? Vector(*object.next_view_world) : nullptr},
+                       {"next_view_gain", object.next_view_gain}});
   }
   nlohmann::json diagnostics = nlohmann::json::array();
   for (const Diagnostic& diagnostic : summary.diagnostics) {
@@ -186,7 +206,7 @@ std::string FormatSummary(const RunSummary& summary) {
   }
   text += fmt::format("peak memory: mapping {} MiB, client {} MiB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
-  text += FormatObjects(summary.objects);
+  text += FormatObjects(summary.objects) + FormatNextView(summary.objects);
   for (const Diagnostic& diagnostic : summary.diagnostics) text += FormatDiagnostic(diagnostic) + "\n";
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,10 @@ struct RunSummary {
     // Delays after sending the first frame in which the object was trackable; -1 = unknown.
     double first_cuboid_s = -1;
     double first_mesh_s = -1;
+    // From the object to a camera that would see most of what was observed badly; World frame, unit length. nullopt: no
+    // view would add much.
+    std::optional<Eigen::Vector3d> next_view_world = {};
+    double next_view_gain = 0;  // share of the surface
   };
 
   std::string sequence;

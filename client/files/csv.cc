@@ -1,5 +1,6 @@
 #include "client/files/csv.h"
 
+#include <algorithm>
 #include <string_view>
 
 #include "client/files/text_file.h"
@@ -9,9 +10,23 @@ namespace {
 
 constexpr std::string_view kCsvBlanks = " \t";
 
+// Of the first row. A comma in it is a separator, whatever else it contains.
+char SeparatorOf(std::string_view text) {
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    const bool is_row = !line.starts_with('#') && line.find_first_not_of(" \t\r") != std::string_view::npos;
+    for (const char separator : {',', ';', '\t'}) {
+      if (is_row && line.find(separator) != std::string_view::npos) return separator;
+    }
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+  }
+  return ',';
+}
+
 class CsvParser {
  public:
-  CsvParser(std::string_view text, const std::string& path) : text_(text), path_(path) {}
+  CsvParser(std::string_view text, const std::string& path)
+      : text_(text), path_(path), separator_(SeparatorOf(text)), field_end_{separator_, '\n'} {}
 
   absl::StatusOr<std::vector<CsvRow>> Parse() {
     std::vector<CsvRow> rows;
@@ -24,7 +39,7 @@ class CsvParser {
       do {
         ROMAP_ASSIGN_OR_RETURN(std::string field, ParseField());
         row.fields.push_back(std::move(field));
-      } while (Skip(","));
+      } while (Skip(std::string_view(&separator_, 1)));
       if (!Skip("\r\n")) Skip("\n");
       ++line_;
       rows.push_back(std::move(row));
@@ -49,14 +64,19 @@ class CsvParser {
     return true;
   }
 
-  void SkipBlanks() { text_.remove_prefix(std::min(text_.find_first_not_of(kCsvBlanks), text_.size())); }
+  // A tab may separate fields.
+  void SkipBlanks() {
+    while (!text_.empty() && kCsvBlanks.find(text_[0]) != std::string_view::npos && text_[0] != separator_) {
+      text_.remove_prefix(1);
+    }
+  }
 
   absl::StatusOr<std::string> ParseField() {
     SkipBlanks();
     if (Skip("\"")) return ParseQuoted();
-    std::string_view field = text_.substr(0, text_.find_first_of(",\n"));
+    std::string_view field = text_.substr(0, text_.find_first_of(field_end_));
     text_.remove_prefix(field.size());
-    if (field.ends_with('\r') && !text_.starts_with(',')) field.remove_suffix(1);
+    if (field.ends_with('\r') && !text_.starts_with(separator_)) field.remove_suffix(1);
     return std::string(field.substr(0, field.find_last_not_of(kCsvBlanks) + 1));
   }
 
@@ -78,10 +98,10 @@ class CsvParser {
       field += '"';
     }
     SkipBlanks();
-    if (!text_.empty() && !text_.starts_with(',') && !text_.starts_with('\n') && !text_.starts_with("\r\n") &&
+    if (!text_.empty() && !text_.starts_with(separator_) && !text_.starts_with('\n') && !text_.starts_with("\r\n") &&
         text_ != "\r") {
       return InvalidArgument(
-          "{}:{}: text follows a closing double quote; expected a comma (a quote inside of a quoted "
+          "{}:{}: text follows a closing double quote; expected a separator (a quote inside of a quoted "
           "field is doubled)",
           path_, line_);
     }
@@ -90,6 +110,8 @@ class CsvParser {
 
   std::string_view text_;  // the rest of the file
   const std::string& path_;
+  const char separator_;
+  const std::string field_end_;
   int line_ = 1;
 };
 

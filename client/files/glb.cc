@@ -129,6 +129,11 @@ tinygltf::Model ToModel(const Mesh& mesh, const Sim3<World, Object>& S_world_mes
   } else if (!mesh.colors.empty()) {  // glTF would multiply them with the texture
     primitive.attributes["COLOR_0"] = AddColors(mesh, &model);
   }
+  if (!mesh.confidence.empty()) {  // names of applications begin with an underscore
+    primitive.attributes["_CONFIDENCE"] =
+        AddArray<float>(mesh.confidence, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR,
+                        TINYGLTF_TARGET_ARRAY_BUFFER, mesh.confidence.size(), &model);
+  }
   if (!mesh.triangles.empty()) {
     primitive.indices =
         AddArray<std::array<uint32_t, 3>>(mesh.triangles, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR,
@@ -174,9 +179,11 @@ absl::Status WriteGlb(const std::string& path, const Mesh& mesh, const Sim3<Worl
                       const MeshTexture& texture) {
   ROMAP_RETURN_IF_ERROR(ValidateMesh(mesh, path));
   const auto fits = [&](size_t size) { return size == 0 || size == mesh.vertices.size(); };
-  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size()) || !fits(mesh.uv.size())) {
-    return InvalidArgument("{}: {} normals, {} colors and {} texture coordinates for {} vertices", path,
-                           mesh.normals.size(), mesh.colors.size(), mesh.uv.size(), mesh.vertices.size());
+  if (!fits(mesh.normals.size()) || !fits(mesh.colors.size()) || !fits(mesh.uv.size()) ||
+      !fits(mesh.confidence.size())) {
+    return InvalidArgument("{}: {} normals, {} colors, {} texture coordinates and {} confidences for {} vertices", path,
+                           mesh.normals.size(), mesh.colors.size(), mesh.uv.size(), mesh.confidence.size(),
+                           mesh.vertices.size());
   }
   const tinygltf::Model model = ToModel(mesh, S_world_mesh, texture);
   constexpr size_t kJsonReserve = 1 << 16;  // upper bound for the JSON chunk and the headers [bytes]

@@ -55,6 +55,21 @@ TEST(MapFilesTest, WritesMeshesFarFromTheOriginWithTheirFullShape) {
   std::filesystem::remove_all(dir);
 }
 
+TEST(MapFilesTest, WritesObjFilesOnRequestAndRemovesThoseOfAnEarlierRun) {
+  const std::string dir = testing::TempDir() + "romap_map_files_obj_test";
+  std::vector<std::string> faults;
+  std::vector<MapObject> objects = DecodeObjects({SnapshotAt({1, 2, 3})}, &faults);
+  objects.at(0).mesh.uv.assign(4, {0.5F, 0.5F});
+  objects.at(0).texture = {.image = "bytes of an image", .media_type = "image/png"};
+  ASSERT_TRUE(WriteMapFiles(dir, objects, {.obj = true}).ok());
+  const std::vector<std::string> names = {"1_.obj", "1_.mtl", "1_.png"};
+  for (const std::string& name : names) EXPECT_TRUE(std::filesystem::exists(dir + "/objects/" + name)) << name;
+  ASSERT_TRUE(WriteMapFiles(dir, objects).ok());
+  for (const std::string& name : names) EXPECT_FALSE(std::filesystem::exists(dir + "/objects/" + name)) << name;
+  EXPECT_TRUE(std::filesystem::exists(dir + "/objects/1_.glb"));
+  std::filesystem::remove_all(dir);
+}
+
 TEST(MapFilesTest, TrajectorySkipsFramesWithoutPose) {
   MapSnapshot snapshot;
   FrameAck tracked, untracked;

@@ -45,10 +45,10 @@ class RunStreamTest : public testing::Test {
     EXPECT_TRUE(files::WriteFile(dir_ + "/" + name, text).ok());
   }
 
-  absl::StatusOr<StreamResult> Stream() {
+  absl::StatusOr<StreamResult> Stream(const StreamOptions& options = {}) {
     sequence_ = files::Sequence::Open(dir_);
     if (!sequence_.ok()) return sequence_.status();
-    return StreamSequence(*sequence_, service_, {}, collector_);
+    return StreamSequence(*sequence_, service_, options, collector_);
   }
 
   const std::string dir_ =
@@ -68,6 +68,18 @@ TEST_F(RunStreamTest, SendsAllFramesOfASoundSequence) {
   EXPECT_EQ(summary.frames_with_pose, 10u);
   EXPECT_THAT(FormatSummary(summary), HasSubstr("poses: 10 of 10 frames have one\n"));
   EXPECT_EQ(ToJson(summary)["frames"]["with_pose"], 10);
+}
+
+TEST_F(RunStreamTest, FramesThatAreHeldOutAreNotSent) {
+  StreamOptions options;
+  options.first_frame = 1;
+  options.hold_out = 4;
+  const auto result = Stream(options);
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_TRUE(result->status.ok()) << result->status;
+  EXPECT_EQ(collector_.sent(), 7u);
+  EXPECT_THAT(HeldOutFrames(*sequence_, options), ElementsAre(3, 7));
+  EXPECT_THAT(result->skipped_frames, ElementsAre(4, 8));
 }
 
 TEST_F(RunStreamTest, GoesOnWithoutAFewUnreadableFiles) {

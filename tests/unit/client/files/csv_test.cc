@@ -33,6 +33,15 @@ TEST_F(CsvTest, SplitsFields) {
   EXPECT_THAT(Row("a\r\n"), ElementsAre("a"));
 }
 
+TEST_F(CsvTest, SemicolonsOrTabsSeparateFieldsIfTheFirstRowHasNoComma) {
+  const auto rows = Read("# a, b\ntimestamp;label\n1.5; \"cup; red\" ;a,b\r\n");
+  ASSERT_TRUE(rows.ok()) << rows.status();
+  ASSERT_EQ(rows->size(), 2u);
+  EXPECT_THAT((*rows)[0].fields, ElementsAre("timestamp", "label"));
+  EXPECT_THAT((*rows)[1].fields, ElementsAre("1.5", "cup; red", "a,b"));
+  EXPECT_THAT(Row("1\t potted plant\t\t\"x\"\n"), ElementsAre("1", "potted plant", "", "x"));
+}
+
 TEST_F(CsvTest, QuotedFieldsKeepEveryCharacter) {
   EXPECT_THAT(Row("1,\"cup, red\",\"the \"\"best\"\" one\"\r\n"), ElementsAre("1", "cup, red", "the \"best\" one"));
   EXPECT_THAT(Row("\" blank \" ,\"two\nlines\",\"\""), ElementsAre(" blank ", "two\nlines", ""));

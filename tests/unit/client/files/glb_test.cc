@@ -106,6 +106,15 @@ TEST(GlbTest, StoresTheTextureInsteadOfTheColors) {
   EXPECT_FALSE(Glb(mesh).document.contains("textures")) << "without a texture";
 }
 
+TEST(GlbTest, StoresTheConfidenceOfTheVertices) {
+  Mesh mesh = Triangle();
+  mesh.confidence = {0, 0.25f, 1};
+  const Glb glb(mesh);
+  const auto& attributes = glb.document["meshes"][0]["primitives"][0]["attributes"];
+  EXPECT_EQ(glb.Read<float>(attributes["_CONFIDENCE"], 1), mesh.confidence);
+  EXPECT_EQ(glb.document["accessors"][attributes["_CONFIDENCE"].get<int>()]["type"], "SCALAR");
+}
+
 TEST(GlbTest, RotatesZUpToYUp) {
   const Glb glb(Triangle());
   const auto q = glb.document["nodes"][0]["rotation"].get<std::vector<double>>();  // x y z w
@@ -144,7 +153,8 @@ TEST(GlbTest, RejectsInvalidMeshes) {
   EXPECT_CODE(WriteGlb(path, Mesh()), absl::StatusCode::kInvalidArgument);
   Mesh mesh = Triangle();
   mesh.normals.pop_back();
-  EXPECT_EQ(Message(WriteGlb(path, mesh)), path + ": 2 normals, 3 colors and 0 texture coordinates for 3 vertices");
+  EXPECT_EQ(Message(WriteGlb(path, mesh)),
+            path + ": 2 normals, 3 colors, 0 texture coordinates and 0 confidences for 3 vertices");
   mesh = Triangle();
   mesh.triangles[0][1] = 3;
   EXPECT_CODE(WriteGlb(path, mesh), absl::StatusCode::kInvalidArgument);
