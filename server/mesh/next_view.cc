@@ -20,6 +20,7 @@ constexpr float kMinCosine = 0.25F;
 // of a bin at which a vertex is hidden.
 constexpr float kBinSpacings = 2;
 constexpr float kHiddenSpacings = 3;
+constexpr float kMaxBins = 512;  // along a side of the depth buffer
 // Of the surface: less is not worth a motion of the camera.
 constexpr double kMinGain = 0.02;
 
@@ -36,6 +37,7 @@ class DepthBuffer {
       lower_ = lower_.min(p);
       upper = upper.max(p);
     }
+    bin_mu_ = std::max(bin_mu_, (upper - lower_).head<2>().maxCoeff() / kMaxBins);
     columns_ = static_cast<size_t>((upper.x() - lower_.x()) / bin_mu_) + 1;
     const size_t rows = static_cast<size_t>((upper.y() - lower_.y()) / bin_mu_) + 1;
     nearest_.assign(columns_ * rows, std::numeric_limits<float>::lowest());

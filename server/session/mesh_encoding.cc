@@ -9,7 +9,9 @@
 #include "common/mesh_codec.h"
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
+#include "server/mesh/filtered_normals.h"
 #include "server/mesh/next_view.h"
+#include "server/texture/align_surface.h"
 #include "server/texture/simplify_mesh.h"
 #include "server/texture/texture_mesh.h"
 
@@ -35,6 +37,10 @@ absl::Status AddTexture(const FieldSnapshot& snapshot, const mesh::MeshConfig& c
                         MeshTexture* texture) {
   const std::vector<TrainingCamera> views = TextureViewsOf(snapshot);
   if (views.empty()) return FailedPrecondition("no view shows the object");
+  const texture::SurfaceAlignment alignment = texture::AlignSurface(views, *mesh);
+  if (alignment.moved_share > 0) mesh::SetFilteredNormals(*mesh);
+  spdlog::debug("{}: {:.0f} % of the surface moved by {:.5f} on average", snapshot.object.ToString(),
+                100 * alignment.moved_share, alignment.mean_mu);
   texture::TextureOptions options;
   options.max_triangles = static_cast<size_t>(config.texture_triangles);
   options.max_atlas_px = config.texture_px;

@@ -211,6 +211,19 @@ ViewedPoint PreparedView::Find(const Eigen::Vector3f& position, const Eigen::Vec
   return point;
 }
 
+std::optional<Eigen::Array3f> PreparedView::DetailAt(const Eigen::Vector3f& position) const {
+  const Eigen::Vector3f pixel = Project(position);
+  if (!(pixel.z() > 0 && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < static_cast<float>(color_bgr_.cols - 1) &&
+        pixel.y() < static_cast<float>(color_bgr_.rows - 1))) {
+    return std::nullopt;
+  }
+  if (inside_.ptr<uint8_t>(static_cast<int>(pixel.y() + 0.5f))[static_cast<int>(pixel.x() + 0.5f)] == 0) {
+    return std::nullopt;
+  }
+  const ViewSample sample = Sample({.weight = 1, .u_px = pixel.x(), .v_px = pixel.y()});
+  return sample.color_bgr - sample.low_bgr;
+}
+
 ViewSample PreparedView::Sample(const ViewedPoint& point) const {
   ViewSample sample;
   sample.weight = point.weight;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "common/mesh.h"
@@ -37,6 +38,10 @@ class PreparedView {
   // the object's mask, beside an edge of a surface in front of another one, or viewed at more than 77 degrees have no
   // weight.
   ViewedPoint Find(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const;
+
+  // The color at a position without the low frequencies of the image, in gray levels; regardless of what hides the
+  // position. nullopt: outside the image or the mask of the object.
+  std::optional<Eigen::Array3f> DetailAt(const Eigen::Vector3f& position) const;
 
   // For points with weight.
   ViewSample Sample(const ViewedPoint& point) const;
