@@ -23,11 +23,11 @@ constexpr size_t kFewestViews = 3;
 // Views that show a vertex much worse than the best one see other details.
 constexpr float kLeastWeight = 0.25f;
 // Rounds in which the costs, and then the distances, are averaged with those of the neighbors.
-constexpr int kCostRounds = 6;
-constexpr int kDistanceRounds = 6;
+constexpr int kCostRounds = 10;
+constexpr int kDistanceRounds = 16;
 // Variance of the noise of images and of the interpolation [gray levels squared]: smaller differences of costs are no
 // evidence.
-constexpr float kNoiseVariance = 12;
+constexpr float kNoiseVariance = 150;
 // Weight of the distance 0 against the evidence of a vertex (0..1) when distances are smoothed.
 constexpr float kPriorWeight = 0.02f;
 constexpr size_t kVerticesPerTask = 256;
@@ -78,7 +78,8 @@ std::vector<SeenBy> BestViewsOf(const std::vector<PreparedView>& views, const Ei
     if (point.weight > 0) seen_by.push_back({&view, point.weight, point.resolution});
   }
   std::sort(seen_by.begin(), seen_by.end(), [](const SeenBy& a, const SeenBy& b) { return a.weight > b.weight; });
-  while (!seen_by.empty() && (seen_by.size() > kMostViews || seen_by.back().weight < kLeastWeight * seen_by[0].weight)) {
+  while (!seen_by.empty() &&
+         (seen_by.size() > kMostViews || seen_by.back().weight < kLeastWeight * seen_by[0].weight)) {
     seen_by.pop_back();
   }
   return seen_by;
