@@ -32,15 +32,19 @@ std::vector<TrainingCamera> TextureViewsOf(const FieldSnapshot& snapshot) {
   return views;
 }
 
+// Moves the surface to where the images agree.
+void AlignWithImages(const FieldSnapshot& snapshot, Mesh* mesh) {
+  const texture::SurfaceAlignment alignment = texture::AlignSurface(TextureViewsOf(snapshot), *mesh);
+  if (alignment.moved_share > 0) mesh::SetFilteredNormals(*mesh);
+  spdlog::debug("{}: {:.0f} % of the surface moved by {:.5f} on average", snapshot.object.ToString(),
+                100 * alignment.moved_share, alignment.mean_mu);
+}
+
 // Replaces the mesh by a simpler one with a texture.
 absl::Status AddTexture(const FieldSnapshot& snapshot, const mesh::MeshConfig& config, Mesh* mesh,
                         MeshTexture* texture) {
   const std::vector<TrainingCamera> views = TextureViewsOf(snapshot);
   if (views.empty()) return FailedPrecondition("no view shows the object");
-  const texture::SurfaceAlignment alignment = texture::AlignSurface(views, *mesh);
-  if (alignment.moved_share > 0) mesh::SetFilteredNormals(*mesh);
-  spdlog::debug("{}: {:.0f} % of the surface moved by {:.5f} on average", snapshot.object.ToString(),
-                100 * alignment.moved_share, alignment.mean_mu);
   texture::TextureOptions options;
   options.max_triangles = static_cast<size_t>(config.texture_triangles);
   options.max_atlas_px = config.texture_px;
@@ -60,6 +64,7 @@ absl::StatusOr<MeshUpdate> MakeMeshUpdate(const FieldSnapshot& snapshot, const m
   update.train_seconds = snapshot.train_seconds;
   update.final = snapshot.converged;
   update.next_view = mesh::FindNextView(mesh);  // first, because simplification leaves vertices unevenly spread
+  if (snapshot.converged) AlignWithImages(snapshot, &mesh);
   if (snapshot.converged && config.texture) {
     const absl::Status status = AddTexture(snapshot, config, &mesh, &update.texture);
     if (!status.ok()) {
