@@ -14,8 +14,8 @@ constexpr size_t kMaxViews = 12;   // evenly spaced among all
 constexpr int kMaskBorder_px = 3;  // accuracy of masks and poses
 constexpr std::array<double, 10> kOtherScales = {0.5, 0.7, 0.83, 0.91, 0.95, 1.05, 1.1, 1.2, 1.4, 2.0};
 constexpr double kSensorDepthNoise = 0.02;  // of the depth
-constexpr double kMaxContradictingShare = 0.4;
-constexpr double kShareNoise = 0.02;     // smaller shares are not significant
+constexpr double kMaxMisplacedShare = 0.4;
+constexpr double kShareNoise = 0.02;     // smaller misplaced shares are not significant
 constexpr double kClearReduction = 0.5;  // another scale fits if it leaves less than this share of the contradictions
 
 struct DepthView {
@@ -79,27 +79,31 @@ Verdict Compare(const DepthView& other, const Eigen::Vector3d& p_world, double s
   return other.background.at<uint8_t>(at) != 0 || in_free_space ? Verdict::kContradicts : Verdict::kAgrees;
 }
 
+// True if any view other than `own` contradicts the point, or if it is visible in none of them.
+bool IsMisplaced(const std::vector<DepthView>& views, size_t own, const Eigen::Vector3d& p_world, double scale) {
+  bool agrees = false;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (i == own) continue;
+    const Verdict verdict = Compare(views[i], p_world, scale);
+    if (verdict == Verdict::kContradicts) return true;
+    agrees |= verdict == Verdict::kAgrees;
+  }
+  return !agrees;
+}
+
 using Points = std::vector<std::vector<Eigen::Vector3d>>;  // of each view
 
-// The share of contradictions among all comparisons of points, with depth multiplied by `scale`, with the other views.
-// A point that is visible in no other view counts as one contradiction.
-double ContradictingShare(const std::vector<DepthView>& views, const Points& points, double scale) {
-  size_t all = 0, contradicting = 0;
-  for (size_t own = 0; own < views.size(); ++own) {
-    for (const Eigen::Vector3d& p_camera : points[own]) {
-      const Eigen::Vector3d p_world = views[own].view->T_world_camera * (scale * p_camera);
-      size_t visible = 0;
-      for (size_t other = 0; other < views.size(); ++other) {
-        if (other == own) continue;
-        const Verdict verdict = Compare(views[other], p_world, scale);
-        visible += verdict == Verdict::kNotVisible ? 0 : 1;
-        contradicting += verdict == Verdict::kContradicts ? 1 : 0;
-      }
-      all += std::max<size_t>(visible, 1);
-      contradicting += visible == 0 ? 1 : 0;
+// The share of all points, with depth multiplied by `scale`, that are misplaced.
+double MisplacedShare(const std::vector<DepthView>& views, const Points& points, double scale) {
+  size_t all = 0, misplaced = 0;
+  for (size_t i = 0; i < views.size(); ++i) {
+    all += points[i].size();
+    for (const Eigen::Vector3d& p_camera : points[i]) {
+      const Eigen::Vector3d p_world = views[i].view->T_world_camera * (scale * p_camera);
+      misplaced += IsMisplaced(views, i, p_world, scale) ? 1 : 0;
     }
   }
-  return all > 0 ? static_cast<double>(contradicting) / static_cast<double>(all) : 0;
+  return all > 0 ? static_cast<double>(misplaced) / static_cast<double>(all) : 0;
 }
 
 }  // namespace
@@ -109,11 +113,11 @@ bool DepthIsConsistent(std::span<const ObjectView> views) {
   if (chosen.size() < 2) return true;
   Points points;
   for (const DepthView& view : chosen) points.push_back(SamplePoints(*view.view));
-  const double contradicting = ContradictingShare(chosen, points, 1);
-  if (contradicting <= kShareNoise) return true;
-  if (contradicting > kMaxContradictingShare) return false;
+  const double misplaced = MisplacedShare(chosen, points, 1);
+  if (misplaced <= kShareNoise) return true;
+  if (misplaced > kMaxMisplacedShare) return false;
   return std::ranges::none_of(kOtherScales, [&](double scale) {
-    return ContradictingShare(chosen, points, scale) < kClearReduction * contradicting - kShareNoise;
+    return MisplacedShare(chosen, points, scale) < kClearReduction * misplaced - kShareNoise;
   });
 }
 

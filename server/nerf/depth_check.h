@@ -8,9 +8,8 @@ namespace romap::nerf {
 
 // Whether the dense depth of the views is consistent with their masks, on a sample of object pixels. A point from one
 // view contradicts another view if it projects to background there, or lies in front of the depth measured there. The
-// depth is consistent if most comparisons of a point with a view are no contradiction, and no other scale of the depth
-// leaves clearly fewer contradictions. Each comparison counts, because with real sensors and masks, most points
-// contradict one of many views. Tolerates holes and outliers. True without dense depth.
+// depth is consistent if most points contradict no view, and no other scale of the depth leaves clearly fewer
+// contradictions. Tolerates holes and outliers. True without dense depth.
 bool DepthIsConsistent(std::span<const ObjectView> views);
 
 }  // namespace romap::nerf

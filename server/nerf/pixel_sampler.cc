@@ -4,7 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "server/nerf/depth_edges.h"
 #include "server/nerf/math/random.h"
 
 namespace romap::nerf {
@@ -27,11 +26,6 @@ TrainingPixel PixelAt(const ObjectView& view, uint16_t view_index, int x, int y,
           static_cast<uint16_t>(y + view.roi_px.y),
           {bgr[2], bgr[1], bgr[0]},
           std::isfinite(z_mu) ? z_mu : 0.0f};
-}
-
-// The dense depth of a pixel of the crop; 0: unknown.
-float DepthAt_mu(const ObjectView& view, cv::Point at) {
-  return view.depth_mu.empty() || IsMixedDepth(view.depth_mu, at) ? 0 : view.depth_mu.at<float>(at);
 }
 
 }  // namespace
@@ -91,7 +85,7 @@ void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, do
       const int column = (x - bounds.x) * kTilesPerSide / bounds.width;
       const int row = (y - bounds.y) * kTilesPerSide / bounds.height;
       const int tile = inside.at<uint8_t>(y, x) != 0 ? row * kTilesPerSide + column : kBorderTile;
-      const float z_mu = use_depth ? DepthAt_mu(view, {x, y}) : 0;
+      const float z_mu = !use_depth || view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(y, x);
       TrainingPixel pixel = PixelAt(view, view_index, x, y, z_mu);
       if (rays_per_slot_ == 2) pixel.partner = FindPartner(view, is_object, {x, y}, distance_px, key, use_depth);
       tiles[static_cast<size_t>(tile)].push_back(pixel);
@@ -115,7 +109,7 @@ PartnerPixel PixelSampler::FindPartner(const ObjectView& view, const cv::Mat& is
     const cv::Point to = at + step;
     if (step == cv::Point() || !cv::Rect({0, 0}, is_object.size()).contains(to)) continue;
     if (is_object.at<uint8_t>(to) == 0) continue;
-    const float z_mu = use_depth ? DepthAt_mu(view, to) : 0;
+    const float z_mu = !use_depth || view.depth_mu.empty() ? 0 : view.depth_mu.at<float>(to);
     const TrainingPixel found = PixelAt(view, 0, to.x, to.y, z_mu);
     return {static_cast<int8_t>(step.x), static_cast<int8_t>(step.y), found.rgb, found.z_mu};
   }
