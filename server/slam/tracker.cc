@@ -58,8 +58,7 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       tentative_points_(config),
       rotation_(config),
       pose_check_(config),
-      pose_noise_(config),
-      focal_check_(config) {}
+      pose_noise_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
@@ -197,7 +196,6 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
     const auto agreeing = pose_check_.AddFrame(image.features, pose);
     if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
     if (agreeing) pose_noise_.AddPair(converted.camera, *agreeing);
-    focal_check_.AddFrame(image.features, pose);
     if (depth_check_.IsContradicted() && !depth_was_wrong) RefuseDepth(image);
   }
   image.diagnostics = Diagnostics(*frame);
@@ -231,8 +229,8 @@ void Tracker::RefuseDepth(TrackedImage& image) {
 
 std::vector<Diagnostic> Tracker::Diagnostics(const Frame& frame) const {
   std::vector<Diagnostic> diagnostics;
-  for (auto& diagnostic : {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(), pose_noise_.Check(),
-                           focal_check_.Check(), depth_check_.Check()}) {
+  for (auto& diagnostic :
+       {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(), pose_noise_.Check(), depth_check_.Check()}) {
     if (diagnostic) diagnostics.push_back(*diagnostic);
   }
   return diagnostics;

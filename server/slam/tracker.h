@@ -10,7 +10,6 @@
 #include "server/slam/depth_check.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/fixed_features.h"
-#include "server/slam/focal_check.h"
 #include "server/slam/frame_converter.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/given_pose_tracker.h"
@@ -135,7 +134,6 @@ class Tracker {
   ReadoutCheck readout_check_;
   PoseCheck pose_check_;
   PoseNoise pose_noise_;
-  FocalCheck focal_check_;
   DepthCheck depth_check_;
   FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
