@@ -55,8 +55,8 @@ class Received {
 };
 
 TEST(MesherTest, OfferMakesTheMeshOnTheThreadOfTheCaller) {
-  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   Received received;
+  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   FieldSnapshot snapshot = BallSnapshot(7, 40);
   snapshot.train_seconds = 1.5;
@@ -77,8 +77,8 @@ TEST(MesherTest, OfferMakesTheMeshOnTheThreadOfTheCaller) {
 }
 
 TEST(MesherTest, AFieldWithoutSurfaceGivesNoMesh) {
-  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   Received received;
+  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   FieldSnapshot snapshot = mesh::SnapshotOf([](const Eigen::Vector3f&) { return -1.0f; });
   mesher.Offer(session, snapshot);
@@ -86,8 +86,8 @@ TEST(MesherTest, AFieldWithoutSurfaceGivesNoMesh) {
 }
 
 TEST(MesherTest, RemovedSessionsReceiveNoMeshes) {
-  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   Received received;
+  Mesher mesher(CoarseMeshes(), Mesher::Threading::kCaller);
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   mesher.RemoveSession(session);
   mesher.Offer(session, BallSnapshot(1, 10));
@@ -97,8 +97,8 @@ TEST(MesherTest, RemovedSessionsReceiveNoMeshes) {
 
 // A final mesh waits for a pause of its session, a mesh of a field that still trains does not.
 TEST(MesherTest, FinalMeshesComeAfterOtherMeshes) {
-  Mesher mesher(CoarseMeshes());
   Received received;
+  Mesher mesher(CoarseMeshes());
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   FieldSnapshot final = BallSnapshot(1, 100);
   final.converged = true;
@@ -115,9 +115,9 @@ TEST(MesherTest, FinalMeshesComeAfterOtherMeshes) {
 // The mesh thread is blocked in the sink of another session while snapshots arrive.
 // Another object of the session sends snapshots all the time.
 TEST(MesherTest, AFinalMeshDoesNotWaitForever) {
+  Received received;
   Mesher mesher(CoarseMeshes(), Mesher::Threading::kOwnThread,
                 {.quiet = std::chrono::hours(1), .longest = std::chrono::milliseconds(100)});
-  Received received;
   const Mesher::SessionId session = mesher.AddSession(received.Sink());
   FieldSnapshot final_snapshot = BallSnapshot(1, 40);
   final_snapshot.converged = true;
