@@ -21,6 +21,18 @@ FaceShapes::FaceShapes(const Mesh& mesh) {
   total_area_mu2 = static_cast<float>(total);
 }
 
+VertexTriangles::VertexTriangles(const Mesh& mesh) : first_(mesh.vertices.size() + 1, 0) {
+  for (const auto& triangle : mesh.triangles) {
+    for (const uint32_t vertex : triangle) ++first_[vertex + 1];
+  }
+  for (size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
+  std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+  triangles_.resize(3 * mesh.triangles.size());
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const uint32_t vertex : mesh.triangles[t]) triangles_[next[vertex]++] = t;
+  }
+}
+
 Eigen::AlignedBox3f BoundsOf(const Mesh& mesh) {
   Eigen::AlignedBox3f bounds;
   for (const Eigen::Vector3f& vertex : mesh.vertices) bounds.extend(vertex);

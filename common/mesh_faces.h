@@ -2,6 +2,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/mesh.h"
@@ -16,6 +19,21 @@ struct FaceShapes {
   float total_area_mu2 = 0;
 
   explicit FaceShapes(const Mesh& mesh);
+};
+
+// The triangles at each vertex, in the order of the mesh.
+class VertexTriangles {
+ public:
+  explicit VertexTriangles(const Mesh& mesh);
+
+  // Indices of triangles.
+  std::span<const uint32_t> At(size_t vertex) const {
+    return std::span(triangles_).subspan(first_[vertex], first_[vertex + 1] - first_[vertex]);
+  }
+
+ private:
+  std::vector<uint32_t> first_;  // by vertex, into `triangles_`; one more than vertices
+  std::vector<uint32_t> triangles_;
 };
 
 // The bounding box of the vertices; empty without vertices.

@@ -80,6 +80,7 @@ absl::StatusOr<std::vector<Diagnostic>> CheckByMapping(const files::Sequence& se
   MapCollector collector;
   ROMAP_ASSIGN_OR_RETURN(const StreamResult result, StreamSequence(sequence, *service, options, collector));
   std::vector<Diagnostic> found = DiagnosticsOf(result, collector);
+  // A consequence of the setting above.
   std::erase_if(found, [](const Diagnostic& diagnostic) { return diagnostic.code == "no_object_confirmed"; });
   const MapCollector::Tracking& tracking = collector.tracking();
   if (!use_poses && tracking.tracked == 0) {

@@ -14,29 +14,6 @@ constexpr int kPasses = 10;
 // Standard deviation of the difference of the unit normals of two triangles that counts as noise.
 constexpr float kNoise = 0.5f;
 
-// The triangles at each vertex.
-class VertexTriangles {
- public:
-  explicit VertexTriangles(const Mesh& mesh) : first_(mesh.vertices.size() + 1, 0) {
-    for (const auto& triangle : mesh.triangles) {
-      for (const uint32_t vertex : triangle) ++first_[vertex + 1];
-    }
-    for (size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
-    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    triangles_.resize(3 * mesh.triangles.size());
-    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-      for (const uint32_t vertex : mesh.triangles[t]) triangles_[next[vertex]++] = t;
-    }
-  }
-
-  const uint32_t* begin(size_t vertex) const { return triangles_.data() + first_[vertex]; }
-  const uint32_t* end(size_t vertex) const { return triangles_.data() + first_[vertex + 1]; }
-
- private:
-  std::vector<uint32_t> first_;
-  std::vector<uint32_t> triangles_;
-};
-
 // About exp(-x) for x >= 0; several times faster than std::exp.
 float Falloff(float x) {
   if (x > 8.0f) return 0;
@@ -59,11 +36,11 @@ Neighborhoods FindNeighborhoods(const Mesh& mesh, const VertexTriangles& at_vert
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     visited_by[t] = t;
     for (const uint32_t vertex : mesh.triangles[t]) {
-      for (const uint32_t* other = at_vertex.begin(vertex); other != at_vertex.end(vertex); ++other) {
-        if (visited_by[*other] == t) continue;
-        visited_by[*other] = t;
-        found.neighbor.push_back(*other);
-        found.weight.push_back((shapes.center[t] - shapes.center[*other]).norm());
+      for (const uint32_t other : at_vertex.At(vertex)) {
+        if (visited_by[other] == t) continue;
+        visited_by[other] = t;
+        found.neighbor.push_back(other);
+        found.weight.push_back((shapes.center[t] - shapes.center[other]).norm());
         sum_mu += found.weight.back();
       }
     }
@@ -106,7 +83,7 @@ void SetFilteredNormals(Mesh& mesh) {
   mesh.normals.assign(mesh.vertices.size(), Eigen::Vector3f::UnitZ());
   for (size_t v = 0; v < mesh.vertices.size(); ++v) {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    for (const uint32_t* t = at_vertex.begin(v); t != at_vertex.end(v); ++t) sum += shapes.area_mu2[*t] * normals[*t];
+    for (const uint32_t t : at_vertex.At(v)) sum += shapes.area_mu2[t] * normals[t];
     if (sum.norm() > 0) mesh.normals[v] = sum.normalized();
   }
 }

@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
+#include "common/mesh_faces.h"
 #include "common/parallel_for.h"
 #include "common/statistics.h"
 #include "server/texture/prepared_view.h"
@@ -30,6 +33,7 @@ constexpr int kDistanceRounds = 16;
 constexpr float kNoiseVariance = 150;
 // Weight of the distance 0 against the evidence of a vertex (0..1) when distances are smoothed.
 constexpr float kPriorWeight = 0.02f;
+constexpr float kNeighborWeight = 4;  // of all neighbors together, against the vertex itself
 constexpr size_t kVerticesPerTask = 256;
 
 using Costs = std::array<float, kDistances>;
@@ -39,35 +43,19 @@ struct Distance {
   float evidence = 0;  // 0..1
 };
 
-// Pairs of neighbors, each in both directions.
-class Neighbors {
- public:
-  explicit Neighbors(const Mesh& mesh) : first_(mesh.vertices.size() + 1, 0) {
-    for (const auto& triangle : mesh.triangles) {
-      for (const uint32_t vertex : triangle) first_[vertex + 1] += 2;
-    }
-    for (size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-    others_.resize(first_.back());
-    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    for (const auto& [a, b, c] : mesh.triangles) {
-      for (const auto& [from, to] : {std::pair{a, b}, {a, c}, {b, a}, {b, c}, {c, a}, {c, b}}) {
-        others_[next[from]++] = to;
-      }
+// Calls visit(other) for the other corners of the triangles at a vertex: its neighbors, most of them twice.
+template <class Visit>
+void VisitNeighbors(const Mesh& mesh, const VertexTriangles& triangles, uint32_t vertex, const Visit& visit) {
+  for (const uint32_t triangle : triangles.At(vertex)) {
+    for (const uint32_t corner : mesh.triangles[triangle]) {
+      if (corner != vertex) visit(corner);
     }
   }
-  // Inner edges occur twice.
-  std::span<const uint32_t> Of(size_t vertex) const {
-    return std::span(others_).subspan(first_[vertex], first_[vertex + 1] - first_[vertex]);
-  }
-
- private:
-  std::vector<uint32_t> first_, others_;
-};
+}
 
 struct SeenBy {
   const PreparedView* view = nullptr;
   float weight = 0;
-  float resolution = 0;
 };
 
 std::vector<SeenBy> BestViewsOf(const std::vector<PreparedView>& views, const Eigen::Vector3f& position,
@@ -75,7 +63,7 @@ std::vector<SeenBy> BestViewsOf(const std::vector<PreparedView>& views, const Ei
   std::vector<SeenBy> seen_by;
   for (const PreparedView& view : views) {
     const ViewedPoint point = view.Find(position, normal);
-    if (point.weight > 0) seen_by.push_back({&view, point.weight, point.resolution});
+    if (point.weight > 0) seen_by.push_back({&view, point.weight});
   }
   std::sort(seen_by.begin(), seen_by.end(), [](const SeenBy& a, const SeenBy& b) { return a.weight > b.weight; });
   while (!seen_by.empty() &&
@@ -108,17 +96,18 @@ Costs CostsOf(const std::vector<PreparedView>& views, const Eigen::Vector3f& pos
   return costs;
 }
 
-void SmoothCosts(const Neighbors& neighbors, std::vector<Costs>& costs) {
+void SmoothCosts(const Mesh& mesh, const VertexTriangles& triangles, std::vector<Costs>& costs) {
   std::vector<Costs> smoothed(costs.size());
   ParallelForRanges(costs.size(), kVerticesPerTask, [&](size_t begin, size_t end) {
     for (size_t vertex = begin; vertex < end; ++vertex) {
-      const auto others = neighbors.Of(vertex);
       Costs sum = costs[vertex];
       for (float& cost : sum) cost *= 2;
-      for (const uint32_t other : others) {
+      float count = 2;
+      VisitNeighbors(mesh, triangles, static_cast<uint32_t>(vertex), [&](uint32_t other) {
         for (int k = 0; k < kDistances; ++k) sum[k] += costs[other][k];
-      }
-      for (float& cost : sum) cost /= static_cast<float>(others.size() + 2);
+        ++count;
+      });
+      for (float& cost : sum) cost /= count;
       smoothed[vertex] = sum;
     }
   });
@@ -143,18 +132,19 @@ Distance BestDistance(const Costs& costs) {
           .evidence = std::clamp(rise / (rise + 2 * at + kNoiseVariance), 0.0f, 1.0f)};
 }
 
-void SmoothDistances(const Neighbors& neighbors, const std::vector<Distance>& found, std::vector<Distance>& distances) {
+void SmoothDistances(const Mesh& mesh, const VertexTriangles& triangles, const std::vector<Distance>& found,
+                     std::vector<Distance>& distances) {
   std::vector<Distance> smoothed(distances.size());
-  for (size_t vertex = 0; vertex < distances.size(); ++vertex) {
-    const auto others = neighbors.Of(vertex);
-    const auto count = static_cast<float>(others.size() + 1);
+  for (uint32_t vertex = 0; vertex < distances.size(); ++vertex) {
+    const auto count = static_cast<float>(2 * triangles.At(vertex).size() + 1);
     float weight = kPriorWeight + found[vertex].evidence, sum = found[vertex].evidence * found[vertex].steps;
     float evidence = distances[vertex].evidence / count;
-    for (const uint32_t other : others) {
-      weight += distances[other].evidence / count * 4;
-      sum += distances[other].evidence / count * 4 * distances[other].steps;
-      evidence += distances[other].evidence / count;
-    }
+    VisitNeighbors(mesh, triangles, vertex, [&](uint32_t other) {
+      const float share = distances[other].evidence / count;
+      weight += kNeighborWeight * share;
+      sum += kNeighborWeight * share * distances[other].steps;
+      evidence += share;
+    });
     smoothed[vertex] = {sum / weight, std::max(evidence, found[vertex].evidence)};
   }
   distances.swap(smoothed);
@@ -167,11 +157,7 @@ SurfaceAlignment AlignSurface(std::span<const TrainingCamera> views, Mesh& mesh)
   std::vector<PreparedView> prepared;
   prepared.reserve(views.size());
   for (const TrainingCamera& view : views) prepared.emplace_back(view, mesh);
-  std::vector<double> resolutions;
-  for (const TrainingCamera& view : views) {
-    const double depth_mu = view.T_camera_object.translation().z();
-    if (depth_mu > 0) resolutions.push_back(view.camera.fx_px / depth_mu);
-  }
+  std::vector<double> resolutions = ResolutionsAt(views, Eigen::Vector3f::Zero());
   if (resolutions.empty()) return {};
   const auto step_mu = static_cast<float>(kStep_px / Median(std::move(resolutions)));
 
@@ -181,13 +167,13 @@ SurfaceAlignment AlignSurface(std::span<const TrainingCamera> views, Mesh& mesh)
       costs[vertex] = CostsOf(prepared, mesh.vertices[vertex], mesh.normals[vertex], step_mu);
     }
   });
-  const Neighbors neighbors(mesh);
-  for (int round = 0; round < kCostRounds; ++round) SmoothCosts(neighbors, costs);
+  const VertexTriangles triangles(mesh);
+  for (int round = 0; round < kCostRounds; ++round) SmoothCosts(mesh, triangles, costs);
   std::vector<Distance> found;
   found.reserve(costs.size());
   for (const Costs& of_vertex : costs) found.push_back(BestDistance(of_vertex));
   std::vector<Distance> distances = found;
-  for (int round = 0; round < kDistanceRounds; ++round) SmoothDistances(neighbors, found, distances);
+  for (int round = 0; round < kDistanceRounds; ++round) SmoothDistances(mesh, triangles, found, distances);
 
   SurfaceAlignment alignment;
   size_t moved = 0;

@@ -60,11 +60,7 @@ absl::Status ValidateTextureOptions(const TextureOptions& options) {
 
 // Pixels per map unit that three quarters of the views have at most; 0: no view shows the center.
 float ResolutionOfViews(std::span<const TrainingCamera> views, const Eigen::Vector3f& center) {
-  std::vector<double> resolutions;
-  for (const TrainingCamera& view : views) {
-    const double depth_mu = (view.T_camera_object * center.cast<double>()).z();
-    if (depth_mu > 0) resolutions.push_back((view.camera.fx_px + view.camera.fy_px) / 2 / depth_mu);
-  }
+  std::vector<double> resolutions = ResolutionsAt(views, center);
   return resolutions.empty() ? 0.0f : static_cast<float>(NearestQuantile(std::move(resolutions), 0.75));
 }
 

@@ -34,4 +34,13 @@ absl::Status ValidateTextureView(const TrainingCamera& view) {
   return absl::OkStatus();
 }
 
+std::vector<double> ResolutionsAt(std::span<const TrainingCamera> views, const Eigen::Vector3f& point) {
+  std::vector<double> resolutions;
+  for (const TrainingCamera& view : views) {
+    const double depth_mu = (view.T_camera_object * point.cast<double>()).z();
+    if (depth_mu > 0) resolutions.push_back((view.camera.fx_px + view.camera.fy_px) / 2 / depth_mu);
+  }
+  return resolutions;
+}
+
 }  // namespace romap::texture

@@ -1,5 +1,6 @@
 #include "common/mesh_faces.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace romap::mesh_faces_test {
@@ -14,6 +15,17 @@ TEST(MeshFacesTest, ShapesOfTriangles) {
   EXPECT_TRUE(shapes.center[0].isApprox(Eigen::Vector3f(2.0f / 3, 1, 0)));
   EXPECT_EQ(shapes.normal[1], Eigen::Vector3f::Zero()) << "without area";
   EXPECT_EQ(shapes.total_area_mu2, 3);
+}
+
+TEST(MeshFacesTest, TrianglesAtVertices) {
+  Mesh mesh;
+  mesh.vertices.resize(5);
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const VertexTriangles triangles(mesh);
+  EXPECT_THAT(triangles.At(0), ::testing::ElementsAre(0, 1));
+  EXPECT_THAT(triangles.At(1), ::testing::ElementsAre(0));
+  EXPECT_THAT(triangles.At(3), ::testing::ElementsAre(1));
+  EXPECT_THAT(triangles.At(4), ::testing::IsEmpty());
 }
 
 TEST(MeshFacesTest, Bounds) {

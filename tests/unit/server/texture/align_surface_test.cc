@@ -64,6 +64,18 @@ TEST(AlignSurfaceTest, WithoutTextureNothingMoves) {
   EXPECT_LT(alignment.moved_share, 0.01);
 }
 
+// Stripes that repeat about every four pixels: several distances agree, so none is chosen against the present one.
+TEST(AlignSurfaceTest, ARepeatedTextureIsNoEvidence) {
+  const SolidTexture stripes = [](const Eigen::Vector3d& p) {
+    const double value = 128 + 60 * std::sin(2 * M_PI * (p.x() + p.y() + p.z()) / (4 * static_cast<double>(kPixel_mu)));
+    return Eigen::Array3d(value, value, value);
+  };
+  const std::vector<TrainingCamera> views = Photos(stripes);
+  Mesh mesh = Ball(1);
+  AlignSurface(views, mesh);
+  EXPECT_LT(MeanError_px(mesh), 0.4F);
+}
+
 TEST(AlignSurfaceTest, TwoViewsAreNoEvidence) {
   Mesh mesh = Ball(1.01);
   const Mesh before = mesh;
