@@ -73,6 +73,11 @@ void SpaceFields(NerfConfig& c, ConfigFields& fields) {
       {.min = 0,
        .max = 1,
        .help = "A hull cell is emptied if fewer than this share of the images that contain it show the object there"});
+  fields.Add("mask_border_spreads", &c.mask_border_spreads,
+             {.min = 0,
+              .max = 10,
+              .help = "Background pixels this close to a mask do not empty hull cells, in standard deviations of the "
+                      "measured noise of the masks' borders; 0 = masks are exact"});
   fields.Add("occupancy_start_step", &c.occupancy_start_step,
              {.unit = "steps",
               .min = 0,

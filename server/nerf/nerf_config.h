@@ -31,6 +31,7 @@ struct NerfConfig {
   double hull_vote_share = 0.08;
   double hull_trim_share = 0.002;
   double hull_show_share = 0.25;
+  double mask_border_spreads = 2;
   int occupancy_start_step = 40;
   int occupancy_interval_steps = 20;
   double occupancy_decay = 0.9;

@@ -20,6 +20,9 @@ namespace romap::nerf {
 namespace {
 
 constexpr int kMaxDivergences = 3;
+constexpr uint64_t kMaskCheckSteps = 100;  // interval of the measurements of mask borders
+// When the masks turn out to be less precise than assumed, training is extended as if this share of the box were new.
+constexpr double kLostShare = 0.3;
 
 bool IsBlack(const ObjectView& view) {
   constexpr double kMaxBlack = 4;  // mean 8-bit value over the object's pixels
@@ -115,12 +118,12 @@ TrainStats ObjectField::Train(int steps, int threads) {
 void ObjectField::PrepareViews() {
   if (!views_changed_) return;
   if (views_.CheckDepths()) RebuildHull();
-  rays_.Build(views_.views(), field_.box(), views_.depth_consistent());
+  rays_.Build(views_.views(), field_.box(), views_.quality());
   probe_.Build(rays_, views_.size());
   rays_.Weigh(views_.Weights());
   warnings_.OnViewChecks({.views = views(),
                           .black_views = static_cast<int>(std::ranges::count_if(views_.views(), IsBlack)),
-                          .depth_consistent = views_.depth_consistent(),
+                          .depth_consistent = views_.quality().depth_is_consistent,
                           .share_intersecting_box = probe_.ShareIntersectingBox(field_.Space().extent)});
   field_.SetHull(views_.CarveHull());
   views_changed_ = false;
@@ -155,6 +158,12 @@ TrainStats ObjectField::RunSteps(int steps, int threads) {
 // Compares the field with all views and adapts poses, trust, ray weights and the training plan to the result.
 void ObjectField::Evaluate() {
   if (views_.RefinementIsDue(steps())) RefinePoses();
+  if (steps() % kMaskCheckSteps == 0 && views_.MeasureMaskBorder(rays_, field_.model(), field_.Space())) {
+    RebuildHull();
+    views_changed_ = true;
+    PrepareViews();
+    plan_.OnNewBox(steps(), kLostShare);
+  }
   const ProbeReport report = probe_.Measure(field_.model(), config_, field_.Space());
   if (views_.UpdateTrust(report, steps())) {
     RebuildHull();

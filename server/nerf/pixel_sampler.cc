@@ -37,7 +37,7 @@ PixelSampler::PixelSampler(const NerfConfig& config, uint64_t seed)
   sparse_.salt = 3;
 }
 
-void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
+void PixelSampler::Build(std::span<const ObjectView> views, const InputQuality& quality) {
   for (PixelKind* kind : {&object_, &background_, &sparse_}) {
     kind->pixels.clear();
     kind->first_of_group.assign(1, 0);
@@ -46,7 +46,7 @@ void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
   for (const ObjectView& view : views) object_pixels += cv::countNonZero(KindMask(view, RayKind::kObject));
   const double keep_share = std::min(1.0, kMaxObjectPixels / std::max(1.0, object_pixels));
   for (size_t i = 0; i < views.size(); ++i) {
-    CollectPixels(views[i], static_cast<uint16_t>(i), keep_share, use_depth);
+    CollectPixels(views[i], static_cast<uint16_t>(i), keep_share, quality);
     CollectMapPoints(views[i], static_cast<uint16_t>(i));
   }
   for (PixelKind* kind : {&object_, &background_, &sparse_}) kind->pixels.shrink_to_fit();
@@ -62,11 +62,13 @@ void PixelSampler::Build(std::span<const ObjectView> views, bool use_depth) {
   Weigh(std::vector<float>(views.size(), 1.0f));
 }
 
-void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth) {
+void PixelSampler::CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share,
+                                 const InputQuality& quality) {
+  const bool use_depth = quality.depth_is_consistent;
   const cv::Mat is_object = KindMask(view, RayKind::kObject);
   const cv::Rect bounds = cv::boundingRect(is_object);
   cv::Mat near_object, inside;
-  cv::dilate(is_object, near_object, Square(kBackgroundBand_px));
+  cv::dilate(is_object, near_object, Square(kBackgroundBand_px + quality.mask_border_px));
   cv::erode(is_object, inside, Square(kBorder_px), {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   std::array<std::vector<TrainingPixel>, kTiles> tiles;
   const double distance_px = std::clamp(kPairDistance * std::sqrt(cv::countNonZero(is_object)), 1.5, 80.0);

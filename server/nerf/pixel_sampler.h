@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/stage_messages.h"
+#include "server/nerf/input_quality.h"
 #include "server/nerf/nerf_config.h"
 
 namespace romap::nerf {
@@ -56,9 +57,10 @@ class PixelSampler {
 
   PixelSampler(const NerfConfig& config, uint64_t seed);
 
-  // Replaces all pixels; all views weigh 1. `use_depth`: object pixels get the dense depth. Keeps no reference to the
-  // views.
-  void Build(std::span<const ObjectView> views, bool use_depth = true);
+  // Replaces all pixels; all views weigh 1. Object pixels get the dense depth if it is consistent. The band of
+  // background pixels includes the uncertain border of the mask, because the hull does not exclude it. Keeps no
+  // reference to the views.
+  void Build(std::span<const ObjectView> views, const InputQuality& quality = {});
   // Sets how often the pixels of each view are chosen relative to those of the others: one weight >= 0 per view. If all
   // weights are 0, all views weigh 1.
   void Weigh(std::span<const float> views);
@@ -104,7 +106,7 @@ class PixelSampler {
     std::vector<const TrainingPixel*> EvenlySpaced(size_t group, size_t count) const;
   };
 
-  void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, bool use_depth);
+  void CollectPixels(const ObjectView& view, uint16_t view_index, double keep_share, const InputQuality& quality);
   PartnerPixel FindPartner(const ObjectView& view, const cv::Mat& is_object, cv::Point at, double distance_px,
                            uint64_t key, bool use_depth) const;
   void CollectMapPoints(const ObjectView& view, uint16_t view_index);

@@ -4,8 +4,8 @@
 
 namespace romap::nerf {
 
-void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth) {
-  sampler_.Build(views, use_depth);
+void RaySet::Build(std::span<const ObjectView> views, const TrainingBox& box, const InputQuality& quality) {
+  sampler_.Build(views, quality);
   SetCameras(views, box);
 }
 

@@ -17,9 +17,9 @@ class RaySet {
  public:
   RaySet(const NerfConfig& config, uint64_t seed) : config_(config), seed_(seed), sampler_(config, seed) {}
 
-  // Replaces all rays. `use_depth`: rays through pixels with dense depth get a target depth. Keeps no reference to the
+  // Replaces all rays. Rays through pixels with consistent dense depth get a target depth. Keeps no reference to the
   // views.
-  void Build(std::span<const ObjectView> views, const TrainingBox& box, bool use_depth = true);
+  void Build(std::span<const ObjectView> views, const TrainingBox& box, const InputQuality& quality = {});
   // Updates the rays after the cameras of the same views, or the box, moved.
   void SetCameras(std::span<const ObjectView> views, const TrainingBox& box);
   bool empty() const { return sampler_.empty(); }

@@ -7,6 +7,7 @@
 
 #include "common/status.h"
 #include "server/nerf/depth_check.h"
+#include "server/nerf/mask_border.h"
 #include "server/nerf/view_alignment.h"
 #include "server/nerf/view_check.h"
 
@@ -89,9 +90,17 @@ SE3<World, Camera> TrainingViews::WithRefinement(size_t index, const SE3<World, 
 }
 
 bool TrainingViews::CheckDepths() {
-  const bool was_consistent = depth_consistent_;
-  depth_consistent_ = DepthIsConsistent(views_);
-  return depth_consistent_ != was_consistent;
+  const bool was_consistent = quality_.depth_is_consistent;
+  quality_.depth_is_consistent = DepthIsConsistent(views_);
+  return quality_.depth_is_consistent != was_consistent;
+}
+
+bool TrainingViews::MeasureMaskBorder(const RaySet& rays, const FieldModel& model, const RenderSpace& space) {
+  const MaskNoise noise = MeasureMaskNoise(views_, trust_.Weights(), rays, model, config_, space);
+  const int border_px = UncertainBorder_px(noise, config_.mask_border_spreads);
+  if (border_px <= quality_.mask_border_px) return false;
+  quality_.mask_border_px = border_px;
+  return true;
 }
 
 bool TrainingViews::RefinePoses(const TrainingBox& box, const RaySet& rays, const FieldModel& model,
@@ -108,7 +117,7 @@ bool TrainingViews::RefinePoses(const TrainingBox& box, const RaySet& rays, cons
 }
 
 void TrainingViews::RebuildHull(const TrainingBox& box) {
-  hull_.Reset(box, depth_consistent_);
+  hull_.Reset(box, quality_);
   for (size_t i = 0; i < views_.size(); ++i) {
     if (trust_.trusted(i)) CastVote(i);
   }

@@ -28,7 +28,7 @@ class TrainingViews {
   // The visual hull counts votes in 8 bits.
   static constexpr size_t kMaxViews = 255;
 
-  explicit TrainingViews(const NerfConfig& config) : refiner_(config), hull_(config) {}
+  explicit TrainingViews(const NerfConfig& config) : config_(config), refiner_(config), hull_(config) {}
 
   bool empty() const { return views_.empty(); }
   size_t size() const { return views_.size(); }
@@ -36,8 +36,7 @@ class TrainingViews {
   bool trusted(size_t index) const { return trust_.trusted(index); }
   // One per view: 1 trusted, 0 not.
   std::vector<float> Weights() const { return trust_.Weights(); }
-  // Whether the dense depth of the views is consistent with their masks; see CheckDepths().
-  bool depth_consistent() const { return depth_consistent_; }
+  const InputQuality& quality() const { return quality_; }
 
   // Adds a view, or replaces the view of the same keyframe. RESOURCE_EXHAUSTED: there are kMaxViews other views.
   absl::Status Add(ObjectView view, uint64_t step);
@@ -50,6 +49,11 @@ class TrainingViews {
   // Checks again whether dense depth is consistent with the masks. True if the result changed; then the hull must be
   // rebuilt.
   bool CheckDepths();
+
+  // Measures the uncertain border of the masks again. `rays` must have been built on these views. True if it became
+  // wider; then the rays and the hull must be rebuilt. It never becomes narrower, because the silhouettes then fit the
+  // masks less.
+  bool MeasureMaskBorder(const RaySet& rays, const FieldModel& model, const RenderSpace& space);
 
   // Updates the trust in every view. True if any changed; then the hull must be rebuilt.
   bool UpdateTrust(const ProbeReport& report, uint64_t step) { return trust_.Update(report, step); }
@@ -78,10 +82,11 @@ class TrainingViews {
 
   std::vector<ObjectView> views_;  // with their refined poses
   ViewTrust trust_;
+  NerfConfig config_;
   PoseRefiner refiner_;
   VisualHull hull_;
   std::vector<SE3<World, Camera>> vote_poses_;  // poses of the views when they voted on the hull
-  bool depth_consistent_ = true;
+  InputQuality quality_;
 };
 
 }  // namespace romap::nerf

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "server/hull/grid_projection.h"
+#include "server/nerf/mask_border.h"
 #include "server/nerf/math/types.h"
 
 namespace romap::nerf {
@@ -22,7 +23,7 @@ enum class Coverage { kUnknown, kNone, kFull, kPartial };
 
 // How a view's mask covers a footprint.
 struct VisualHull::Verdict {
-  Coverage foreground = Coverage::kUnknown;  // pixels that are not background
+  Coverage foreground = Coverage::kUnknown;  // pixels that are not certainly background
   Coverage object = Coverage::kUnknown;      // pixels that show the object
   bool in_image = false;                     // the whole footprint, whether inside the crop or not
 
@@ -36,16 +37,20 @@ struct VisualHull::Verdict {
 // One view's mask and depth, prepared for queries by balls of the Object frame.
 class VisualHull::Footprints {
  public:
-  Footprints(const ObjectView& view, const TrainingBox& box, bool use_depth, double cell_radius_mu)
+  Footprints(const ObjectView& view, const TrainingBox& box, const InputQuality& quality, double cell_radius_mu)
       : image_px_(view.camera.width_px, view.camera.height_px),
         roi_px_(view.roi_px),
         focal_px_(std::max(view.camera.fx_px, view.camera.fy_px)) {
     const SE3<Camera, Object> T_camera_object = view.T_world_camera.Inverse() * box.T_world_object;
     projection_ =
         hull::GridProjection::Of(view.camera, T_camera_object.RotationMatrix(), T_camera_object.translation());
-    cv::integral((view.ray_kind != static_cast<int>(RayKind::kBackground)) / 255, foreground_sum_, CV_32S);
-    cv::integral((view.ray_kind == static_cast<int>(RayKind::kObject)) / 255, object_sum_, CV_32S);
-    if (!use_depth || view.depth_mu.empty()) return;
+    const cv::Mat object = view.ray_kind == static_cast<int>(RayKind::kObject);
+    cv::Mat foreground;
+    cv::bitwise_or(view.ray_kind == static_cast<int>(RayKind::kOccluder), PossibleObject(view, quality.mask_border_px),
+                   foreground);
+    cv::integral(foreground / 255, foreground_sum_, CV_32S);
+    cv::integral(object / 255, object_sum_, CV_32S);
+    if (!quality.depth_is_consistent || view.depth_mu.empty()) return;
     const double min_z_mu = T_camera_object.translation().z() - box.half_extents.norm();
     if (min_z_mu <= 0) return;  // the footprints of some cells are unbounded
     const int reach_px = 1 + static_cast<int>(cell_radius_mu * focal_px_ / min_z_mu);
@@ -96,7 +101,7 @@ class VisualHull::Footprints {
   cv::Size image_px_;
   cv::Rect roi_px_;
   double focal_px_;
-  cv::Mat foreground_sum_;  // integral image of "not background"
+  cv::Mat foreground_sum_;  // integral image of "not certainly background"
   cv::Mat object_sum_;      // integral image of "object"
   cv::Mat nearest_mu_;  // least depth under the footprint of a cell, 0 if part of it is unknown; empty without depth
 };
@@ -115,9 +120,9 @@ VisualHull::VisualHull(const NerfConfig& config)
             .min_object = config.hull_show_share > 0 ? 1 : 0,
             .object_share = config.hull_show_share} {}
 
-void VisualHull::Reset(const TrainingBox& box, bool use_depth) {
+void VisualHull::Reset(const TrainingBox& box, const InputQuality& quality) {
   box_ = box;
-  use_depth_ = use_depth;
+  quality_ = quality;
   evidence_.Reset({box.half_extents, kOccupancyResolution});
   views_ = 0;
 }
@@ -126,7 +131,7 @@ double VisualHull::CellRadius_mu() const { return box_.half_extents.norm() / kOc
 
 void VisualHull::Count(const ObjectView& view, int sign) {
   views_ += sign;
-  const Footprints footprints(view, box_, use_depth_, CellRadius_mu());
+  const Footprints footprints(view, box_, quality_, CellRadius_mu());
   for (int z = 0; z < kOccupancyResolution; z += kMaxBlock) {
     for (int y = 0; y < kOccupancyResolution; y += kMaxBlock) {
       for (int x = 0; x < kOccupancyResolution; x += kMaxBlock) {

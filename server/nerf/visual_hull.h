@@ -5,6 +5,7 @@
 
 #include "common/stage_messages.h"
 #include "server/hull/evidence_grid.h"
+#include "server/nerf/input_quality.h"
 #include "server/nerf/nerf_config.h"
 #include "server/nerf/training_box.h"
 
@@ -17,8 +18,9 @@ class VisualHull {
  public:
   explicit VisualHull(const NerfConfig& config);
 
-  // Removes all views; the hull is the whole box. `use_depth`: carve by dense depth too, if its values are reliable.
-  void Reset(const TrainingBox& box, bool use_depth = true);
+  // Removes all views; the hull is the whole box. Consistent depth carves too, and background pixels within the
+  // uncertain border of the mask are no evidence.
+  void Reset(const TrainingBox& box, const InputQuality& quality = {});
   void Add(const ObjectView& view) { Count(view, 1); }
   // `view` must be the same as when it was added.
   void Remove(const ObjectView& view) { Count(view, -1); }
@@ -36,7 +38,7 @@ class VisualHull {
 
   TrainingBox box_;
   bool carve_;
-  bool use_depth_ = true;
+  InputQuality quality_;
   double margin_;
   hull::CarvingRule rule_;
   int views_ = 0;

@@ -19,6 +19,7 @@
 #include "client/bench/true_views.h"
 #include "client/files/ply.h"
 #include "client/files/sequence.h"
+#include "common/angles.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
 #include "tests/bench/frame_noise.h"
@@ -70,7 +71,7 @@ void PrintRow(const std::string& name, int views, const nerf::TrainStats& stats,
 Cuboid FirstBox(const files::ObjectRecord& object, const Options& options) {
   const Eigen::Vector3d scale(options.first_scale[0], options.first_scale[1], options.first_scale[2]);
   const Eigen::Vector3d half = object.half_extents.cwiseProduct(scale);
-  const Eigen::AngleAxisd turn(options.first_yaw_deg * M_PI / 180, Eigen::Vector3d::UnitZ());
+  const Eigen::AngleAxisd turn(options.first_yaw_deg * kRadPerDeg, Eigen::Vector3d::UnitZ());
   const SE3<Object, Object> T_object_first(Eigen::Quaterniond(turn), half - object.half_extents);
   return {object.T_world_object * T_object_first, half, 1.0};
 }

@@ -18,6 +18,7 @@
 #include "client/bench/true_views.h"
 #include "client/files/ply.h"
 #include "client/files/sequence.h"
+#include "common/angles.h"
 #include "common/status.h"
 #include "server/mesh/extract_mesh.h"
 #include "server/nerf/object_field.h"
@@ -41,7 +42,7 @@ using Damage = std::function<void(Views& views, const Views& other)>;
 
 void RotateOneView(Views& views, const Views&) {
   ObjectView& view = views[views.size() / 2];
-  const Eigen::AngleAxisd turn(5 * M_PI / 180, Eigen::Vector3d::UnitY());
+  const Eigen::AngleAxisd turn(5 * kRadPerDeg, Eigen::Vector3d::UnitY());
   view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/synth/random.h"
+#include "common/angles.h"
 #include "tests/support/mask_damage.h"
 
 namespace romap::measure {
@@ -16,7 +17,7 @@ SE3<World, Camera> PerturbedPose(const SE3<World, Camera>& T_world_camera, const
     const double x = random.Normal(), y = random.Normal();
     return {x, y, random.Normal()};
   };
-  const Eigen::Vector3d turn_rad = normals() * noise.pose_deg * M_PI / 180;
+  const Eigen::Vector3d turn_rad = normals() * noise.pose_deg * kRadPerDeg;
   const Eigen::Vector3d shift_m = normals() * noise.pose_cm / 100;
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_rad.norm(), turn_rad.stableNormalized()));
   return {T_world_camera.rotation() * turn, T_world_camera.translation() + shift_m};

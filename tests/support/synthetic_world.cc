@@ -7,10 +7,10 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "common/angles.h"
+
 namespace romap {
 namespace {
-
-constexpr double kDegToRad = std::numbers::pi / 180;
 
 Eigen::Matrix3d YawMatrix(double yaw_rad) {
   return Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -125,8 +125,8 @@ void SyntheticWorld::MakePoints() {
 
 SE3<World, Camera> SyntheticWorld::CameraPose(int index) const {
   const double share = options_.frames > 1 ? static_cast<double>(index) / options_.frames : 0;
-  const double azimuth = (options_.start_azimuth_deg + share * options_.sweep_deg) * kDegToRad;
-  const double elevation = options_.elevation_deg * kDegToRad;
+  const double azimuth = (options_.start_azimuth_deg + share * options_.sweep_deg) * kRadPerDeg;
+  const double elevation = options_.elevation_deg * kRadPerDeg;
   const Eigen::Vector3d direction(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
                                   std::sin(elevation));
   const Eigen::Vector3d position = options_.orbit_radius_mu * direction;

@@ -10,6 +10,7 @@
 #include <map>
 #include <random>
 
+#include "common/angles.h"
 #include "common/status.h"
 
 namespace romap::mesh_codec_test {
@@ -92,7 +93,7 @@ TEST(MeshCodec, RoundTripKeepsGeometryWithinAHundredthOfAMillimeter) {
     const size_t original = decoded.colors[k][0] * 40 + decoded.colors[k][1];  // the color identifies the vertex
     ASSERT_EQ(decoded.colors[k], mesh.colors[original]);
     EXPECT_LT((decoded.vertices[k] - mesh.vertices[original]).cwiseAbs().maxCoeff(), 1e-5f);
-    EXPECT_GT(decoded.normals[k].dot(mesh.normals[original]), std::cos(0.7 * M_PI / 180));
+    EXPECT_GT(decoded.normals[k].dot(mesh.normals[original]), std::cos(0.7 * kRadPerDeg));
     EXPECT_NEAR(decoded.normals[k].norm(), 1.0f, 1e-4f);
   }
 }

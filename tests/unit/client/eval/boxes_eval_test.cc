@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "common/angles.h"
 #include "tests/unit/client/eval/eval_world.h"
 
 namespace romap::eval::boxes_eval_test {
@@ -14,8 +15,6 @@ using eval_world::TempFolder;
 using eval_world::UprightCuboid;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 class BoxesEvalTest : public testing::Test {
  protected:

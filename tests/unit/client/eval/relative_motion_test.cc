@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/angles.h"
 #include "tests/unit/client/eval/eval_world.h"
 
 namespace romap::eval::relative_motion_test {
@@ -76,7 +77,7 @@ TEST(RelativeMotionTest, MeasuresRelativeRotationErrors) {
   std::vector<PosePair> pairs = Pairs(Orbit());
   // A yaw drift of 0.1 degrees per frame, 2.5 degrees per second.
   for (size_t k = 0; k < pairs.size(); ++k) {
-    const double angle_rad = 0.1 * static_cast<double>(k) * std::numbers::pi / 180;
+    const double angle_rad = 0.1 * static_cast<double>(k) * kRadPerDeg;
     const SE3<World, Camera>& pose = pairs[k].truth;
     pairs[k].estimated = {Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ())) * pose.rotation(),
                           pose.translation()};

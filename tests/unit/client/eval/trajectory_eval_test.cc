@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/angles.h"
 #include "tests/unit/client/eval/eval_world.h"
 
 namespace romap::eval::trajectory_eval_test {
@@ -61,7 +62,7 @@ TEST_F(TrajectoryEvalTest, RigidAlignmentLeavesTheScaleError) {
 
 TEST_F(TrajectoryEvalTest, MeasuresAKnownTranslationAndRoll) {
   std::vector<files::StampedPose> poses = eval_world::Orbit();
-  const Eigen::Quaterniond roll(Eigen::AngleAxisd(2 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
+  const Eigen::Quaterniond roll(Eigen::AngleAxisd(2 * kRadPerDeg, Eigen::Vector3d::UnitZ()));
   for (files::StampedPose& pose : poses) {
     pose.T_world_camera = {pose.T_world_camera.rotation() * roll,
                            Eigen::Vector3d(pose.T_world_camera.translation() + Eigen::Vector3d(0.03, 0.04, 0))};

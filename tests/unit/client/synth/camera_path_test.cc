@@ -8,10 +8,9 @@
 
 #include "client/synth/scene.h"
 #include "client/synth/synth_camera.h"
+#include "common/angles.h"
 
 namespace romap::synth::camera_path_test {
-
-constexpr double kDegree = M_PI / 180;
 
 std::vector<SE3<World, Camera>> Poses(const SynthOptions& options, const Scene& scene) {
   const CameraPath path(options, scene, SynthCamera(options));
@@ -28,7 +27,7 @@ double TotalAzimuth_deg(const std::vector<SE3<World, Camera>>& poses) {
   for (size_t i = 1; i < poses.size(); ++i) {
     sum += std::remainder(Azimuth(poses[i]) - Azimuth(poses[i - 1]), 2 * M_PI);
   }
-  return sum / kDegree;
+  return sum / kRadPerDeg;
 }
 
 // The largest rotation [deg] and translation [mm] between consecutive frames from `first` to `last` - 1.
@@ -41,7 +40,7 @@ PeakMotion FindPeakMotion(const std::vector<SE3<World, Camera>>& poses, size_t f
   PeakMotion peak;
   for (size_t i = first + 1; i < last; ++i) {
     peak.rotation_deg =
-        std::max(peak.rotation_deg, poses[i].rotation().angularDistance(poses[i - 1].rotation()) / kDegree);
+        std::max(peak.rotation_deg, poses[i].rotation().angularDistance(poses[i - 1].rotation()) / kRadPerDeg);
     peak.translation_mm =
         std::max(peak.translation_mm, 1000 * (poses[i].translation() - poses[i - 1].translation()).norm());
   }
@@ -180,7 +179,7 @@ TEST(CameraPathTest, RotationKeepsThePositionAndReachesTheGivenSpeed) {
     }
     EXPECT_LT(positions.sizes().maxCoeff(), 0.045);
     EXPECT_GT(positions.sizes().maxCoeff(), 0.01);
-    EXPECT_GT(rotations.sizes().minCoeff(), 35 * kDegree) << "rotates about all three axes";
+    EXPECT_GT(rotations.sizes().minCoeff(), 35 * kRadPerDeg) << "rotates about all three axes";
   }
 }
 
@@ -247,7 +246,7 @@ TEST(CameraPathTest, SeedsDiffer) {
   const auto second = Poses({.seed = 2, .frames = 100, .path = PathKind::kRotation}, scene);
   EXPECT_GT(first[50].rotation().angularDistance(first[0].rotation() * second[0].rotation().conjugate() *
                                                  second[50].rotation()),
-            2 * kDegree);
+            2 * kRadPerDeg);
 }
 
 }  // namespace romap::synth::camera_path_test

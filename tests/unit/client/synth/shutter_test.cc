@@ -6,10 +6,9 @@
 
 #include "client/synth/scene.h"
 #include "client/synth/synth_camera.h"
+#include "common/angles.h"
 
 namespace romap::synth::shutter_test {
-
-constexpr double kDegree = M_PI / 180;
 
 class ShutterTest : public ::testing::Test {
  protected:
@@ -28,8 +27,8 @@ TEST_F(ShutterTest, MiddleRowHasThePoseOfTheFrame) {
   ASSERT_TRUE(poses.Rolling());
   const double middle_px = 0.5 * (camera.height_px - 1);
   EXPECT_LT((poses.Row(middle_px).translation() - path.Pose(40).translation()).norm(), 1e-6);
-  EXPECT_NEAR(poses.Row(0).rotation().angularDistance(poses.Row(camera.height_px - 1).rotation()), 0.45 * kDegree,
-              0.01 * kDegree);
+  EXPECT_NEAR(poses.Row(0).rotation().angularDistance(poses.Row(camera.height_px - 1).rotation()), 0.45 * kRadPerDeg,
+              0.01 * kRadPerDeg);
   EXPECT_LT((poses.Row(0).translation() - path.Pose(40, -0.25).translation()).norm(), 1e-4)
       << "the first row is the earliest";
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/angles.h"
 #include "common/status.h"
 #include "tests/unit/server/mesh/field_fakes.h"
 #include "tests/unit/server/mesh/mesh_checks.h"
@@ -42,7 +43,7 @@ TEST(ExtractMesh, NormalsHaveUnitLengthAndPointOutward) {
     EXPECT_NEAR(mesh.normals[i].norm(), 1.0f, 1e-5f);
     worst_cosine = std::min<double>(worst_cosine, mesh.normals[i].dot(mesh.vertices[i].normalized()));
   }
-  EXPECT_GT(worst_cosine, std::cos(5.0 * kPi / 180));
+  EXPECT_GT(worst_cosine, std::cos(5.0 * kRadPerDeg));
 }
 
 TEST(ExtractMesh, ColorsAreThoseOfTheFieldAtTheVertices) {

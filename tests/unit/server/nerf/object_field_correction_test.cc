@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/angles.h"
 #include "common/map_motion.h"
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
@@ -32,7 +33,7 @@ ObjectField MakeField(const BallScene& scene, const std::vector<ObjectView>& vie
 
 // A loop closure: rotation by 20 degrees about a tilted axis, shift and scale.
 Sim3<World, World> LoopClosure() {
-  const Eigen::AngleAxisd turn(20 * M_PI / 180, Eigen::Vector3d(0.1, -0.1, 1).normalized());
+  const Eigen::AngleAxisd turn(20 * kRadPerDeg, Eigen::Vector3d(0.1, -0.1, 1).normalized());
   return {1.3, Eigen::Quaterniond(turn), {2.0, -1.0, 0.5}};
 }
 

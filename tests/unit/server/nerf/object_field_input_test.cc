@@ -9,6 +9,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
+#include "common/angles.h"
 #include "server/nerf/object_field.h"
 #include "tests/unit/server/nerf/test_scene.h"
 
@@ -52,7 +53,7 @@ ObjectField TrainedOn(const BallScene& scene, const std::vector<ObjectView>& vie
 }
 
 void Turn(ObjectView& view, double angle_deg) {
-  const Eigen::AngleAxisd turn(angle_deg * M_PI / 180, Eigen::Vector3d::UnitY());
+  const Eigen::AngleAxisd turn(angle_deg * kRadPerDeg, Eigen::Vector3d::UnitY());
   view.T_world_camera = view.T_world_camera * SE3<Camera, Camera>(Eigen::Quaterniond(turn), Eigen::Vector3d::Zero());
 }
 

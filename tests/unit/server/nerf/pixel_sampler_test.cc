@@ -137,7 +137,7 @@ TEST_F(PixelSamplerTest, InvalidDepthIsUnknown) {
   }
   const PixelSampler sampler = Build();
   PixelSampler without(config_, 5);
-  without.Build(views_, false);
+  without.Build(views_, {.depth_is_consistent = false});
   for (int i = 0; i < config_.rays_per_step; ++i) {
     const auto [pixel, is_object, partner] = sampler.At(0, i);
     EXPECT_LE(without.At(0, i).pixel.z_mu, 0);

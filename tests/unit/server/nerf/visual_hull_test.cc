@@ -97,7 +97,7 @@ TEST(VisualHullTest, DepthCarvesConcavities) {
   const Eigen::Vector3d point = 0.9 * scene.radius_mu * eye.normalized();  // in the Object frame
   const auto is_kept = [&](double dent_mu, bool use_depth) {
     VisualHull hull(NerfConfig{});
-    hull.Reset(box, use_depth);
+    hull.Reset(box, {.depth_is_consistent = use_depth});
     for (ObjectView view : scene.Views()) {
       cv::add(view.depth_mu, dent_mu, view.depth_mu, view.depth_mu > 0);
       hull.Add(view);

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "common/angles.h"
 #include "server/objects/projection.h"
 
 namespace romap::objects::view_picker_test {
@@ -14,7 +15,6 @@ namespace romap::objects::view_picker_test {
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr double kDeg = std::numbers::pi / 180;
 constexpr uint16_t kLabel = 3;
 
 // A cube with sides of 0.2 map units at the origin, and cameras that orbit it at a distance of one map unit.
@@ -29,7 +29,7 @@ class ViewPickerTest : public ::testing::Test {
 
   // A keyframe from this direction with an exact mask of the cube's bounding box.
   ViewCandidate MakeCandidate(double azimuth_deg, double distance_mu = 1) {
-    const double a = azimuth_deg * kDeg;
+    const double a = azimuth_deg * kRadPerDeg;
     Eigen::Matrix3d R_world_camera;
     R_world_camera.col(2) = -Eigen::Vector3d(std::cos(a), std::sin(a), 0);
     R_world_camera.col(1) = -Eigen::Vector3d::UnitZ();

@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include "common/angles.h"
 #include "tests/unit/server/slam/loop_world.h"
 
 namespace romap::slam::loop_detector_test {
@@ -25,7 +26,7 @@ TEST(LoopDetectorTest, FindsTheReturnToAWallAndItsDrift) {
   const int old = static_cast<int>(loop->old.value) - 1;
   const Sim3<World, World> expected = world.DriftAt(old) * world.DriftAt(newest).Inverse();
   const Sim3<World, World> correction = loop->Correction(world.map());
-  EXPECT_LT(correction.rotation().angularDistance(expected.rotation()), 0.4 * std::numbers::pi / 180);
+  EXPECT_LT(correction.rotation().angularDistance(expected.rotation()), 0.4 * kRadPerDeg);
   const Eigen::Vector3d& center = world.newest().center_world();
   EXPECT_LT((correction * center - expected * center).norm(), 0.05);
 }

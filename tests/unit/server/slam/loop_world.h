@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "common/angles.h"
 #include "server/slam/place_recognizer.h"
 #include "server/slam/slam_map.h"
 #include "tests/unit/server/slam/random_descriptor.h"
@@ -57,7 +58,7 @@ class LoopWorld {
   // Motion of the space around keyframe `i` by the drift.
   Sim3<World, World> DriftAt(int i) const {
     const Eigen::Quaterniond rotation(
-        Eigen::AngleAxisd(i * drift_.rotation_deg * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
+        Eigen::AngleAxisd(i * drift_.rotation_deg * kRadPerDeg, Eigen::Vector3d::UnitZ()));
     return {1.0, rotation, Eigen::Vector3d(i * drift_.shift_mu, 0, 0)};
   }
 

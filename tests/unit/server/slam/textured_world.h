@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "common/angles.h"
 #include "common/stage_messages.h"
 
 namespace romap::slam {
@@ -48,7 +49,7 @@ class TexturedWorld {
 
   // A camera on a circle of radius 1.2 mu, 1.2 mu above the floor, looking at the plate.
   static SE3<World, Camera> OrbitPose(double angle_deg) {
-    const double angle_rad = angle_deg * std::numbers::pi / 180;
+    const double angle_rad = angle_deg * kRadPerDeg;
     return LookAt({1.2 * std::cos(angle_rad), 1.2 * std::sin(angle_rad), 1.2}, {0, 0, 0.2});
   }
 

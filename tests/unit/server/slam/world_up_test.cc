@@ -10,11 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/angles.h"
 #include "tests/unit/server/slam/textured_world.h"
 
 namespace romap::slam::world_up_test {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // A thin book on a table, seen from all sides: few points of the table are on one side of the book, and many points
 // of the book's edge on the other.
@@ -80,7 +79,7 @@ class WorldUpTest : public ::testing::Test {
   // Tilts the world by 10 degrees. Returns the angle between the true up and z after the rotation that `up` proposes;
   // infinite if it proposes none.
   double UpErrorAfterTilt_rad(WorldUp* up) {
-    const Eigen::Quaterniond tilt(Eigen::AngleAxisd(10 * kDegree, Eigen::Vector3d(1, 1, 0).normalized()));
+    const Eigen::Quaterniond tilt(Eigen::AngleAxisd(10 * kRadPerDeg, Eigen::Vector3d(1, 1, 0).normalized()));
     map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
     const auto R_new_old = up->ProposeRotation(map_);
     if (!R_new_old) return std::numeric_limits<double>::infinity();
@@ -98,7 +97,7 @@ TEST_F(WorldUpTest, EdgesOfFlatObjectsDoNotTiltTheWorld) {
   AddPoints();
   TakeMasks();
   WorldUp up;
-  EXPECT_LT(UpErrorAfterTilt_rad(&up), 0.2 * kDegree);
+  EXPECT_LT(UpErrorAfterTilt_rad(&up), 0.2 * kRadPerDeg);
   EXPECT_TRUE(up.is_known());
   EXPECT_TRUE(up.Diagnostics().empty());
 }
@@ -107,13 +106,13 @@ TEST_F(WorldUpTest, EdgesOfFlatObjectsDoNotTiltTheWorld) {
 TEST_F(WorldUpTest, LevelCamerasShowUpWithoutMasks) {
   AddPoints();
   WorldUp up;
-  EXPECT_LT(UpErrorAfterTilt_rad(&up), 0.5 * kDegree);
+  EXPECT_LT(UpErrorAfterTilt_rad(&up), 0.5 * kRadPerDeg);
   EXPECT_LT(up.confidence(), 0.9);
 }
 
 // Cameras on a mount roll, and nothing but the objects is visible.
 TEST_F(WorldUpTest, UpIsUnknownWithoutEvidence) {
-  roll_rad_ = 20 * kDegree;
+  roll_rad_ = 20 * kRadPerDeg;
   RollCameras();
   AddPoints();
   WorldUp up;
@@ -124,7 +123,7 @@ TEST_F(WorldUpTest, UpIsUnknownWithoutEvidence) {
 }
 
 TEST_F(WorldUpTest, GravityShowsUpWithoutOtherEvidence) {
-  roll_rad_ = 20 * kDegree;
+  roll_rad_ = 20 * kRadPerDeg;
   RollCameras();
   Frame frame;
   const SE3<World, Camera> T_world_camera = TexturedWorld::OrbitPose(0);
@@ -141,14 +140,14 @@ TEST_F(WorldUpTest, GravityShowsUpWithoutOtherEvidence) {
 TEST_F(WorldUpTest, SmallRotationsAreProposedOnlyAtTheEnd) {
   AddPoints();
   TakeMasks();
-  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.15 * kDegree, Eigen::Vector3d::UnitX()));
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.15 * kRadPerDeg, Eigen::Vector3d::UnitX()));
   map_.Transform({1.0, tilt, Eigen::Vector3d::Zero()});
   WorldUp up;
   EXPECT_FALSE(up.ProposeRotation(map_));
   const auto R_new_old = up.ProposeRotation(map_, /*is_last=*/true);
   ASSERT_TRUE(R_new_old);
   const Eigen::Vector3d up_new = *R_new_old * (tilt * Eigen::Vector3d::UnitZ());
-  EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.1 * kDegree);
+  EXPECT_LT(std::acos(std::min(1.0, up_new.z())), 0.1 * kRadPerDeg);
 }
 
 }  // namespace romap::slam::world_up_test

@@ -8,12 +8,12 @@
 #include <random>
 #include <vector>
 
+#include "common/angles.h"
 #include "common/geometry.h"
 
 namespace romap::objects::yaw_from_lines_test {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kDeg = kPi / 180;
 
 CameraModel TestCamera() {
   return {.width_px = 640, .height_px = 480, .fx_px = 520, .fy_px = 520, .cx_px = 319.5, .cy_px = 239.5};
@@ -145,7 +145,7 @@ TEST_P(BoxYawTest, IsRobustToClutter) {
   scene.AddClutter(15);
   const auto yaw = scene.Yaw();
   ASSERT_TRUE(yaw.has_value());
-  EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 0.5 * kDeg);
+  EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 0.5 * kRadPerDeg);
   EXPECT_LE(std::abs(yaw->yaw_rad), kPi / 4 + 1e-9);
   EXPECT_GT(yaw->confidence, 0.25);
 }
@@ -156,7 +156,7 @@ TEST_P(BoxYawTest, IsFoundFromViewsOfOneSide) {
   scene.AddCuboid(GetParam(), kBox);
   const auto yaw = scene.Yaw();
   ASSERT_TRUE(yaw.has_value());
-  EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 1 * kDeg);
+  EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 1 * kRadPerDeg);
   EXPECT_GT(yaw->confidence, 0.25);
 }
 
@@ -177,9 +177,9 @@ TEST_P(BoxYawTest, IsRobustToATiltedUp) {
   scene.AddRing(20, 0, 2 * kPi);
   scene.AddCuboid(GetParam(), kBox);
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)}) {
-    const auto yaw = scene.Yaw(Eigen::AngleAxisd(2 * kDeg, axis).toRotationMatrix());
+    const auto yaw = scene.Yaw(Eigen::AngleAxisd(2 * kRadPerDeg, axis).toRotationMatrix());
     ASSERT_TRUE(yaw.has_value());
-    EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 1 * kDeg);
+    EXPECT_LT(std::abs(std::remainder(yaw->yaw_rad - GetParam(), kPi / 2)), 1 * kRadPerDeg);
     EXPECT_GT(yaw->confidence, 0.25);
   }
 }
@@ -224,7 +224,7 @@ TEST(YawFromLinesTest, LowConfidenceForOneEdge) {
   scene.AddEdge(0, {-0.1, 0, 0}, {0.1, 0, 0});
   const auto yaw = scene.Yaw();
   ASSERT_TRUE(yaw.has_value());
-  EXPECT_NEAR(yaw->yaw_rad, 0, 2 * kDeg);
+  EXPECT_NEAR(yaw->yaw_rad, 0, 2 * kRadPerDeg);
   EXPECT_LT(yaw->confidence, 0.2);
 }
 

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-namespace romap::slam::level_cameras_test {
+#include "common/angles.h"
 
-constexpr double kDegree = std::numbers::pi / 180;
+namespace romap::slam::level_cameras_test {
 
 struct CameraArc {
   double arc_deg = 150;
@@ -31,11 +31,11 @@ class CamerasOnArc {
     up = turn * Eigen::Vector3d::UnitZ();
     constexpr int kCameras = 40;
     for (int i = 0; i < kCameras; ++i) {
-      const double azimuth = arc.arc_deg * kDegree * i / kCameras;
-      const double roll = (arc.constant_roll_deg + arc.sway_deg * normal(random)) * kDegree;
-      const Eigen::Vector3d forward(-std::cos(azimuth) * std::cos(arc.pitch_deg * kDegree),
-                                    -std::sin(azimuth) * std::cos(arc.pitch_deg * kDegree),
-                                    -std::sin(arc.pitch_deg * kDegree));
+      const double azimuth = arc.arc_deg * kRadPerDeg * i / kCameras;
+      const double roll = (arc.constant_roll_deg + arc.sway_deg * normal(random)) * kRadPerDeg;
+      const Eigen::Vector3d forward(-std::cos(azimuth) * std::cos(arc.pitch_deg * kRadPerDeg),
+                                    -std::sin(azimuth) * std::cos(arc.pitch_deg * kRadPerDeg),
+                                    -std::sin(arc.pitch_deg * kRadPerDeg));
       const Eigen::Vector3d level = forward.cross(Eigen::Vector3d::UnitZ()).normalized();
       const Eigen::Quaterniond rolled = turn * Eigen::Quaterniond(Eigen::AngleAxisd(roll, forward));
       rights.push_back(rolled * level);
@@ -65,7 +65,7 @@ TEST(LevelCameras, ErrorsAgreeWithTheStandardDeviation) {
       squared_sigma += 2 * std::pow(level->sigma_rad, 2);
     }
     EXPECT_LT(std::sqrt(squared_error), 1.5 * std::sqrt(squared_sigma));
-    EXPECT_LT(std::sqrt(squared_error / 20), 2.5 * kDegree);
+    EXPECT_LT(std::sqrt(squared_error / 20), 2.5 * kRadPerDeg);
   }
 }
 
@@ -74,7 +74,7 @@ TEST(LevelCameras, AConstantRollDoesNotTiltUpAfterAFullCircle) {
   const CamerasOnArc circle({.arc_deg = 360, .constant_roll_deg = 6, .sway_deg = 1});
   const auto around = UpFromLevelCameras(circle.rights, circle.ups);
   ASSERT_TRUE(around.has_value());
-  EXPECT_LT(circle.Error_rad(*around), 1 * kDegree);
+  EXPECT_LT(circle.Error_rad(*around), 1 * kRadPerDeg);
   const CamerasOnArc arc({.arc_deg = 100, .constant_roll_deg = 4, .sway_deg = 1});
   const auto aside = UpFromLevelCameras(arc.rights, arc.ups);
   ASSERT_TRUE(aside.has_value());

@@ -9,9 +9,9 @@
 #include <random>
 #include <vector>
 
-namespace romap::slam::scene_planes_test {
+#include "common/angles.h"
 
-constexpr double kDegree = std::numbers::pi / 180;
+namespace romap::slam::scene_planes_test {
 
 class ScenePlanesTest : public ::testing::Test {
  protected:
@@ -48,8 +48,8 @@ TEST_F(ScenePlanesTest, FindsFloorAndWallsAmongOtherPoints) {
   const Eigen::Vector3d normals[] = {z, y, x};
   for (size_t i = 0; i < 3; ++i) {
     SCOPED_TRACE(i);
-    EXPECT_GT(std::abs(planes[i].plane.normal.dot(normals[i])), std::cos(1 * kDegree));
-    EXPECT_LT(planes[i].sigma_rad, 2.2 * kDegree);
+    EXPECT_GT(std::abs(planes[i].plane.normal.dot(normals[i])), std::cos(1 * kRadPerDeg));
+    EXPECT_LT(planes[i].sigma_rad, 2.2 * kRadPerDeg);
   }
 }
 

@@ -7,11 +7,10 @@
 #include <ostream>
 #include <string>
 
+#include "common/angles.h"
 #include "tests/unit/server/slam/geometry/support_world.h"
 
 namespace romap::slam::support_plane_test {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 struct WorldCase {
   std::string name;
@@ -29,10 +28,10 @@ TEST_P(SupportPlaneInWorlds, FindsTheTable) {
     const SupportWorld world(options);
     const auto plane = FindSupportPlane(world.Query());
     ASSERT_TRUE(plane.has_value());
-    EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kDegree);
+    EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kRadPerDeg);
     EXPECT_LT(world.HeightError_m(*plane), 0.01);
     EXPECT_LT(world.TiltError_rad(*plane), 4 * plane->sigma_rad);
-    EXPECT_LT(plane->sigma_rad, 1 * kDegree);
+    EXPECT_LT(plane->sigma_rad, 1 * kRadPerDeg);
     EXPECT_GT(plane->confidence, 0.5);
     EXPECT_LE(plane->confidence, 1);
     EXPECT_NEAR(plane->normal_world.norm(), 1, 1e-9);
@@ -48,10 +47,10 @@ INSTANTIATE_TEST_SUITE_P(
                       WorldCase{"FloorVisibleBesideTheTable", {.table_points = 60, .floor_points = 1000}},
                       WorldCase{"FloorVisibleAndObjectBottomsHidden", {.object_bottom = 0.4, .floor_points = 500}},
                       WorldCase{"WallBehind", {.wall_points = 1000}},
-                      WorldCase{"WallBehindSteepView", {.wall_points = 500, .elevation_rad = 60 * kDegree}},
+                      WorldCase{"WallBehindSteepView", {.wall_points = 500, .elevation_rad = 60 * kRadPerDeg}},
                       WorldCase{"ClutterOnTheTable", {.clutter_points = 200}},
                       WorldCase{"HalfOfTheTablePointsAreOutliers", {.outlier_share = 0.5}},
-                      WorldCase{"GrazingView", {.elevation_rad = 12 * kDegree}},
+                      WorldCase{"GrazingView", {.elevation_rad = 12 * kRadPerDeg}},
                       WorldCase{"Everything",
                                 {.table_points = 250,
                                  .floor_points = 500,
@@ -135,7 +134,7 @@ TEST(SupportPlane, IgnoresPointsThatAreNotFinite) {
   world.camera_ups[0].x() = nan;
   const auto plane = FindSupportPlane(world.Query());
   ASSERT_TRUE(plane.has_value());
-  EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kDegree);
+  EXPECT_LT(world.TiltError_rad(*plane), 0.5 * kRadPerDeg);
 }
 
 TEST(SupportPlane, IsDeterministicForASeedAndSimilarForAnother) {
@@ -146,7 +145,7 @@ TEST(SupportPlane, IsDeterministicForASeedAndSimilarForAnother) {
   ASSERT_TRUE(first && again && other);
   EXPECT_EQ(first->normal_world, again->normal_world);
   EXPECT_EQ(first->confidence, again->confidence);
-  EXPECT_GT(first->normal_world.dot(other->normal_world), std::cos(0.3 * kDegree));
+  EXPECT_GT(first->normal_world.dot(other->normal_world), std::cos(0.3 * kRadPerDeg));
 }
 
 }  // namespace romap::slam::support_plane_test

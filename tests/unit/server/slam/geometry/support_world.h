@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "common/angles.h"
 #include "server/slam/geometry/support_plane.h"
 
 namespace romap::slam {
@@ -26,7 +27,7 @@ class SupportWorld {
     double outlier_share = 0;    // share of the table points at random heights
     double depth_noise = 0.005;  // relative, along the ray
     double sigma_factor = 1;     // ratio of the stated to the true uncertainty
-    double elevation_rad = 35 * std::numbers::pi / 180;
+    double elevation_rad = 35 * kRadPerDeg;
     uint64_t seed = 1;
   };
 

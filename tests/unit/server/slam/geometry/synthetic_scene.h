@@ -9,12 +9,11 @@
 #include <numbers>
 #include <random>
 
+#include "common/angles.h"
 #include "common/camera_model.h"
 #include "common/geometry.h"
 
 namespace romap::slam {
-
-inline constexpr double kDegree = std::numbers::pi / 180;
 
 inline CameraModel TestCamera() {
   return {.width_px = 640, .height_px = 480, .fx_px = 525, .fy_px = 530, .cx_px = 319.5, .cy_px = 239.5};
@@ -53,9 +52,9 @@ class Noise {
 
 // Rotations about the x, y and z axes, multiplied in this order.
 inline Eigen::Quaterniond RotationXyz(double x_deg, double y_deg, double z_deg) {
-  return Eigen::AngleAxisd(x_deg * kDegree, Eigen::Vector3d::UnitX()) *
-         Eigen::AngleAxisd(y_deg * kDegree, Eigen::Vector3d::UnitY()) *
-         Eigen::AngleAxisd(z_deg * kDegree, Eigen::Vector3d::UnitZ());
+  return Eigen::AngleAxisd(x_deg * kRadPerDeg, Eigen::Vector3d::UnitX()) *
+         Eigen::AngleAxisd(y_deg * kRadPerDeg, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(z_deg * kRadPerDeg, Eigen::Vector3d::UnitZ());
 }
 
 inline bool IsInImage(const CameraModel& camera, const Eigen::Vector3d& p_camera) {
@@ -65,10 +64,10 @@ inline bool IsInImage(const CameraModel& camera, const Eigen::Vector3d& p_camera
 }
 
 inline double AngleBetween_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) / kDegree;
+  return std::atan2(a.cross(b).norm(), a.dot(b)) / kRadPerDeg;
 }
 inline double AngleBetween_deg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-  return a.angularDistance(b) / kDegree;
+  return a.angularDistance(b) / kRadPerDeg;
 }
 
 }  // namespace romap::slam

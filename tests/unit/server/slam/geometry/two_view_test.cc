@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "common/angles.h"
 #include "common/statistics.h"
 #include "tests/unit/server/slam/geometry/synthetic_scene.h"
 
@@ -16,7 +17,7 @@ using Surface = std::function<double(const Eigen::Vector3d& ray, Noise& noise)>;
 // Boxes and walls at depths between 1 and 4 units.
 double Clutter(const Eigen::Vector3d&, Noise& noise) { return noise.Uniform(1, 4); }
 // A plane tilted by 35 degrees, 2 units away in the middle of the image.
-double TiltedDesk(const Eigen::Vector3d& ray, Noise&) { return 2 / (1 + std::tan(35 * kDegree) * ray.y()); }
+double TiltedDesk(const Eigen::Vector3d& ray, Noise&) { return 2 / (1 + std::tan(35 * kRadPerDeg) * ray.y()); }
 // The same desk with objects up to 0.3 units high on a third of it.
 double DeskWithObjects(const Eigen::Vector3d& ray, Noise& noise) {
   const double desk = TiltedDesk(ray, noise);
@@ -85,7 +86,7 @@ TEST(TwoView, FindsTheMotionInAClutteredScene) {
   ExpectAccurate(scene, result);
   EXPECT_FALSE(result.from_homography);
   EXPECT_GT(result.points, 240);
-  EXPECT_GT(result.parallax_rad, 4 * kDegree);
+  EXPECT_GT(result.parallax_rad, 4 * kRadPerDeg);
 }
 
 TEST(TwoView, FindsForwardMotion) {

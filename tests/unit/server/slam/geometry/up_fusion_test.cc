@@ -7,28 +7,28 @@
 #include <numbers>
 #include <vector>
 
+#include "common/angles.h"
+
 namespace romap::slam::up_fusion_test {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 Eigen::Vector3d Tilted(double x_deg, double y_deg = 0) {
-  return Eigen::AngleAxisd(x_deg * kDegree, Eigen::Vector3d::UnitX()) *
-         (Eigen::AngleAxisd(y_deg * kDegree, Eigen::Vector3d::UnitY()) * Eigen::Vector3d::UnitZ());
+  return Eigen::AngleAxisd(x_deg * kRadPerDeg, Eigen::Vector3d::UnitX()) *
+         (Eigen::AngleAxisd(y_deg * kRadPerDeg, Eigen::Vector3d::UnitY()) * Eigen::Vector3d::UnitZ());
 }
 
 UpClue Direction(const Eigen::Vector3d& up, double sigma_deg, double reliability) {
-  return {.vector_world = up, .sigma_rad = sigma_deg * kDegree, .reliability = reliability};
+  return {.vector_world = up, .sigma_rad = sigma_deg * kRadPerDeg, .reliability = reliability};
 }
 
 UpClue Wall(const Eigen::Vector3d& normal, double sigma_deg, double reliability) {
   return {.kind = UpClue::Kind::kPerpendicular,
           .vector_world = normal,
-          .sigma_rad = sigma_deg * kDegree,
+          .sigma_rad = sigma_deg * kRadPerDeg,
           .reliability = reliability};
 }
 
 double Error_deg(const FusedUp& up, const Eigen::Vector3d& truth) {
-  return std::atan2(up.direction_world.cross(truth).norm(), up.direction_world.dot(truth)) / kDegree;
+  return std::atan2(up.direction_world.cross(truth).norm(), up.direction_world.dot(truth)) / kRadPerDeg;
 }
 
 // The cameras look down, so the mean of their own up axes is far from up.
@@ -39,7 +39,7 @@ TEST(UpFusion, OneClueIsAsReliableAsItSays) {
   const FusedUp up = FuseUp(clues, kGuess);
   EXPECT_LT(Error_deg(up, Tilted(3)), 0.05);
   EXPECT_NEAR(up.confidence, 0.6, 0.02);
-  EXPECT_NEAR(up.sigma_rad / kDegree, 0.5, 0.01);
+  EXPECT_NEAR(up.sigma_rad / kRadPerDeg, 0.5, 0.01);
 }
 
 TEST(UpFusion, CluesThatAgreeConfirmEachOther) {
@@ -47,7 +47,7 @@ TEST(UpFusion, CluesThatAgreeConfirmEachOther) {
   const FusedUp up = FuseUp(clues, kGuess);
   EXPECT_GT(up.confidence, 0.95);
   EXPECT_LT(Error_deg(up, Tilted(1)), 0.2);
-  EXPECT_LT(up.sigma_rad, 0.5 * kDegree);
+  EXPECT_LT(up.sigma_rad, 0.5 * kRadPerDeg);
 }
 
 TEST(UpFusion, TheMoreReliableOfTwoContradictoryCluesWins) {
@@ -64,7 +64,7 @@ TEST(UpFusion, WallsDecideBetweenContradictoryClues) {
   const std::vector<UpClue> clues = {Direction(Tilted(30), 0.5, 0.8), Direction(Tilted(0, 1), 2, 0.8),
                                      Wall(Eigen::Vector3d::UnitY(), 0.5, 0.7)};
   const FusedUp up = FuseUp(clues, kGuess);
-  EXPECT_LT(std::abs(up.direction_world.y()), std::sin(0.5 * kDegree));
+  EXPECT_LT(std::abs(up.direction_world.y()), std::sin(0.5 * kRadPerDeg));
   EXPECT_GT(up.confidence, 0.9);
 }
 
