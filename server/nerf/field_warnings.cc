@@ -8,6 +8,8 @@ namespace romap::nerf {
 namespace {
 
 constexpr double kMinShareIntersectingBox = 0.5;
+// Shapes are hardly worse than with exact masks up to this width.
+constexpr int kMaxPreciseBorder_px = 3;
 
 }  // namespace
 
@@ -30,6 +32,10 @@ std::string FieldWarnings::Text(int divergences, const std::vector<KeyframeId>& 
   }
   if (checks_.black_views > 0) {
     warnings.push_back(fmt::format("the object is black in {} of {} views", checks_.black_views, checks_.views));
+  }
+  if (checks_.mask_border_px > kMaxPreciseBorder_px) {
+    warnings.push_back(
+        fmt::format("the masks are imprecise: their borders are uncertain by {} px", checks_.mask_border_px));
   }
   if (!checks_.depth_consistent) warnings.push_back("depth images ignored because they contradict the masks");
   if (checks_.share_intersecting_box < kMinShareIntersectingBox) {

@@ -16,6 +16,7 @@ class FieldWarnings {
   struct ViewChecks {
     int views = 0;
     int black_views = 0;                // those whose object pixels are black
+    int mask_border_px = 0;             // see InputQuality
     bool depth_consistent = true;       // dense depth agrees with the masks, or there is none
     double share_intersecting_box = 1;  // share of the rays through the masks that intersect the box
   };

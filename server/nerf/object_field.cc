@@ -123,6 +123,7 @@ void ObjectField::PrepareViews() {
   rays_.Weigh(views_.Weights());
   warnings_.OnViewChecks({.views = views(),
                           .black_views = static_cast<int>(std::ranges::count_if(views_.views(), IsBlack)),
+                          .mask_border_px = views_.quality().mask_border_px,
                           .depth_consistent = views_.quality().depth_is_consistent,
                           .share_intersecting_box = probe_.ShareIntersectingBox(field_.Space().extent)});
   field_.SetHull(views_.CarveHull());
@@ -159,6 +160,8 @@ TrainStats ObjectField::RunSteps(int steps, int threads) {
 void ObjectField::Evaluate() {
   if (views_.RefinementIsDue(steps())) RefinePoses();
   if (steps() % kMaskCheckSteps == 0 && views_.MeasureMaskBorder(rays_, field_.model(), field_.Space())) {
+    spdlog::info("{}: the borders of the masks are uncertain by {} px; widening the hull", id_.ToString(),
+                 views_.quality().mask_border_px);
     RebuildHull();
     views_changed_ = true;
     PrepareViews();

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "client/synth/synth.h"
+#include "tests/integration/quick_run.h"
 #include "tests/support/subprocess.h"
 
 namespace romap::replay_test {
@@ -52,7 +53,7 @@ class ReplayTest : public ::testing::Test {
         "run",   folder_ / "sequence", "--local",      "--set", "session.record_dir=" + (folder_ / "recordings"),
         "--out", folder_ / "map",      "--no-pictures"};
     arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
-    const testing_support::ProcessResult run = Romap(arguments);
+    const testing_support::ProcessResult run = Romap(integration::Quick(arguments));
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const auto files = AllFiles(folder_ / "recordings");
     EXPECT_EQ(files.size(), 1U);
@@ -61,7 +62,8 @@ class ReplayTest : public ::testing::Test {
 
   void ExpectTwoEqualReplays(const std::string& recording) const {
     for (const char* out : {"first", "second"}) {
-      const testing_support::ProcessResult replay = Romap({"replay", recording, "--out", folder_ / out});
+      const testing_support::ProcessResult replay =
+          Romap(integration::Quick({"replay", recording, "--out", folder_ / out}));
       ASSERT_EQ(replay.exit_code, 0) << replay.err;
       EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
     }
