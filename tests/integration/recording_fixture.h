@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -50,12 +51,16 @@ struct RunResult {
     }
     return codes;
   }
+  // By file name; empty, with a test failure, if there are none.
+  std::map<std::string, files::MeshFile> Meshes() const {
+    auto meshes = files::ReadMeshFolder(dir + "/objects");
+    EXPECT_TRUE(meshes.ok()) << meshes.status();
+    return meshes.ok() ? *std::move(meshes) : std::map<std::string, files::MeshFile>();
+  }
   // Number of different x coordinates in the meshes' files.
   size_t DistinctX() const {
     std::set<double> distinct;
-    const auto meshes = files::ReadMeshFolder(dir + "/objects");
-    EXPECT_TRUE(meshes.ok()) << meshes.status();
-    for (const auto& [name, mesh] : *meshes) {
+    for (const auto& [name, mesh] : Meshes()) {
       for (size_t k = 0; k < mesh.mesh.vertices.size(); ++k) distinct.insert(mesh.Position(k).x());
     }
     return distinct.size();
@@ -90,7 +95,7 @@ class RecordingTest : public ::testing::Test {
 
   // Maps the objects, but hardly trains them.
   RunResult Run(std::vector<std::string> options = {}) {
-    options.insert(options.end(), {"--max-training", testing_support::kUnderSanitizer ? "10" : "1"});
+    options.insert(options.end(), {"--max-training", testing_support::kUnderSanitizer ? "90" : "1"});
     return RunTrained(options);
   }
 
