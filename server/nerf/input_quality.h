@@ -7,10 +7,8 @@ struct InputQuality {
   // Whether dense depth is consistent with the masks; otherwise it is not used. See DepthIsConsistent().
   bool depth_is_consistent = true;
   // Background pixels this close to the object's mask may show the object, because the border of the mask is imprecise.
-  // See MaskBorder().
+  // See UncertainBorder_px().
   int mask_border_px = 0;
-
-  bool operator==(const InputQuality&) const = default;
 };
 
 }  // namespace romap::nerf

@@ -18,7 +18,7 @@ constexpr size_t kMaxViews = 24;          // evenly spaced over the trusted view
 constexpr size_t kMaxPointsPerView = 16;  // evenly spaced over the border
 constexpr int kMinPoints = 60;            // for a reliable spread
 constexpr float kSilhouetteOpacity = 0.5f;
-// With exact masks the spread is 0.1 to 0.8 px, because the silhouette of a field is not exact either.
+// With exact masks the spread is 0 to 0.8 px, because the silhouette of a field is not exact either.
 constexpr double kPreciseSpread_px = 0.9;
 
 struct BorderPoint {

@@ -51,8 +51,8 @@ class TrainingViews {
   bool CheckDepths();
 
   // Measures the uncertain border of the masks again. `rays` must have been built on these views. True if it became
-  // wider; then the rays and the hull must be rebuilt. It never becomes narrower, because the silhouettes then fit the
-  // masks less.
+  // wider; then the rays and the hull must be rebuilt. It never becomes narrower, because a wider
+  // hull fits the noisy masks better, which hides their noise.
   bool MeasureMaskBorder(const RaySet& rays, const FieldModel& model, const RenderSpace& space);
 
   // Updates the trust in every view. True if any changed; then the hull must be rebuilt.

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "server/nerf/model/occupancy.h"
