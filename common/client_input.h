@@ -54,11 +54,13 @@ struct FrameInput : EncodedMasks {
   std::string depth;                              // z depth (not ray length) registered to the image, size of the image
   double depth_scale_mu = 0;                      // map units per depth unit
   std::optional<Eigen::Vector3d> gravity_camera;  // direction of gravity (down) in the camera frame, any length > 0
+  bool resent = false;                            // it was sent before on an earlier stream, see FrameAck::duplicate
 };
 
 // The masks of a frame that was sent without masks, for detectors that are slower than the camera.
 struct MasksInput : EncodedMasks {
   uint64_t frame_id = 0;  // of an accepted frame
+  bool resent = false;    // they were sent before on an earlier stream, see MasksAck::duplicate
 };
 
 // Everything a client can send on a Map stream. Masks must follow their frame.

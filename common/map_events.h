@@ -36,13 +36,22 @@ struct FrameAck {
   std::optional<Eigen::Quaterniond> R_world_camera = {};
   // The map that T_world_camera refers to; 0: none. The worlds of two maps are not related to each other.
   SparseMapId map_id = {};
+  // The frame was sent again, and the session accepted it before. Then only frame_id and accepted are set.
+  bool duplicate = false;
 };
 
 // The result of one MasksInput.
 struct MasksAck {
   uint64_t frame_id = 0;
   bool accepted = true;
-  std::string error;  // why the masks were rejected; empty if they were accepted
+  std::string error = {};  // why the masks were rejected; empty if they were accepted
+  bool duplicate = false;  // as in FrameAck
+};
+
+// All accepted inputs up to these are stored: they survive a crash of the server. 0: none.
+struct Durable {
+  uint64_t frame_id = 0;        // frames with ids up to this one
+  uint64_t masks_frame_id = 0;  // late masks of frames with ids up to this one
 };
 
 struct ObjectUpdate {
@@ -118,7 +127,7 @@ struct Statistics {
   std::vector<Diagnostic> diagnostics = {};
 };
 
-using MapEvent =
-    std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck, Diagnostic>;
+using MapEvent = std::variant<FrameAck, ObjectUpdate, MeshUpdate, ObjectRemoved, ObjectMerged, Statistics, MasksAck,
+                              Diagnostic, Durable>;
 
 }  // namespace romap

@@ -22,6 +22,7 @@ enum class SessionState {
   kFinishing,  // accepts no more frames; processing and training continue
   kFinished,   // all processing and training is complete
   kFailed,     // ended by an internal error; the map up to then can be exported
+  kRestoring,  // read from the store after a restart; its stored map can be watched and exported
 };
 
 enum class FrameMode {
@@ -50,6 +51,7 @@ struct SessionInfo {
   int64_t created_unix_ns = 0;  // nanoseconds since the Unix epoch
   bool stream_open = false;     // a client has an open Map stream
   Statistics statistics;
+  bool durable = false;  // the service stores the session
 };
 
 // The current state of one object.
@@ -68,10 +70,20 @@ struct MapSnapshot {
   Statistics statistics;
 };
 
+// What a service says when it opens a stream.
+struct StreamOpening {
+  std::string resume_token;  // map streams only: lets OpenMap() replace this stream
+  bool durable = false;      // accepted inputs are stored; Durable events say up to which
+  // The objects of the map, whose events follow first. No other object exists any longer.
+  std::vector<ObjectId> objects;
+  std::optional<uint64_t> newest_frame_id;  // of the frames that the session accepted
+};
+
 // The events of one subscription. Cancel() may be called while another thread waits in Next().
 class EventStream {
  public:
   virtual ~EventStream() = default;
+  virtual const StreamOpening& opening() const = 0;
   // Waits up to `timeout` for the next event. Returns nullopt on timeout or when the stream has ended (see Done()).
   virtual std::optional<MapEvent> Next(std::chrono::milliseconds timeout) = 0;
   // True once the stream has ended and all of its events have been returned.
@@ -113,9 +125,12 @@ class MappingService {
   virtual absl::StatusOr<SessionInfo> FinishSession(const std::string& session_id) = 0;
   // Deletes a session and its map.
   virtual absl::Status DeleteSession(const std::string& session_id) = 0;
-  // Opens the stream that feeds a session. FAILED_PRECONDITION: the session already has an open Map stream or accepts
-  // no more frames.
-  virtual absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) = 0;
+  // Opens the stream that feeds a session. With the `resume_token` of an earlier stream of the session, ends that
+  // stream if it is still open. FAILED_PRECONDITION: the session already has another open Map stream or accepts no more
+  // frames. UNAVAILABLE: the session is being restored; try again.
+  virtual absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id,
+                                                             const std::string& resume_token) = 0;
+  absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) { return OpenMap(session_id, ""); }
   // Subscribes to the events of a session: first the current state of all objects, then every change.
   virtual absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) = 0;
   // Returns the map of a session, in any state.

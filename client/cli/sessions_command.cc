@@ -26,6 +26,8 @@ const char* StateName(SessionState state) {
       return "finished";
     case SessionState::kFailed:
       return "failed";
+    case SessionState::kRestoring:
+      return "restoring";
   }
   return "?";
 }

@@ -115,8 +115,9 @@ absl::Status RemoteMappingService::DeleteSession(const std::string& session_id) 
   return wire::FromGrpc(connection_->stub->DeleteSession(&context, request, &response));
 }
 
-absl::StatusOr<std::unique_ptr<MapStream>> RemoteMappingService::OpenMap(const std::string& session_id) {
-  return RemoteMapStream::Open(connection_->stub, session_id, connection_->options.call_timeout,
+absl::StatusOr<std::unique_ptr<MapStream>> RemoteMappingService::OpenMap(const std::string& session_id,
+                                                                         const std::string& resume_token) {
+  return RemoteMapStream::Open(connection_->stub, session_id, resume_token, connection_->options.call_timeout,
                                connection_->options.max_message_bytes);
 }
 

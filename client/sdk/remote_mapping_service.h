@@ -43,7 +43,9 @@ class RemoteMappingService : public MappingService {
   absl::Status DeleteSession(const std::string& session_id) override;
   // Send() and SendMasks() of the stream block while HTTP/2 flow control applies. A request larger than
   // max_message_bytes is not sent; the stream delivers a FrameAck or MasksAck with accepted = false instead.
-  absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) override;
+  using MappingService::OpenMap;
+  absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id,
+                                                     const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
 

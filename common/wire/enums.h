@@ -56,11 +56,12 @@ inline constexpr std::array<EnumPair<PoseUse, v1::PoseUse>, 4> kPoseUses{{
     {PoseUse::kIgnore, v1::POSE_USE_IGNORE},
 }};
 
-inline constexpr std::array<EnumPair<SessionState, v1::SessionState>, 4> kSessionStates{{
+inline constexpr std::array<EnumPair<SessionState, v1::SessionState>, 5> kSessionStates{{
     {SessionState::kOpen, v1::SESSION_STATE_OPEN},
     {SessionState::kFinishing, v1::SESSION_STATE_FINISHING},
     {SessionState::kFinished, v1::SESSION_STATE_FINISHED},
     {SessionState::kFailed, v1::SESSION_STATE_FAILED},
+    {SessionState::kRestoring, v1::SESSION_STATE_RESTORING},
 }};
 
 inline constexpr std::array<EnumPair<TrackingState, v1::TrackingState>, 4> kTrackingStates{{

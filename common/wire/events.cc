@@ -86,11 +86,22 @@ v1::MasksAck ToProto(MasksAck ack) {
   proto.set_frame_id(ack.frame_id);
   proto.set_accepted(ack.accepted);
   proto.set_error(std::move(ack.error));
+  proto.set_duplicate(ack.duplicate);
   return proto;
 }
 
 MasksAck FromProto(v1::MasksAck proto) {
-  return {.frame_id = proto.frame_id(), .accepted = proto.accepted(), .error = std::move(*proto.mutable_error())};
+  return {.frame_id = proto.frame_id(),
+          .accepted = proto.accepted(),
+          .error = std::move(*proto.mutable_error()),
+          .duplicate = proto.duplicate()};
+}
+
+v1::Durable ToProto(const Durable& durable) {
+  v1::Durable proto;
+  proto.set_frame_id(durable.frame_id);
+  proto.set_masks_frame_id(durable.masks_frame_id);
+  return proto;
 }
 
 v1::Diagnostic ToProto(const Diagnostic& diagnostic) {
@@ -126,6 +137,7 @@ struct EventWriter {
   void operator()(Statistics&& statistics) const { *proto.mutable_statistics() = ToProto(statistics); }
   void operator()(MasksAck&& ack) const { *proto.mutable_masks_ack() = ToProto(std::move(ack)); }
   void operator()(Diagnostic&& diagnostic) const { *proto.mutable_diagnostic() = ToProto(diagnostic); }
+  void operator()(Durable&& durable) const { *proto.mutable_durable() = ToProto(durable); }
 };
 
 }  // namespace
@@ -154,6 +166,8 @@ absl::StatusOr<MapEvent> FromProto(v1::MapEvent proto, const std::string& where)
       return FromProto(std::move(*proto.mutable_masks_ack()));
     case v1::MapEvent::kDiagnostic:
       return FromProto(proto.diagnostic());
+    case v1::MapEvent::kDurable:
+      return Durable{.frame_id = proto.durable().frame_id(), .masks_frame_id = proto.durable().masks_frame_id()};
     default:
       return InvalidArgument("{}: unknown kind of event", where);
   }
@@ -175,6 +189,7 @@ v1::FrameAck ToProto(FrameAck ack) {
   }
   proto.set_map_id(ack.map_id.value);
   if (ack.R_world_camera) *proto.mutable_rotation_world_camera() = ToProto(*ack.R_world_camera);
+  proto.set_duplicate(ack.duplicate);
   return proto;
 }
 
@@ -196,6 +211,7 @@ absl::StatusOr<FrameAck> FromProto(v1::FrameAck proto, const std::string& where)
     ROMAP_ASSIGN_OR_RETURN(ack.uncertainty, FromProto(proto.uncertainty(), where + ".uncertainty"));
   }
   ack.map_id = SparseMapId{proto.map_id()};
+  ack.duplicate = proto.duplicate();
   if (proto.has_rotation_world_camera()) {
     ROMAP_ASSIGN_OR_RETURN(ack.R_world_camera,
                            QuaternionFromProto(proto.rotation_world_camera(), where + ".rotation_world_camera"));

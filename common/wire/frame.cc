@@ -133,6 +133,7 @@ v1::Frame ToProto(FrameInput frame) {
     proto.mutable_depth()->set_scale_mu(frame.depth_scale_mu);
   }
   if (frame.gravity_camera) *proto.mutable_gravity_camera() = ToProto(*frame.gravity_camera);
+  proto.set_resent(frame.resent);
   return proto;
 }
 
@@ -153,6 +154,7 @@ absl::StatusOr<FrameInput> FromProto(v1::Frame proto) {
     if (gravity.squaredNorm() == 0) return InvalidArgument("frame.gravity_camera: must not be zero");
     frame.gravity_camera = gravity;
   }
+  frame.resent = proto.resent();
   return frame;
 }
 
@@ -160,6 +162,7 @@ v1::LateMasks ToProto(MasksInput masks) {
   v1::LateMasks proto;
   proto.set_frame_id(masks.frame_id);
   *proto.mutable_masks() = MasksToProto(masks);
+  proto.set_resent(masks.resent);
   return proto;
 }
 
@@ -168,6 +171,7 @@ absl::StatusOr<MasksInput> FromProto(v1::LateMasks proto) {
   masks.frame_id = proto.frame_id();
   if (!proto.has_masks()) return InvalidArgument("late_masks.masks: missing");
   ROMAP_RETURN_IF_ERROR(ReadMasks(*proto.mutable_masks(), "late_masks.masks", masks));
+  masks.resent = proto.resent();
   return masks;
 }
 

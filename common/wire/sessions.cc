@@ -65,6 +65,7 @@ v1::SessionInfo ToProto(const SessionInfo& info) {
   proto.set_created_unix_ns(info.created_unix_ns);
   proto.set_stream_open(info.stream_open);
   *proto.mutable_statistics() = ToProto(info.statistics);
+  proto.set_durable(info.durable);
   return proto;
 }
 
@@ -80,7 +81,27 @@ absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::s
   info.created_unix_ns = proto.created_unix_ns();
   info.stream_open = proto.stream_open();
   ROMAP_ASSIGN_OR_RETURN(info.statistics, FromProto(proto.statistics(), where + ".statistics"));
+  info.durable = proto.durable();
   return info;
+}
+
+v1::StreamOpened ToProto(const std::string& session_id, StreamOpening opening) {
+  v1::StreamOpened proto;
+  proto.set_session_id(session_id);
+  proto.set_resume_token(std::move(opening.resume_token));
+  proto.set_durable(opening.durable);
+  for (const ObjectId object : opening.objects) proto.add_object_ids(object.value);
+  if (opening.newest_frame_id) proto.set_newest_frame_id(*opening.newest_frame_id);
+  return proto;
+}
+
+StreamOpening FromProto(v1::StreamOpened proto) {
+  StreamOpening opening;
+  opening.resume_token = std::move(*proto.mutable_resume_token());
+  opening.durable = proto.durable();
+  for (const uint64_t id : proto.object_ids()) opening.objects.push_back(ObjectId{id});
+  if (proto.has_newest_frame_id()) opening.newest_frame_id = proto.newest_frame_id();
+  return opening;
 }
 
 std::vector<v1::ExportMapResponse> ToProto(MapSnapshot snapshot) {

@@ -19,6 +19,10 @@ absl::StatusOr<SessionOptions> FromProto(const v1::CreateSessionRequest& proto);
 v1::SessionInfo ToProto(const SessionInfo& info);
 absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::string& where);
 
+// The first message of a stream.
+v1::StreamOpened ToProto(const std::string& session_id, StreamOpening opening);
+StreamOpening FromProto(v1::StreamOpened proto);
+
 // The messages of an export in sending order: header, objects, pieces of the trajectory. Only a part with a very large
 // mesh can exceed the message limit.
 std::vector<v1::ExportMapResponse> ToProto(MapSnapshot snapshot);

@@ -39,12 +39,33 @@ void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& t
   ack.latency_s = SecondsSince(arrival.time);
   ack.state_reason = tracked.reason;
   ack.uncertainty = tracked.uncertainty;
+  {
+    std::lock_guard lock(mutex_);
+    newest_frame_id_ = input.frame_id;
+  }
   map_->Acknowledge(std::move(ack), input.timestamp_ns, tracked.reference, tracked.T_reference_camera,
                     tracked.reference_uncertainty);
 }
 
-void FrameLedger::AcknowledgeMasks(const FrameMasks& masks) {
-  map_->Acknowledge(MasksAck{.frame_id = masks.frame_id, .accepted = true, .error = ""});
+void FrameLedger::AcknowledgeMasks(const FrameMasks& masks) { map_->Acknowledge(MasksAck{.frame_id = masks.frame_id}); }
+
+void FrameLedger::AcknowledgeDuplicate(const Arrival& arrival) {
+  if (const auto* masks = std::get_if<MasksInput>(&arrival.input)) {
+    map_->Acknowledge(MasksAck{.frame_id = masks->frame_id, .duplicate = true});
+  } else {
+    const FrameInput& frame = std::get<FrameInput>(arrival.input);
+    --frames_received_;  // it was counted before
+    FrameAck ack;
+    ack.frame_id = frame.frame_id;
+    ack.duplicate = true;
+    map_->Acknowledge(std::move(ack), frame.timestamp_ns);
+  }
+  Settle();
+}
+
+std::optional<uint64_t> FrameLedger::newest_frame_id() const {
+  std::lock_guard lock(mutex_);
+  return newest_frame_id_;
 }
 
 void FrameLedger::Reject(const Arrival& arrival, const absl::Status& reason) {

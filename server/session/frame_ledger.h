@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,13 +32,17 @@ class FrameLedger {
   void AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& tracked);
   void AcknowledgeMasks(const FrameMasks& masks);
 
-  // Each of these settles one input. Reject: malformed. Drop: the live queue was full. SkipMapping: acknowledged, but
-  // not mapped, because mapping cannot keep up with a live stream.
+  // Each of these settles one input. AcknowledgeDuplicate: the client sent it again, and it was accepted before.
+  // Reject: malformed. Drop: the live queue was full. SkipMapping: acknowledged, but not mapped, because mapping cannot
+  // keep up with a live stream.
+  void AcknowledgeDuplicate(const Arrival& arrival);
   void Reject(const Arrival& arrival, const absl::Status& reason);
   void Drop(const Arrival& arrival);
   void SkipMapping() { Settle(); }
   void CountMappedFrame(bool is_keyframe, size_t map_points);
   void CountMappedMasks() { Settle(); }
+
+  std::optional<uint64_t> newest_frame_id() const;  // of the accepted frames
 
   // No further input will be settled.
   void SettleAll();
@@ -60,6 +65,7 @@ class FrameLedger {
   std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
 
   mutable std::mutex mutex_;
+  std::optional<uint64_t> newest_frame_id_;
   uint64_t inputs_settled_ = 0;
   bool all_settled_ = false;
   std::multimap<uint64_t, std::function<void()>> waiters_;  // by the number of inputs that must be settled

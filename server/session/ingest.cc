@@ -85,6 +85,14 @@ Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s)
   if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
 }
 
+bool Ingest::IsDuplicate(const SessionInput& input) const {
+  if (const auto* masks = std::get_if<MasksInput>(&input)) {
+    return masks->resent && newest_late_masks_ > 0 && masks->frame_id <= newest_late_masks_;
+  }
+  const FrameInput& frame = std::get<FrameInput>(input);
+  return frame.resent && !accepted_.empty() && frame.frame_id <= accepted_.back().frame_id;
+}
+
 absl::Status Ingest::CheckOrder(const FrameInput& input) const {
   if (accepted_.empty()) return absl::OkStatus();
   const AcceptedFrame& last = accepted_.back();
@@ -146,6 +154,7 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   AddUnlistedLabels(masks.labels, masks.instances);
   mask_interpreter_.Interpret(HasEightBits(input), &masks);
   frame->has_masks = true;
+  newest_late_masks_ = std::max(newest_late_masks_, input.frame_id);
   return masks;
 }
 

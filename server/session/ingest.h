@@ -27,6 +27,9 @@ class Ingest {
   // effect on later ones.
   absl::StatusOr<std::shared_ptr<const Frame>> Accept(const FrameInput& input);
 
+  // The input was sent again, and the session accepted it before.
+  bool IsDuplicate(const SessionInput& input) const;
+
   // The masks of an accepted frame that has none. INVALID_ARGUMENT: the masks are malformed, the frame is unknown or
   // too old, or it already has masks. Rejected masks have no effect.
   absl::StatusOr<FrameMasks> AcceptMasks(const MasksInput& input);
@@ -54,6 +57,7 @@ class Ingest {
   masks::MaskInterpreter mask_interpreter_;
   DepthSentinels depth_sentinels_;
   bool any_expired_ = false;
+  uint64_t newest_late_masks_ = 0;      // id of their frame; 0: none
   std::deque<AcceptedFrame> accepted_;  // by id and time: the newest and those that may still get masks
 };
 

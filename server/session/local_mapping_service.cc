@@ -23,28 +23,27 @@ int TrainingThreads(const ServerConfig& config) {
 
 class LocalEventStream : public MapStream {
  public:
-  LocalEventStream(std::shared_ptr<Session> session, std::shared_ptr<Outbox> outbox, bool sender)
-      : session_(std::move(session)), outbox_(std::move(outbox)), sending_(sender) {}
+  // `holder`: null for a stream that only watches.
+  LocalEventStream(std::shared_ptr<Session> session, std::shared_ptr<Outbox> outbox, StreamOpening opening,
+                   std::shared_ptr<SenderClaim::Holder> holder)
+      : session_(std::move(session)),
+        outbox_(std::move(outbox)),
+        opening_(std::move(opening)),
+        holder_(std::move(holder)),
+        sending_(holder_ != nullptr) {}
 
   ~LocalEventStream() override { Cancel(); }
 
+  const StreamOpening& opening() const override { return opening_; }
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
   bool Done() const override { return outbox_->Done(); }
   absl::Status status() const override { return outbox_->status(); }
 
-  absl::Status Send(FrameInput frame) override {
-    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
-    return session_->Offer(std::move(frame));
-  }
-
-  absl::Status SendMasks(MasksInput masks) override {
-    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
-    return session_->Offer(std::move(masks));
-  }
+  absl::Status Send(FrameInput frame) override { return Offer(std::move(frame)); }
+  absl::Status SendMasks(MasksInput masks) override { return Offer(std::move(masks)); }
 
   absl::Status CloseSend() override {
-    if (!StopSending())
-      return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+    if (!StopSending()) return SendingEnded();
     session_->WhenSettled([outbox = outbox_] { outbox->Close(); });
     return absl::OkStatus();
   }
@@ -56,14 +55,27 @@ class LocalEventStream : public MapStream {
   }
 
  private:
+  absl::Status Offer(SessionInput input) {
+    if (!sending_) return SendingEnded();
+    absl::Status status;
+    if (holder_->Run([&] { status = session_->Offer(std::move(input)); })) return status;
+    return outbox_->status().ok() ? SendingEnded() : outbox_->status();
+  }
+
+  static absl::Status SendingEnded() {
+    return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+  }
+
   bool StopSending() {
     if (!sending_.exchange(false)) return false;
-    session_->DetachSender();
+    session_->sender().Release(holder_);
     return true;
   }
 
   const std::shared_ptr<Session> session_;
   const std::shared_ptr<Outbox> outbox_;
+  const StreamOpening opening_;
+  const std::shared_ptr<SenderClaim::Holder> holder_;
   std::atomic<bool> sending_;
 };
 
@@ -160,20 +172,32 @@ absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<MapStream>> LocalMappingService::OpenMap(const std::string& session_id) {
+absl::StatusOr<std::unique_ptr<MapStream>> LocalMappingService::OpenMap(const std::string& session_id,
+                                                                        const std::string& resume_token) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
   ROMAP_RETURN_IF_ERROR(session->CheckOpen());
-  if (!session->AttachSender()) {
+  StreamOpening opening;
+  const std::shared_ptr<Outbox> outbox =
+      session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue, &opening.objects);
+  auto holder = session->sender().Attach(resume_token, [session, outbox] {
+    session->map().Unsubscribe(outbox);
+    outbox->Close(absl::AbortedError("the client continues the session on another stream"));
+  });
+  if (!holder) {
+    session->map().Unsubscribe(outbox);
     return FailedPrecondition("session '{}' already has a Map stream; close it first", session_id);
   }
-  auto outbox = session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue);
-  return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/true);
+  opening.resume_token = session->sender().token();
+  opening.newest_frame_id = session->newest_frame_id();
+  return std::make_unique<LocalEventStream>(session, outbox, std::move(opening), std::move(holder));
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> LocalMappingService::Watch(const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
-  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1);
-  return std::make_unique<LocalEventStream>(session, std::move(outbox), /*sender=*/false);
+  StreamOpening opening;
+  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening.objects);
+  opening.newest_frame_id = session->newest_frame_id();
+  return std::make_unique<LocalEventStream>(session, std::move(outbox), std::move(opening), /*holder=*/nullptr);
 }
 
 absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& session_id) {

@@ -131,10 +131,18 @@ void MapState::Publish(const Diagnostic& diagnostic) {
   Send(diagnostic);
 }
 
-std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks) {
+void MapState::Publish(const Durable& durable) {
+  std::lock_guard lock(mutex_);
+  durable_ = durable;
+  Send(durable);
+}
+
+std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects) {
   auto outbox = std::make_shared<Outbox>(acks, max_acks);
   std::lock_guard lock(mutex_);
+  if (durable_) outbox->Put(*durable_);
   for (const auto& [id, entry] : objects_) {
+    if (objects != nullptr) objects->push_back(id);
     outbox->Put(entry.object);
     if (entry.mesh) outbox->Put(*entry.mesh);
   }

@@ -49,9 +49,11 @@ class MapState {
   void Acknowledge(MasksAck ack);
   void Publish(const Statistics& statistics);
   void Publish(const Diagnostic& diagnostic);
+  void Publish(const Durable& durable);
 
-  // The outbox starts with the current objects. It is closed if the map is closed.
-  std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks);
+  // The outbox starts with the current objects, whose ids are stored in `objects` if it is not null. It is closed if
+  // the map is closed.
+  std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects = nullptr);
   void Unsubscribe(const std::shared_ptr<Outbox>& outbox);
   // Ends all present and future subscriptions.
   void Close(const absl::Status& status);
@@ -83,6 +85,7 @@ class MapState {
   std::vector<TrackedAck> tracked_;                 // accepted frames with a pose
   Trajectory trajectory_;                           // of the same frames
   std::map<SparseMapId, SparseMapId> merged_maps_;  // each into which one
+  std::optional<Durable> durable_;
   std::vector<std::shared_ptr<Outbox>> outboxes_;
   std::optional<absl::Status> closed_;
 };

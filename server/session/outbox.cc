@@ -24,6 +24,7 @@ struct Outbox::Putter {
   // Few: a session sends each code at most once per severity.
   void operator()(Diagnostic&& diagnostic) const { outbox.Append(std::move(diagnostic)); }
   void operator()(Statistics&& statistics) const { outbox.Replace(outbox.statistics_, statistics); }
+  void operator()(Durable&& durable) const { outbox.Replace(outbox.durable_, durable); }
 };
 
 void Outbox::Put(MapEvent event) {
@@ -156,6 +157,7 @@ void Outbox::ClearIteratorsToFront() {
     if (acks_ == Acks::kAll) --waiting_acks_;
   } else {
     clear(statistics_);
+    clear(durable_);
   }
 }
 

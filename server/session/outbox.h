@@ -80,7 +80,7 @@ class Outbox {
   std::list<MapEvent> events_;
   std::map<ObjectId, AnnouncedObject> objects_;
   std::map<ObjectId, WaitingMerge> merges_;  // by `from`
-  std::optional<EventIterator> statistics_, newest_ack_;
+  std::optional<EventIterator> statistics_, durable_, newest_ack_;
   size_t waiting_acks_ = 0;
   bool closed_ = false;
   absl::Status status_;

@@ -32,7 +32,9 @@ CheckedInput Pipeline::Check(Arrival arrival) {
     Record(input);
   };
   try {
-    if (const auto* frame = std::get_if<FrameInput>(&input)) {
+    if (ingest_.IsDuplicate(input)) {
+      checked.content = DuplicateInput{};
+    } else if (const auto* frame = std::get_if<FrameInput>(&input)) {
       set_content(ingest_.Accept(*frame));
     } else {
       set_content(ingest_.AcceptMasks(std::get<MasksInput>(input)));
@@ -50,6 +52,8 @@ void Pipeline::Process(const CheckedInput& input, const MappingExecutor& execute
     Reject(input.arrival, *error);
   } else if (const auto* frame = std::get_if<std::shared_ptr<const Frame>>(&input.content)) {
     ProcessFrame(input.arrival, *frame, execute);
+  } else if (std::holds_alternative<DuplicateInput>(input.content)) {
+    ledger_->AcknowledgeDuplicate(input.arrival);
   } else {
     ProcessLateMasks(std::get<FrameMasks>(input.content), execute);
   }

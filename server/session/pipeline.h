@@ -37,10 +37,14 @@ struct MappingStep {
   bool relocalizes = false;        // the frame was lost; the newest such frame is the most useful one
 };
 
+// The client sent an input again that the session has.
+struct DuplicateInput {};
+
 // An input that was decoded, checked and, if it is valid, recorded.
 struct CheckedInput {
   Arrival arrival;
-  std::variant<absl::Status, std::shared_ptr<const Frame>, FrameMasks> content;  // the status: why it is rejected
+  // The status: why it is rejected.
+  std::variant<absl::Status, std::shared_ptr<const Frame>, FrameMasks, DuplicateInput> content;
 };
 
 // The stages of one session and the data path through them:

@@ -78,9 +78,6 @@ void Session::Stop(const absl::Status& status) {
   scheduler_.Stop();
 }
 
-bool Session::AttachSender() { return !sender_attached_.exchange(true); }
-void Session::DetachSender() { sender_attached_ = false; }
-
 void Session::PublishStatisticsIfDue() {
   const Clock::time_point now = Clock::now();
   if (now < next_statistics_) return;
@@ -110,7 +107,7 @@ SessionInfo Session::Info() const {
   info.mode = options_.mode;
   info.state = lifecycle_.state();
   info.created_unix_ns = created_unix_ns_;
-  info.stream_open = sender_attached_;
+  info.stream_open = sender_.IsHeld();
   info.statistics = CurrentStatistics();
   return info;
 }

@@ -2,11 +2,11 @@
 
 #include <absl/status/status.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/mapping_service.h"
@@ -17,6 +17,7 @@
 #include "server/session/mesher.h"
 #include "server/session/pipeline.h"
 #include "server/session/scheduler.h"
+#include "server/session/sender_claim.h"
 #include "server/session/server_config.h"
 #include "server/session/session_lifecycle.h"
 
@@ -46,9 +47,9 @@ class Session {
   // Ends the threads without completing the training, and ends every stream with `status`. Called before deletion.
   void Stop(const absl::Status& status);
 
-  // Claims the right to send inputs; false if another stream holds it.
-  bool AttachSender();
-  void DetachSender();
+  // The right to send inputs.
+  SenderClaim& sender() { return sender_; }
+  std::optional<uint64_t> newest_frame_id() const { return ledger_.newest_frame_id(); }
   // Calls `done` when all inputs offered before this call are settled: immediately or on a session thread.
   void WhenSettled(std::function<void()> done) { ledger_.WhenSettled(std::move(done)); }
 
@@ -70,7 +71,7 @@ class Session {
   const int64_t created_unix_ns_;
 
   SessionLifecycle lifecycle_;
-  std::atomic<bool> sender_attached_ = false;
+  SenderClaim sender_{MakeRandomToken()};
   Clock::time_point next_statistics_ = Clock::now();  // the scheduler's mapping thread
 
   MapState map_;

@@ -15,7 +15,8 @@ absl::Status MapReactor::Run() {
     return InvalidArgument("map: first request must be `start`");
   }
   const std::string session_id = request_.start().session_id();
-  ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MapStream> stream, service().OpenMap(session_id));
+  ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MapStream> stream,
+                         service().OpenMap(session_id, request_.start().resume_token()));
 
   std::thread pump([&] { PumpRequests(*stream); });
   // Guarded, so that the pump is joined in any case.

@@ -10,6 +10,7 @@
 
 #include "common/mapping_service.h"
 #include "common/wire/events.h"
+#include "common/wire/sessions.h"
 #include "common/wire/status.h"
 #include "server/transport/call_host.h"
 
@@ -104,7 +105,7 @@ class StreamReactor : public Reactor, public StoppableCall {
     constexpr std::chrono::milliseconds kLongWait{1000};
     if (!Attach(&events)) return absl::CancelledError("stopped before the stream was open");
     Response opened;
-    opened.mutable_opened()->set_session_id(session_id);
+    *opened.mutable_opened() = wire::ToProto(session_id, events.opening());
     bool writable = Write(opened);
     while (writable && !stopping()) {
       std::optional<MapEvent> event = events.Next(kLongWait);

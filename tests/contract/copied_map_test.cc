@@ -21,6 +21,7 @@ using testing_support::RandomMap;
 class OutboxStream : public EventStream {
  public:
   explicit OutboxStream(std::shared_ptr<session::Outbox> outbox) : outbox_(std::move(outbox)) {}
+  const StreamOpening& opening() const override { return opening_; }
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
   bool Done() const override { return outbox_->Done(); }
   absl::Status status() const override { return outbox_->status(); }
@@ -28,6 +29,7 @@ class OutboxStream : public EventStream {
 
  private:
   const std::shared_ptr<session::Outbox> outbox_;
+  const StreamOpening opening_;
 };
 
 // Every Watch() subscribes to the same map, whatever the session id.

@@ -158,6 +158,63 @@ TEST_P(StreamContract, SessionAcceptsOneStreamAfterAnother) {
   EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(3));
 }
 
+TEST_P(StreamContract, ResumeTokenReplacesTheStreamAndResentInputsAreDuplicates) {
+  const std::string session = NewSession();
+  const auto lost = Open(session);
+  EXPECT_FALSE(lost->opening().resume_token.empty());
+  EXPECT_EQ(lost->opening().newest_frame_id, std::nullopt);
+  for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(lost->Send(MakeFrame(id)));
+  EXPECT_OK(lost->SendMasks(MasksOf(2, "mug")));
+  EXPECT_TRUE(NextOf<MasksAck>(*lost).has_value());
+  EXPECT_CODE(service().OpenMap(session, "another token").status(), StatusCode::kFailedPrecondition);
+
+  auto resumed = service().OpenMap(session, lost->opening().resume_token);
+  ASSERT_TRUE(resumed.ok()) << Message(resumed.status());
+  MapStream& stream = **resumed;
+  ReadToEnd(*lost);
+  EXPECT_CODE(lost->status(), StatusCode::kAborted);
+  EXPECT_FALSE(lost->Send(MakeFrame(4)).ok());
+  EXPECT_EQ(stream.opening().newest_frame_id, 3u);
+  EXPECT_EQ(stream.opening().resume_token, lost->opening().resume_token);
+
+  for (uint64_t id = 2; id <= 4; ++id) {
+    FrameInput frame = MakeFrame(id);
+    frame.resent = id < 4;
+    EXPECT_OK(stream.Send(frame));
+  }
+  MasksInput masks = MasksOf(2, "mug");
+  masks.resent = true;
+  EXPECT_OK(stream.SendMasks(masks));
+  EXPECT_OK(stream.CloseSend());
+  const auto events = ReadToEnd(stream);
+  const auto acks = Only<FrameAck>(events);
+  ASSERT_THAT(acks, SizeIs(3));
+  for (const FrameAck& ack : acks) {
+    EXPECT_TRUE(ack.accepted) << ack.error;
+    EXPECT_EQ(ack.duplicate, ack.frame_id < 4) << ack.frame_id;
+  }
+  const auto masks_acks = Only<MasksAck>(events);
+  ASSERT_THAT(masks_acks, SizeIs(1));
+  EXPECT_TRUE(masks_acks[0].accepted && masks_acks[0].duplicate);
+  EXPECT_THAT(service().ExportMap(session)->trajectory, SizeIs(4));
+  EXPECT_EQ(service().GetSession(session)->statistics.frames_received, 4u);
+}
+
+TEST_P(StreamContract, TheOpeningListsTheObjects) {
+  if (!GetParam().objects_from_one_frame) GTEST_SKIP() << "this service needs frames of a consistent scene";
+  const std::string session = NewSession();
+  const auto stream = Open(session);
+  EXPECT_THAT(stream->opening().objects, SizeIs(0));
+  EXPECT_OK(stream->Send(MakeFrame(1, "mug")));
+  const auto object = NextOf<ObjectUpdate>(*stream);
+  ASSERT_TRUE(object.has_value());
+  const auto watch = service().Watch(session);
+  ASSERT_TRUE(watch.ok());
+  EXPECT_THAT((*watch)->opening().objects, ::testing::ElementsAre(object->id));
+  EXPECT_EQ((*watch)->opening().newest_frame_id, 1u);
+  EXPECT_EQ((*watch)->opening().resume_token, "");
+}
+
 TEST_P(StreamContract, FinishedSessionRejectsMapStreams) {
   const std::string session = NewSession();
   EXPECT_OK(service().FinishSession(session).status());

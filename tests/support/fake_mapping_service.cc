@@ -81,17 +81,36 @@ class FakeSession {
     return SubscribeLocked();
   }
 
-  absl::StatusOr<std::shared_ptr<Mailbox>> AttachSender() {
+  absl::StatusOr<std::shared_ptr<Mailbox>> AttachSender(const std::string& resume_token) {
     std::lock_guard lock(mutex_);
     if (info_.state != SessionState::kOpen)
       return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
-    if (info_.stream_open) return FailedPrecondition("session '{}' already has a Map stream; close it first", info_.id);
+    if (sender_) {
+      if (resume_token != ResumeToken())
+        return FailedPrecondition("session '{}' already has a Map stream; close it first", info_.id);
+      sender_->Close(absl::AbortedError("the client continues the session on another stream"));
+    }
     info_.stream_open = true;
-    return SubscribeLocked();
+    sender_ = SubscribeLocked();
+    return sender_;
   }
-  void DetachSender() {
+  void DetachSender(const std::shared_ptr<Mailbox>& mailbox) {
     std::lock_guard lock(mutex_);
+    if (sender_ != mailbox) return;
+    sender_ = nullptr;
     info_.stream_open = false;
+  }
+  bool IsSender(const std::shared_ptr<Mailbox>& mailbox) {
+    std::lock_guard lock(mutex_);
+    return sender_ == mailbox;
+  }
+  StreamOpening Opening(bool sender) {
+    std::lock_guard lock(mutex_);
+    StreamOpening opening;
+    if (sender) opening.resume_token = ResumeToken();
+    for (const auto& [name, object] : objects_) opening.objects.push_back(object.id);
+    if (newest_frame_id_ > 0) opening.newest_frame_id = newest_frame_id_;
+    return opening;
   }
   void Unsubscribe(const std::shared_ptr<Mailbox>& mailbox) {
     std::lock_guard lock(mutex_);
@@ -102,6 +121,10 @@ class FakeSession {
     std::lock_guard lock(mutex_);
     if (info_.state != SessionState::kOpen)
       return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
+    if (frame.resent && frame.frame_id <= newest_frame_id_) {
+      Publish(FrameAck{.frame_id = frame.frame_id, .error = "", .T_world_camera = {}, .duplicate = true});
+      return absl::OkStatus();
+    }
     Statistics& statistics = info_.statistics;
     ++statistics.frames_received;
     FrameAck ack{.frame_id = frame.frame_id,
@@ -114,6 +137,7 @@ class FakeSession {
     ++(ack.accepted ? statistics.frames_processed : statistics.frames_rejected);
     Publish(ack);
     if (!ack.accepted) return absl::OkStatus();
+    newest_frame_id_ = std::max(newest_frame_id_, frame.frame_id);
     if (frame.mask_encoding == MaskEncoding::kNone) awaiting_masks_.insert(frame.frame_id);
     trajectory_.push_back(ack);
     timestamps_ns_.push_back(frame.timestamp_ns);
@@ -125,7 +149,12 @@ class FakeSession {
     std::lock_guard lock(mutex_);
     if (info_.state != SessionState::kOpen)
       return FailedPrecondition("session '{}' was finished and accepts no more frames", info_.id);
+    if (masks.resent && with_late_masks_.contains(masks.frame_id)) {
+      Publish(MasksAck{.frame_id = masks.frame_id, .duplicate = true});
+      return absl::OkStatus();
+    }
     const bool awaited = awaiting_masks_.erase(masks.frame_id) > 0;
+    if (awaited) with_late_masks_.insert(masks.frame_id);
     Publish(MasksAck{.frame_id = masks.frame_id,
                      .accepted = awaited,
                      .error = awaited ? "" : "frame_id: no accepted frame without masks has this id"});
@@ -159,6 +188,8 @@ class FakeSession {
   }
 
  private:
+  std::string ResumeToken() const { return "token of " + info_.id; }
+
   std::shared_ptr<Mailbox> SubscribeLocked() {
     auto mailbox = std::make_shared<Mailbox>();
     for (const auto& [name, object] : objects_) {
@@ -201,8 +232,11 @@ class FakeSession {
   std::mutex mutex_;
   SessionInfo info_;
   std::set<std::shared_ptr<Mailbox>> subscribers_;
+  std::shared_ptr<Mailbox> sender_;              // of the stream that may send; null: none
+  uint64_t newest_frame_id_ = 0;                 // of the accepted frames
   std::map<std::string, ObjectUpdate> objects_;  // by class name
   std::set<uint64_t> awaiting_masks_;            // accepted frames without masks
+  std::set<uint64_t> with_late_masks_;           // accepted frames that got them later
   std::vector<FrameAck> trajectory_;
   std::vector<int64_t> timestamps_ns_;
 };
@@ -214,20 +248,26 @@ using FrameHook = std::function<void(const FrameInput&)>;
 class FakeStream : public MapStream {
  public:
   FakeStream(std::shared_ptr<FakeSession> session, std::shared_ptr<Mailbox> mailbox, bool sender, FrameHook hook)
-      : session_(std::move(session)), mailbox_(std::move(mailbox)), hook_(std::move(hook)), sending_(sender) {}
+      : session_(std::move(session)),
+        mailbox_(std::move(mailbox)),
+        hook_(std::move(hook)),
+        opening_(session_->Opening(sender)),
+        sending_(sender) {}
   ~FakeStream() override { Cancel(); }
+
+  const StreamOpening& opening() const override { return opening_; }
 
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return mailbox_->Next(timeout); }
   bool Done() const override { return mailbox_->Done(); }
   absl::Status status() const override { return mailbox_->status(); }
 
   absl::Status Send(FrameInput frame) override {
-    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+    ROMAP_RETURN_IF_ERROR(CheckSending());
     hook_(frame);
     return session_->Process(frame);
   }
   absl::Status SendMasks(MasksInput masks) override {
-    if (!sending_) return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+    ROMAP_RETURN_IF_ERROR(CheckSending());
     return session_->ProcessMasks(masks);
   }
   absl::Status CloseSend() override {
@@ -243,15 +283,20 @@ class FakeStream : public MapStream {
   }
 
  private:
+  absl::Status CheckSending() const {
+    if (sending_ && session_->IsSender(mailbox_)) return absl::OkStatus();
+    return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
+  }
   bool StopSending() {
     if (!sending_.exchange(false)) return false;
-    session_->DetachSender();
+    session_->DetachSender(mailbox_);
     return true;
   }
 
   const std::shared_ptr<FakeSession> session_;
   const std::shared_ptr<Mailbox> mailbox_;
   const FrameHook hook_;
+  const StreamOpening opening_;
   std::atomic<bool> sending_;
 };
 
@@ -300,9 +345,10 @@ absl::Status FakeMappingService::DeleteSession(const std::string& session_id) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::unique_ptr<MapStream>> FakeMappingService::OpenMap(const std::string& session_id) {
+absl::StatusOr<std::unique_ptr<MapStream>> FakeMappingService::OpenMap(const std::string& session_id,
+                                                                       const std::string& resume_token) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
-  ROMAP_ASSIGN_OR_RETURN(auto mailbox, session->AttachSender());
+  ROMAP_ASSIGN_OR_RETURN(auto mailbox, session->AttachSender(resume_token));
   return std::make_unique<FakeStream>(session, std::move(mailbox), /*sender=*/true, frame_hook_);
 }
 

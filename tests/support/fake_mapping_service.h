@@ -37,7 +37,9 @@ class FakeMappingService : public MappingService {
   absl::StatusOr<SessionInfo> GetSession(const std::string& session_id) override;
   absl::StatusOr<SessionInfo> FinishSession(const std::string& session_id) override;
   absl::Status DeleteSession(const std::string& session_id) override;
-  absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id) override;
+  using MappingService::OpenMap;
+  absl::StatusOr<std::unique_ptr<MapStream>> OpenMap(const std::string& session_id,
+                                                     const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
 

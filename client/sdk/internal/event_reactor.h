@@ -14,8 +14,10 @@
 #include <utility>
 
 #include "common/map_events.h"
+#include "common/mapping_service.h"
 #include "common/status.h"
 #include "common/wire/events.h"
+#include "common/wire/sessions.h"
 #include "common/wire/status.h"
 
 namespace romap::client {
@@ -49,6 +51,9 @@ class EventReactor : public Reactor {
     Cancel();
     return absl::DeadlineExceededError(fmt::format("the server did not open the stream within {} ms", timeout.count()));
   }
+
+  // Call after Begin().
+  const StreamOpening& opening() const { return opening_; }
 
   // As EventStream::Next().
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) {
@@ -138,7 +143,10 @@ class EventReactor : public Reactor {
 
   // Buffers the event of a response. Requires mutex_.
   void Store(Response& response) {
-    if (response.has_opened()) opened_ = true;
+    if (response.has_opened()) {
+      opening_ = wire::FromProto(std::move(*response.mutable_opened()));
+      opened_ = true;
+    }
     if (discarding_ || !response.has_event()) return;
     if (response.event().event_case() == v1::MapEvent::EVENT_NOT_SET) return;  // event type of a newer server
     auto event = wire::FromProto(std::move(*response.mutable_event()), "event");
@@ -174,6 +182,7 @@ class EventReactor : public Reactor {
   std::condition_variable changed_;
   std::deque<MapEvent> events_;
   bool opened_ = false;
+  StreamOpening opening_;    // written once, before opened_ is set
   bool paused_ = false;      // no read is pending because the buffer is full
   bool draining_ = false;    // read to the end without pausing
   bool discarding_ = false;  // drop all further events

@@ -19,17 +19,19 @@ absl::StatusOr<std::unique_ptr<EventStream>> RemoteWatchStream::Open(std::shared
 
 absl::StatusOr<std::unique_ptr<MapStream>> RemoteMapStream::Open(std::shared_ptr<v1::Mapping::Stub> stub,
                                                                  const std::string& session_id,
+                                                                 const std::string& resume_token,
                                                                  std::chrono::milliseconds timeout,
                                                                  int max_message_bytes) {
   std::unique_ptr<RemoteMapStream> stream(new RemoteMapStream(std::move(stub), max_message_bytes));
   stream->stub_->async()->Map(stream->reactor_.context(), &stream->reactor_);
-  stream->reactor_.QueueStart(session_id);
+  stream->reactor_.QueueStart(session_id, resume_token);
   ROMAP_RETURN_IF_ERROR(stream->reactor_.Begin(timeout));
   return stream;
 }
 
-void RemoteMapStream::Reactor::QueueStart(const std::string& session_id) {
+void RemoteMapStream::Reactor::QueueStart(const std::string& session_id, const std::string& resume_token) {
   request_.mutable_start()->set_session_id(session_id);
+  request_.mutable_start()->set_resume_token(resume_token);
   write_pending_ = true;
   StartWrite(&request_);
 }

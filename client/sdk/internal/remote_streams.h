@@ -26,6 +26,7 @@ class RemoteWatchStream : public EventStream {
                                                            const std::string& session_id,
                                                            std::chrono::milliseconds timeout);
 
+  const StreamOpening& opening() const override { return reactor_.opening(); }
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return reactor_.Next(timeout); }
   bool Done() const override { return reactor_.Done(); }
   absl::Status status() const override { return reactor_.status(); }
@@ -49,9 +50,10 @@ class RemoteMapStream : public MapStream {
  public:
   // As RemoteWatchStream::Open(). Requests of more than max_message_bytes are rejected locally.
   static absl::StatusOr<std::unique_ptr<MapStream>> Open(std::shared_ptr<v1::Mapping::Stub> stub,
-                                                         const std::string& session_id,
+                                                         const std::string& session_id, const std::string& resume_token,
                                                          std::chrono::milliseconds timeout, int max_message_bytes);
 
+  const StreamOpening& opening() const override { return reactor_.opening(); }
   std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return reactor_.Next(timeout); }
   bool Done() const override { return reactor_.Done(); }
   absl::Status status() const override { return reactor_.status(); }
@@ -68,7 +70,7 @@ class RemoteMapStream : public MapStream {
     ~Reactor() override { Shutdown(); }
 
     // Queues the first request. Call before Begin(), which sends it.
-    void QueueStart(const std::string& session_id);
+    void QueueStart(const std::string& session_id, const std::string& resume_token);
     absl::Status Send(FrameInput frame);
     absl::Status SendMasks(MasksInput masks);
     absl::Status CloseSend();

@@ -81,6 +81,12 @@ TEST(WireEvents, UncertaintyMustBePositive) {
   }
 }
 
+TEST(WireEvents, DurableRoundTrips) {
+  const Durable got = RoundTrip(Durable{.frame_id = 7, .masks_frame_id = 5});
+  EXPECT_EQ(got.frame_id, 7u);
+  EXPECT_EQ(got.masks_frame_id, 5u);
+}
+
 TEST(WireEvents, MasksAckRoundTrips) {
   const MasksAck got = RoundTrip(MasksAck{.frame_id = 3, .accepted = false, .error = "too late"});
   EXPECT_EQ(got.frame_id, 3u);
