@@ -60,6 +60,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
       "server/nerf/train_stats.h", "server/nerf/trainer.h", "common/"}},
     {"server/mesh/", {"server/mesh/", "common/"}},
     {"server/texture/", {"server/texture/", "common/"}},
+    {"server/store/", {"server/store/", "common/", "romap/v1/"}},
     {"server/session/", {"server/", "common/"}},
     {"server/transport/", {"server/transport/", "server/session/", "common/", "romap/v1/"}},
     {"server/main.cc", {"server/", "common/"}},
