@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -21,6 +22,8 @@
 #include "common/version.h"
 #include "server/session/local_mapping_service.h"
 #include "server/session/server_config.h"
+#include "server/store/store.h"
+#include "server/store/store_config.h"
 #include "server/transport/grpc_server.h"
 #include "server/transport/transport_config.h"
 
@@ -37,6 +40,7 @@ struct Flags {
 struct Config {
   transport::TransportConfig transport;
   std::string log_level = "info";
+  store::StoreConfig store;
   session::ServerConfig server;
 
   ConfigFields Fields() {
@@ -48,6 +52,8 @@ struct Config {
                {.choices = {"trace", "debug", "info", "warning", "error", "critical", "off"},
                 .audience = Audience::kOperator,
                 .help = "Minimum severity of logged messages"});
+    fields.Section("store");
+    store.Fields(fields);
     server.Fields(fields);
     return fields;
   }
@@ -58,12 +64,18 @@ void PrintError(const std::string& message) { fmt::print(stderr, "romap-server: 
 // The flags, or the exit status if the program must exit (--help, --version, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
-  std::optional<std::string> listen_address, log_level;
+  std::optional<std::string> listen_address, log_level, data_dir;
+  bool ephemeral = false;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
   app.add_option(
       "--listen", listen_address,
       "HOST:PORT of the gRPC service; port 0 = any free port. Same as --set transport.listen_address=HOST:PORT");
+  app.add_option("--data-dir", data_dir,
+                 "Folder where sessions are stored; default: $XDG_DATA_HOME/romap or ~/.local/share/romap. Same as "
+                 "--set store.data_dir=DIR");
+  app.add_flag("--ephemeral", ephemeral,
+               "Store nothing: sessions end with the server. Same as --set store.ephemeral=true");
   app.add_option("--config", flags.config_file, "YAML file with settings; see deploy/server.yaml");
   app.add_option("--set", flags.assignments, "SECTION.FIELD=VALUE; overrides the file; may be repeated")
       ->allow_extra_args(false);
@@ -83,6 +95,8 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
     return kUsageError;
   }
   if (listen_address) flags.assignments.push_back("transport.listen_address=" + *listen_address);
+  if (data_dir) flags.assignments.push_back("store.data_dir=" + *data_dir);
+  if (ephemeral) flags.assignments.push_back("store.ephemeral=true");
   if (log_level) flags.assignments.push_back("log.level=" + *log_level);
   if (threads) flags.assignments.push_back(fmt::format("nerf.training_threads={}", *threads));
   return flags;
@@ -131,7 +145,17 @@ int Main(int argc, char** argv) {
 
   SetUpLogging(config.log_level);
   const sigset_t signals = BlockStopSignals();
-  session::LocalMappingService service(config.server);
+  std::unique_ptr<store::Store> store;
+  if (!config.store.ephemeral) {
+    auto opened = store::Store::Open(config.store);
+    if (!opened.ok()) {
+      PrintError(Message(opened.status()));
+      return kFailure;
+    }
+    store = *std::move(opened);
+    spdlog::info("sessions are stored in {}", store->path());
+  }
+  session::LocalMappingService service(config.server, std::move(store));
   auto server = transport::GrpcServer::Start(&service, config.transport);
   if (!server.ok()) {
     PrintError(Message(server.status()));

@@ -16,6 +16,7 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
   // The file may also be used by romap-server, which has these additional sections.
   fields.IgnoreSection("transport");
   fields.IgnoreSection("log");
+  fields.IgnoreSection("store");
   ROMAP_RETURN_IF_ERROR(fields.Load(options.config_file, options.settings));
   return config;
 }

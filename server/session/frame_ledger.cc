@@ -63,6 +63,11 @@ void FrameLedger::AcknowledgeDuplicate(const Arrival& arrival) {
   Settle();
 }
 
+bool FrameLedger::IsSettled() const {
+  std::lock_guard lock(mutex_);
+  return all_settled_ || inputs_settled_ >= inputs_received_;
+}
+
 std::optional<uint64_t> FrameLedger::newest_frame_id() const {
   std::lock_guard lock(mutex_);
   return newest_frame_id_;

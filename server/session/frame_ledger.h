@@ -42,6 +42,7 @@ class FrameLedger {
   void CountMappedFrame(bool is_keyframe, size_t map_points);
   void CountMappedMasks() { Settle(); }
 
+  bool IsSettled() const;                           // all inputs
   std::optional<uint64_t> newest_frame_id() const;  // of the accepted frames
 
   // No further input will be settled.

@@ -21,6 +21,35 @@ int TrainingThreads(const ServerConfig& config) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+int64_t UnixNow_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+// A stream of a stored map that is not in memory otherwise.
+class ShelfStream : public EventStream {
+ public:
+  explicit ShelfStream(std::shared_ptr<MapState> map) : map_(std::move(map)) {
+    outbox_ = map_->Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening_.objects);
+    opening_.durable = true;
+  }
+  ~ShelfStream() override { Cancel(); }
+
+  const StreamOpening& opening() const override { return opening_; }
+  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
+  bool Done() const override { return outbox_->Done(); }
+  absl::Status status() const override { return outbox_->status(); }
+  void Cancel() override {
+    map_->Unsubscribe(outbox_);
+    outbox_->Close(absl::CancelledError("the stream was canceled"));
+  }
+
+ private:
+  const std::shared_ptr<MapState> map_;
+  std::shared_ptr<Outbox> outbox_;
+  StreamOpening opening_;
+};
+
 class LocalEventStream : public MapStream {
  public:
   // `holder`: null for a stream that only watches.
@@ -50,7 +79,7 @@ class LocalEventStream : public MapStream {
 
   void Cancel() override {
     StopSending();
-    session_->map().Unsubscribe(outbox_);
+    session_->Unsubscribe(outbox_);
     outbox_->Close(absl::CancelledError("the stream was canceled"));
   }
 
@@ -81,15 +110,38 @@ class LocalEventStream : public MapStream {
 
 }  // namespace
 
-LocalMappingService::LocalMappingService(const ServerConfig& config)
+LocalMappingService::LocalMappingService(const ServerConfig& config, std::unique_ptr<store::Store> store)
     : config_(config),
+      store_(std::move(store)),
       pool_(config.nerf, TrainingThreads(config)),
-      mesher_(config.mesh, config.session.single_thread ? Mesher::Threading::kCaller : Mesher::Threading::kOwnThread) {}
+      mesher_(config.mesh, config.session.single_thread ? Mesher::Threading::kCaller : Mesher::Threading::kOwnThread) {
+  if (!store_) return;
+  auto stored = store_->Sessions();
+  if (!stored.ok()) spdlog::error("store: {}", Message(stored.status()));
+  shelf_ = std::make_unique<SessionShelf>(store_.get(),
+                                          stored.ok() ? *std::move(stored) : std::vector<store::StoredSession>{});
+  std::lock_guard lock(mutex_);
+  for (const std::string& id : shelf_->Unfinished()) {
+    if (const absl::Status status = RestoreLocked(id); !status.ok()) {
+      spdlog::error("session {}: cannot be restored: {}", id, Message(status));
+    }
+  }
+  store_thread_ = std::thread([this] { KeepStored(); });
+}
 
 LocalMappingService::~LocalMappingService() {
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+    stopping_changed_.notify_all();
+  }
+  if (store_thread_.joinable()) store_thread_.join();
   // Sessions use the pool and the mesher, so they must end first.
   std::lock_guard lock(mutex_);
-  for (const auto& [id, session] : sessions_) session->Stop(absl::UnavailableError("the server is shutting down"));
+  for (const auto& [id, session] : sessions_) {
+    session->StoreChanges(/*complete=*/true);
+    session->Stop(absl::UnavailableError("the server is shutting down"));
+  }
   sessions_.clear();
 }
 
@@ -97,7 +149,7 @@ std::string LocalMappingService::NewId() {
   std::string id;
   do {
     id = fmt::format("{:012x}", random_() >> 16);
-  } while (sessions_.contains(id));
+  } while (sessions_.contains(id) || (shelf_ && shelf_->Contains(id)));
   return id;
 }
 
@@ -109,8 +161,8 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
   if (options.name.size() > kMaxNameLength) {
     return InvalidArgument("name: must have at most {} bytes, has {}", kMaxNameLength, options.name.size());
   }
-  std::lock_guard lock(mutex_);
-  if (sessions_.size() >= static_cast<size_t>(config_.session.max_sessions)) {
+  std::unique_lock lock(mutex_);
+  if (sessions_.size() + sessions_in_creation_ >= static_cast<size_t>(config_.session.max_sessions)) {
     return absl::ResourceExhaustedError(
         fmt::format("the limit of {} sessions (session.max_sessions) is reached; delete a session first",
                     config_.session.max_sessions));
@@ -121,26 +173,46 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
     const std::filesystem::path path = std::filesystem::path(config_.session.record_dir) / (id + ".romaprec");
     ROMAP_ASSIGN_OR_RETURN(recorder, wire::RecordingWriter::Create(path.string(), options));
   }
-  auto session = std::make_shared<Session>(id, options, config_, &pool_, &mesher_, std::move(recorder));
+  const int64_t now_unix_ns = UnixNow_ns();
+  if (store_) {
+    ++sessions_in_creation_;
+    lock.unlock();  // a slow disk must not delay other calls
+    const absl::Status created =
+        store_->Create({.id = id, .options = options, .created_unix_ns = now_unix_ns, .used_unix_ns = now_unix_ns});
+    // While the disk fails, the session goes on in memory, and the store tries again.
+    if (!created.ok()) spdlog::warn("session {}: is not stored yet: {}", id, Message(created));
+    lock.lock();
+    --sessions_in_creation_;
+  }
+  auto session = std::make_shared<Session>(id, options, now_unix_ns, config_, Services(), std::move(recorder));
   sessions_[id] = session;
   spdlog::info("session {}: created, {}x{} px", id, options.camera.width_px, options.camera.height_px);
   return session->Info();
 }
 
-absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::Find(const std::string& session_id) const {
-  std::lock_guard lock(mutex_);
+absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::FindLocked(const std::string& session_id) {
   const auto it = sessions_.find(session_id);
-  if (it == sessions_.end()) return NotFound("session '{}' does not exist", session_id);
-  return it->second;
+  if (it != sessions_.end()) return it->second;
+  if (shelf_ && shelf_->Contains(session_id)) return nullptr;
+  return NotFound("session '{}' does not exist", session_id);
+}
+
+absl::Status LocalMappingService::RestoreLocked(const std::string& session_id) {
+  ROMAP_ASSIGN_OR_RETURN(auto taken, shelf_->Take(session_id));
+  auto& [record, stored] = taken;
+  sessions_[session_id] = std::make_shared<Session>(session_id, record.options, record.created_unix_ns, config_,
+                                                    Services(), std::move(stored));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<SessionInfo>> LocalMappingService::ListSessions() {
   std::vector<std::shared_ptr<Session>> sessions;
+  std::vector<SessionInfo> infos;
   {
     std::lock_guard lock(mutex_);
     for (const auto& [id, session] : sessions_) sessions.push_back(session);
+    if (shelf_) infos = shelf_->Infos();
   }
-  std::vector<SessionInfo> infos;
   for (const auto& session : sessions) infos.push_back(session->Info());
   std::sort(infos.begin(), infos.end(),
             [](const SessionInfo& a, const SessionInfo& b) { return a.created_unix_ns < b.created_unix_ns; });
@@ -148,12 +220,23 @@ absl::StatusOr<std::vector<SessionInfo>> LocalMappingService::ListSessions() {
 }
 
 absl::StatusOr<SessionInfo> LocalMappingService::GetSession(const std::string& session_id) {
-  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  if (!session) return shelf_->Info(session_id);
+  lock.unlock();
   return session->Info();
 }
 
 absl::StatusOr<SessionInfo> LocalMappingService::FinishSession(const std::string& session_id) {
-  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(auto session, FindLocked(session_id));
+  if (!session) {
+    const SessionInfo info = shelf_->Info(session_id);
+    if (info.state != SessionState::kOpen) return info;
+    ROMAP_RETURN_IF_ERROR(RestoreLocked(session_id));
+    session = sessions_.at(session_id);
+  }
+  lock.unlock();
   session->Finish();
   return session->Info();
 }
@@ -163,46 +246,146 @@ absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
   {
     std::lock_guard lock(mutex_);
     const auto it = sessions_.find(session_id);
-    if (it == sessions_.end()) return NotFound("session '{}' does not exist", session_id);
-    session = std::move(it->second);
-    sessions_.erase(it);
+    if (it != sessions_.end()) {
+      session = std::move(it->second);
+      sessions_.erase(it);
+    } else if (shelf_ && shelf_->Contains(session_id)) {
+      shelf_->Remove(session_id);
+    } else {
+      return NotFound("session '{}' does not exist", session_id);
+    }
   }
-  session->Stop(NotFound("session '{}' was deleted", session_id));
+  if (session) session->Stop(NotFound("session '{}' was deleted", session_id));
+  if (store_) ROMAP_RETURN_IF_ERROR(store_->Remove(session_id));
   spdlog::info("session {}: deleted", session_id);
   return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<MapStream>> LocalMappingService::OpenMap(const std::string& session_id,
                                                                         const std::string& resume_token) {
-  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(auto session, FindLocked(session_id));
+  if (!session) {
+    ROMAP_RETURN_IF_ERROR(RestoreLocked(session_id));
+    session = sessions_.at(session_id);
+  }
+  lock.unlock();
   ROMAP_RETURN_IF_ERROR(session->CheckOpen());
   StreamOpening opening;
   const std::shared_ptr<Outbox> outbox =
-      session->map().Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue, &opening.objects);
-  auto holder = session->sender().Attach(resume_token, [session, outbox] {
-    session->map().Unsubscribe(outbox);
+      session->Subscribe(Outbox::Acks::kAll, session->config().subscriber_queue, &opening.objects);
+  // The holder must not keep the session alive, because the session keeps the holder.
+  auto holder = session->sender().Attach(resume_token, [weak = std::weak_ptr(session), outbox] {
+    if (const auto replaced = weak.lock()) replaced->Unsubscribe(outbox);
     outbox->Close(absl::AbortedError("the client continues the session on another stream"));
   });
   if (!holder) {
-    session->map().Unsubscribe(outbox);
+    session->Unsubscribe(outbox);
     return FailedPrecondition("session '{}' already has a Map stream; close it first", session_id);
   }
   opening.resume_token = session->sender().token();
   opening.newest_frame_id = session->newest_frame_id();
+  opening.durable = session->is_durable();
   return std::make_unique<LocalEventStream>(session, outbox, std::move(opening), std::move(holder));
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> LocalMappingService::Watch(const std::string& session_id) {
-  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  if (!session) {
+    ROMAP_ASSIGN_OR_RETURN(auto map, shelf_->Map(session_id));
+    return std::make_unique<ShelfStream>(std::move(map));
+  }
+  lock.unlock();
   StreamOpening opening;
-  auto outbox = session->map().Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening.objects);
+  auto outbox = session->Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening.objects);
   opening.newest_frame_id = session->newest_frame_id();
+  opening.durable = session->is_durable();
   return std::make_unique<LocalEventStream>(session, std::move(outbox), std::move(opening), /*holder=*/nullptr);
 }
 
 absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& session_id) {
-  ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  if (!session) return shelf_->Export(session_id);
+  lock.unlock();
   return session->Export();
+}
+
+// --------------------------------------------------------------------------------------------------- the store thread
+
+void LocalMappingService::KeepStored() {
+  constexpr std::chrono::milliseconds kPeriod{100};
+  constexpr std::chrono::minutes kExpiryPeriod{10};
+  auto next_expiry = std::chrono::steady_clock::now();
+  std::unique_lock lock(mutex_);
+  while (!stopping_changed_.wait_for(lock, kPeriod, [&] { return stopping_; })) {
+    lock.unlock();
+    StoreChanges();
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= next_expiry) {
+      next_expiry = now + kExpiryPeriod;
+      DeleteExpired();
+    }
+    lock.lock();
+  }
+}
+
+void LocalMappingService::StoreChanges() {
+  std::map<std::string, std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    sessions = sessions_;
+  }
+  for (const auto& [id, session] : sessions) {
+    const bool has_ended = session->state() == SessionState::kFinished || session->state() == SessionState::kFailed;
+    const bool is_unused = has_ended || IsUnused(id, *session);
+    session->StoreChanges(/*complete=*/is_unused);
+    // A session that could not be stored stays in memory.
+    if (is_unused && store_->Flush().ok()) Shelve(id, session);
+  }
+  std::erase_if(unused_since_, [&](const auto& entry) { return !sessions.contains(entry.first); });
+}
+
+bool LocalMappingService::IsUnused(const std::string& session_id, const Session& session) {
+  const auto now = std::chrono::steady_clock::now();
+  if (session.state() != SessionState::kOpen || !session.IsIdle()) {
+    unused_since_.erase(session_id);
+    return false;
+  }
+  const auto since = unused_since_.try_emplace(session_id, now).first->second;
+  return now - since > std::chrono::duration<double>(config_.session.unload_after_s);
+}
+
+void LocalMappingService::Shelve(const std::string& session_id, std::shared_ptr<Session> session) {
+  auto stored = store_->Sessions();
+  if (!stored.ok()) return;
+  const auto record = std::find_if(stored->begin(), stored->end(),
+                                   [&](const store::StoredSession& candidate) { return candidate.id == session_id; });
+  std::lock_guard lock(mutex_);
+  const auto it = sessions_.find(session_id);
+  if (it == sessions_.end() || record == stored->end()) return;  // deleted meanwhile
+  const bool is_open = session->state() == SessionState::kOpen;
+  if (is_open && !session->IsIdle()) return;  // somebody uses it again
+  // Streams of an ended session keep it until they are closed.
+  sessions_.erase(it);
+  if (is_open) session->Stop(absl::UnavailableError("the session was unloaded; open the stream again"));
+  shelf_->Add(std::move(*record));
+}
+
+void LocalMappingService::DeleteExpired() {
+  std::vector<std::string> expired;
+  {
+    std::lock_guard lock(mutex_);
+    const store::StoreConfig& limits = store_->config();
+    expired = shelf_->Expired(limits.max_age_days, limits.max_gib * (1 << 30), UnixNow_ns());
+  }
+  for (const std::string& id : expired) {
+    spdlog::info("session {}: expired", id);
+    if (const absl::Status status = DeleteSession(id); !status.ok()) {
+      spdlog::warn("session {}: cannot be deleted: {}", id, Message(status));
+    }
+  }
 }
 
 }  // namespace romap::session

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "common/mapping_service.h"
@@ -12,14 +15,21 @@
 #include "server/session/mesher.h"
 #include "server/session/server_config.h"
 #include "server/session/session.h"
+#include "server/session/session_shelf.h"
+#include "server/store/store.h"
 
 namespace romap::session {
 
 // The mapping service in this process: owns the sessions, the training pool and the mesh thread. Thread-safe. All
 // streams must be destroyed before the service.
+//
+// With a store, sessions survive this service. Those that nobody uses are on the shelf (SessionShelf): they are listed,
+// watched and exported from the store. An open one is restored when a client opens it, and an unfinished one that was
+// closed at once.
 class LocalMappingService : public MappingService {
  public:
-  explicit LocalMappingService(const ServerConfig& config);
+  // `store` may be null: then sessions end with the service.
+  explicit LocalMappingService(const ServerConfig& config, std::unique_ptr<store::Store> store = nullptr);
   ~LocalMappingService() override;
 
   absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) override;
@@ -34,15 +44,32 @@ class LocalMappingService : public MappingService {
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
 
  private:
-  absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& session_id) const;
+  // Null: it is on the shelf. NOT_FOUND: there is no such session.
+  absl::StatusOr<std::shared_ptr<Session>> FindLocked(const std::string& session_id);
   std::string NewId();
+  Session::Services Services() { return {.pool = &pool_, .mesher = &mesher_, .store = store_.get()}; }
+  absl::Status RestoreLocked(const std::string& session_id);
+
+  // The store thread: stores changes, and puts sessions that ended or that nobody uses on the shelf.
+  void KeepStored();
+  void StoreChanges();
+  bool IsUnused(const std::string& session_id, const Session& session);
+  void Shelve(const std::string& session_id, std::shared_ptr<Session> session);
+  void DeleteExpired();
 
   const ServerConfig config_;
+  const std::unique_ptr<store::Store> store_;  // null: nothing is stored
   nerf::TrainingPool pool_;
   Mesher mesher_;
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   std::mt19937_64 random_{std::random_device{}()};
-  std::map<std::string, std::shared_ptr<Session>> sessions_;
+  std::map<std::string, std::shared_ptr<Session>> sessions_;  // in memory
+  size_t sessions_in_creation_ = 0;
+  std::unique_ptr<SessionShelf> shelf_;  // null without a store
+  std::condition_variable stopping_changed_;
+  bool stopping_ = false;
+  std::map<std::string, std::chrono::steady_clock::time_point> unused_since_;  // the store thread
+  std::thread store_thread_;
 };
 
 }  // namespace romap::session

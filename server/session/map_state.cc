@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/session/restored_objects.h"
+
 namespace romap::session {
 
 void MapState::Send(const MapEvent& event) {
@@ -20,8 +22,20 @@ void MapState::Apply(MapEvent event) {
   }
 }
 
+// Ids of removed objects have no public id any longer, so check removed_ first.
+ObjectId MapState::PublicId(ObjectId id) {
+  if (!public_ids_) {
+    last_object_ = std::max(last_object_, id);
+    return id;
+  }
+  const auto [it, is_new] = public_ids_->try_emplace(id);
+  if (is_new) it->second = last_object_ = ObjectId{last_object_.value + 1};
+  return it->second;
+}
+
 void MapState::ApplyUpdate(ObjectUpdate update) {
   if (removed_.contains(update.id)) return;
+  update.id = PublicId(update.id);
   Object& entry = objects_[update.id];
   update.revision = entry.object.revision + 1;
   update.T_world_mesh = entry.object.T_world_mesh;
@@ -31,22 +45,28 @@ void MapState::ApplyUpdate(ObjectUpdate update) {
 }
 
 void MapState::ApplyRemoval(ObjectRemoved removed) {
+  if (removed_.contains(removed.id)) return;
+  const ObjectId id = removed.id;
+  removed.id = PublicId(id);
   const auto it = objects_.find(removed.id);
   if (it == objects_.end()) return;
   removed.revision = it->second.object.revision + 1;
-  removed_.insert(removed.id);
+  removed_.insert(id);
   objects_.erase(it);
   Send(removed);
 }
 
 void MapState::ApplyMerge(ObjectMerged merged) {
-  if (merged.from == merged.into) return;
-  const auto into = objects_.find(merged.into);
+  if (merged.from == merged.into || removed_.contains(merged.from)) return;
+  const auto into = removed_.contains(merged.into) ? objects_.end() : objects_.find(PublicId(merged.into));
   if (into == objects_.end()) {
     return ApplyRemoval({.id = merged.from, .revision = 0, .reason = "merged into " + merged.into.ToString()});
   }
+  const ObjectId from = merged.from;
+  merged.from = PublicId(from);
+  merged.into = into->first;
   if (objects_.erase(merged.from) == 0) return;
-  removed_.insert(merged.from);
+  removed_.insert(from);
   ObjectUpdate& object = into->second.object;
   merged.revision = ++object.revision;
   Send(merged);
@@ -57,7 +77,8 @@ void MapState::ApplyMerge(ObjectMerged merged) {
 
 void MapState::MoveObject(ObjectId object, const Sim3<World, World>& S_new_old) {
   std::lock_guard lock(mutex_);
-  const auto it = objects_.find(object);
+  if (removed_.contains(object)) return;
+  const auto it = objects_.find(PublicId(object));
   if (it == objects_.end()) return;
   Object& entry = it->second;
   entry.S_new_first = S_new_old * entry.S_new_first;
@@ -68,9 +89,13 @@ void MapState::MoveObject(ObjectId object, const Sim3<World, World>& S_new_old) 
 
 void MapState::PublishMesh(MeshUpdate mesh, const MeshPose& pose) {
   std::lock_guard lock(mutex_);
+  if (removed_.contains(mesh.id)) return;
+  mesh.id = PublicId(mesh.id);
   const auto it = objects_.find(mesh.id);
   if (it == objects_.end()) return;
   Object& entry = it->second;
+  if (mesh.steps < entry.stored_steps && !mesh.final) return;
+  entry.stored_steps = 0;
   mesh.revision = ++entry.object.revision;
   entry.mesh = std::move(mesh);
   Send(*entry.mesh);
@@ -137,6 +162,78 @@ void MapState::Publish(const Durable& durable) {
   Send(durable);
 }
 
+void MapState::Load(std::vector<ObjectSnapshot> objects, std::vector<FrameAck> trajectory,
+                    std::vector<int64_t> timestamps_ns, ObjectId last_object) {
+  std::lock_guard lock(mutex_);
+  last_object_ = last_object;
+  for (ObjectSnapshot& snapshot : objects) {
+    const ObjectId id = snapshot.object.id;
+    last_object_ = std::max(last_object_, id);
+    objects_[id] = {.object = std::move(snapshot.object), .mesh = std::move(snapshot.mesh), .S_new_first = {}};
+  }
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    trajectory_.Add({.frame_id = trajectory[i].frame_id,
+                     .timestamp_ns = timestamps_ns[i],
+                     .T_world_camera = *trajectory[i].T_world_camera,
+                     .uncertainty = trajectory[i].uncertainty});
+    tracked_.push_back({std::move(trajectory[i]), timestamps_ns[i]});
+  }
+}
+
+void MapState::Replace(MapState& stored) {
+  std::scoped_lock lock(mutex_, stored.mutex_);
+  std::vector<ObjectUpdate> before, made_again;
+  for (const auto& [id, entry] : stored.objects_) before.push_back(entry.object);
+  for (const auto& [id, entry] : objects_) made_again.push_back(entry.object);
+  public_ids_ = FindRestoredObjects(before, made_again);
+  last_object_ = stored.last_object_;
+  outboxes_.insert(outboxes_.end(), stored.outboxes_.begin(), stored.outboxes_.end());
+  std::map<ObjectId, Object> objects;
+  for (auto& [id, entry] : objects_) {
+    const ObjectId public_id = PublicId(id);
+    entry.object.id = public_id;
+    if (entry.mesh) entry.mesh->id = public_id;
+    objects[public_id] = std::move(entry);
+  }
+  objects_ = std::move(objects);
+  for (const ObjectUpdate& object : before) {
+    if (objects_.contains(object.id)) continue;
+    Send(ObjectRemoved{
+        .id = object.id, .revision = object.revision + 1, .reason = "not found again when the session was restored"});
+  }
+  for (auto& [id, entry] : objects_) TakeOver(stored, id, entry);
+  if (closed_) {
+    for (const auto& outbox : outboxes_) outbox->Close(*closed_);
+    outboxes_.clear();
+  }
+  stored.outboxes_.clear();
+  stored.closed_ = absl::UnavailableError("the session was restored; open the stream again");
+}
+
+// Continues the revisions of the stored object, if there is one, and keeps its mesh unless the new one is better.
+void MapState::TakeOver(MapState& stored, ObjectId id, Object& entry) {
+  bool is_new_mesh = entry.mesh.has_value();
+  if (const auto it = stored.objects_.find(id); it != stored.objects_.end()) {
+    Object& old = it->second;
+    entry.object.revision = std::max(entry.object.revision, old.object.revision);
+    const bool is_better = entry.mesh && old.mesh && (entry.mesh->final || entry.mesh->steps >= old.mesh->steps);
+    if (old.mesh && !is_better) {
+      entry.stored_steps = old.mesh->steps;
+      entry.mesh = std::move(old.mesh);
+      entry.object.T_world_mesh = old.object.T_world_mesh;
+      entry.object.mesh_scale = old.object.mesh_scale;
+      is_new_mesh = false;
+    }
+  }
+  ++entry.object.revision;
+  Send(entry.object);
+  if (!is_new_mesh) return;
+  entry.mesh->revision = ++entry.object.revision;
+  Send(*entry.mesh);
+  ++entry.object.revision;
+  Send(entry.object);
+}
+
 std::shared_ptr<Outbox> MapState::Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects) {
   auto outbox = std::make_shared<Outbox>(acks, max_acks);
   std::lock_guard lock(mutex_);
@@ -175,16 +272,35 @@ MapSnapshot MapState::Snapshot() const {
       snapshot.objects.push_back({entry.object, entry.mesh});
     }
   }
+  CopyTrajectoryLocked(&snapshot.trajectory, &snapshot.timestamps_ns);
+  return snapshot;
+}
+
+void MapState::CopyTrajectory(std::vector<FrameAck>* trajectory, std::vector<int64_t>* timestamps_ns) const {
+  std::lock_guard lock(mutex_);
+  CopyTrajectoryLocked(trajectory, timestamps_ns);
+}
+
+void MapState::CopyTrajectoryLocked(std::vector<FrameAck>* trajectory, std::vector<int64_t>* timestamps_ns) const {
   const std::vector<SE3<World, Camera>> poses = trajectory_.Poses();
   const std::vector<std::optional<PoseUncertainty>> uncertainties = trajectory_.Uncertainties();
   for (size_t i = 0; i < tracked_.size(); ++i) {
-    snapshot.trajectory.push_back(tracked_[i].ack);
-    snapshot.trajectory.back().T_world_camera = poses[i];
-    snapshot.trajectory.back().uncertainty = uncertainties[i];
-    snapshot.trajectory.back().map_id = CurrentMap(tracked_[i].ack.map_id);
-    snapshot.timestamps_ns.push_back(tracked_[i].timestamp_ns);
+    FrameAck& ack = trajectory->emplace_back(tracked_[i].ack);
+    ack.T_world_camera = poses[i];
+    ack.uncertainty = uncertainties[i];
+    ack.map_id = CurrentMap(tracked_[i].ack.map_id);
+    timestamps_ns->push_back(tracked_[i].timestamp_ns);
   }
-  return snapshot;
+}
+
+size_t MapState::Subscribers() const {
+  std::lock_guard lock(mutex_);
+  return outboxes_.size();
+}
+
+size_t MapState::TrackedFrames() const {
+  std::lock_guard lock(mutex_);
+  return tracked_.size();
 }
 
 uint64_t MapState::ConfirmedObjects() const {

@@ -22,6 +22,9 @@ namespace romap::session {
 // class assigns revisions: every change of an object gets the next one and is sent to all outboxes. A correction moves
 // existing meshes by their pose; their vertices are not sent again. The id of a removed object is never used again.
 // Thread-safe.
+//
+// After a restart of the server there are two for a while: the stored one serves clients, while the session makes its
+// map again from the stored inputs in another one, which then takes the place of the stored one.
 class MapState {
  public:
   // Applies an ObjectUpdate, ObjectRemoved or ObjectMerged; its revision is overwritten. Ignored if the object was
@@ -51,6 +54,14 @@ class MapState {
   void Publish(const Diagnostic& diagnostic);
   void Publish(const Durable& durable);
 
+  // A new map begins with stored objects and trajectory. `last_object`: the largest id that was ever used.
+  void Load(std::vector<ObjectSnapshot> objects, std::vector<FrameAck> trajectory, std::vector<int64_t> timestamps_ns,
+            ObjectId last_object);
+  // This map was made again from the inputs of `stored`. Its objects get the ids that they have there, and new ids
+  // otherwise, also in all later events. Their stored meshes are kept until the training has made better ones. The
+  // subscribers of `stored` become those of this map and get the differences; `stored` is closed.
+  void Replace(MapState& stored);
+
   // The outbox starts with the current objects, whose ids are stored in `objects` if it is not null. It is closed if
   // the map is closed.
   std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects = nullptr);
@@ -61,12 +72,16 @@ class MapState {
   // Objects, trajectory and timestamps. The caller sets the other fields.
   MapSnapshot Snapshot() const;
   uint64_t ConfirmedObjects() const;
+  size_t Subscribers() const;
+  size_t TrackedFrames() const;  // length of the trajectory
+  void CopyTrajectory(std::vector<FrameAck>* trajectory, std::vector<int64_t>* timestamps_ns) const;
 
  private:
   struct Object {
     ObjectUpdate object;
     std::optional<MeshUpdate> mesh;
     Sim3<World, World> S_new_first;  // product of all corrections of its space
+    uint64_t stored_steps = 0;       // > 0: a stored mesh, which is better than one with fewer steps
   };
   struct TrackedAck {
     FrameAck ack;
@@ -78,10 +93,16 @@ class MapState {
   void ApplyRemoval(ObjectRemoved removed);
   void ApplyMerge(ObjectMerged merged);
   SparseMapId CurrentMap(SparseMapId map) const;
+  void CopyTrajectoryLocked(std::vector<FrameAck>* trajectory, std::vector<int64_t>* timestamps_ns) const;
+  ObjectId PublicId(ObjectId id);
+  void TakeOver(MapState& stored, ObjectId id, Object& entry);
 
   mutable std::mutex mutex_;
-  std::map<ObjectId, Object> objects_;
-  std::set<ObjectId> removed_;
+  std::map<ObjectId, Object> objects_;  // by the id that clients know
+  std::set<ObjectId> removed_;          // ids of the mapper
+  // After Replace(): the ids that clients know, by those of the mapper. nullopt: they are the same.
+  std::optional<std::map<ObjectId, ObjectId>> public_ids_;
+  ObjectId last_object_;
   std::vector<TrackedAck> tracked_;                 // accepted frames with a pose
   Trajectory trajectory_;                           // of the same frames
   std::map<SparseMapId, SparseMapId> merged_maps_;  // each into which one

@@ -29,7 +29,7 @@ CheckedInput Pipeline::Check(Arrival arrival) {
       return;
     }
     checked.content = *std::move(result);
-    Record(input);
+    if (on_accepted_) on_accepted_(input);
   };
   try {
     if (ingest_.IsDuplicate(input)) {
@@ -167,17 +167,15 @@ void Pipeline::FinishMapping() {
 
 // -------------------------------------------------------------------------------------------------------------------
 
-Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config,
-                   nerf::TrainingPool* pool, Mesher* mesher, MapState* map, FrameLedger* ledger,
-                   DiagnosticLog* diagnostics, std::unique_ptr<wire::RecordingWriter> recorder)
-    : session_id_(std::move(session_id)),
-      pool_(pool),
+Pipeline::Pipeline(const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool, Mesher* mesher,
+                   MapState* map, FrameLedger* ledger, DiagnosticLog* diagnostics, InputSink on_accepted)
+    : pool_(pool),
       mesher_(mesher),
       map_(map),
       ledger_(ledger),
       diagnostics_(diagnostics),
       ingest_(options.camera, config.objects.max_mask_delay_s),
-      recorder_(std::move(recorder)),
+      on_accepted_(std::move(on_accepted)),
       tracker_(config.slam, options.pose_use, &local_map_),
       sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session),
                      {.direction_world = options.up_world, .estimate = options.estimate_up}),
@@ -190,15 +188,6 @@ Pipeline::Pipeline(std::string session_id, const SessionOptions& options, const 
 Pipeline::~Pipeline() {
   pool_->RemoveSession(pool_session_);
   mesher_->RemoveSession(mesher_session_);
-}
-
-// A write error ends the recording, but not the session.
-void Pipeline::Record(const SessionInput& input) {
-  if (!recorder_) return;
-  const absl::Status status = recorder_->Append(input);
-  if (status.ok()) return;
-  spdlog::error("session {}: recording stopped: {}", session_id_, Message(status));
-  recorder_ = nullptr;
 }
 
 bool Pipeline::IsTrainingDone() const { return pool_->IsIdle(pool_session_) && mesher_->IsIdle(mesher_session_); }

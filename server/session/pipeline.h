@@ -10,7 +10,6 @@
 #include "common/field_snapshot.h"
 #include "common/mapping_service.h"
 #include "common/stage_messages.h"
-#include "common/wire/recording.h"
 #include "server/nerf/training_pool.h"
 #include "server/objects/object_mapper.h"
 #include "server/session/arrival.h"
@@ -60,16 +59,17 @@ class Pipeline {
   // Runs the step, or queues it for the mapping thread.
   using MappingExecutor = std::function<void(MappingStep)>;
 
-  // `pool`, `mesher`, `map`, `ledger` and `diagnostics` outlive the pipeline. `recorder` gets every accepted input; may
-  // be null.
-  Pipeline(std::string session_id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
-           Mesher* mesher, MapState* map, FrameLedger* ledger, DiagnosticLog* diagnostics,
-           std::unique_ptr<wire::RecordingWriter> recorder);
+  using InputSink = std::function<void(const SessionInput&)>;
+
+  // `pool`, `mesher`, `map`, `ledger` and `diagnostics` outlive the pipeline. `on_accepted` gets every accepted input
+  // in Check(); may be null.
+  Pipeline(const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool, Mesher* mesher,
+           MapState* map, FrameLedger* ledger, DiagnosticLog* diagnostics, InputSink on_accepted);
   ~Pipeline();  // the pool and the mesher make no more calls
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  // Decodes, checks and records a frame or late masks.
+  // Decodes and checks a frame or late masks, and passes them to `on_accepted`.
   CheckedInput Check(Arrival arrival);
   // Processes a checked input, or rejects it. `execute` is called at most once, before Process() returns: not at all
   // for an input that is rejected. Acknowledgments and rejections keep the order of the inputs.
@@ -92,14 +92,12 @@ class Pipeline {
   std::optional<slam::TrackedImage> Track(const Arrival& arrival, const std::shared_ptr<const Frame>& frame);
   void ProcessLateMasks(const FrameMasks& masks, const MappingExecutor& execute);
   void Reject(const Arrival& arrival, const absl::Status& reason);
-  void Record(const SessionInput& input);
   void Correct(const MapCorrection& correction);
   void Publish(objects::ObjectOutput output);
   void PublishEvent(MapEvent event);
   void MeshField(FieldSnapshot snapshot);
   void PublishMesh(MeshUpdate mesh, const MeshPose& pose);
 
-  const std::string session_id_;
   nerf::TrainingPool* const pool_;
   Mesher* const mesher_;
   MapState* const map_;
@@ -109,7 +107,7 @@ class Pipeline {
   slam::LocalMapSlot local_map_;  // from the mapper to the tracker
   // Used by Check().
   Ingest ingest_;
-  std::unique_ptr<wire::RecordingWriter> recorder_;  // null: not recorded, or recording failed
+  const InputSink on_accepted_;
   // Used by Process().
   slam::Tracker tracker_;
   FailureGuard tracker_guard_{/*max_failures_in_a_row=*/10};

@@ -42,7 +42,7 @@ bool Scheduler::Offer(SessionInput input) {
   Arrival arrival{std::move(input), std::chrono::steady_clock::now()};
   bool accepted = false;
   std::optional<Arrival> dropped;
-  if (mode_ == FrameMode::kReplay) {
+  if (!IsLive()) {
     accepted = inputs_.Push(std::move(arrival));
   } else {
     dropped = inputs_.PushDroppingOldest(std::move(arrival), &accepted);
@@ -76,7 +76,7 @@ void Scheduler::RunIngest() {
 
 void Scheduler::RunTracking() {
   const Pipeline::MappingExecutor execute = [this](MappingStep step) {
-    mode_ == FrameMode::kLive ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
+    IsLive() ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
   };
   try {
     while (const std::optional<CheckedInput> input = checked_.Pop()) {
@@ -92,7 +92,7 @@ void Scheduler::RunMapping() {
   const auto period = std::chrono::milliseconds(static_cast<int64_t>(1000 * config_.statistics_period_s));
   try {
     while (!steps_.Drained()) {
-      if (const std::optional<MappingStep> step = steps_.PopFor(period)) RunStep(*step);
+      if (const std::optional<QueuedStep> step = steps_.PopFor(period)) RunStep(*step);
       callbacks_.tick();
     }
     EndMapping();
@@ -129,7 +129,7 @@ void Scheduler::ExecuteReplay(MappingStep step) {
     std::lock_guard lock(mutex_);
     ++map_changes_waiting_;
   }
-  if (!steps_.Push(std::move(step)) || !changes_local_map) return;
+  if (!steps_.Push({std::move(step), /*is_live=*/false}) || !changes_local_map) return;
   std::unique_lock lock(mutex_);
   local_map_changed_.wait(lock, [&] { return map_changes_waiting_ == 0 || mapping_ended_; });
 }
@@ -139,23 +139,25 @@ void Scheduler::ExecuteLive(MappingStep step) {
   // An older lost frame would be relocalized too late.
   if (step.relocalizes && lost_frames_waiting_ > 0) return ledger_->SkipMapping();
   if (step.relocalizes) ++lost_frames_waiting_;
-  if (steps_.TryPush(step)) return;
-  if (step.relocalizes) --lost_frames_waiting_;
-  if (step.may_be_skipped) return ledger_->SkipMapping();
+  QueuedStep queued{std::move(step), /*is_live=*/true};
+  if (steps_.TryPush(queued)) return;
+  if (queued.step.relocalizes) --lost_frames_waiting_;
+  if (queued.step.may_be_skipped) return ledger_->SkipMapping();
   // Tracking never waits for keyframes: it makes no more of them while several wait. Clients that send masks faster
   // than they are mapped have to wait.
-  if (step.is_keyframe || step.changes_local_map) {
-    steps_.ForcePush(std::move(step));
+  if (queued.step.is_keyframe || queued.step.changes_local_map) {
+    steps_.ForcePush(std::move(queued));
   } else {
-    steps_.Push(std::move(step));
+    steps_.Push(std::move(queued));
   }
 }
 
-void Scheduler::RunStep(const MappingStep& step) {
-  if (mode_ == FrameMode::kLive && step.is_keyframe) pipeline_->SetKeyframesWait(--keyframes_waiting_ > 0);
-  if (mode_ == FrameMode::kLive && step.relocalizes) --lost_frames_waiting_;
+void Scheduler::RunStep(const QueuedStep& queued) {
+  const MappingStep& step = queued.step;
+  if (queued.is_live && step.is_keyframe) pipeline_->SetKeyframesWait(--keyframes_waiting_ > 0);
+  if (queued.is_live && step.relocalizes) --lost_frames_waiting_;
   if (!stopping_) step.run();
-  if (mode_ == FrameMode::kReplay && step.changes_local_map) {
+  if (!queued.is_live && step.changes_local_map) {
     std::lock_guard lock(mutex_);
     --map_changes_waiting_;
     local_map_changed_.notify_all();

@@ -42,6 +42,9 @@ class Scheduler {
 
   // Queues an input. False after CloseInputs() or a failure.
   bool Offer(SessionInput input);
+  // Until EndRestoring(), a live session is processed like a replay session, so that no stored input is dropped.
+  void BeginRestoring() { restoring_ = true; }
+  void EndRestoring() { restoring_ = false; }
   // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
   // Ends and joins the threads without processing the waiting inputs or completing the training. Must not be called by
@@ -49,6 +52,13 @@ class Scheduler {
   void Stop();
 
  private:
+  // A step with the mode in which it was queued.
+  struct QueuedStep {
+    MappingStep step;
+    bool is_live = false;
+  };
+
+  bool IsLive() const { return mode_ == FrameMode::kLive && !restoring_; }
   void RunIngest();        // the ingest thread
   void RunTracking();      // the tracking thread
   void RunMapping();       // the mapping thread
@@ -58,7 +68,7 @@ class Scheduler {
   void ExecuteImmediately(const MappingStep& step);
   void ExecuteReplay(MappingStep step);
   void ExecuteLive(MappingStep step);
-  void RunStep(const MappingStep& step);
+  void RunStep(const QueuedStep& queued);
 
   void TrainToCompletion();
   void Fail(const char* stage, const std::string& what);
@@ -72,8 +82,9 @@ class Scheduler {
 
   BoundedQueue<Arrival> inputs_;
   BoundedQueue<CheckedInput> checked_;
-  BoundedQueue<MappingStep> steps_;
+  BoundedQueue<QueuedStep> steps_;
   std::atomic<bool> stopping_ = false;
+  std::atomic<bool> restoring_ = false;
   std::atomic<bool> failed_ = false;
 
   std::atomic<int> keyframes_waiting_ = 0;    // live: in `steps_`

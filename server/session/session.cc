@@ -5,17 +5,13 @@
 
 #include <algorithm>
 #include <fstream>
+#include <future>
 #include <utility>
 
 #include "common/status.h"
 
 namespace romap::session {
 namespace {
-
-int64_t UnixNow_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 uint64_t ResidentBytes() {
   std::ifstream statm("/proc/self/statm");
@@ -26,17 +22,42 @@ uint64_t ResidentBytes() {
 
 }  // namespace
 
-Session::Session(std::string id, const SessionOptions& options, const ServerConfig& config, nerf::TrainingPool* pool,
-                 Mesher* mesher, std::unique_ptr<wire::RecordingWriter> recorder)
+Session::Session(std::string id, const SessionOptions& options, int64_t created_unix_ns, const ServerConfig& config,
+                 const Services& services, SessionState state, std::shared_ptr<MapState> stored_map)
     : id_(std::move(id)),
       options_(options),
       config_(config.session),
-      created_unix_ns_(UnixNow_ns()),
-      lifecycle_(id_),
+      created_unix_ns_(created_unix_ns),
+      store_(services.store),
+      lifecycle_(id_, state),
+      stored_map_(std::move(stored_map)),
       ledger_(id_, &map_),
       diagnostics_(id_, &map_),
-      pipeline_(id_, options, config, pool, mesher, &map_, &ledger_, &diagnostics_, std::move(recorder)),
+      storage_(store_ == nullptr ? nullptr
+                                 : std::make_unique<SessionStorage>(store_, id_, options.mode, StoreListener())),
+      pipeline_(options, config, services.pool, services.mesher, &map_, &ledger_, &diagnostics_,
+                [this](const SessionInput& input) { OnAccepted(input); }),
       scheduler_(config.session, options.mode, &pipeline_, &ledger_, SchedulerCallbacks()) {}
+
+Session::Session(std::string id, const SessionOptions& options, int64_t created_unix_ns, const ServerConfig& config,
+                 const Services& services, std::unique_ptr<wire::RecordingWriter> recorder)
+    : Session(std::move(id), options, created_unix_ns, config, services, SessionState::kOpen, nullptr) {
+  recorder_ = std::move(recorder);  // before the first input
+  if (storage_) {
+    map_.Publish(Durable{});
+    storage_->Follow(&map_, {});
+  }
+}
+
+Session::Session(std::string id, const SessionOptions& options, int64_t created_unix_ns, const ServerConfig& config,
+                 const Services& services, Stored stored)
+    : Session(std::move(id), options, created_unix_ns, config, services, SessionState::kRestoring, stored.map) {
+  restoring_ = true;
+  finish_after_restoring_ = stored.state == SessionState::kFinishing;
+  stored_statistics_ = stored.statistics;
+  scheduler_.BeginRestoring();
+  restore_thread_ = std::thread([this, moved = std::move(stored)]() mutable { Restore(std::move(moved)); });
+}
 
 Session::~Session() { Stop(absl::CancelledError("the session was closed")); }
 
@@ -53,8 +74,104 @@ absl::Status Session::Offer(SessionInput input) {
 }
 
 void Session::Finish() {
+  finish_after_restoring_ = true;
+  if (lifecycle_.state() == SessionState::kRestoring) {
+    store_->PutState(id_, SessionState::kFinishing, "", stored_statistics_);
+    return;
+  }
   lifecycle_.BeginFinish();
   scheduler_.CloseInputs();
+}
+
+// A write error ends the recording, but not the session.
+void Session::OnAccepted(const SessionInput& input) {
+  if (storage_ && !restoring_) storage_->Append(input);
+  if (!recorder_) return;
+  const absl::Status status = recorder_->Append(input);
+  if (status.ok()) return;
+  spdlog::error("session {}: recording stopped: {}", id_, Message(status));
+  recorder_ = nullptr;
+}
+
+store::Store::Listener Session::StoreListener() {
+  return {
+      .durable = [this](const Durable& durable) { map_.Publish(durable); },
+      .trouble =
+          [this](const absl::Status& status) {
+            if (absl::IsDataLoss(status)) {
+              diagnostics_.Report(
+                  {.code = "inputs_not_stored",
+                   .severity = Severity::kWarning,
+                   .text = Message(status),
+                   .advice = "the map is complete, but after a restart of the server it will lack them"});
+              return;
+            }
+            std::vector<Diagnostic> conditions;
+            if (!status.ok()) {
+              conditions.push_back({.code = "not_durable",
+                                    .severity = Severity::kWarning,
+                                    .text = "the server cannot store the session now: " + Message(status),
+                                    .advice = "the session continues in memory; make room on the disk of the server"});
+            }
+            diagnostics_.SetConditions("store", std::move(conditions));
+          }};
+}
+
+// The restore thread.
+void Session::Restore(Stored stored) {
+  OfferStoredInputs(stored.inputs);
+  std::promise<void> settled;
+  ledger_.WhenSettled([&] { settled.set_value(); });
+  settled.get_future().wait();
+  if (stopping_) return;
+  map_.Replace(*stored_map_);
+  map_.Publish(store_->DurableInputs(id_));
+  storage_->Follow(&map_, stored.objects);
+  restoring_ = false;
+  scheduler_.EndRestoring();
+  lifecycle_.EndRestoring();
+  spdlog::info("session {}: restored from {} inputs, {} objects", id_, stored.inputs, map_.ConfirmedObjects());
+  if (finish_after_restoring_) Finish();
+}
+
+void Session::OfferStoredInputs(uint64_t inputs) {
+  for (uint64_t number = 1; number <= inputs && !stopping_; ++number) {
+    absl::StatusOr<SessionInput> input = store_->LoadInput(id_, number);
+    if (input.ok()) {
+      if (!scheduler_.Offer(*std::move(input))) return;  // stopped or failed
+      continue;
+    }
+    diagnostics_.Report(
+        {.code = "stored_data_damaged",
+         .severity = Severity::kWarning,
+         .count = 1,
+         .text = "a part of the stored session is damaged and was left out: " + Message(input.status())});
+  }
+}
+
+void Session::StoreChanges(bool complete) {
+  if (!storage_) return;
+  storage_->StoreChanges(
+      [this] {
+        return SessionStorage::State{lifecycle_.state(), lifecycle_.failure(), CurrentStatistics()};
+      },
+      complete);
+}
+
+std::shared_ptr<Outbox> Session::Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects) {
+  // A stored map that was replaced meanwhile ends the subscription, and the client opens the stream again.
+  return restoring_ ? stored_map_->Subscribe(acks, max_acks, objects) : map_.Subscribe(acks, max_acks, objects);
+}
+
+bool Session::IsIdle() const {
+  // The storage is one subscriber.
+  return !restoring_ && !sender_.IsHeld() && map_.Subscribers() <= (storage_ ? 1 : 0) && ledger_.IsSettled() &&
+         pipeline_.TrainingProgress().objects_training == 0;
+}
+
+void Session::Unsubscribe(const std::shared_ptr<Outbox>& outbox) {
+  if (stored_map_) stored_map_->Unsubscribe(outbox);
+  map_.Unsubscribe(outbox);
 }
 
 void Session::OnFinished() {
@@ -74,8 +191,11 @@ void Session::OnFailed(const char* stage, const std::string& what) {
 }
 
 void Session::Stop(const absl::Status& status) {
+  stopping_ = true;
   map_.Close(status);
+  if (stored_map_) stored_map_->Close(status);
   scheduler_.Stop();
+  if (restore_thread_.joinable()) restore_thread_.join();
 }
 
 void Session::PublishStatisticsIfDue() {
@@ -87,6 +207,7 @@ void Session::PublishStatisticsIfDue() {
 }
 
 Statistics Session::CurrentStatistics() const {
+  if (restoring_) return stored_statistics_;
   const nerf::TrainingPool::Progress training = pipeline_.TrainingProgress();
   Statistics statistics;
   ledger_.FillIn(&statistics);
@@ -109,11 +230,12 @@ SessionInfo Session::Info() const {
   info.created_unix_ns = created_unix_ns_;
   info.stream_open = sender_.IsHeld();
   info.statistics = CurrentStatistics();
+  info.durable = is_durable();
   return info;
 }
 
 MapSnapshot Session::Export() const {
-  MapSnapshot snapshot = map_.Snapshot();
+  MapSnapshot snapshot = restoring_ ? stored_map_->Snapshot() : map_.Snapshot();
   snapshot.session_id = id_;
   snapshot.state = lifecycle_.state();
   snapshot.statistics = CurrentStatistics();

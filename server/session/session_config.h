@@ -12,6 +12,7 @@ struct SessionConfig {
   int mapping_queue = 8;
   int subscriber_queue = 65536;
   double statistics_period_s = 0.5;
+  double unload_after_s = 600;
   std::string record_dir;
   bool single_thread = false;
 
@@ -21,7 +22,7 @@ struct SessionConfig {
                 .min = 1,
                 .max = 10000,
                 .audience = Audience::kOperator,
-                .help = "Maximum number of sessions, including finished ones"});
+                .help = "Maximum number of sessions in memory: open ones, and without a store also finished ones"});
     fields.Add("frame_queue", &frame_queue,
                {.unit = "frames",
                 .min = 1,
@@ -39,6 +40,12 @@ struct SessionConfig {
                         "oldest ones are dropped"});
     fields.Add("statistics_period_s", &statistics_period_s,
                {.unit = "s", .min = 0.05, .max = 60, .help = "Time between two statistics messages"});
+    fields.Add("unload_after_s", &unload_after_s,
+               {.unit = "s",
+                .min = 0,
+                .max = 1e6,
+                .help = "Time after which an open session that nobody uses gives back its memory; it is restored from "
+                        "the store when a client opens it"});
     fields.Add("record_dir", &record_dir,
                {.audience = Audience::kOperator,
                 .help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "

@@ -7,6 +7,10 @@ namespace romap::session {
 absl::Status SessionLifecycle::CheckOpen() const {
   const SessionState state = state_;
   if (state == SessionState::kOpen) return absl::OkStatus();
+  if (state == SessionState::kRestoring) {
+    return absl::UnavailableError(
+        fmt::format("session '{}' is being restored from the store; try again soon", session_id_));
+  }
   if (state != SessionState::kFailed) {
     return FailedPrecondition("session '{}' was finished and accepts no more frames", session_id_);
   }
@@ -17,6 +21,16 @@ absl::Status SessionLifecycle::CheckOpen() const {
 void SessionLifecycle::BeginFinish() {
   SessionState open = SessionState::kOpen;
   state_.compare_exchange_strong(open, SessionState::kFinishing);
+}
+
+void SessionLifecycle::EndRestoring() {
+  SessionState restoring = SessionState::kRestoring;
+  state_.compare_exchange_strong(restoring, SessionState::kOpen);
+}
+
+std::string SessionLifecycle::failure() const {
+  std::lock_guard lock(mutex_);
+  return failure_;
 }
 
 void SessionLifecycle::Fail(const std::string& cause) {

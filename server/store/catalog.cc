@@ -27,6 +27,7 @@ CREATE TABLE sessions(
   failure TEXT NOT NULL,
   statistics BLOB NOT NULL,         -- romap.v1.Statistics
   pinned INTEGER NOT NULL,
+  last_object INTEGER NOT NULL DEFAULT 0,  -- the largest id that was ever used
   trajectory_segment INTEGER, trajectory_offset INTEGER, trajectory_length INTEGER, trajectory_hash BLOB
 ) WITHOUT ROWID;
 CREATE TABLE inputs(
@@ -219,6 +220,11 @@ void Catalog::PutObject(const std::string& session, const ObjectUpdate& object) 
   statement.bind(2, Bits(object.id.value));
   BindBytes(statement, 3, wire::ToProto(object));
   Run(statement);
+  static constexpr char kLast[] = "UPDATE sessions SET last_object = max(last_object, ?) WHERE id = ?";
+  SQLite::Statement& last = Prepared(kLast);
+  last.bind(1, Bits(object.id.value));
+  last.bind(2, session);
+  Run(last);
 }
 
 void Catalog::PutMesh(const std::string& session, ObjectId object, const BlobRef& blob) {
@@ -366,6 +372,12 @@ std::vector<std::pair<ObjectUpdate, std::optional<BlobRef>>> Catalog::Objects(co
     }
   }
   return objects;
+}
+
+ObjectId Catalog::LastObject(const std::string& session) {
+  SQLite::Statement statement(database_, "SELECT last_object FROM sessions WHERE id = ?");
+  statement.bind(1, session);
+  return statement.executeStep() ? ObjectId{static_cast<uint64_t>(statement.getColumn(0).getInt64())} : ObjectId{};
 }
 
 std::optional<BlobRef> Catalog::TrajectoryBlob(const std::string& session) {

@@ -62,6 +62,7 @@ class Catalog {
   std::vector<std::pair<ObjectUpdate, std::optional<BlobRef>>> Objects(const std::string& session,
                                                                        std::vector<std::string>* damage);
   std::optional<BlobRef> TrajectoryBlob(const std::string& session);
+  ObjectId LastObject(const std::string& session);
 
  private:
   Catalog(const std::string& path, Mode mode);

@@ -389,6 +389,7 @@ absl::StatusOr<StoredMap> Store::LoadMap(const std::string& session) const {
     try {
       objects = reader_->Objects(session, &map.damage);
       trajectory = reader_->TrajectoryBlob(session);
+      map.last_object = reader_->LastObject(session);
     } catch (const SQLite::Exception& e) {
       return absl::DataLossError(fmt::format("{}: the catalog cannot be read: {}", path(), e.what()));
     }

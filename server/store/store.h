@@ -46,6 +46,7 @@ class Store {
   ~Store();
 
   const std::string& path() const { return folder_.path(); }
+  const StoreConfig& config() const { return config_; }
   // As they are in the catalog, oldest first. Without writes that are queued.
   absl::StatusOr<std::vector<StoredSession>> Sessions() const;
   // Of all files of the session.

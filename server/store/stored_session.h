@@ -26,6 +26,7 @@ struct StoredMap {
   std::vector<ObjectSnapshot> objects;  // all, also provisional ones, by id
   std::vector<FrameAck> trajectory;     // as MapSnapshot
   std::vector<int64_t> timestamps_ns;
+  ObjectId last_object;             // the largest id that was ever used
   std::vector<std::string> damage;  // parts that could not be read, as messages; they are missing above
 };
 

@@ -85,7 +85,8 @@ void ExpectMapOfThree(const std::string& out) {
 TEST(ProgramsTest, ServerAndClientMapASequence) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
-  testing_support::BackgroundProcess server(integration::Quick({ROMAP_SERVER, "--listen", "127.0.0.1:0"}));
+  testing_support::BackgroundProcess server(
+      integration::Quick({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0"}));
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
 
@@ -277,7 +278,7 @@ TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
 TEST(InvalidInputTest, NoServerAndPortInUse) {
   const testing_support::TemporaryFolder folder;
   MakeTinySequence(folder / "sequence");
-  testing_support::BackgroundProcess server({ROMAP_SERVER, "--listen", "127.0.0.1:0"});
+  testing_support::BackgroundProcess server({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0"});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
   ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);

@@ -23,7 +23,7 @@ done
 cmake -S "$here" -B "$work/client" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Debug >"$work/client.log" 2>&1 &&
   cmake --build "$work/client" >>"$work/client.log" 2>&1 || { cat "$work/client.log"; exit 1; }
 
-"$prefix/bin/romap-server" --config "$prefix/share/romap/server.yaml" --listen 127.0.0.1:0 \
+"$prefix/bin/romap-server" --config "$prefix/share/romap/server.yaml" --ephemeral --listen 127.0.0.1:0 \
   >"$work/server.log" 2>&1 &
 server=$!
 address=

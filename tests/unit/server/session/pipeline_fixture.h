@@ -44,8 +44,7 @@ class PipelineFixture : public ::testing::Test {
   std::shared_ptr<Outbox> outbox_ = map_.Subscribe(Outbox::Acks::kAll, 100);
   DiagnosticLog diagnostics_{"session", &map_};
   FrameLedger ledger_{"session", &map_};
-  Pipeline pipeline_{"session",           Options(), config_, &pool_, &mesher_, &map_, &ledger_, &diagnostics_,
-                     /*recorder=*/nullptr};
+  Pipeline pipeline_{Options(), config_, &pool_, &mesher_, &map_, &ledger_, &diagnostics_, /*on_accepted=*/nullptr};
 };
 
 }  // namespace romap::session

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "common/status.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/subprocess.h"
 
 namespace romap::store::blob_log_test {
 
 class BlobLogTest : public ::testing::Test {
  protected:
-  std::string Folder() const { return folder_.Path("session"); }
+  std::string Folder() const { return folder_ / "session"; }
   std::string Segment(const char* name = "000000.seg") const { return std::filesystem::path(Folder()) / name; }
 
   testing_support::TemporaryFolder folder_;
@@ -88,8 +88,8 @@ TEST_F(BlobLogTest, StartsANewSegmentWhenOneIsFull) {
 }
 
 TEST_F(BlobLogTest, ReportsAFolderThatCannotBeCreated) {
-  std::ofstream(folder_.Path("file")).put('x');
-  BlobLog log(folder_.Path("file") + "/session", 0, 0);
+  std::ofstream((folder_ / "file")).put('x');
+  BlobLog log((folder_ / "file") + "/session", 0, 0);
   log.Append("blob");
   EXPECT_FALSE(log.Sync().ok());
 }

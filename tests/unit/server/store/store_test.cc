@@ -15,7 +15,7 @@
 
 #include "common/status.h"
 #include "tests/support/streams.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/subprocess.h"
 
 namespace romap::store::store_test {
 
@@ -111,6 +111,7 @@ TEST_F(StoreTest, EverythingIsThereAfterReopening) {
   EXPECT_EQ(store->DurableInputs("a").masks_frame_id, 5u);
   const StoredMap map = store->LoadMap("a").value();
   EXPECT_THAT(map.damage, IsEmpty());
+  EXPECT_EQ(map.last_object, ObjectId{3});
   ASSERT_THAT(map.objects, SizeIs(2));
   EXPECT_EQ(map.objects[0].object.revision, 4u);
   EXPECT_EQ(map.objects[0].mesh->draco, "second");
@@ -199,20 +200,20 @@ TEST_F(StoreTest, ASecondProcessIsRefusedWithTheIdOfTheFirst) {
 TEST_F(StoreTest, ANewerSchemaIsRefusedAndNotChanged) {
   { const auto store = OpenStore(); }
   {
-    SQLite::Database database(folder_.Path("catalog.sqlite"), SQLite::OPEN_READWRITE);
+    SQLite::Database database((folder_ / "catalog.sqlite"), SQLite::OPEN_READWRITE);
     database.exec("PRAGMA user_version = 99");
   }
   const auto refused = Store::Open(Config());
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(Message(refused.status()), HasSubstr("has schema 99"));
-  SQLite::Database database(folder_.Path("catalog.sqlite"), SQLite::OPEN_READONLY);
+  SQLite::Database database((folder_ / "catalog.sqlite"), SQLite::OPEN_READONLY);
   EXPECT_EQ(database.execAndGet("PRAGMA user_version").getInt(), 99);
 }
 
 TEST_F(StoreTest, ADamagedCatalogIsRefused) {
   { const auto store = OpenStore(); }
-  std::filesystem::remove(folder_.Path("catalog.sqlite-wal"));
-  std::ofstream(folder_.Path("catalog.sqlite"), std::ios::binary | std::ios::trunc) << std::string(8192, 'x');
+  std::filesystem::remove((folder_ / "catalog.sqlite-wal"));
+  std::ofstream((folder_ / "catalog.sqlite"), std::ios::binary | std::ios::trunc) << std::string(8192, 'x');
   EXPECT_EQ(Store::Open(Config()).status().code(), absl::StatusCode::kDataLoss);
 }
 
@@ -226,16 +227,16 @@ TEST_F(StoreTest, RemovedSessionsLeaveNoFiles) {
   ASSERT_TRUE(store->Remove("a").ok());
   store->AppendInput("a", testing_support::MakeFrame(2), true);  // late: ignored
   ASSERT_TRUE(store->Flush().ok());
-  EXPECT_FALSE(std::filesystem::exists(folder_.Path("sessions/a")));
+  EXPECT_FALSE(std::filesystem::exists((folder_ / "sessions/a")));
   EXPECT_THAT(store->Sessions().value(), SizeIs(1));
   EXPECT_TRUE(store->LoadInput("b", 1).ok());
 }
 
 TEST_F(StoreTest, FilesOfUnknownSessionsAreSwept) {
-  std::filesystem::create_directories(folder_.Path("sessions/half"));
-  std::ofstream(folder_.Path("sessions/half/000000.seg")).put('x');
+  std::filesystem::create_directories((folder_ / "sessions/half"));
+  std::ofstream((folder_ / "sessions/half/000000.seg")).put('x');
   const auto store = OpenStore();
-  EXPECT_FALSE(std::filesystem::exists(folder_.Path("sessions/half")));
+  EXPECT_FALSE(std::filesystem::exists((folder_ / "sessions/half")));
 }
 
 TEST_F(StoreTest, DamagedPartsAreNamedAndTheRestIsRead) {
@@ -247,7 +248,7 @@ TEST_F(StoreTest, DamagedPartsAreNamedAndTheRestIsRead) {
     store->PutMesh("a", MakeMesh(2, std::string(5000, 'm')));
   }
   {
-    std::fstream file(folder_.Path("sessions/a/000000.seg"), std::ios::in | std::ios::out | std::ios::binary);
+    std::fstream file((folder_ / "sessions/a/000000.seg"), std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(2000);
     file.put('?');
   }
