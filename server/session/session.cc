@@ -1,5 +1,6 @@
 #include "server/session/session.h"
 
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -60,6 +61,8 @@ Session::Session(std::string id, const SessionOptions& options, int64_t created_
 }
 
 Session::~Session() { Stop(absl::CancelledError("the session was closed")); }
+
+Session::ReturnsMemory::~ReturnsMemory() { malloc_trim(0); }
 
 Scheduler::Callbacks Session::SchedulerCallbacks() {
   return {.tick = [this] { PublishStatisticsIfDue(); },

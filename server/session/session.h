@@ -107,6 +107,12 @@ class Session {
   void OnFailed(const char* stage, const std::string& what);
   Statistics CurrentStatistics() const;
 
+  // Destroyed after the rest. Otherwise the allocator keeps most of the memory of the session.
+  struct ReturnsMemory {
+    ~ReturnsMemory();
+  };
+
+  const ReturnsMemory returns_memory_;
   const std::string id_;
   const SessionOptions options_;
   const SessionConfig config_;

@@ -288,10 +288,8 @@ void SparseMapper::CompleteKeyframe(const TrackedImage& image, MapKeyframe& keyf
     for (const auto& [id, shared] : map.Covisible(keyframe, kMinSharedPoints))
       map.ConvertByDepth(*map.FindKeyframe(id));
   }
-  if (!keyframe.pose_given) {
-    local_adjuster_.Adjust(keyframe, map);
-    for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current().places.Remove(removed);
-  }
+  if (!keyframe.pose_given) local_adjuster_.Adjust(keyframe, map);
+  for (const KeyframeId removed : CullKeyframes(config_, keyframe, map)) current().places.Remove(removed);
   current().places.Add(keyframe);
   if (!keyframe.pose_given && !loop_trial_.IsPending()) current().unchecked.push_back(keyframe.id);
 }

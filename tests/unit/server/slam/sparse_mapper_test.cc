@@ -32,6 +32,7 @@ class Mapper {
   KeyframeView AddKeyframe(const TrackedImage& image) { return *mapper_.Process(image).view; }
   size_t points() const { return mapper_.points(); }
   size_t keyframes() const { return SparseMapperInspector(mapper_).keyframes_made(); }
+  size_t keyframes_kept() const { return SparseMapperInspector(mapper_).map().keyframes().size(); }
 
  private:
   LocalMapSlot slot_;
@@ -72,6 +73,19 @@ KnownPoints MapOrbit(const TexturedWorld& world, Mapper& mapper, int keyframes, 
     known.Take(mapper.AddKeyframe(Keyframe(frame)));
   }
   return known;
+}
+
+// The same six views again and again: after a while, they add no keyframe that the map keeps.
+TEST(SparseMapper, RepeatedViewsWithGivenPosesDoNotEnlargeTheMap) {
+  const TexturedWorld world;
+  Mapper mapper;
+  std::vector<size_t> keyframes;
+  for (uint64_t i = 0; i < 48; ++i) {
+    mapper.AddKeyframe(Keyframe(world.Render(i + 1, TexturedWorld::OrbitPose(6.0 * static_cast<double>(i % 6)))));
+    if (i % 12 == 11) keyframes.push_back(mapper.keyframes_kept());
+  }
+  EXPECT_EQ(mapper.keyframes(), 48u);
+  EXPECT_LE(keyframes.back(), keyframes.front() + 6) << "kept after 12 and 48 views";
 }
 
 TEST(SparseMapper, PointsLieOnTheTrueSurfaces) {
