@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -51,7 +52,9 @@ struct SessionInfo {
   int64_t created_unix_ns = 0;  // nanoseconds since the Unix epoch
   bool stream_open = false;     // a client has an open Map stream
   Statistics statistics;
-  bool durable = false;  // the service stores the session
+  bool durable = false;       // the service stores the session
+  bool pinned = false;        // see MappingService::PinSession()
+  uint64_t stored_bytes = 0;  // on the disk
 };
 
 // The current state of one object.
@@ -135,6 +138,16 @@ class MappingService {
   virtual absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) = 0;
   // Returns the map of a session, in any state.
   virtual absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) = 0;
+
+  // Only for services that store sessions; otherwise FAILED_PRECONDITION.
+  using PieceWriter = std::function<absl::Status(std::string piece)>;
+  using PieceReader = std::function<absl::StatusOr<std::string>()>;  // the next piece; empty at the end
+  // Passes the session to `write` as one file (*.romap). Errors of `write` are returned. DATA_LOSS: it is damaged.
+  virtual absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) = 0;
+  // Adds the session of a file with another id. INVALID_ARGUMENT: the file is damaged or cut off; nothing is added.
+  virtual absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) = 0;
+  // A pinned session is not deleted by age or size.
+  virtual absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) = 0;
 };
 
 }  // namespace romap

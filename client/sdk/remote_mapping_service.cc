@@ -140,4 +140,53 @@ absl::StatusOr<MapSnapshot> RemoteMappingService::ExportMap(const std::string& s
   return assembler.Take();
 }
 
+absl::Status RemoteMappingService::SaveSession(const std::string& session_id, const PieceWriter& write) {
+  TimedContext context(connection_->options.export_timeout);
+  v1::SaveSessionRequest request;
+  request.set_session_id(session_id);
+  const auto reader = connection_->stub->SaveSession(&context, request);
+  absl::Status written;
+  for (v1::SaveSessionResponse piece; written.ok() && reader->Read(&piece);) {
+    written = write(std::move(*piece.mutable_piece()));
+  }
+  if (!written.ok()) context.TryCancel();
+  const grpc::Status finished = reader->Finish();
+  ROMAP_RETURN_IF_ERROR(written);
+  return wire::FromGrpc(finished);
+}
+
+absl::StatusOr<SessionInfo> RemoteMappingService::LoadSession(const PieceReader& read) {
+  TimedContext context(connection_->options.export_timeout);
+  v1::LoadSessionResponse response;
+  const auto writer = connection_->stub->LoadSession(&context, &response);
+  absl::Status failed;
+  while (true) {
+    absl::StatusOr<std::string> piece = read();
+    if (!piece.ok()) failed = piece.status();
+    if (!piece.ok() || piece->empty()) break;
+    v1::LoadSessionRequest request;
+    request.set_piece(*std::move(piece));
+    if (!writer->Write(request)) break;  // the status says why
+  }
+  if (failed.ok()) {
+    writer->WritesDone();
+  } else {
+    context.TryCancel();
+  }
+  const grpc::Status finished = writer->Finish();
+  ROMAP_RETURN_IF_ERROR(failed);
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(finished));
+  return wire::FromProto(response.session(), "session");
+}
+
+absl::StatusOr<SessionInfo> RemoteMappingService::PinSession(const std::string& session_id, bool pinned) {
+  TimedContext context(connection_->options.call_timeout);
+  v1::PinSessionRequest request;
+  request.set_session_id(session_id);
+  request.set_pinned(pinned);
+  v1::PinSessionResponse response;
+  ROMAP_RETURN_IF_ERROR(wire::FromGrpc(connection_->stub->PinSession(&context, request, &response)));
+  return wire::FromProto(response.session(), "session");
+}
+
 }  // namespace romap::client

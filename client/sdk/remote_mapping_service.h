@@ -48,6 +48,9 @@ class RemoteMappingService : public MappingService {
                                                      const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
+  absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) override;
+  absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) override;
+  absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) override;
 
  private:
   struct Connection;

@@ -66,6 +66,8 @@ v1::SessionInfo ToProto(const SessionInfo& info) {
   proto.set_stream_open(info.stream_open);
   *proto.mutable_statistics() = ToProto(info.statistics);
   proto.set_durable(info.durable);
+  proto.set_pinned(info.pinned);
+  proto.set_stored_bytes(info.stored_bytes);
   return proto;
 }
 
@@ -82,6 +84,8 @@ absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::s
   info.stream_open = proto.stream_open();
   ROMAP_ASSIGN_OR_RETURN(info.statistics, FromProto(proto.statistics(), where + ".statistics"));
   info.durable = proto.durable();
+  info.pinned = proto.pinned();
+  info.stored_bytes = proto.stored_bytes();
   return info;
 }
 

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "common/status.h"
+#include "common/unix_time.h"
 #include "common/wire/recording.h"
+#include "server/store/session_transfer.h"
 
 namespace romap::session {
 namespace {
@@ -19,11 +21,6 @@ int TrainingThreads(const ServerConfig& config) {
   if (config.session.single_thread) return 0;
   if (config.training_threads > 0) return config.training_threads;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
-int64_t UnixNow_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 // A stream of a stored map that is not in memory otherwise.
@@ -310,6 +307,47 @@ absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& se
   if (!session) return shelf_->Export(session_id);
   lock.unlock();
   return session->Export();
+}
+
+absl::Status LocalMappingService::CheckStore() const {
+  if (store_) return absl::OkStatus();
+  return FailedPrecondition("this service stores no sessions (romap-server --ephemeral, or romap --local)");
+}
+
+absl::Status LocalMappingService::SaveSession(const std::string& session_id, const PieceWriter& write) {
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  lock.unlock();
+  ROMAP_RETURN_IF_ERROR(CheckStore());
+  if (session) session->StoreChanges(/*complete=*/true);
+  ROMAP_RETURN_IF_ERROR(store_->Flush());
+  return store::SaveSession(*store_, session_id, write);
+}
+
+absl::StatusOr<SessionInfo> LocalMappingService::LoadSession(const PieceReader& read) {
+  ROMAP_RETURN_IF_ERROR(CheckStore());
+  std::unique_lock lock(mutex_);
+  const std::string id = NewId();
+  lock.unlock();
+  ROMAP_ASSIGN_OR_RETURN(store::StoredSession stored, store::LoadSession(*store_, id, read));
+  spdlog::info("session {}: loaded from a file, {} inputs", id, stored.inputs);
+  lock.lock();
+  shelf_->Add(std::move(stored));
+  return shelf_->Info(id);
+}
+
+absl::StatusOr<SessionInfo> LocalMappingService::PinSession(const std::string& session_id, bool pinned) {
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  ROMAP_RETURN_IF_ERROR(CheckStore());
+  store_->SetPinned(session_id, pinned);
+  if (!session) {
+    shelf_->SetPinned(session_id, pinned);
+    return shelf_->Info(session_id);
+  }
+  lock.unlock();
+  session->SetPinned(pinned);
+  return session->Info();
 }
 
 // --------------------------------------------------------------------------------------------------- the store thread

@@ -42,11 +42,15 @@ class LocalMappingService : public MappingService {
                                                      const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
+  absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) override;
+  absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) override;
+  absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) override;
 
  private:
   // Null: it is on the shelf. NOT_FOUND: there is no such session.
   absl::StatusOr<std::shared_ptr<Session>> FindLocked(const std::string& session_id);
   std::string NewId();
+  absl::Status CheckStore() const;
   Session::Services Services() { return {.pool = &pool_, .mesher = &mesher_, .store = store_.get()}; }
   absl::Status RestoreLocked(const std::string& session_id);
 

@@ -56,6 +56,7 @@ Session::Session(std::string id, const SessionOptions& options, int64_t created_
   restoring_ = true;
   finish_after_restoring_ = stored.state == SessionState::kFinishing;
   stored_statistics_ = stored.statistics;
+  pinned_ = stored.pinned;
   scheduler_.BeginRestoring();
   restore_thread_ = std::thread([this, moved = std::move(stored)]() mutable { Restore(std::move(moved)); });
 }
@@ -234,6 +235,8 @@ SessionInfo Session::Info() const {
   info.stream_open = sender_.IsHeld();
   info.statistics = CurrentStatistics();
   info.durable = is_durable();
+  info.pinned = pinned_;
+  if (store_ != nullptr) info.stored_bytes = store_->BytesOf(id_);
   return info;
 }
 

@@ -51,6 +51,7 @@ class Session {
     std::shared_ptr<MapState> map;        // serves clients until the session is restored
     std::vector<ObjectSnapshot> objects;  // of the map
     Statistics statistics;
+    bool pinned = false;
   };
 
   // A new session. `recorder` gets every accepted input; null: not recorded.
@@ -88,6 +89,7 @@ class Session {
   void Unsubscribe(const std::shared_ptr<Outbox>& outbox);
   const SessionConfig& config() const { return config_; }
   bool is_durable() const { return storage_ != nullptr; }
+  void SetPinned(bool pinned) { pinned_ = pinned; }
   // Nobody sends or watches, and everything is mapped and trained.
   bool IsIdle() const;
 
@@ -129,6 +131,7 @@ class Session {
   std::atomic<bool> restoring_ = false;
   std::atomic<bool> finish_after_restoring_ = false;
   std::atomic<bool> stopping_ = false;
+  std::atomic<bool> pinned_ = false;
   FrameLedger ledger_;
   DiagnosticLog diagnostics_;
   std::unique_ptr<SessionStorage> storage_;          // null: not stored

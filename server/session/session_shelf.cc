@@ -10,7 +10,7 @@ namespace {
 
 bool HasEnded(SessionState state) { return state == SessionState::kFinished || state == SessionState::kFailed; }
 
-SessionInfo InfoOf(const store::StoredSession& session) {
+SessionInfo InfoOf(const store::StoredSession& session, const store::Store& store) {
   SessionInfo info;
   info.id = session.id;
   info.name = session.options.name;
@@ -20,6 +20,8 @@ SessionInfo InfoOf(const store::StoredSession& session) {
   info.created_unix_ns = session.created_unix_ns;
   info.statistics = session.statistics;
   info.durable = true;
+  info.pinned = session.pinned;
+  info.stored_bytes = store.BytesOf(session.id);
   return info;
 }
 
@@ -36,11 +38,13 @@ void SessionShelf::Add(store::StoredSession session) {
 
 std::vector<SessionInfo> SessionShelf::Infos() const {
   std::vector<SessionInfo> infos;
-  for (const auto& [id, entry] : entries_) infos.push_back(InfoOf(entry.session));
+  for (const auto& [id, entry] : entries_) infos.push_back(InfoOf(entry.session, *store_));
   return infos;
 }
 
-SessionInfo SessionShelf::Info(const std::string& session_id) const { return InfoOf(entries_.at(session_id).session); }
+SessionInfo SessionShelf::Info(const std::string& session_id) const {
+  return InfoOf(entries_.at(session_id).session, *store_);
+}
 
 std::vector<std::string> SessionShelf::Unfinished() const {
   std::vector<std::string> ids;
@@ -119,6 +123,7 @@ absl::StatusOr<std::pair<store::StoredSession, Session::Stored>> SessionShelf::T
   stored.inputs = session.inputs;
   ROMAP_ASSIGN_OR_RETURN(stored.map, Map(session_id));
   stored.statistics = session.statistics;
+  stored.pinned = session.pinned;
   std::pair<store::StoredSession, Session::Stored> taken(std::move(session), std::move(stored));
   entries_.erase(session_id);
   return taken;

@@ -32,6 +32,7 @@ class SessionShelf {
 
   void Add(store::StoredSession session);
   void Remove(const std::string& session_id) { entries_.erase(session_id); }
+  void SetPinned(const std::string& session_id, bool pinned) { entries_.at(session_id).session.pinned = pinned; }
 
   // The map as it was stored; requires Contains(). It is closed if the session has ended. An error: it cannot be read.
   absl::StatusOr<std::shared_ptr<MapState>> Map(const std::string& session_id);

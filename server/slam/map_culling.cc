@@ -55,9 +55,10 @@ void CullPoints(const SlamConfig& config, SlamMap& map) {
 std::vector<KeyframeId> CullKeyframes(const SlamConfig& config, const MapKeyframe& newest, SlamMap& map) {
   std::vector<KeyframeId> removed;
   const auto may_remove = [&](const MapKeyframe& keyframe) {
-    // Tracking depends on the newest keyframes, and the first keyframe defines the world, as do given poses while others
-    // are tracked.
-    return (!keyframe.pose_given || newest.pose_given) && keyframe.parent && keyframe.loops.empty() && keyframe.id.value + 5 < newest.id.value;
+    // Tracking depends on the newest keyframes, and the first keyframe defines the world, as do given poses while
+    // others are tracked.
+    return (!keyframe.pose_given || newest.pose_given) && keyframe.parent && keyframe.loops.empty() &&
+           keyframe.id.value + 5 < newest.id.value;
   };
   for (const auto& [id, shared] : map.Covisible(newest, kMinSharedPoints)) {
     if (removed.size() == kMaxRemoved) break;

@@ -42,6 +42,16 @@ absl::StatusOr<SessionInput> ParseInput(const std::string& content) {
   return SessionInput(*std::move(frame));
 }
 
+std::string ObjectContent(const ObjectUpdate& object) { return wire::ToProto(object).SerializeAsString(); }
+
+absl::StatusOr<ObjectUpdate> ParseObject(const std::string& content) {
+  v1::ObjectUpdate proto;
+  if (!proto.ParseFromString(content)) return Damaged("object", "cannot be parsed");
+  auto object = wire::FromProto(std::move(proto), "object");
+  if (!object.ok()) return Damaged("object", Message(object.status()));
+  return object;
+}
+
 std::string MeshContent(const MeshUpdate& mesh) { return wire::ToProto(mesh).SerializeAsString(); }
 
 absl::StatusOr<MeshUpdate> ParseMesh(const std::string& content) {

@@ -16,6 +16,9 @@ namespace romap::store {
 std::string InputContent(const SessionInput& input);  // a MapRequest with `frame` or `late_masks`
 absl::StatusOr<SessionInput> ParseInput(const std::string& content);
 
+std::string ObjectContent(const ObjectUpdate& object);  // an ObjectUpdate
+absl::StatusOr<ObjectUpdate> ParseObject(const std::string& content);
+
 std::string MeshContent(const MeshUpdate& mesh);  // a MeshUpdate
 absl::StatusOr<MeshUpdate> ParseMesh(const std::string& content);
 

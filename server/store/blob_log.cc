@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <array>
 #include <cerrno>
@@ -14,21 +13,14 @@
 
 #include "common/file_status.h"
 #include "common/status.h"
+#include "server/store/content_hash.h"
 
 namespace romap::store {
 namespace {
 
 constexpr std::string_view kMagic{"RBLB\0\0\0\0", 8};
-constexpr size_t kHashBytes = 16;
 constexpr size_t kHeaderBytes = 8 + 8 + kHashBytes;
 constexpr uint64_t kSegmentBytes = uint64_t{64} << 20;
-
-std::string HashOf(std::string_view content) {
-  XXH128_canonical_t canonical;
-  XXH128_canonicalFromHash(&canonical, XXH3_128bits(content.data(), content.size()));
-  static_assert(sizeof(canonical.digest) == kHashBytes);
-  return {reinterpret_cast<const char*>(canonical.digest), kHashBytes};
-}
 
 std::string HeaderOf(uint64_t length, const std::string& hash) {
   std::string header(kMagic);

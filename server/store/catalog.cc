@@ -9,6 +9,7 @@
 #include "common/wire/events.h"
 #include "common/wire/sessions.h"
 #include "romap/v1/mapping.pb.h"
+#include "server/store/blob_content.h"
 
 namespace romap::store {
 namespace {
@@ -27,6 +28,7 @@ CREATE TABLE sessions(
   failure TEXT NOT NULL,
   statistics BLOB NOT NULL,         -- romap.v1.Statistics
   pinned INTEGER NOT NULL,
+  complete INTEGER NOT NULL,        -- 0: it is being imported
   last_object INTEGER NOT NULL DEFAULT 0,  -- the largest id that was ever used
   trajectory_segment INTEGER, trajectory_offset INTEGER, trajectory_length INTEGER, trajectory_hash BLOB
 ) WITHOUT ROWID;
@@ -162,8 +164,8 @@ void Catalog::Rollback() {
 
 void Catalog::PutSession(const StoredSession& session) {
   static constexpr char kSql[] =
-      "INSERT INTO sessions(id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned) "
-      "VALUES(?, ?, ?, ?, ?, ?, ?, ?)";
+      "INSERT INTO sessions(id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, complete) "
+      "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)";
   SQLite::Statement& statement = Prepared(kSql);
   statement.bind(1, session.id);
   BindBytes(statement, 2, wire::ToProto(session.options));
@@ -173,6 +175,7 @@ void Catalog::PutSession(const StoredSession& session) {
   statement.bind(6, session.failure);
   BindBytes(statement, 7, wire::ToProto(session.statistics));
   statement.bind(8, session.pinned ? 1 : 0);
+  statement.bind(9, session.complete ? 1 : 0);
   Run(statement);
 }
 
@@ -197,6 +200,15 @@ void Catalog::SetPinned(const std::string& session, bool pinned) {
   Run(statement);
 }
 
+void Catalog::SetComplete(const std::string& session) {
+  static constexpr char kSql[] = "UPDATE sessions SET complete = 1 WHERE id = ?";
+  SQLite::Statement& statement = Prepared(kSql);
+  statement.bind(1, session);
+  Run(statement);
+}
+
+void Catalog::RemoveIncomplete() { database_.exec("DELETE FROM sessions WHERE NOT complete"); }
+
 void Catalog::AddInput(const std::string& session, uint64_t number, bool is_masks, uint64_t frame_id,
                        const BlobRef& blob) {
   static constexpr char kSql[] =
@@ -218,7 +230,8 @@ void Catalog::PutObject(const std::string& session, const ObjectUpdate& object) 
   SQLite::Statement& statement = Prepared(kSql);
   statement.bind(1, session);
   statement.bind(2, Bits(object.id.value));
-  BindBytes(statement, 3, wire::ToProto(object));
+  const std::string content = ObjectContent(object);
+  statement.bind(3, content.data(), static_cast<int>(content.size()));
   Run(statement);
   static constexpr char kLast[] = "UPDATE sessions SET last_object = max(last_object, ?) WHERE id = ?";
   SQLite::Statement& last = Prepared(kLast);
@@ -267,7 +280,7 @@ std::vector<StoredSession> Catalog::Sessions() {
   SQLite::Statement statement(
       database_,
       "SELECT id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, "
-      "(SELECT count(*) FROM inputs WHERE session = id) FROM sessions ORDER BY created_unix_ns");
+      "(SELECT count(*) FROM inputs WHERE session = id) FROM sessions WHERE complete ORDER BY created_unix_ns");
   std::vector<StoredSession> sessions;
   while (statement.executeStep()) {
     StoredSession session;
@@ -362,9 +375,7 @@ std::vector<std::pair<ObjectUpdate, std::optional<BlobRef>>> Catalog::Objects(co
   statement.bind(1, session);
   std::vector<std::pair<ObjectUpdate, std::optional<BlobRef>>> objects;
   while (statement.executeStep()) {
-    v1::ObjectUpdate proto;
-    const bool parsed = proto.ParseFromString(Text(statement.getColumn(4)));
-    auto object = parsed ? wire::FromProto(std::move(proto), "object") : InvalidArgument("cannot be parsed");
+    auto object = ParseObject(Text(statement.getColumn(4)));
     if (object.ok()) {
       objects.emplace_back(*std::move(object), ReadBlobRef(statement, 0));
     } else {

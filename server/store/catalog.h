@@ -37,6 +37,9 @@ class Catalog {
   void SetState(const std::string& session, SessionState state, const std::string& failure,
                 const Statistics& statistics, int64_t now_unix_ns);
   void SetPinned(const std::string& session, bool pinned);
+  void SetComplete(const std::string& session);
+  // Sessions whose import was not completed.
+  void RemoveIncomplete();
   void AddInput(const std::string& session, uint64_t number, bool is_masks, uint64_t frame_id, const BlobRef& blob);
   // Keeps its mesh.
   void PutObject(const std::string& session, const ObjectUpdate& object);

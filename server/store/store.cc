@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/status.h"
+#include "common/unix_time.h"
 #include "common/wire/events.h"
 #include "server/store/blob_content.h"
 
@@ -18,11 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::chrono::seconds kRetryPeriod{1};
-
-int64_t UnixNow_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 size_t SizeOf(const SessionInput& input) {
   const auto size_of_masks = [](const EncodedMasks& masks) {
@@ -50,6 +46,11 @@ absl::StatusOr<std::unique_ptr<Store>> Store::Open(const StoreConfig& config) {
   const std::string catalog = fs::path(path) / "catalog.sqlite";
   ROMAP_ASSIGN_OR_RETURN(auto writer, Catalog::Open(catalog, Catalog::Mode::kReadWrite));
   ROMAP_ASSIGN_OR_RETURN(auto reader, Catalog::Open(catalog, Catalog::Mode::kRead));
+  try {
+    writer->RemoveIncomplete();
+  } catch (const SQLite::Exception& e) {
+    return absl::ResourceExhaustedError(fmt::format("{}: cannot write: {}", catalog, e.what()));
+  }
   std::unique_ptr<Store> store(new Store(config, std::move(folder), std::move(writer), std::move(reader)));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<StoredSession> sessions, store->Sessions());
   store->SweepFolders(sessions);
@@ -100,6 +101,7 @@ absl::Status Store::EnqueueAndWait(Write write) {
 }
 
 absl::Status Store::Create(const StoredSession& session) { return EnqueueAndWait({session.id, session}); }
+absl::Status Store::Complete(const std::string& session) { return EnqueueAndWait({session, Completion{}}); }
 absl::Status Store::Remove(const std::string& session) { return EnqueueAndWait({session, Removal{}}); }
 absl::Status Store::Flush() { return EnqueueAndWait({"", FlushMark{}}); }
 
@@ -249,6 +251,8 @@ void Store::Apply(const Write& write, Commitment* commitment) {
     writer_->SetState(id, state->state, state->failure, state->statistics, UnixNow_ns());
   } else if (const auto* pin = std::get_if<PinWrite>(&write.content)) {
     writer_->SetPinned(id, pin->pinned);
+  } else if (std::holds_alternative<Completion>(write.content)) {
+    writer_->SetComplete(id);
   } else if (std::holds_alternative<Removal>(write.content)) {
     writer_->RemoveSession(id);
     log->blobs->Discard();

@@ -68,6 +68,8 @@ class Store {
   void PutTrajectory(const std::string& session, std::vector<FrameAck> frames, std::vector<int64_t> timestamps_ns);
   void PutState(const std::string& session, SessionState state, std::string failure, Statistics statistics);
   void SetPinned(const std::string& session, bool pinned);
+  // Waits until a session that was created incomplete is durable and listed.
+  absl::Status Complete(const std::string& session);
   // Waits until the session and its files are removed.
   absl::Status Remove(const std::string& session);
 
@@ -96,12 +98,13 @@ class Store {
   struct PinWrite {
     bool pinned = false;
   };
+  struct Completion {};
   struct Removal {};
   struct FlushMark {};
   struct Write {
     std::string session;
     std::variant<StoredSession, InputWrite, ObjectUpdate, MeshUpdate, ObjectId, TrajectoryWrite, StateWrite, PinWrite,
-                 Removal, FlushMark>
+                 Completion, Removal, FlushMark>
         content;
     size_t bytes = 0;
     std::shared_ptr<std::promise<absl::Status>> done = {};

@@ -17,6 +17,7 @@ struct StoredSession {
   SessionState state = SessionState::kOpen;  // never kRestoring
   std::string failure = {};                  // why the state is kFailed
   Statistics statistics = {};                // when it was stored last
+  bool complete = true;                      // false while it is being imported: it is not listed
   bool pinned = false;                       // never deleted by age or size
   uint64_t inputs = 0;                       // frames and late masks
 };

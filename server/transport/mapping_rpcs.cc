@@ -7,6 +7,7 @@
 #include "common/status.h"
 #include "common/wire/sessions.h"
 #include "common/wire/status.h"
+#include "server/transport/load_reactor.h"
 #include "server/transport/map_reactor.h"
 #include "server/transport/stream_reactor.h"
 
@@ -37,6 +38,23 @@ class ExportReactor : public StreamReactor<grpc::ServerWriteReactor<v1::ExportMa
       if (stopping() || !Write(part)) return absl::CancelledError("the client disconnected");
     }
     return absl::OkStatus();
+  }
+
+  const std::string session_id_;
+};
+
+class SaveReactor : public StreamReactor<grpc::ServerWriteReactor<v1::SaveSessionResponse>, v1::SaveSessionResponse> {
+ public:
+  SaveReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+
+ private:
+  absl::Status Run() override {
+    return service().SaveSession(session_id_, [this](std::string piece) -> absl::Status {
+      v1::SaveSessionResponse response;
+      response.set_piece(std::move(piece));
+      if (stopping() || !Write(response)) return absl::CancelledError("the client disconnected");
+      return absl::OkStatus();
+    });
   }
 
   const std::string session_id_;
@@ -117,6 +135,27 @@ grpc::ServerWriteReactor<v1::WatchResponse>* MappingRpcs::Watch(grpc::CallbackSe
 grpc::ServerWriteReactor<v1::ExportMapResponse>* MappingRpcs::ExportMap(grpc::CallbackServerContext* /*context*/,
                                                                         const v1::ExportMapRequest* request) {
   return Started(new ExportReactor(host_, request->session_id()));
+}
+
+grpc::ServerWriteReactor<v1::SaveSessionResponse>* MappingRpcs::SaveSession(grpc::CallbackServerContext* /*context*/,
+                                                                            const v1::SaveSessionRequest* request) {
+  return Started(new SaveReactor(host_, request->session_id()));
+}
+
+grpc::ServerReadReactor<v1::LoadSessionRequest>* MappingRpcs::LoadSession(grpc::CallbackServerContext* /*context*/,
+                                                                          v1::LoadSessionResponse* response) {
+  return Started(new LoadReactor(host_, response));
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::PinSession(grpc::CallbackServerContext* context,
+                                                  const v1::PinSessionRequest* request,
+                                                  v1::PinSessionResponse* response) {
+  return Run(context, [=, this]() -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info,
+                           host_->service().PinSession(request->session_id(), request->pinned()));
+    *response->mutable_session() = wire::ToProto(info);
+    return absl::OkStatus();
+  });
 }
 
 }  // namespace romap::transport

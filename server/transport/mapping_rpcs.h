@@ -29,6 +29,12 @@ class MappingRpcs : public v1::Mapping::CallbackService {
                                                      const v1::WatchRequest* request) override;
   grpc::ServerWriteReactor<v1::ExportMapResponse>* ExportMap(grpc::CallbackServerContext* context,
                                                              const v1::ExportMapRequest* request) override;
+  grpc::ServerWriteReactor<v1::SaveSessionResponse>* SaveSession(grpc::CallbackServerContext* context,
+                                                                 const v1::SaveSessionRequest* request) override;
+  grpc::ServerReadReactor<v1::LoadSessionRequest>* LoadSession(grpc::CallbackServerContext* context,
+                                                               v1::LoadSessionResponse* response) override;
+  grpc::ServerUnaryReactor* PinSession(grpc::CallbackServerContext* context, const v1::PinSessionRequest* request,
+                                       v1::PinSessionResponse* response) override;
 
  private:
   // Runs `body` on its own thread and finishes the call with the status that it returns. gRPC keeps request and

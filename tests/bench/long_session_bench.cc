@@ -2,9 +2,10 @@
 //
 //   long_session_bench SEQUENCE FRAMES [given|none] [STORE_DIR]
 //
-// Sends the frames of the sequence forward and backward, again and again, until FRAMES are sent, and prints the resident
-// memory, the user time per frame of the process (with training) and the numbers of keyframes and points every 500
-// frames; at the end, what remains resident when the session is deleted. With STORE_DIR, the session is stored there.
+// Sends the frames of the sequence forward and backward, again and again, until FRAMES are sent, and prints the
+// resident memory, the user time per frame of the process (with training) and the numbers of keyframes and points every
+// 500 frames; at the end, what remains resident when the session is deleted. With STORE_DIR, the session is stored
+// there.
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -51,8 +52,8 @@ absl::Status Measure(const std::string& dir, size_t frames, PoseUse pose_use, co
   ROMAP_ASSIGN_OR_RETURN(const SessionInfo session, service.CreateSession(options));
   ROMAP_ASSIGN_OR_RETURN(const SessionInfo idle, service.GetSession(session.id));
   ROMAP_ASSIGN_OR_RETURN(auto stream, service.OpenMap(session.id));
-  fmt::print("{:>7} {:>12} {:>14} {:>10} {:>8} {:>8}\n", "frame", "memory [MB]", "user [ms/frame]", "keyframes", "points",
-             "objects");
+  fmt::print("{:>7} {:>12} {:>14} {:>10} {:>8} {:>8}\n", "frame", "memory [MB]", "user [ms/frame]", "keyframes",
+             "points", "objects");
   const size_t cycle = 2 * (sequence.size() - 1);
   double user_s = UserSeconds();
   for (size_t i = 0; i < frames; ++i) {
@@ -91,9 +92,9 @@ int main(int argc, char** argv) {
   }
   spdlog::set_level(spdlog::level::warn);
   const bool given = argc < 4 || std::string(argv[3]) != "none";
-  const absl::Status status = romap::measure::Measure(
-      argv[1], static_cast<size_t>(std::atoll(argv[2])), given ? romap::PoseUse::kGiven : romap::PoseUse::kIgnore,
-      argc > 4 ? argv[4] : "");
+  const absl::Status status =
+      romap::measure::Measure(argv[1], static_cast<size_t>(std::atoll(argv[2])),
+                              given ? romap::PoseUse::kGiven : romap::PoseUse::kIgnore, argc > 4 ? argv[4] : "");
   if (!status.ok()) fmt::print(stderr, "long_session_bench: {}\n", romap::Message(status));
   return status.ok() ? 0 : 1;
 }

@@ -5,7 +5,9 @@
 #include "client/sdk/remote_mapping_service.h"
 #include "common/status.h"
 #include "server/session/local_mapping_service.h"
+#include "server/store/store.h"
 #include "tests/support/fake_mapping_service.h"
+#include "tests/support/subprocess.h"
 
 namespace romap::contract {
 namespace {
@@ -16,18 +18,35 @@ T Must(absl::StatusOr<T> result) {
   return std::move(result).value();
 }
 
+struct Folder {
+  testing_support::TemporaryFolder folder;
+};
+
+std::unique_ptr<store::Store> OpenStore(const std::string& path) {
+  store::StoreConfig config;
+  config.data_dir = path;
+  return Must(store::Store::Open(config));
+}
+
+session::ServerConfig OneThread() {
+  session::ServerConfig config;
+  config.training_threads = 1;
+  return config;
+}
+
+// A service with a store in a folder of its own.
+class StoringService : private Folder, public session::LocalMappingService {
+ public:
+  StoringService() : LocalMappingService(OneThread(), OpenStore(folder.path())) {}
+};
+
 }  // namespace
 
 std::vector<Backend> AllBackends() {
   const std::vector<Backend> in_process = {
       {"Fake", [] { return std::make_unique<testing_support::FakeMappingService>(); }, /*objects_from_one_frame=*/true},
-      {"Local",
-       [] {
-         session::ServerConfig config;
-         config.training_threads = 1;
-         return std::make_unique<session::LocalMappingService>(config);
-       },
-       /*objects_from_one_frame=*/false},
+      {"Local", [] { return std::make_unique<session::LocalMappingService>(OneThread()); }},
+      {.name = "Storing", .make = [] { return std::make_unique<StoringService>(); }, .stores_sessions = true},
   };
   std::vector<Backend> all;
   for (const Backend& backend : in_process) {

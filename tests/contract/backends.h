@@ -19,6 +19,7 @@ struct Backend {
   // scene (see the integration tests).
   bool objects_from_one_frame = false;
   bool over_grpc = false;
+  bool stores_sessions = false;
 
   friend void PrintTo(const Backend& backend, std::ostream* os) { *os << backend.name; }
 };

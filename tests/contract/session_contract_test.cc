@@ -118,4 +118,54 @@ TEST_P(SessionContract, ExportContainsTheObjects) {
   EXPECT_TRUE(map->objects[0].object.T_world_mesh.has_value());
 }
 
+TEST_P(SessionContract, ASavedSessionIsLoadedWithAnotherId) {
+  const std::string session = NewSession("kitchen");
+  std::string file;
+  const auto write = [&](const std::string& piece) {
+    file += piece;
+    return absl::OkStatus();
+  };
+  if (!GetParam().stores_sessions) {
+    EXPECT_CODE(service().SaveSession(session, write), StatusCode::kFailedPrecondition);
+    EXPECT_CODE(service().LoadSession([] { return std::string(); }).status(), StatusCode::kFailedPrecondition);
+    EXPECT_CODE(service().PinSession(session, true).status(), StatusCode::kFailedPrecondition);
+    EXPECT_FALSE(service().GetSession(session)->durable);
+    return;
+  }
+  EXPECT_TRUE(service().GetSession(session)->durable);
+  {
+    const auto stream = Open(session);
+    EXPECT_TRUE(stream->opening().durable);
+    for (uint64_t id = 1; id <= 3; ++id) EXPECT_OK(stream->Send(MakeFrame(id)));
+    EXPECT_OK(stream->CloseSend());
+    ReadToEnd(*stream);
+  }
+  EXPECT_OK(service().SaveSession(session, write));
+  bool was_read = false;
+  const auto loaded =
+      service().LoadSession([&]() -> absl::StatusOr<std::string> { return std::exchange(was_read, true) ? "" : file; });
+  ASSERT_TRUE(loaded.ok()) << Message(loaded.status());
+  EXPECT_NE(loaded->id, session);
+  EXPECT_EQ(loaded->name, "kitchen");
+  EXPECT_EQ(loaded->state, SessionState::kOpen);
+  EXPECT_GT(loaded->stored_bytes, 3u * 64 * 48);
+  EXPECT_EQ(service().ListSessions()->size(), 2u);
+  EXPECT_EQ(service().ExportMap(loaded->id)->trajectory.size(), 3u);
+  const auto continued = Reopen(loaded->id);
+  ASSERT_NE(continued, nullptr);
+  EXPECT_EQ(continued->opening().newest_frame_id, 3u);
+  EXPECT_CODE(service().LoadSession([] { return std::string(); }).status(), StatusCode::kInvalidArgument);
+  EXPECT_CODE(service().SaveSession("unknown", write), StatusCode::kNotFound);
+}
+
+TEST_P(SessionContract, SessionsCanBePinned) {
+  if (!GetParam().stores_sessions) GTEST_SKIP() << "this service stores no sessions";
+  const std::string session = NewSession();
+  EXPECT_FALSE(service().GetSession(session)->pinned);
+  EXPECT_TRUE(service().PinSession(session, true)->pinned);
+  EXPECT_TRUE(service().GetSession(session)->pinned);
+  EXPECT_FALSE(service().PinSession(session, false)->pinned);
+  EXPECT_CODE(service().PinSession("unknown", true).status(), StatusCode::kNotFound);
+}
+
 }  // namespace romap::contract::session_contract_test

@@ -362,6 +362,24 @@ absl::StatusOr<MapSnapshot> FakeMappingService::ExportMap(const std::string& ses
   return session->Export();
 }
 
+namespace {
+
+absl::Status StoresNothing() { return FailedPrecondition("this service stores no sessions"); }
+
+}  // namespace
+
+absl::Status FakeMappingService::SaveSession(const std::string& session_id, const PieceWriter& /*write*/) {
+  ROMAP_RETURN_IF_ERROR(Find(session_id).status());
+  return StoresNothing();
+}
+
+absl::StatusOr<SessionInfo> FakeMappingService::LoadSession(const PieceReader& /*read*/) { return StoresNothing(); }
+
+absl::StatusOr<SessionInfo> FakeMappingService::PinSession(const std::string& session_id, bool /*pinned*/) {
+  ROMAP_RETURN_IF_ERROR(Find(session_id).status());
+  return StoresNothing();
+}
+
 absl::StatusOr<std::shared_ptr<FakeSession>> FakeMappingService::Find(const std::string& session_id) {
   std::lock_guard lock(mutex_);
   const auto it = sessions_.find(session_id);

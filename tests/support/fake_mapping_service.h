@@ -42,6 +42,9 @@ class FakeMappingService : public MappingService {
                                                      const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
+  absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) override;
+  absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) override;
+  absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) override;
 
  private:
   absl::StatusOr<std::shared_ptr<FakeSession>> Find(const std::string& session_id);
