@@ -153,14 +153,15 @@ int Main(int argc, char** argv) {
       return kFailure;
     }
     store = *std::move(opened);
-    spdlog::info("sessions are stored in {}", store->path());
   }
+  const std::string data_dir = store ? store->path() : "";
   session::LocalMappingService service(config.server, std::move(store));
   auto server = transport::GrpcServer::Start(&service, config.transport);
   if (!server.ok()) {
     PrintError(Message(server.status()));
     return absl::IsInvalidArgument(server.status()) ? kUsageError : kFailure;
   }
+  spdlog::info("sessions are {}", data_dir.empty() ? "not stored" : "stored in " + data_dir);
   fmt::print("romap-server listening on {}\n", (*server)->address());
   std::fflush(stdout);
 

@@ -21,7 +21,15 @@ Progress::Progress(std::string title)
 
 Progress::~Progress() { Done(); }
 
+void Progress::Say(const std::string& text) {
+  std::lock_guard lock(mutex_);
+  fmt::print(stderr, "{}romap: {}\n", shown_ && terminal_ ? "\r\x1b[2K" : "", text);
+  std::fflush(stderr);
+  shown_ = false;
+}
+
 void Progress::Show(double fraction, const std::string& text) {
+  std::lock_guard lock(mutex_);
   const Clock::time_point now = Clock::now();
   const Clock::duration period = terminal_ ? Clock::duration(kTerminalPeriod) : Clock::duration(kLogPeriod);
   if (now - last_ < period) return;
@@ -41,6 +49,7 @@ void Progress::Show(double fraction, const std::string& text) {
 }
 
 void Progress::Done() {
+  std::lock_guard lock(mutex_);
   if (shown_ && terminal_) fmt::print(stderr, "\n");
   shown_ = false;
 }

@@ -32,6 +32,7 @@ struct RunOptions {
   ServiceOptions service;
   MapFileOptions map_files;
   bool no_pictures = false;
+  bool keep_session = false;  // do not delete the session from the server
   int64_t permute_labels_seed = -1;
 };
 
@@ -104,6 +105,40 @@ void CompareTextures(const RunOptions& options, const files::Sequence& sequence,
              text);
 }
 
+std::string WhereSessionIs(const StreamResult& result) {
+  if (result.durable) {
+    return fmt::format("session {0} is stored on the server; get its map with: romap export {0}", result.session_id);
+  }
+  return fmt::format("session {0} is in the memory of the server while that runs; get its map with: romap export {0}",
+                     result.session_id);
+}
+
+bool KeepsSession(const RunOptions& options, const StreamResult& result) {
+  return options.keep_session || options.stream.leave_open || !options.stream.session_id.empty() || !result.status.ok();
+}
+
+absl::Status SaveMap(const RunOptions& options, const files::Sequence& sequence, const MapCollector& collector,
+                     const StreamResult& result) {
+  std::vector<std::string> faults;
+  const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
+  const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
+  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
+  ROMAP_RETURN_IF_ERROR(files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), trajectory));
+  RunSummary summary = Summarize(sequence, result, collector, objects);
+  summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
+  if (!result.status.ok()) summary.faults.push_back("the run is not complete: " + Message(result.status));
+  if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));
+
+  fmt::print("{}", FormatSummary(summary));
+  nlohmann::json json = ToJson(summary);
+  if (KeepsSession(options, result)) json["session"] = result.session_id;
+  Evaluate(options, RecordOf(options, result, collector), sequence, json);
+  CompareTextures(options, sequence, objects, json);
+  ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
+  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
+  return absl::OkStatus();
+}
+
 absl::Status RunSequence(const RunOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(files::SequenceOptions sequence_options, options.sequence.FileOptions());
   if (options.permute_labels_seed >= 0) sequence_options.permute_labels_seed = options.permute_labels_seed;
@@ -113,32 +148,23 @@ absl::Status RunSequence(const RunOptions& options) {
 
   MapCollector collector;
   ROMAP_ASSIGN_OR_RETURN(const StreamResult result, StreamSequence(sequence, *service, options.stream, collector));
-
-  std::vector<std::string> faults;
-  const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
-  const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
-  ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
-  ROMAP_RETURN_IF_ERROR(files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), trajectory));
-  RunSummary summary = Summarize(sequence, result, collector, objects);
-  summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());
-  if (!options.no_pictures) ROMAP_RETURN_IF_ERROR(WriteMapPictures(options.out, sequence, trajectory, objects));
-
-  fmt::print("{}", FormatSummary(summary));
-  nlohmann::json json = ToJson(summary);
-  if (options.stream.keep_session) json["session"] = result.session_id;
-  Evaluate(options, RecordOf(options, result, collector), sequence, json);
-  CompareTextures(options, sequence, objects, json);
-  ROMAP_RETURN_IF_ERROR(files::WriteFile((fs::path(options.out) / "summary.json").string(), json.dump(1) + "\n"));
-  fmt::print("\nmeshes: {0}/objects/*.ply and *.glb\nimages: {0}/pictures\nsummary: {0}/summary.json\n", options.out);
-  if (options.stream.keep_session) fmt::print("session {} remains on the server\n", result.session_id);
+  const absl::Status saved = SaveMap(options, sequence, collector, result);
+  if (!saved.ok()) return absl::Status(saved.code(), fmt::format("{} ({})", Message(saved), WhereSessionIs(result)));
   if (!result.status.ok()) {
-    return absl::Status(result.status.code(), fmt::format("{} (wrote the partial map; session {} remains on the "
-                                                          "server)",
-                                                          Message(result.status), result.session_id));
+    return absl::Status(result.status.code(),
+                        fmt::format("{} (wrote the partial map; {})", Message(result.status), WhereSessionIs(result)));
+  }
+  if (options.stream.leave_open) {
+    fmt::print("session {0} is open: continue it with --session {0}\n", result.session_id);
+  } else if (KeepsSession(options, result)) {
+    fmt::print("session {} remains on the server\n", result.session_id);
+  } else {
+    // The map is saved; a failed deletion does not affect it.
+    service->DeleteSession(result.session_id).IgnoreError();
   }
   if (collector.acknowledged() > 0 && collector.rejected() == collector.acknowledged()) {
     return InvalidArgument("all frames of {} were rejected; first error: {}", options.sequence.dir,
-                           summary.faults.empty() ? "" : summary.faults.front());
+                           collector.faults().empty() ? "" : collector.faults().front());
   }
   return absl::OkStatus();
 }
@@ -187,11 +213,16 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
                    "Do not send every N-th frame, and compare the colors of the meshes with these frames; 0 = send all")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--name", options->stream.session_name, "Display name of the session");
-  command->add_flag("--keep-session", options->stream.keep_session, "Do not delete the session from the server");
+  command->add_flag("--keep-session", options->keep_session, "Do not delete the session from the server");
+  command->add_option("--session", options->stream.session_id,
+                      "ID of an open session to continue, with the frames that it does not have yet");
+  command->add_flag("--leave-open", options->stream.leave_open,
+                    "Do not finish the session, so that it can be continued with --session");
   command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
   options->map_files.AddTo(*command);
   command->callback([options, chosen] {
     options->sequence.SetPoseUse(&options->stream);
+    options->stream.resume = !options->service.local;
     *chosen = [options] { return RunSequence(*options); };
   });
 }

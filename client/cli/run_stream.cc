@@ -14,6 +14,8 @@
 #include "client/cli/mask_schedule.h"
 #include "client/cli/progress.h"
 #include "client/cli/unreadable_files.h"
+#include "client/sdk/resuming_map_stream.h"
+#include "client/sdk/retry.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -23,6 +25,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
 constexpr std::chrono::seconds kMaxAckWait{5};
 constexpr double kTrainingAfterInterrupt_s = 3;
+constexpr size_t kMaxWaitingInputs = 8;  // not yet sent
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -133,10 +136,25 @@ class Sender {
   std::thread thread_;
 };
 
+// Says once when the link breaks, and when it is up again.
+class LinkMessages {
+ public:
+  explicit LinkMessages(Progress& progress) : progress_(progress) {}
+
+  // On a thread of the stream.
+  void Note(bool up, const std::string& reason, int attempt) {
+    if (!up && attempt > 0) return;
+    progress_.Say(up ? "link restored" : fmt::format("link lost, retrying ({})", reason));
+  }
+
+ private:
+  Progress& progress_;
+};
+
 class Run {
  public:
   Run(const files::Sequence& sequence, MappingService& service, const StreamOptions& options, MapCollector& collector)
-      : sequence_(sequence), service_(service), options_(options), collector_(collector) {}
+      : sequence_(sequence), service_(service), options_(options), collector_(collector), link_(progress_) {}
 
   absl::StatusOr<StreamResult> Execute() {
     SessionOptions session;
@@ -146,22 +164,51 @@ class Run {
     session.up_world = options_.up_world;
     session.estimate_up = options_.estimate_up;
     session.mode = options_.realtime ? FrameMode::kLive : FrameMode::kReplay;
-    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
-    result_.session_id = info.id;
-    ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(info.id));
+    result_.session_id = options_.session_id;
+    if (result_.session_id.empty()) {
+      ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service_.CreateSession(session));
+      result_.session_id = info.id;
+    }
+    ROMAP_RETURN_IF_ERROR(OpenStream());
     result_.status = SendFrames();
-    if (result_.status.ok()) result_.status = Train();
+    if (result_.status.ok() && !options_.leave_open) result_.status = Train();
     progress_.Done();
     stream_.reset();
     if (result_.status.ok()) FetchTrajectory();
-    if (result_.status.ok() && !options_.keep_session) {
-      // The map is complete; a failed deletion does not affect it.
-      service_.DeleteSession(info.id).IgnoreError();
-    }
     return result_;
   }
 
  private:
+  absl::Status OpenStream() {
+    if (options_.resume) {
+      client::ResumeOptions resume;
+      resume.retry = Retry();
+      // A recorded sequence can wait. Frames of a live one are kept while the connection is broken, as far as they fit
+      // into the memory.
+      resume.drop_oldest = options_.realtime;
+      if (!options_.realtime) resume.max_waiting = kMaxWaitingInputs;
+      resume.on_link = [this](bool up, const std::string& reason, int attempt) { link_.Note(up, reason, attempt); };
+      ROMAP_ASSIGN_OR_RETURN(stream_,
+                             client::ResumingMapStream::Open(&service_, result_.session_id, std::move(resume)));
+    } else {
+      ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(result_.session_id));
+    }
+    result_.durable = stream_->opening().durable;
+    const std::optional<uint64_t> newest = stream_->opening().newest_frame_id;
+    if (options_.session_id.empty() || !newest) return absl::OkStatus();
+    // Frame ids are indices + 1.
+    options_.first_frame = std::max<size_t>(options_.first_frame, *newest);
+    if (options_.first_frame < sequence_.size()) return absl::OkStatus();
+    return InvalidArgument("--session {}: it has all {} frames of the sequence already", options_.session_id,
+                           sequence_.size());
+  }
+
+  static client::RetryOptions Retry() {
+    client::RetryOptions retry;
+    retry.keep_trying = [] { return !Interrupted(); };
+    return retry;
+  }
+
   absl::Status SendFrames() {
     Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
     const absl::Status status = AwaitAcknowledgements(sender);
@@ -196,7 +243,8 @@ class Run {
   }
 
   absl::Status Train() {
-    ROMAP_RETURN_IF_ERROR(service_.FinishSession(result_.session_id).status());
+    ROMAP_RETURN_IF_ERROR(
+        client::RetryWhileUnavailable([&] { return service_.FinishSession(result_.session_id); }, Retry()).status());
     const Clock::time_point start = Clock::now();
     const auto timed_out = [&] {
       return SecondsSince(start) > (Interrupted() ? kTrainingAfterInterrupt_s : options_.max_training_s);
@@ -212,7 +260,8 @@ class Run {
   }
 
   void FetchTrajectory() {
-    if (const auto map = service_.ExportMap(result_.session_id); map.ok()) {
+    const auto map = client::RetryWhileUnavailable([&] { return service_.ExportMap(result_.session_id); }, Retry());
+    if (map.ok()) {
       result_.trajectory = TrajectoryOf(*map);
     } else {
       fmt::print(stderr, "romap: the trajectory lacks later corrections because the map could not be exported: {}\n",
@@ -262,12 +311,13 @@ class Run {
 
   const files::Sequence& sequence_;
   MappingService& service_;
-  const StreamOptions& options_;
+  StreamOptions options_;
   MapCollector& collector_;
   std::mutex collector_mutex_;  // shared with the sender thread
-  std::unique_ptr<MapStream> stream_;
   StreamResult result_;
   Progress progress_{"mapping"};
+  LinkMessages link_;
+  std::unique_ptr<MapStream> stream_;  // its threads use the members above
 };
 
 }  // namespace

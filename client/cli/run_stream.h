@@ -26,12 +26,15 @@ struct StreamOptions {
   size_t stride = 1;              // send every `stride`-th of these
   size_t hold_out = 0;            // do not send one of this number of frames, see HeldOutFrames(); 0: send all
   double max_training_s = 600;    // maximum wait for training after the last frame
-  bool keep_session = false;      // do not delete the session
+  std::string session_id;         // the open session to continue; empty: a new one
+  bool leave_open = false;        // do not finish the session, so that it can be continued
+  bool resume = false;            // over a network: survive a broken connection and a restart of the server
 };
 
 struct StreamResult {
   std::string session_id;
-  absl::Status status;  // not OK if the stream failed; the collector has the events received before
+  bool durable = false;  // the server stores the session
+  absl::Status status;   // not OK if the stream failed; the collector has the events received before
   // The final trajectory of the map, including later corrections. nullopt if the stream failed or the map could not be
   // exported.
   std::optional<std::vector<files::StampedPose>> trajectory;
@@ -47,7 +50,8 @@ struct StreamResult {
 std::vector<size_t> HeldOutFrames(const files::Sequence& sequence, const StreamOptions& options);
 
 // Streams a sequence to a mapping service and collects the map: creates a session, sends every frame, waits for all
-// acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early.
+// acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early. The
+// caller deletes the session when it has saved the map.
 // Shows a progress bar. Skips images, masks and depth images that cannot be read; too many of them end sending with an
 // error. Returns an error if no session could be opened. Later errors are in StreamResult::status; the
 // session then stays on the server.

@@ -26,7 +26,8 @@ int TrainingThreads(const ServerConfig& config) {
 // A stream of a stored map that is not in memory otherwise.
 class ShelfStream : public EventStream {
  public:
-  explicit ShelfStream(std::shared_ptr<MapState> map) : map_(std::move(map)) {
+  ShelfStream(std::shared_ptr<MapState> map, uint64_t newest_frame_id) : map_(std::move(map)) {
+    if (newest_frame_id > 0) opening_.newest_frame_id = newest_frame_id;
     outbox_ = map_->Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening_.objects);
     opening_.durable = true;
   }
@@ -235,6 +236,11 @@ absl::StatusOr<SessionInfo> LocalMappingService::FinishSession(const std::string
   }
   lock.unlock();
   session->Finish();
+  if (store_) {
+    // The client may rely on it. While the disk fails, the session is finished in memory.
+    session->StoreState();
+    store_->Flush().IgnoreError();
+  }
   return session->Info();
 }
 
@@ -291,7 +297,7 @@ absl::StatusOr<std::unique_ptr<EventStream>> LocalMappingService::Watch(const st
   ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
   if (!session) {
     ROMAP_ASSIGN_OR_RETURN(auto map, shelf_->Map(session_id));
-    return std::make_unique<ShelfStream>(std::move(map));
+    return std::make_unique<ShelfStream>(std::move(map), store_->DurableInputs(session_id).frame_id);
   }
   lock.unlock();
   StreamOpening opening;

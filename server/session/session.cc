@@ -79,10 +79,7 @@ absl::Status Session::Offer(SessionInput input) {
 
 void Session::Finish() {
   finish_after_restoring_ = true;
-  if (lifecycle_.state() == SessionState::kRestoring) {
-    store_->PutState(id_, SessionState::kFinishing, "", stored_statistics_);
-    return;
-  }
+  if (lifecycle_.state() == SessionState::kRestoring) return;
   lifecycle_.BeginFinish();
   scheduler_.CloseInputs();
 }
@@ -155,11 +152,19 @@ void Session::OfferStoredInputs(uint64_t inputs) {
 
 void Session::StoreChanges(bool complete) {
   if (!storage_) return;
-  storage_->StoreChanges(
-      [this] {
-        return SessionStorage::State{lifecycle_.state(), lifecycle_.failure(), CurrentStatistics()};
-      },
-      complete);
+  storage_->StoreChanges([this] { return StateToStore(); }, complete);
+}
+
+void Session::StoreState() {
+  if (storage_) storage_->StoreState([this] { return StateToStore(); });
+}
+
+SessionStorage::State Session::StateToStore() const {
+  SessionState state = lifecycle_.state();
+  if (state == SessionState::kRestoring) {
+    state = finish_after_restoring_ ? SessionState::kFinishing : SessionState::kOpen;
+  }
+  return {state, lifecycle_.failure(), CurrentStatistics()};
 }
 
 std::shared_ptr<Outbox> Session::Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects) {

@@ -77,6 +77,7 @@ class Session {
   void Stop(const absl::Status& status);
   // Stores what has changed. `complete`: also what is stored only now and then. Does nothing while it is restored.
   void StoreChanges(bool complete);
+  void StoreState();
 
   // The right to send inputs.
   SenderClaim& sender() { return sender_; }
@@ -104,6 +105,7 @@ class Session {
   void OnAccepted(const SessionInput& input);
   void Restore(Stored stored);
   void OfferStoredInputs(uint64_t inputs);
+  SessionStorage::State StateToStore() const;
   void PublishStatisticsIfDue();
   void OnFinished();
   void OnFailed(const char* stage, const std::string& what);

@@ -47,8 +47,7 @@ struct SessionConfig {
                 .help = "Time after which an open session that nobody uses gives back its memory; it is restored from "
                         "the store when a client opens it"});
     fields.Add("record_dir", &record_dir,
-               {.audience = Audience::kOperator,
-                .help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "
+               {.help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "
                         "replay; empty = no recording"});
     fields.Add("single_thread", &single_thread,
                {.help = "Run every session on one thread in a fixed order: slower, but the same input gives the same "

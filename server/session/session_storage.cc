@@ -54,9 +54,17 @@ void SessionStorage::StoreChanges(const std::function<State()>& state, bool comp
   }
   const Clock::time_point now = Clock::now();
   if (!complete && now < state_stored_ + kStatePeriod) return;
-  state_stored_ = now;
-  State current = state();
-  store_->PutState(session_id_, current.state, std::move(current.failure), std::move(current.statistics));
+  PutState(state());
+}
+
+void SessionStorage::StoreState(const std::function<State()>& state) {
+  std::lock_guard lock(mutex_);  // a later state must not be stored before
+  PutState(state());
+}
+
+void SessionStorage::PutState(State state) {
+  state_stored_ = Clock::now();
+  store_->PutState(session_id_, state.state, std::move(state.failure), std::move(state.statistics));
 }
 
 void SessionStorage::StoreEvent(MapEvent event) {

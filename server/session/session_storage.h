@@ -40,6 +40,7 @@ class SessionStorage {
   // Stores what has changed since the last call. Unless `complete`, a mesh that is still being trained is stored only
   // now and then, and the trajectory when it has grown by a quarter, because old versions stay on the disk.
   void StoreChanges(const std::function<State()>& state, bool complete);
+  void StoreState(const std::function<State()>& state);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -50,6 +51,7 @@ class SessionStorage {
   };
 
   void StoreEvent(MapEvent event);
+  void PutState(State state);
   void StoreMeshes(bool complete);
 
   store::Store* const store_;

@@ -18,8 +18,7 @@ struct StoreConfig {
     fields.Add("data_dir", &data_dir,
                {.audience = Audience::kOperator,
                 .help = "Folder where sessions are stored; empty = $XDG_DATA_HOME/romap or ~/.local/share/romap"});
-    fields.Add("ephemeral", &ephemeral,
-               {.audience = Audience::kOperator, .help = "Store nothing: sessions end with the server"});
+    fields.Add("ephemeral", &ephemeral, {.help = "Store nothing: sessions end with the server"});
     fields.Add("max_age_days", &max_age_days,
                {.unit = "days",
                 .min = 0,

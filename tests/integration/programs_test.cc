@@ -281,7 +281,8 @@ TEST(InvalidInputTest, NoServerAndPortInUse) {
   testing_support::BackgroundProcess server({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0"});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
-  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--listen", address}), 1, "cannot listen on " + address);
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--ephemeral", "--listen", address}), 1,
+                "cannot listen on " + address);
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);
   ExpectOneLine(Romap({"run", folder / "sequence", "--server", address, "--out", folder / "map"}), 4,
