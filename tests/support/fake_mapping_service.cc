@@ -117,6 +117,27 @@ class FakeSession {
     subscribers_.erase(mailbox);
   }
 
+  void PublishDurable(const Durable& durable) {
+    std::lock_guard lock(mutex_);
+    Publish(durable);
+  }
+  void Break(const absl::Status& status) {
+    std::lock_guard lock(mutex_);
+    for (const auto& subscriber : subscribers_) subscriber->Close(status);
+    subscribers_.clear();
+    sender_ = nullptr;
+    info_.stream_open = false;
+  }
+  void Forget(uint64_t newest_frame_id) {
+    std::lock_guard lock(mutex_);
+    newest_frame_id_ = newest_frame_id;
+    objects_.clear();
+    while (!trajectory_.empty() && trajectory_.back().frame_id > newest_frame_id) {
+      trajectory_.pop_back();
+      timestamps_ns_.pop_back();
+    }
+  }
+
   absl::Status Process(const FrameInput& frame) {
     std::lock_guard lock(mutex_);
     if (info_.state != SessionState::kOpen)
@@ -247,12 +268,15 @@ using FrameHook = std::function<void(const FrameInput&)>;
 
 class FakeStream : public MapStream {
  public:
-  FakeStream(std::shared_ptr<FakeSession> session, std::shared_ptr<Mailbox> mailbox, bool sender, FrameHook hook)
+  FakeStream(std::shared_ptr<FakeSession> session, std::shared_ptr<Mailbox> mailbox, bool sender, FrameHook hook,
+             bool durable = false)
       : session_(std::move(session)),
         mailbox_(std::move(mailbox)),
         hook_(std::move(hook)),
         opening_(session_->Opening(sender)),
-        sending_(sender) {}
+        sending_(sender) {
+    opening_.durable = durable;
+  }
   ~FakeStream() override { Cancel(); }
 
   const StreamOpening& opening() const override { return opening_; }
@@ -296,7 +320,7 @@ class FakeStream : public MapStream {
   const std::shared_ptr<FakeSession> session_;
   const std::shared_ptr<Mailbox> mailbox_;
   const FrameHook hook_;
-  const StreamOpening opening_;
+  StreamOpening opening_;
   std::atomic<bool> sending_;
 };
 
@@ -348,8 +372,34 @@ absl::Status FakeMappingService::DeleteSession(const std::string& session_id) {
 absl::StatusOr<std::unique_ptr<MapStream>> FakeMappingService::OpenMap(const std::string& session_id,
                                                                        const std::string& resume_token) {
   ROMAP_ASSIGN_OR_RETURN(const auto session, Find(session_id));
+  {
+    std::lock_guard lock(mutex_);
+    if (!refusal_.ok()) return refusal_;
+  }
   ROMAP_ASSIGN_OR_RETURN(auto mailbox, session->AttachSender(resume_token));
-  return std::make_unique<FakeStream>(session, std::move(mailbox), /*sender=*/true, frame_hook_);
+  return std::make_unique<FakeStream>(session, std::move(mailbox), /*sender=*/true, frame_hook_, durable_);
+}
+
+void FakeMappingService::PublishDurable(const std::string& session_id, const Durable& durable) {
+  if (const auto session = Find(session_id); session.ok()) (*session)->PublishDurable(durable);
+}
+
+void FakeMappingService::RefuseStreams(const absl::Status& status) {
+  std::lock_guard lock(mutex_);
+  refusal_ = status;
+}
+
+void FakeMappingService::BreakStreams(const absl::Status& status) {
+  std::lock_guard lock(mutex_);
+  for (const auto& [id, session] : sessions_) session->Break(status);
+}
+
+void FakeMappingService::Crash(uint64_t newest_frame_id) {
+  std::lock_guard lock(mutex_);
+  for (const auto& [id, session] : sessions_) {
+    session->Break(absl::UnavailableError("the server crashed"));
+    session->Forget(newest_frame_id);
+  }
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> FakeMappingService::Watch(const std::string& session_id) {

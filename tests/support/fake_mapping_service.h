@@ -31,6 +31,16 @@ class FakeMappingService : public MappingService {
 
   // Called within Send() before a frame is processed; may block to simulate a busy server. Set before the first frame.
   void SetFrameHook(std::function<void(const FrameInput&)> hook) { frame_hook_ = std::move(hook); }
+  // The streams say that the service stores inputs. Durable events come only from PublishDurable(). Set before a
+  // stream.
+  void SetDurable(bool durable) { durable_ = durable; }
+  void PublishDurable(const std::string& session_id, const Durable& durable);
+  // OpenMap() fails with `status` until it is OK.
+  void RefuseStreams(const absl::Status& status);
+  // Ends the open streams of all sessions as a broken connection does.
+  void BreakStreams(const absl::Status& status);
+  // The same, as a crash does: the sessions forget the frames after `newest_frame_id` and all objects.
+  void Crash(uint64_t newest_frame_id);
 
   absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) override;
   absl::StatusOr<std::vector<SessionInfo>> ListSessions() override;
@@ -52,6 +62,8 @@ class FakeMappingService : public MappingService {
   std::function<void(const FrameInput&)> frame_hook_ = [](const FrameInput&) {};
   std::mutex mutex_;
   uint64_t sessions_created_ = 0;
+  bool durable_ = false;
+  absl::Status refusal_;
   std::map<std::string, std::shared_ptr<FakeSession>> sessions_;
 };
 
