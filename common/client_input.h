@@ -41,6 +41,9 @@ struct EncodedMasks {
   std::vector<Instance> instances;   // labels of the mask that are not listed get class "object" and score 1
 };
 
+// An input is `resent` if it was sent before on an earlier stream, or waited while a stream was broken. One that the
+// session has already is acknowledged as a duplicate. A live session never drops it, but processes it as in a replay.
+
 // One frame as the client sends it, still encoded. mask_encoding kNone: no masks, or they follow in a MasksInput.
 struct FrameInput : EncodedMasks {
   uint64_t frame_id = 0;     // chosen by the client, strictly increasing within a session
@@ -54,13 +57,13 @@ struct FrameInput : EncodedMasks {
   std::string depth;                              // z depth (not ray length) registered to the image, size of the image
   double depth_scale_mu = 0;                      // map units per depth unit
   std::optional<Eigen::Vector3d> gravity_camera;  // direction of gravity (down) in the camera frame, any length > 0
-  bool resent = false;                            // it was sent before on an earlier stream, see FrameAck::duplicate
+  bool resent = false;                            // it comes late because of a broken stream, see below
 };
 
 // The masks of a frame that was sent without masks, for detectors that are slower than the camera.
 struct MasksInput : EncodedMasks {
   uint64_t frame_id = 0;  // of an accepted frame
-  bool resent = false;    // they were sent before on an earlier stream, see MasksAck::duplicate
+  bool resent = false;    // as FrameInput::resent
 };
 
 // Everything a client can send on a Map stream. Masks must follow their frame.

@@ -49,8 +49,8 @@ std::vector<ObjectSnapshot> ToSnapshots(const MapCollector& collector) {
 
 // What the run used; `romap eval map` reads it from summary.json.
 eval::RunRecord RecordOf(const RunOptions& options, const StreamResult& result, const MapCollector& collector) {
-  eval::RunRecord record{.first_frame = options.stream.first_frame,
-                         .frames_sent = collector.sent(),
+  eval::RunRecord record{.first_frame = result.first_frame,
+                         .frames_sent = result.frames_before + collector.sent(),
                          .skipped_frames = result.skipped_frames};
   record.poses = "none";  // also if no frame has a pose
   if (collector.sent_with_pose() > 0 && options.sequence.poses != PoseUse::kIgnore) {

@@ -136,19 +136,26 @@ class Sender {
   std::thread thread_;
 };
 
-// Says once when the link breaks, and when it is up again.
+// Says once when the link breaks or the server is not ready, and when the stream is open again.
 class LinkMessages {
  public:
   explicit LinkMessages(Progress& progress) : progress_(progress) {}
 
   // On a thread of the stream.
   void Note(bool up, const std::string& reason, int attempt) {
-    if (!up && attempt > 0) return;
-    progress_.Say(up ? "link restored" : fmt::format("link lost, retrying ({})", reason));
+    if (up) {
+      progress_.Say("link restored");
+    } else if (attempt == 0) {
+      progress_.Say(fmt::format("link lost, retrying ({})", reason));
+    } else if (!std::exchange(waits_, true)) {
+      progress_.Say(fmt::format("waiting for the server ({})", reason));
+    }
+    if (up) waits_ = false;
   }
 
  private:
   Progress& progress_;
+  bool waits_ = false;
 };
 
 class Run {
@@ -194,10 +201,12 @@ class Run {
       ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(result_.session_id));
     }
     result_.durable = stream_->opening().durable;
+    result_.first_frame = options_.session_id.empty() ? options_.first_frame : 0;
     const std::optional<uint64_t> newest = stream_->opening().newest_frame_id;
     if (options_.session_id.empty() || !newest) return absl::OkStatus();
     // Frame ids are indices + 1.
     options_.first_frame = std::max<size_t>(options_.first_frame, *newest);
+    result_.frames_before = options_.first_frame;
     if (options_.first_frame < sequence_.size()) return absl::OkStatus();
     return InvalidArgument("--session {}: it has all {} frames of the sequence already", options_.session_id,
                            sequence_.size());

@@ -33,8 +33,10 @@ struct StreamOptions {
 
 struct StreamResult {
   std::string session_id;
-  bool durable = false;  // the server stores the session
-  absl::Status status;   // not OK if the stream failed; the collector has the events received before
+  bool durable = false;      // the server stores the session
+  size_t first_frame = 0;    // index of the first frame that the session has
+  size_t frames_before = 0;  // that a continued session had, if it had all
+  absl::Status status;       // not OK if the stream failed; the collector has the events received before
   // The final trajectory of the map, including later corrections. nullopt if the stream failed or the map could not be
   // exported.
   std::optional<std::vector<files::StampedPose>> trajectory;

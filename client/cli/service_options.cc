@@ -25,9 +25,11 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
 
 void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
   auto* server_option = app.add_option("--server", server, "Address of romap-server, HOST:PORT")->capture_default_str();
+  auto* wait = app.add_option("--wait", wait_s, "Wait so long for a server that is not there yet [s]")
+                   ->check(CLI::NonNegativeNumber);
   if (!offer_local) return;
   auto* local_flag = app.add_flag("--local", local, "Map in this process instead of on a server");
-  local_flag->excludes(server_option);
+  local_flag->excludes(server_option)->excludes(wait);
   app.add_option("--config", config_file, "YAML configuration file (with --local)")->needs(local_flag);
   app.add_option("--set", settings, "Set a configuration value, section.field=value (with --local); repeatable")
       ->needs(local_flag);
@@ -36,7 +38,9 @@ void ServiceOptions::AddTo(CLI::App& app, bool offer_local) {
 absl::StatusOr<std::unique_ptr<MappingService>> ServiceOptions::Connect() const {
   if (!local) {
     if (server.find(':') == std::string::npos) return InvalidArgument("--server: expected HOST:PORT, got '{}'", server);
-    ROMAP_ASSIGN_OR_RETURN(auto remote, client::RemoteMappingService::Connect(server));
+    client::RemoteOptions remote_options;
+    remote_options.wait = std::chrono::milliseconds(static_cast<int64_t>(1000 * wait_s));
+    ROMAP_ASSIGN_OR_RETURN(auto remote, client::RemoteMappingService::Connect(server, remote_options));
     return std::unique_ptr<MappingService>(std::move(remote));
   }
   ROMAP_ASSIGN_OR_RETURN(const session::ServerConfig config, LoadConfig(*this));

@@ -16,6 +16,7 @@ namespace romap::cli {
 struct ServiceOptions {
   std::string server = "127.0.0.1:50051";
   bool local = false;
+  double wait_s = 0;                  // for a server that is not there yet
   std::string config_file;            // --local only
   std::vector<std::string> settings;  // --local only
 

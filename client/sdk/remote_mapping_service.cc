@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/sdk/internal/remote_streams.h"
+#include "client/sdk/retry.h"
 #include "common/status.h"
 #include "common/wire/sessions.h"
 #include "common/wire/status.h"
@@ -48,8 +49,8 @@ struct RemoteMappingService::Connection {
   std::shared_ptr<v1::Mapping::Stub> stub;
 };
 
-absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::Connect(const std::string& host_port,
-                                                                                    const RemoteOptions& options) {
+absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::ConnectOnce(const std::string& host_port,
+                                                                                        const RemoteOptions& options) {
   const std::shared_ptr<grpc::Channel> channel =
       grpc::CreateCustomChannel(host_port, grpc::InsecureChannelCredentials(), MakeChannelArguments(options));
   if (!channel->WaitForConnected(system_clock::now() + options.connect_timeout)) {
@@ -64,6 +65,13 @@ absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::Conn
         fmt::format("{} accepts connections but is not a working romap-server: {}", host_port, Message(listed)));
   }
   return service;
+}
+
+absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::Connect(const std::string& host_port,
+                                                                                    const RemoteOptions& options) {
+  RetryOptions retry;
+  retry.max_down = options.wait;
+  return RetryWhileUnavailable([&] { return ConnectOnce(host_port, options); }, retry);
 }
 
 RemoteMappingService::RemoteMappingService(std::unique_ptr<Connection> connection)

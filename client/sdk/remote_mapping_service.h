@@ -13,6 +13,7 @@ namespace romap::client {
 
 struct RemoteOptions {
   std::chrono::milliseconds connect_timeout{3000};
+  std::chrono::milliseconds wait{0};                  // Connect() waits so long for a server that is not there yet
   std::chrono::milliseconds call_timeout{30'000};     // per unary call, and for opening a stream
   std::chrono::milliseconds export_timeout{300'000};  // for a whole ExportMap()
   int max_message_bytes = 32 << 20;                   // must match transport.max_message_bytes of the server
@@ -23,14 +24,14 @@ struct RemoteOptions {
 // Thread-safe. Streams share ownership of the connection and may outlive this object.
 //
 // gRPC reconnects automatically. When the connection breaks, open streams end with UNAVAILABLE. The session stays on
-// the server; call OpenMap() again to continue it.
+// the server; call OpenMap() again to continue it, or use ResumingMapStream, which does and loses nothing.
 //
 // Errors: in addition to those of MappingService, every call may return UNAVAILABLE (no connection to the server),
 // DEADLINE_EXCEEDED (a timeout of RemoteOptions), and INVALID_ARGUMENT for a malformed response.
 class RemoteMappingService : public MappingService {
  public:
   // Connects to a server and verifies that it is a romap-server. `host_port`: e.g. "127.0.0.1:50051".
-  // Errors: UNAVAILABLE if no romap-server responds within the timeouts of `options`.
+  // Errors: UNAVAILABLE if no romap-server responds within the times of `options`.
   static absl::StatusOr<std::unique_ptr<RemoteMappingService>> Connect(const std::string& host_port,
                                                                        const RemoteOptions& options = {});
 
@@ -55,6 +56,8 @@ class RemoteMappingService : public MappingService {
  private:
   struct Connection;
   explicit RemoteMappingService(std::unique_ptr<Connection> connection);
+  static absl::StatusOr<std::unique_ptr<RemoteMappingService>> ConnectOnce(const std::string& host_port,
+                                                                           const RemoteOptions& options);
 
   std::unique_ptr<Connection> connection_;
 };

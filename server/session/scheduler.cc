@@ -16,6 +16,10 @@ constexpr std::chrono::milliseconds kTrainingPollPeriod{20};
 // Decoded inputs that wait for tracking: enough that it never waits for the decoder.
 constexpr size_t kCheckedQueue = 2;
 
+bool IsResent(const SessionInput& input) {
+  return std::visit([](const auto& content) { return content.resent; }, input);
+}
+
 }  // namespace
 
 Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger,
@@ -37,12 +41,20 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
   }
 }
 
+bool Scheduler::IsLive(const SessionInput& input) const {
+  return mode_ == FrameMode::kLive && !restoring_ && !IsResent(input);
+}
+
 bool Scheduler::Offer(SessionInput input) {
+  const bool is_resent = IsResent(input);
+  // A live input must not push a resent one out of the queue.
+  const bool may_drop = IsLive(input) && resent_waiting_ == 0;
+  if (is_resent) ++resent_waiting_;
   const bool is_frame = std::holds_alternative<FrameInput>(input);
   Arrival arrival{std::move(input), std::chrono::steady_clock::now()};
   bool accepted = false;
   std::optional<Arrival> dropped;
-  if (!IsLive()) {
+  if (!may_drop) {
     accepted = inputs_.Push(std::move(arrival));
   } else {
     dropped = inputs_.PushDroppingOldest(std::move(arrival), &accepted);
@@ -65,6 +77,7 @@ void Scheduler::Stop() {
 void Scheduler::RunIngest() {
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (IsResent(arrival->input)) --resent_waiting_;
       if (stopping_) continue;
       checked_.Push(pipeline_->Check(*std::move(arrival)));
     }
@@ -75,12 +88,12 @@ void Scheduler::RunIngest() {
 }
 
 void Scheduler::RunTracking() {
-  const Pipeline::MappingExecutor execute = [this](MappingStep step) {
-    IsLive() ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step));
-  };
   try {
     while (const std::optional<CheckedInput> input = checked_.Pop()) {
-      if (!stopping_) pipeline_->Process(*input, execute);
+      if (stopping_) continue;
+      const bool is_live = IsLive(input->arrival.input);
+      pipeline_->Process(
+          *input, [&](MappingStep step) { is_live ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step)); });
     }
   } catch (const std::exception& e) {
     Fail("tracking", e.what());
@@ -107,6 +120,7 @@ void Scheduler::RunSingleThread() {
   const Pipeline::MappingExecutor execute = [this](const MappingStep& step) { ExecuteImmediately(step); };
   try {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
+      if (IsResent(arrival->input)) --resent_waiting_;
       if (!stopping_) pipeline_->Process(pipeline_->Check(*std::move(arrival)), execute);
       callbacks_.tick();
     }

@@ -23,6 +23,9 @@ namespace romap::session {
 //   steps
 //   -> [mapping thread: MappingStep::run()]
 //
+// Inputs that come late because of a broken connection (resent), and those of a stored session that is restored, are
+// processed as in a replay, because they come faster than the camera.
+//
 // Replay: a full queue blocks, and steps that change the local map are executed before the next frame is tracked. Live:
 // a full input queue drops its oldest input; tracking never waits for the mapping of a frame. Single thread
 // (session.single_thread): the tracking thread does all this and trains too, in a fixed order, so that equal input
@@ -58,7 +61,7 @@ class Scheduler {
     bool is_live = false;
   };
 
-  bool IsLive() const { return mode_ == FrameMode::kLive && !restoring_; }
+  bool IsLive(const SessionInput& input) const;
   void RunIngest();        // the ingest thread
   void RunTracking();      // the tracking thread
   void RunMapping();       // the mapping thread
@@ -85,6 +88,7 @@ class Scheduler {
   BoundedQueue<QueuedStep> steps_;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> restoring_ = false;
+  std::atomic<int> resent_waiting_ = 0;  // in `inputs_`
   std::atomic<bool> failed_ = false;
 
   std::atomic<int> keyframes_waiting_ = 0;    // live: in `steps_`

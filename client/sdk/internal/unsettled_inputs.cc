@@ -38,7 +38,7 @@ std::optional<UnsettledInputs::Outgoing> UnsettledInputs::TakeNext() {
   if (it == items_.end()) return std::nullopt;
   next_ = it->first + 1;
   Item& item = it->second;
-  const bool resent = std::exchange(item.sent, true);
+  const bool resent = std::exchange(item.sent, true) || item.waited;
   item.sent_on_stream = true;
   return Outgoing{item.input, resent};
 }
@@ -48,8 +48,10 @@ void UnsettledInputs::BeginStream(bool durable) {
   next_ = 0;
   for (auto it = items_.begin(); it != items_.end();) {
     it->second.sent_on_stream = it->second.answered = false;
+    it->second.waited = !is_first_;
     it = IsSettled(it->second) ? Erase(it) : std::next(it);
   }
+  is_first_ = false;
 }
 
 template <class Ack>

@@ -23,7 +23,7 @@ class UnsettledInputs {
 
   struct Outgoing {
     std::shared_ptr<const SessionInput> input;
-    bool resent = false;  // it was sent on an earlier stream
+    bool resent = false;  // see FrameInput
   };
 
   static size_t BytesOf(const SessionInput& input);
@@ -69,6 +69,7 @@ class UnsettledInputs {
     size_t bytes = 0;
     Clock::time_point added;
     bool sent = false;            // on any stream
+    bool waited = false;          // while there was no stream
     bool sent_on_stream = false;  // on the current one
     bool acked = false;           // the caller has had its acknowledgement
     bool answered = false;        // the server has acknowledged it on the current stream
@@ -85,8 +86,9 @@ class UnsettledInputs {
   Items::iterator Erase(Items::iterator item);
 
   Items items_;
-  uint64_t added_ = 0;  // the next sequence number
-  uint64_t next_ = 0;   // sequence number from which on the inputs were not taken for the current stream
+  bool is_first_ = true;  // no stream has begun
+  uint64_t added_ = 0;    // the next sequence number
+  uint64_t next_ = 0;     // sequence number from which on the inputs were not taken for the current stream
   size_t bytes_ = 0;
   bool durable_ = false;
 };
