@@ -376,6 +376,7 @@ void LocalMappingService::KeepStored() {
 }
 
 void LocalMappingService::StoreChanges() {
+  if (!store_->AcceptsChanges()) return;  // they wait in the outboxes, where newer ones replace them
   std::map<std::string, std::shared_ptr<Session>> sessions;
   {
     std::lock_guard lock(mutex_);

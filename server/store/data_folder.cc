@@ -39,7 +39,8 @@ std::string DefaultDataDir() {
 
 absl::StatusOr<DataFolder> DataFolder::Claim(const std::string& path) {
   std::error_code error;
-  fs::create_directories(fs::path(path) / "sessions", error);
+  if (fs::create_directories(path, error)) fs::permissions(path, fs::perms::owner_all, error);  // others see no images
+  if (!error) fs::create_directories(fs::path(path) / "sessions", error);
   if (error) return FileError(path, "create the data folder", error);
   const std::string lock_path = fs::path(path) / "lock";
   const int fd = open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);

@@ -13,7 +13,7 @@ constexpr std::string_view kFileMagic = "ROMAPSES";
 constexpr uint32_t kFileVersion = 1;
 constexpr size_t kFileHeaderBytes = 8 + 4;
 constexpr size_t kRecordHeaderBytes = 1 + 8 + kHashBytes;
-constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxRecordBytes = uint64_t{256} << 20;
 
 std::string LittleEndian(uint64_t number, int bytes) {
   std::string text;

@@ -121,6 +121,11 @@ void Store::AppendInput(const std::string& session, SessionInput input, bool may
   Enqueue(std::move(write));
 }
 
+bool Store::AcceptsChanges() const {
+  std::lock_guard lock(mutex_);
+  return !failing_ && queued_bytes_ <= static_cast<size_t>(config_.max_waiting_mib) << 20;
+}
+
 void Store::PutObject(const std::string& session, ObjectUpdate object) {
   Enqueue({session, std::move(object), sizeof(ObjectUpdate)});
 }

@@ -73,6 +73,9 @@ class Store {
   // Waits until the session and its files are removed.
   absl::Status Remove(const std::string& session);
 
+  // False while the disk fails or is too slow: changes of maps should wait then, because they would fill the memory.
+  bool AcceptsChanges() const;
+
   // Waits until all writes that were queued before are durable. An error: the disk fails.
   absl::Status Flush();
 
@@ -142,7 +145,7 @@ class Store {
   std::mutex listener_mutex_;  // held during the calls
   std::map<std::string, Listener> listeners_;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable queued_;   // writes were queued, or closing_ was set
   std::condition_variable written_;  // the queue became shorter
   std::deque<Write> queue_;

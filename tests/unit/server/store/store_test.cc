@@ -190,6 +190,13 @@ TEST_F(StoreTest, WhatIsDurableSurvivesAKill) {
   }
 }
 
+TEST_F(StoreTest, ANewDataFolderIsPrivate) {
+  StoreConfig config = Config();
+  config.data_dir = folder_ / "new/data";
+  ASSERT_TRUE(Store::Open(config).ok());
+  EXPECT_EQ(std::filesystem::status(config.data_dir).permissions(), std::filesystem::perms::owner_all);
+}
+
 TEST_F(StoreTest, ASecondProcessIsRefusedWithTheIdOfTheFirst) {
   const auto store = OpenStore();
   const auto second = Store::Open(Config());
@@ -299,10 +306,12 @@ TEST_F(StoreTest, AFullDiskIsSaidAndWritesAreTriedAgain) {
     LimitedFileSize full(10'000);
     for (uint64_t id = 1; id <= 20; ++id) store->AppendInput("a", testing_support::MakeFrame(id), true);
     ASSERT_TRUE(testing_support::Eventually([&] { return count() == 1; }));
+    EXPECT_FALSE(store->AcceptsChanges());
     EXPECT_FALSE(store->Create(MakeSession("b")).ok());
   }
   ASSERT_TRUE(testing_support::Eventually([&] { return count() == 2; }));
   ASSERT_TRUE(store->Flush().ok());
+  EXPECT_TRUE(store->AcceptsChanges());
   std::lock_guard lock(mutex);
   EXPECT_FALSE(troubles[0].ok());
   EXPECT_TRUE(troubles[1].ok());
