@@ -86,16 +86,20 @@ FrameUncertainty Trajectory::CurrentUncertainty(const TrackedPose& frame) const 
 
 std::vector<std::optional<PoseUncertainty>> Trajectory::Uncertainties() const {
   const std::vector<SE3<World, Camera>> poses = Poses();
+  std::vector<std::optional<PoseUncertainty>> uncertainties(frames_.size());
   std::vector<size_t> indices;
   std::vector<FrameUncertainty> sources;
   for (size_t i = 0; i < frames_.size(); ++i) {
     if (!frames_[i].uncertainty) continue;
+    if (!frames_[i].reference) {
+      uncertainties[i] = frames_[i].uncertainty;  // of a stored trajectory, which is final
+      continue;
+    }
     indices.push_back(i);
     sources.push_back(CurrentUncertainty(frames_[i]));
     sources.back().position_world = poses[i].translation();
   }
   const std::vector<PoseUncertainty> aligned = AlignedUncertainties(sources);
-  std::vector<std::optional<PoseUncertainty>> uncertainties(frames_.size());
   for (size_t k = 0; k < indices.size(); ++k) uncertainties[indices[k]] = aligned[k];
   return uncertainties;
 }

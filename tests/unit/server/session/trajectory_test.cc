@@ -45,6 +45,20 @@ TEST_F(TrajectoryTest, FramesHaveTheirTrackedPoses) {
   for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(Position(i).x(), 1 + static_cast<double>(i), 1e-9);
 }
 
+// As the frames of a stored trajectory are.
+TEST(StoredTrajectoryTest, FramesWithoutReferenceKeepTheirUncertainty) {
+  Trajectory trajectory;
+  for (int i = 1; i <= 3; ++i) {
+    trajectory.Add({.frame_id = static_cast<uint64_t>(i),
+                    .timestamp_ns = 10 * i,
+                    .T_world_camera = At(i),
+                    .uncertainty = PoseUncertainty{.position_sigma_mu = 0.1 * i, .rotation_sigma_rad = 0.01}});
+  }
+  const auto uncertainties = trajectory.Uncertainties();
+  ASSERT_EQ(uncertainties.size(), 3u);
+  EXPECT_DOUBLE_EQ(uncertainties[2]->position_sigma_mu, 0.1 * 3);
+}
+
 TEST_F(TrajectoryTest, FramesMoveWithTheirReference) {
   Correct(Moved(kFirst, At(5), 2));
   EXPECT_NEAR(Position(0).x(), 7, 1e-9) << "the map was scaled by two";
