@@ -387,7 +387,11 @@ void LocalMappingService::StoreChanges() {
     const bool is_unused = has_ended || IsUnused(id, *session);
     session->StoreChanges(/*complete=*/is_unused);
     // A session that could not be stored stays in memory.
-    if (is_unused && store_->Flush().ok()) Shelve(id, session);
+    if (!is_unused || !store_->Flush().ok()) continue;
+    if (const absl::Status compacted = store_->Compact(id); !compacted.ok()) {
+      spdlog::warn("session {}: is not compacted: {}", id, Message(compacted));
+    }
+    Shelve(id, session);
   }
   std::erase_if(unused_since_, [&](const auto& entry) { return !sessions.contains(entry.first); });
 }

@@ -126,6 +126,17 @@ absl::Status BlobLog::Sync() {
 
 void BlobLog::Discard() { pending_.clear(); }
 
+void BlobLog::RemoveSegmentsBefore(const std::string& folder, uint32_t segment) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename();
+    // Names have six digits, so that their order is that of the numbers.
+    if (name.ends_with(".seg") && name < fmt::format("{:06}.seg", segment)) {
+      std::filesystem::remove(entry.path(), error);
+    }
+  }
+}
+
 absl::StatusOr<std::string> BlobLog::Read(const std::string& folder, const BlobRef& blob) {
   const std::string path = SegmentPath(folder, blob.segment);
   const FileDescriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));

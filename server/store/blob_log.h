@@ -38,6 +38,10 @@ class BlobLog {
   // Forgets the blobs that were appended since the last successful Sync().
   void Discard();
   bool HasPending() const { return !pending_.empty(); }
+  size_t pending_bytes() const { return pending_.size(); }
+  uint32_t segment() const { return segment_; }
+  // Removes the segments before `segment`. Those that cannot be removed are left.
+  static void RemoveSegmentsBefore(const std::string& folder, uint32_t segment);
 
   // NOT_FOUND etc. as FileError(). DATA_LOSS: the content is not what was written.
   static absl::StatusOr<std::string> Read(const std::string& folder, const BlobRef& blob);

@@ -322,6 +322,37 @@ uint64_t Catalog::CountInputs(const std::string& session) {
   return static_cast<uint64_t>(statement.getColumn(0).getInt64());
 }
 
+std::vector<Catalog::StoredBlob> Catalog::Blobs(const std::string& session) {
+  std::vector<StoredBlob> blobs;
+  const auto add = [&](StoredBlob::Kind kind, const char* sql) {
+    SQLite::Statement statement(database_, sql);
+    statement.bind(1, session);
+    while (statement.executeStep()) {
+      const auto blob = ReadBlobRef(statement, 1);
+      if (blob) blobs.push_back({kind, static_cast<uint64_t>(statement.getColumn(0).getInt64()), *blob});
+    }
+  };
+  add(StoredBlob::Kind::kInput,
+      "SELECT number, segment, offset, length, hash FROM inputs WHERE session = ? ORDER BY number");
+  add(StoredBlob::Kind::kMesh,
+      "SELECT object, mesh_segment, mesh_offset, mesh_length, mesh_hash FROM objects WHERE session = ?");
+  add(StoredBlob::Kind::kTrajectory,
+      "SELECT 0, trajectory_segment, trajectory_offset, trajectory_length, trajectory_hash FROM sessions WHERE id = ?");
+  return blobs;
+}
+
+void Catalog::MoveBlob(const std::string& session, const StoredBlob& moved) {
+  if (moved.kind == StoredBlob::Kind::kMesh) return PutMesh(session, ObjectId{moved.number}, moved.blob);
+  if (moved.kind == StoredBlob::Kind::kTrajectory) return PutTrajectory(session, moved.blob);
+  static constexpr char kSql[] =
+      "UPDATE inputs SET segment = ?, offset = ?, length = ?, hash = ? WHERE session = ? AND number = ?";
+  SQLite::Statement& statement = Prepared(kSql);
+  BindBlob(statement, 1, moved.blob);
+  statement.bind(5, session);
+  statement.bind(6, Bits(moved.number));
+  Run(statement);
+}
+
 Catalog::LogEnd Catalog::EndOfBlobs(const std::string& session) {
   LogEnd end;
   // An empty log ends at 0, 0.

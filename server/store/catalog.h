@@ -57,6 +57,15 @@ class Catalog {
     uint32_t segment = 0;
     uint64_t offset = 0;
   };
+  // All blobs of a session, each with the row that refers to it.
+  struct StoredBlob {
+    enum class Kind { kInput, kMesh, kTrajectory };
+    Kind kind = Kind::kInput;
+    uint64_t number = 0;  // of the input, or id of the object
+    BlobRef blob;
+  };
+  std::vector<StoredBlob> Blobs(const std::string& session);
+  void MoveBlob(const std::string& session, const StoredBlob& moved);
   // The end of the newest blob of a session.
   LogEnd EndOfBlobs(const std::string& session);
   std::optional<BlobRef> Input(const std::string& session, uint64_t number);

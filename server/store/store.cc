@@ -102,6 +102,7 @@ absl::Status Store::EnqueueAndWait(Write write) {
 
 absl::Status Store::Create(const StoredSession& session) { return EnqueueAndWait({session.id, session}); }
 absl::Status Store::Complete(const std::string& session) { return EnqueueAndWait({session, Completion{}}); }
+absl::Status Store::Compact(const std::string& session) { return EnqueueAndWait({session, Compaction{}}); }
 absl::Status Store::Remove(const std::string& session) { return EnqueueAndWait({session, Removal{}}); }
 absl::Status Store::Flush() { return EnqueueAndWait({"", FlushMark{}}); }
 
@@ -229,7 +230,8 @@ Store::SessionLog* Store::LogOf(const std::string& session, Commitment* commitme
 
 void Store::Apply(const Write& write, Commitment* commitment) {
   const std::string& id = write.session;
-  if (std::holds_alternative<FlushMark>(write.content)) return;
+  // A compaction follows the commit, see Finish().
+  if (std::holds_alternative<FlushMark>(write.content) || std::holds_alternative<Compaction>(write.content)) return;
   if (const auto* session = std::get_if<StoredSession>(&write.content)) {
     writer_->PutSession(*session);
     commitment->created.insert(id);
@@ -303,8 +305,45 @@ void Store::Finish(std::deque<Write>& batch, Commitment& commitment) {
     Notify(session, [&](const Listener& listener) { listener.durable(durable); });
   }
   for (Write& write : batch) {
-    if (write.done) write.done->set_value(absl::OkStatus());
+    absl::Status status;
+    if (std::holds_alternative<Compaction>(write.content)) status = CompactNow(write.session);
+    if (write.done) write.done->set_value(status);
   }
+}
+
+absl::Status Store::CompactNow(const std::string& session) {
+  constexpr double kMinDeadShare = 0.1;
+  constexpr size_t kPieceBytes = 16 << 20;
+  const std::string folder = FolderOf(session);
+  absl::Status status;
+  try {
+    std::vector<Catalog::StoredBlob> blobs = writer_->Blobs(session);
+    uint64_t live_bytes = 0;
+    for (const auto& stored : blobs) live_bytes += stored.blob.EndOffset() - stored.blob.offset;
+    if (static_cast<double>(live_bytes) > (1 - kMinDeadShare) * static_cast<double>(BytesOf(session))) return status;
+    const uint32_t first = writer_->EndOfBlobs(session).segment + 1;
+    auto copy = std::make_unique<BlobLog>(folder, first, 0);
+    for (Catalog::StoredBlob& stored : blobs) {
+      ROMAP_ASSIGN_OR_RETURN(const std::string content, BlobLog::Read(folder, stored.blob));
+      stored.blob = copy->Append(content);
+      if (copy->pending_bytes() > kPieceBytes) ROMAP_RETURN_IF_ERROR(copy->Sync());
+    }
+    ROMAP_RETURN_IF_ERROR(copy->Sync());
+    writer_->Begin();
+    for (const auto& stored : blobs) writer_->MoveBlob(session, stored);
+    writer_->Commit();
+    if (const auto log = logs_.find(session); log != logs_.end()) log->second.blobs = std::move(copy);
+    BlobLog::RemoveSegmentsBefore(folder, first);
+  } catch (const SQLite::Exception& e) {
+    status = absl::ResourceExhaustedError(fmt::format("{}: cannot compact: {}", path(), e.what()));
+  }
+  if (status.ok()) return status;
+  try {
+    writer_->Rollback();
+  } catch (const SQLite::Exception& e) {
+    spdlog::warn("store: cannot roll back: {}", e.what());
+  }
+  return status;
 }
 
 void Store::Fail(std::deque<Write>& batch, const absl::Status& status) {
@@ -375,18 +414,25 @@ Durable Store::DurableInputs(const std::string& session) const {
 }
 
 absl::StatusOr<SessionInput> Store::LoadInput(const std::string& session, uint64_t number) const {
-  std::optional<BlobRef> blob;
-  {
-    std::lock_guard lock(read_mutex_);
-    try {
-      blob = reader_->Input(session, number);
-    } catch (const SQLite::Exception& e) {
-      return absl::DataLossError(fmt::format("{}: the catalog cannot be read: {}", path(), e.what()));
+  absl::StatusOr<std::string> content;
+  // A compaction may move the blob between the two steps.
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    std::optional<BlobRef> blob;
+    {
+      std::lock_guard lock(read_mutex_);
+      try {
+        blob = reader_->Input(session, number);
+      } catch (const SQLite::Exception& e) {
+        return absl::DataLossError(fmt::format("{}: the catalog cannot be read: {}", path(), e.what()));
+      }
     }
+    if (!blob) return NotFound("session '{}' has no stored input {}", session, number);
+    content = BlobLog::Read(FolderOf(session), *blob);
+    if (content.ok() || !absl::IsNotFound(content.status())) break;
   }
-  if (!blob) return NotFound("session '{}' has no stored input {}", session, number);
-  ROMAP_ASSIGN_OR_RETURN(const std::string content, BlobLog::Read(FolderOf(session), *blob));
-  return ParseInput(content);
+  if (absl::IsNotFound(content.status())) return absl::DataLossError(Message(content.status()));
+  ROMAP_RETURN_IF_ERROR(content.status());
+  return ParseInput(*content);
 }
 
 absl::StatusOr<StoredMap> Store::LoadMap(const std::string& session) const {

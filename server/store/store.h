@@ -70,6 +70,9 @@ class Store {
   void SetPinned(const std::string& session, bool pinned);
   // Waits until a session that was created incomplete is durable and listed.
   absl::Status Complete(const std::string& session);
+  // Gives back the space of old versions of meshes and trajectories, if it is more than a tenth: copies the rest to new
+  // segments. Other writes wait meanwhile. DATA_LOSS: a blob is damaged; then nothing changes.
+  absl::Status Compact(const std::string& session);
   // Waits until the session and its files are removed.
   absl::Status Remove(const std::string& session);
 
@@ -102,12 +105,13 @@ class Store {
     bool pinned = false;
   };
   struct Completion {};
+  struct Compaction {};
   struct Removal {};
   struct FlushMark {};
   struct Write {
     std::string session;
     std::variant<StoredSession, InputWrite, ObjectUpdate, MeshUpdate, ObjectId, TrajectoryWrite, StateWrite, PinWrite,
-                 Completion, Removal, FlushMark>
+                 Completion, Compaction, Removal, FlushMark>
         content;
     size_t bytes = 0;
     std::shared_ptr<std::promise<absl::Status>> done = {};
@@ -128,6 +132,7 @@ class Store {
   std::deque<Write> TakeBatch();
   absl::Status Commit(const std::deque<Write>& batch, Commitment* commitment);
   void Apply(const Write& write, Commitment* commitment);
+  absl::Status CompactNow(const std::string& session);
   SessionLog* LogOf(const std::string& session, Commitment* commitment);
   void Finish(std::deque<Write>& batch, Commitment& commitment);
   void Fail(std::deque<Write>& batch, const absl::Status& status);

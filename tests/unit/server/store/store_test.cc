@@ -190,6 +190,50 @@ TEST_F(StoreTest, WhatIsDurableSurvivesAKill) {
   }
 }
 
+TEST_F(StoreTest, CompactionGivesBackTheSpaceOfOldMeshes) {
+  auto store = OpenStore();
+  ASSERT_TRUE(store->Create(MakeSession("a")).ok());
+  for (uint64_t id = 1; id <= 10; ++id) store->AppendInput("a", testing_support::MakeFrame(id), true);
+  store->PutObject("a", MakeObject(1, 1));
+  for (int version = 1; version <= 20; ++version) {
+    store->PutMesh("a", MakeMesh(1, std::string(10'000, static_cast<char>('a' + version))));
+  }
+  ASSERT_TRUE(store->Flush().ok());
+  EXPECT_GT(store->BytesOf("a"), 200'000u);
+  ASSERT_TRUE(store->Compact("a").ok());
+  EXPECT_LT(store->BytesOf("a"), 60'000u);
+  store->AppendInput("a", testing_support::MakeFrame(11), true);
+  ASSERT_TRUE(store->Flush().ok());
+  for (int reopened = 0; reopened < 2; ++reopened) {
+    for (uint64_t id = 1; id <= 11; ++id) {
+      EXPECT_EQ(std::get<FrameInput>(store->LoadInput("a", id).value()).frame_id, id);
+    }
+    EXPECT_EQ(store->LoadMap("a")->objects.at(0).mesh->draco, std::string(10'000, 'a' + 20));
+    store = nullptr;
+    store = OpenStore();
+  }
+  const uint64_t before = store->BytesOf("a");
+  ASSERT_TRUE(store->Compact("a").ok());
+  EXPECT_EQ(store->BytesOf("a"), before) << "there is little to gain";
+}
+
+TEST_F(StoreTest, ADamagedSessionIsNotCompacted) {
+  const auto store = OpenStore();
+  ASSERT_TRUE(store->Create(MakeSession("a")).ok());
+  store->AppendInput("a", testing_support::MakeFrame(1), true);
+  store->PutObject("a", MakeObject(1, 1));
+  for (int version = 1; version <= 5; ++version) store->PutMesh("a", MakeMesh(1, std::string(10'000, 'm')));
+  ASSERT_TRUE(store->Flush().ok());
+  {
+    std::fstream file((folder_ / "sessions/a/000000.seg"), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(100);
+    file.put('?');
+  }
+  EXPECT_EQ(store->Compact("a").code(), absl::StatusCode::kDataLoss);
+  EXPECT_TRUE(store->LoadMap("a")->objects.at(0).mesh.has_value());
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "sessions/a/000000.seg"));
+}
+
 TEST_F(StoreTest, ANewDataFolderIsPrivate) {
   StoreConfig config = Config();
   config.data_dir = folder_ / "new/data";
