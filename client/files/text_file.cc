@@ -52,11 +52,16 @@ absl::Status WriteFile(const std::string& path, std::string_view bytes) {
   std::ofstream out(partial, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) return FileError(path, "write");
-  std::error_code error;
+  std::error_code error, ignored;
+  if (!out) {
+    const absl::Status status = FileError(path, "write");
+    std::filesystem::remove(partial, ignored);  // frees the space on a full disk
+    return status;
+  }
   std::filesystem::rename(partial, path, error);
-  if (error) return FileError(path, "write", error);
-  return absl::OkStatus();
+  if (!error) return absl::OkStatus();
+  std::filesystem::remove(partial, ignored);
+  return FileError(path, "write", error);
 }
 
 absl::Status MakeFolder(const std::string& path) {

@@ -44,6 +44,7 @@ class ResumingMapStream::Impl {
 
   absl::StatusOr<Link> Establish(absl::Status broken);
   bool MayTryAgain() const;
+  absl::Status GiveUp(const absl::Status& failure) const;
   void BeginLink(const Link& link);
   absl::Status Receive(EventStream& stream);
   void Process(MapEvent event, std::vector<MapEvent>* deliver);
@@ -73,14 +74,13 @@ class ResumingMapStream::Impl {
   Link link_;                 // empty while the link is down
   bool send_failed_ = false;  // on the current link
   bool half_closed_ = false;  // the current link
-  bool watching_ = false;
   UnsettledInputs inputs_;
   SeenObjects seen_;
   std::deque<MapEvent> events_;
   absl::Status send_status_;  // not OK: the session accepts no more inputs, although its stream may go on
   bool closing_ = false;      // CloseSend() was called
   bool ended_ = false;
-  absl::Status status_;
+  absl::Status end_status_;
   uint64_t dropped_ = 0;
 
   std::thread receiver_, sender_;
@@ -108,6 +108,7 @@ void ResumingMapStream::Impl::RunReceiver() {
     Link link;
     {
       std::lock_guard lock(mutex_);
+      if (ended_) return;
       link = link_;
     }
     const absl::Status broken = Receive(*link.events);
@@ -136,7 +137,7 @@ absl::StatusOr<LinkOpener::Link> ResumingMapStream::Impl::Establish(absl::Status
       while (Clock::now() < end && MayTryAgain()) {
         WaitToRetry(std::chrono::milliseconds(20), end, options_.retry);
       }
-      if (!MayTryAgain()) return failure;
+      if (!MayTryAgain()) return GiveUp(failure);
     }
     LinkOpener::Kept kept;
     {
@@ -162,10 +163,16 @@ bool ResumingMapStream::Impl::MayTryAgain() const {
   return Clock::now() < *down_since_ + options_.retry.max_down;
 }
 
+absl::Status ResumingMapStream::Impl::GiveUp(const absl::Status& failure) const {
+  const std::chrono::duration<double> down = Clock::now() - *down_since_;
+  return absl::Status(failure.code(), fmt::format("{} (gave up after {:.1f} s)", Message(failure), down.count()));
+}
+
 void ResumingMapStream::Impl::BeginLink(const Link& link) {
   std::vector<MapEvent> removals;
   {
     std::lock_guard lock(mutex_);
+    if (ended_) return;
     inputs_.BeginStream(link.events->opening().durable);
     if (!link.inputs) {
       // Everything is on the server; see LinkOpener.
@@ -176,9 +183,7 @@ void ResumingMapStream::Impl::BeginLink(const Link& link) {
     for (ObjectRemoved& removed : seen_.KeepOnly(link.events->opening().objects))
       removals.push_back(std::move(removed));
     link_ = link;
-    watching_ = !link.inputs;
     send_failed_ = half_closed_ = false;
-    if (ended_) link.events->Cancel();  // Cancel() did not see it
   }
   changed_.notify_all();
   Deliver(std::move(removals));
@@ -239,7 +244,7 @@ void ResumingMapStream::Impl::End(absl::Status status) {
   }
   if (status.ok()) inputs_.Clear();
   ended_ = true;
-  status_ = std::move(status);
+  end_status_ = std::move(status);
   link_ = {};
   changed_.notify_all();
 }
@@ -252,7 +257,7 @@ void ResumingMapStream::Impl::RunSender() {
     changed_.wait(lock, [&] { return ended_ || HasWork(); });
     if (ended_) return;
     DropExpired();
-    const std::shared_ptr<MapStream> stream = link_.inputs;
+    std::shared_ptr<MapStream> stream = link_.inputs;
     const auto outgoing = inputs_.TakeNext();
     if (!outgoing && !closing_) continue;
     if (!outgoing) half_closed_ = true;
@@ -260,6 +265,7 @@ void ResumingMapStream::Impl::RunSender() {
     lock.unlock();
     const absl::Status sent = outgoing ? SendOne(*stream, *outgoing) : stream->CloseSend();
     if (!sent.ok()) OnSendFailed(*stream, sent);
+    stream.reset();  // may wait for gRPC
     lock.lock();
   }
 }
@@ -308,7 +314,7 @@ absl::Status ResumingMapStream::Impl::Send(SessionInput input) {
 
 absl::Status ResumingMapStream::Impl::CheckSending() const {
   if (closing_) return FailedPrecondition("CloseSend() was already called on this stream");
-  if (!status_.ok()) return status_;
+  ROMAP_RETURN_IF_ERROR(end_status_);
   ROMAP_RETURN_IF_ERROR(send_status_);
   if (ended_) return FailedPrecondition("the server closed the stream and accepts no more frames");
   return absl::OkStatus();
@@ -349,7 +355,7 @@ void ResumingMapStream::Impl::NoteDropped(uint64_t frame_id, const char* reason)
 absl::Status ResumingMapStream::Impl::CloseSend() {
   std::lock_guard lock(mutex_);
   if (closing_) return FailedPrecondition("CloseSend() was already called on this stream");
-  if (!status_.ok()) return status_;
+  ROMAP_RETURN_IF_ERROR(end_status_);
   closing_ = true;
   changed_.notify_all();
   return absl::OkStatus();
@@ -372,7 +378,7 @@ bool ResumingMapStream::Impl::Done() const {
 
 absl::Status ResumingMapStream::Impl::status() const {
   std::lock_guard lock(mutex_);
-  return status_;
+  return end_status_;
 }
 
 void ResumingMapStream::Impl::Cancel() {
@@ -380,7 +386,7 @@ void ResumingMapStream::Impl::Cancel() {
   {
     std::lock_guard lock(mutex_);
     events_.clear();
-    if (!ended_) status_ = absl::CancelledError("the stream was canceled");
+    if (!ended_) end_status_ = absl::CancelledError("the stream was canceled");
     ended_ = true;
     link = std::exchange(link_, {});
     changed_.notify_all();

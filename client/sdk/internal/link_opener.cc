@@ -59,7 +59,10 @@ bool LinkOpener::MayReopen(const absl::Status& status) {
     --unanswered_;
     return true;
   }
-  return IsBrokenLink(status) || absl::IsInternal(status);
+  if (!absl::IsInternal(status)) return IsBrokenLink(status);
+  // From gRPC's transport, or because the session failed.
+  const auto info = service_->GetSession(session_id_);
+  return !info.ok() || info->state != SessionState::kFailed;
 }
 
 }  // namespace romap::client
