@@ -383,8 +383,7 @@ void LocalMappingService::StoreChanges() {
     sessions = sessions_;
   }
   for (const auto& [id, session] : sessions) {
-    const bool has_ended = session->state() == SessionState::kFinished || session->state() == SessionState::kFailed;
-    const bool is_unused = has_ended || IsUnused(id, *session);
+    const bool is_unused = store::HasEnded(session->state()) || IsUnused(id, *session);
     session->StoreChanges(/*complete=*/is_unused);
     // A session that could not be stored stays in memory.
     if (!is_unused || !store_->Flush().ok()) continue;

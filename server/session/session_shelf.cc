@@ -6,27 +6,6 @@
 #include "common/status.h"
 
 namespace romap::session {
-namespace {
-
-bool HasEnded(SessionState state) { return state == SessionState::kFinished || state == SessionState::kFailed; }
-
-SessionInfo InfoOf(const store::StoredSession& session, const store::Store& store) {
-  SessionInfo info;
-  info.id = session.id;
-  info.name = session.options.name;
-  info.camera = session.options.camera;
-  info.mode = session.options.mode;
-  info.state = session.state;
-  info.created_unix_ns = session.created_unix_ns;
-  info.statistics = session.statistics;
-  info.durable = true;
-  info.pinned = session.pinned;
-  info.stored_bytes = store.BytesOf(session.id);
-  return info;
-}
-
-}  // namespace
-
 SessionShelf::SessionShelf(store::Store* store, std::vector<store::StoredSession> sessions) : store_(store) {
   for (store::StoredSession& session : sessions) Add(std::move(session));
 }
@@ -38,12 +17,14 @@ void SessionShelf::Add(store::StoredSession session) {
 
 std::vector<SessionInfo> SessionShelf::Infos() const {
   std::vector<SessionInfo> infos;
-  for (const auto& [id, entry] : entries_) infos.push_back(InfoOf(entry.session, *store_));
+  for (const auto& [id, entry] : entries_) infos.push_back(Info(id));
   return infos;
 }
 
 SessionInfo SessionShelf::Info(const std::string& session_id) const {
-  return InfoOf(entries_.at(session_id).session, *store_);
+  SessionInfo info = store::InfoOf(entries_.at(session_id).session);
+  info.stored_bytes = store_->BytesOf(session_id);
+  return info;
 }
 
 std::vector<std::string> SessionShelf::Unfinished() const {
@@ -69,7 +50,7 @@ std::vector<std::string> SessionShelf::Expired(double max_age_days, double max_b
   for (const store::StoredSession* session : oldest_first) {
     const double age_days = static_cast<double>(now_unix_ns - session->used_unix_ns) / 86'400e9;
     const bool is_old = max_age_days > 0 && age_days > max_age_days;
-    const bool is_too_much = max_bytes > 0 && bytes > max_bytes && HasEnded(session->state);
+    const bool is_too_much = max_bytes > 0 && bytes > max_bytes && store::HasEnded(session->state);
     if (!is_old && !is_too_much) continue;
     if (max_bytes > 0) bytes -= static_cast<double>(store_->BytesOf(session->id));
     expired.push_back(session->id);

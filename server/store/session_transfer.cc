@@ -15,18 +15,6 @@ namespace {
 
 constexpr size_t kPieceBytes = 1 << 20;
 
-v1::SessionInfo StateOf(const StoredSession& session) {
-  SessionInfo info;
-  info.id = session.id;
-  info.name = session.options.name;
-  info.camera = session.options.camera;
-  info.mode = session.options.mode;
-  info.state = session.state;
-  info.created_unix_ns = session.created_unix_ns;
-  info.statistics = session.statistics;
-  return wire::ToProto(info);
-}
-
 // Collects records to pieces.
 class PieceWriter {
  public:
@@ -113,8 +101,7 @@ class SessionImport {
     auto info = wire::FromProto(proto, "state");
     if (!info.ok()) return InvalidRecord(info.status());
     // A session that was finishing when it was saved can be continued.
-    const bool has_ended = info->state == SessionState::kFinished || info->state == SessionState::kFailed;
-    session_.state = has_ended ? info->state : SessionState::kOpen;
+    session_.state = HasEnded(info->state) ? info->state : SessionState::kOpen;
     session_.created_unix_ns = info->created_unix_ns;
     session_.used_unix_ns = UnixNow_ns();
     session_.statistics = info->statistics;
@@ -138,7 +125,7 @@ absl::Status SaveSession(const Store& store, const std::string& session,
   if (found == sessions.end()) return NotFound("session '{}' is not stored", session);
   PieceWriter writer(write);
   ROMAP_RETURN_IF_ERROR(writer.Add(FileRecord::kSession, wire::ToProto(found->options).SerializeAsString()));
-  ROMAP_RETURN_IF_ERROR(writer.Add(FileRecord::kState, StateOf(*found).SerializeAsString()));
+  ROMAP_RETURN_IF_ERROR(writer.Add(FileRecord::kState, wire::ToProto(InfoOf(*found)).SerializeAsString()));
   for (uint64_t number = 1; number <= found->inputs; ++number) {
     ROMAP_ASSIGN_OR_RETURN(const SessionInput input, store.LoadInput(session, number));
     ROMAP_RETURN_IF_ERROR(writer.Add(FileRecord::kInput, InputContent(input)));

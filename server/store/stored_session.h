@@ -22,6 +22,23 @@ struct StoredSession {
   uint64_t inputs = 0;                       // frames and late masks
 };
 
+inline bool HasEnded(SessionState state) { return state == SessionState::kFinished || state == SessionState::kFailed; }
+
+// Without the size on the disk and the state of its stream.
+inline SessionInfo InfoOf(const StoredSession& session) {
+  SessionInfo info;
+  info.id = session.id;
+  info.name = session.options.name;
+  info.camera = session.options.camera;
+  info.mode = session.options.mode;
+  info.state = session.state;
+  info.created_unix_ns = session.created_unix_ns;
+  info.statistics = session.statistics;
+  info.durable = true;
+  info.pinned = session.pinned;
+  return info;
+}
+
 // The map of a session as clients saw it last.
 struct StoredMap {
   std::vector<ObjectSnapshot> objects;  // all, also provisional ones, by id

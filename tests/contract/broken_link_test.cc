@@ -104,7 +104,9 @@ TEST_P(BrokenLink, NothingIsLostOrTwiceThroughManyCuts) {
   ASSERT_THAT(map.trajectory, SizeIs(kFrames));
   for (uint64_t i = 0; i < kFrames; ++i) EXPECT_EQ(map.trajectory[i].frame_id, i + 1);
   EXPECT_EQ(map.statistics.frames_received, kFrames);
-  EXPECT_EQ(copy.objects().size(), GetParam().objects_from_one_frame ? 2u : copy.objects().size());
+  if (GetParam().objects_from_one_frame) {
+    EXPECT_THAT(copy.objects(), SizeIs(2));
+  }
   for (const ObjectSnapshot& object : map.objects) {
     EXPECT_EQ(copy.objects().at(object.object.id).object.revision, object.object.revision);
   }

@@ -326,40 +326,57 @@ class LimitedFileSize {
   rlimit before_{};
 };
 
+// What the listener of a session heard.
+class Heard {
+ public:
+  Heard(Store& store, const std::string& session) : store_(store), session_(session) {
+    store_.SetListener(session_, {.durable =
+                                      [this](const Durable& durable) {
+                                        std::lock_guard lock(mutex_);
+                                        durable_ = durable.frame_id;
+                                      },
+                                  .trouble =
+                                      [this](const absl::Status& status) {
+                                        std::lock_guard lock(mutex_);
+                                        troubles_.push_back(status);
+                                      }});
+  }
+  ~Heard() { store_.RemoveListener(session_); }
+
+  std::vector<absl::Status> troubles() const {
+    std::lock_guard lock(mutex_);
+    return troubles_;
+  }
+  uint64_t durable() const {
+    std::lock_guard lock(mutex_);
+    return durable_;
+  }
+
+ private:
+  Store& store_;
+  const std::string session_;
+  mutable std::mutex mutex_;
+  std::vector<absl::Status> troubles_;
+  uint64_t durable_ = 0;
+};
+
 TEST_F(StoreTest, AFullDiskIsSaidAndWritesAreTriedAgain) {
   const auto store = OpenStore();
   ASSERT_TRUE(store->Create(MakeSession("a")).ok());
-  std::mutex mutex;
-  std::vector<absl::Status> troubles;
-  uint64_t durable = 0;
-  store->SetListener("a", {.durable =
-                               [&](const Durable& d) {
-                                 std::lock_guard lock(mutex);
-                                 durable = d.frame_id;
-                               },
-                           .trouble =
-                               [&](const absl::Status& status) {
-                                 std::lock_guard lock(mutex);
-                                 troubles.push_back(status);
-                               }});
-  const auto count = [&] {
-    std::lock_guard lock(mutex);
-    return troubles.size();
-  };
+  Heard heard(*store, "a");
   {
     LimitedFileSize full(10'000);
     for (uint64_t id = 1; id <= 20; ++id) store->AppendInput("a", testing_support::MakeFrame(id), true);
-    ASSERT_TRUE(testing_support::Eventually([&] { return count() == 1; }));
+    ASSERT_TRUE(testing_support::Eventually([&] { return heard.troubles().size() == 1; }));
     EXPECT_FALSE(store->AcceptsChanges());
     EXPECT_FALSE(store->Create(MakeSession("b")).ok());
   }
-  ASSERT_TRUE(testing_support::Eventually([&] { return count() == 2; }));
+  ASSERT_TRUE(testing_support::Eventually([&] { return heard.troubles().size() == 2; }));
   ASSERT_TRUE(store->Flush().ok());
   EXPECT_TRUE(store->AcceptsChanges());
-  std::lock_guard lock(mutex);
-  EXPECT_FALSE(troubles[0].ok());
-  EXPECT_TRUE(troubles[1].ok());
-  EXPECT_EQ(durable, 20u);
+  EXPECT_FALSE(heard.troubles()[0].ok());
+  EXPECT_TRUE(heard.troubles()[1].ok());
+  EXPECT_EQ(heard.durable(), 20u);
   for (uint64_t id = 1; id <= 20; ++id) EXPECT_TRUE(store->LoadInput("a", id).ok()) << id;
 }
 
@@ -368,19 +385,7 @@ TEST_F(StoreTest, InputsThatDoNotFitAreReportedAndNothingLaterCountsAsDurable) {
   config.max_waiting_mib = 1;
   const auto store = Store::Open(config).value();
   ASSERT_TRUE(store->Create(MakeSession("a")).ok());
-  std::mutex mutex;
-  std::vector<absl::StatusCode> troubles;
-  uint64_t durable = 0;
-  store->SetListener("a", {.durable =
-                               [&](const Durable& d) {
-                                 std::lock_guard lock(mutex);
-                                 durable = d.frame_id;
-                               },
-                           .trouble =
-                               [&](const absl::Status& status) {
-                                 std::lock_guard lock(mutex);
-                                 troubles.push_back(status.code());
-                               }});
+  Heard heard(*store, "a");
   FrameInput large = testing_support::MakeFrame(1);
   large.image.assign(400'000, 'x');
   {
@@ -389,19 +394,14 @@ TEST_F(StoreTest, InputsThatDoNotFitAreReportedAndNothingLaterCountsAsDurable) {
       large.frame_id = id;
       store->AppendInput("a", large, /*may_wait=*/false);
     }
-    ASSERT_TRUE(testing_support::Eventually([&] {
-      std::lock_guard lock(mutex);
-      return !troubles.empty();
-    }));
+    ASSERT_TRUE(testing_support::Eventually([&] { return !heard.troubles().empty(); }));
   }
-  ASSERT_TRUE(testing_support::Eventually([&] {
-    std::lock_guard lock(mutex);
-    return troubles.size() == 3;
-  }));
-  std::lock_guard lock(mutex);
-  EXPECT_THAT(troubles, ::testing::UnorderedElementsAre(absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk,
-                                                        absl::StatusCode::kDataLoss));
-  EXPECT_LT(durable, 10u);
+  ASSERT_TRUE(testing_support::Eventually([&] { return heard.troubles().size() == 3; }));
+  std::vector<absl::StatusCode> codes;
+  for (const absl::Status& trouble : heard.troubles()) codes.push_back(trouble.code());
+  EXPECT_THAT(codes, ::testing::UnorderedElementsAre(absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk,
+                                                     absl::StatusCode::kDataLoss));
+  EXPECT_LT(heard.durable(), 10u);
 }
 
 }  // namespace romap::store::store_test
