@@ -24,6 +24,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kEventWait{50};
 constexpr std::chrono::seconds kMaxAckWait{5};
+constexpr std::chrono::seconds kMaxDurableWait{10};
 constexpr double kTrainingAfterInterrupt_s = 3;
 constexpr size_t kMaxWaitingInputs = 8;  // not yet sent
 
@@ -195,8 +196,10 @@ class Run {
       resume.drop_oldest = options_.realtime;
       if (!options_.realtime) resume.max_waiting = kMaxWaitingInputs;
       resume.on_link = [this](bool up, const std::string& reason, int attempt) { link_.Note(up, reason, attempt); };
-      ROMAP_ASSIGN_OR_RETURN(stream_,
+      ROMAP_ASSIGN_OR_RETURN(auto resuming,
                              client::ResumingMapStream::Open(&service_, result_.session_id, std::move(resume)));
+      resuming_ = resuming.get();
+      stream_ = std::move(resuming);
     } else {
       ROMAP_ASSIGN_OR_RETURN(stream_, service_.OpenMap(result_.session_id));
     }
@@ -243,12 +246,24 @@ class Run {
       }
     }
     result_.mapping_s = collector_.last_ack_s() - collector_.first_sent_s();
+    if (sender.done() && sender.status().ok()) AwaitDurable();
     result_.interrupted = Interrupted();
     if (!sender.done()) {
       stream_->Cancel();  // unblocks Send()
       return absl::DeadlineExceededError("the server stopped accepting frames");
     }
     return sender.status();
+  }
+
+  // A server that is restarted loses what it had accepted but not yet stored. Such inputs can be sent again only while
+  // the session is not finished. A server whose disk is full stores nothing; hence the limit.
+  void AwaitDurable() {
+    Clock::time_point answered = Clock::now();
+    while (resuming_ != nullptr && resuming_->unsettled() > 0 && !stream_->Done() && !Interrupted()) {
+      ReceiveEvent();
+      if (!resuming_->all_answered()) answered = Clock::now();
+      if (Clock::now() > answered + kMaxDurableWait) return;
+    }
   }
 
   absl::Status Train() {
@@ -326,7 +341,8 @@ class Run {
   StreamResult result_;
   Progress progress_{"mapping"};
   LinkMessages link_;
-  std::unique_ptr<MapStream> stream_;  // its threads use the members above
+  std::unique_ptr<MapStream> stream_;                    // its threads use the members above
+  const client::ResumingMapStream* resuming_ = nullptr;  // stream_, if it resumes
 };
 
 }  // namespace

@@ -60,7 +60,8 @@ class ResumingMapStream : public MapStream {
   absl::Status CloseSend() override;
 
   uint64_t dropped() const;  // frames
-  // Inputs that are kept, because they are not known to be safe on the server.
+  // Inputs that are kept, because they are not known to be safe on the server. Finish the session when this is 0:
+  // inputs that a restarted server lost cannot be sent again to a finished session.
   size_t unsettled() const;
   // Whether the server has acknowledged all inputs on the current stream.
   bool all_answered() const;
