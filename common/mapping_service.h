@@ -41,6 +41,8 @@ struct SessionOptions {
   std::optional<Eigen::Vector3d> up_world = {};
   // Without `up_world` and gravity: estimate up in the world of the client's poses from the images instead.
   bool estimate_up = false;
+  // Who owns the session, see server/access. Set by the server, never by the client; empty without access control.
+  std::string tenant = {};
 };
 
 struct SessionInfo {
@@ -55,6 +57,7 @@ struct SessionInfo {
   bool durable = false;       // the service stores the session
   bool pinned = false;        // see MappingService::PinSession()
   uint64_t stored_bytes = 0;  // on the disk
+  std::string tenant = {};    // as in SessionOptions
 };
 
 // The current state of one object.
@@ -144,8 +147,10 @@ class MappingService {
   using PieceReader = std::function<absl::StatusOr<std::string>()>;  // the next piece; empty at the end
   // Passes the session to `write` as one file (*.romap). Errors of `write` are returned. DATA_LOSS: it is damaged.
   virtual absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) = 0;
-  // Adds the session of a file with another id. INVALID_ARGUMENT: the file is damaged or cut off; nothing is added.
-  virtual absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) = 0;
+  // Adds the session of a file with another id. `tenant`: as in SessionOptions. INVALID_ARGUMENT: the file is damaged
+  // or cut off; nothing is added.
+  virtual absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read, const std::string& tenant) = 0;
+  absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read) { return LoadSession(read, ""); }
   // A pinned session is not deleted by age or size.
   virtual absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) = 0;
 };

@@ -7,6 +7,7 @@
 #include <signal.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -20,11 +21,15 @@
 #include "common/exit_code.h"
 #include "common/status.h"
 #include "common/version.h"
+#include "server/access/access_config.h"
+#include "server/access/authenticator.h"
+#include "server/access/token_command.h"
 #include "server/session/local_mapping_service.h"
 #include "server/session/server_config.h"
 #include "server/store/store.h"
 #include "server/store/store_config.h"
 #include "server/transport/grpc_server.h"
+#include "server/transport/host_port.h"
 #include "server/transport/transport_config.h"
 
 namespace romap {
@@ -35,10 +40,13 @@ struct Flags {
   std::vector<std::string> assignments;  // section.field=value, in the order they take effect
   bool dump_config = false;
   bool expert = false;
+  bool check_config = false;
+  bool insecure_network = false;
 };
 
 struct Config {
   transport::TransportConfig transport;
+  access::AccessConfig access;
   std::string log_level = "info";
   store::StoreConfig store;
   session::ServerConfig server;
@@ -47,6 +55,8 @@ struct Config {
     ConfigFields fields;
     fields.Section("transport");
     transport.Fields(fields);
+    fields.Section("access");
+    access.Fields(fields);
     fields.Section("log");
     fields.Add("level", &log_level,
                {.choices = {"trace", "debug", "info", "warning", "error", "critical", "off"},
@@ -61,10 +71,14 @@ struct Config {
 
 void PrintError(const std::string& message) { fmt::print(stderr, "romap-server: {}\n", message); }
 
-// The flags, or the exit status if the program must exit (--help, --version, invalid flags).
+std::string TokenFileOf(const std::string& data_dir) {
+  return (data_dir.empty() ? store::DefaultDataDir() : data_dir) + "/tokens.json";
+}
+
+// The flags, or the exit status if the program must exit (--help, --version, token commands, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
-  std::optional<std::string> listen_address, log_level, data_dir;
+  std::optional<std::string> listen_address, log_level, data_dir, tls_certificate, tls_key, tls_client_ca;
   bool ephemeral = false;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
@@ -76,6 +90,16 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
                  "--set store.data_dir=DIR");
   app.add_flag("--ephemeral", ephemeral,
                "Store nothing: sessions end with the server. Same as --set store.ephemeral=true");
+  app.add_option("--tls-cert", tls_certificate,
+                 "PEM file with the server's certificate. Same as --set transport.tls_certificate=FILE");
+  app.add_option("--tls-key", tls_key, "PEM file with its private key. Same as --set transport.tls_key=FILE");
+  app.add_option("--tls-client-ca", tls_client_ca,
+                 "PEM file; clients need a certificate signed by one of these. Same as --set "
+                 "transport.tls_client_ca=FILE");
+  app.add_flag("--insecure-network", flags.insecure_network,
+               "Listen beyond this machine without TLS or without tokens: whoever reaches the address can read, change "
+               "and delete every session");
+  app.add_flag("--check-config", flags.check_config, "Check flags, configuration and TLS files, and exit");
   app.add_option("--config", flags.config_file, "YAML file with settings; see deploy/server.yaml");
   app.add_option("--set", flags.assignments, "SECTION.FIELD=VALUE; overrides the file; may be repeated")
       ->allow_extra_args(false);
@@ -86,6 +110,7 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   app.add_option("--log-level", log_level, "Minimum severity of logged messages. Same as --set log.level=LEVEL");
   app.add_option("--threads", threads, "Number of training threads. Same as --set nerf.training_threads=N");
   app.set_version_flag("--version", fmt::format("romap-server {}", Version()));
+  access::TokenCommand token_command(&app, TokenFileOf);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {
@@ -94,12 +119,39 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
     PrintError(fmt::format("{} (see romap-server --help)", e.what()));
     return kUsageError;
   }
+  if (token_command.IsChosen()) return token_command.Run();
+  if (tls_certificate) flags.assignments.push_back("transport.tls_certificate=" + *tls_certificate);
+  if (tls_key) flags.assignments.push_back("transport.tls_key=" + *tls_key);
+  if (tls_client_ca) flags.assignments.push_back("transport.tls_client_ca=" + *tls_client_ca);
   if (listen_address) flags.assignments.push_back("transport.listen_address=" + *listen_address);
   if (data_dir) flags.assignments.push_back("store.data_dir=" + *data_dir);
   if (ephemeral) flags.assignments.push_back("store.ephemeral=true");
   if (log_level) flags.assignments.push_back("log.level=" + *log_level);
   if (threads) flags.assignments.push_back(fmt::format("nerf.training_threads={}", *threads));
   return flags;
+}
+
+// Sessions are not offered to a network in which everybody can take them.
+absl::Status CheckExposure(const Config& config, const std::string& token_file, bool is_allowed) {
+  const auto address = transport::ParseHostPort(config.transport.listen_address);
+  if (!address || transport::IsLoopback(*address) || is_allowed) return absl::OkStatus();
+  const bool has_tls = !config.transport.tls_certificate.empty();
+  const bool has_tokens = access::TokenStore(token_file).Exists();
+  if (has_tls && has_tokens) return absl::OkStatus();
+  return InvalidArgument(
+      "{} is reachable from other machines, but {}. Use tokens (romap-server token create) and TLS (--tls-cert, "
+      "--tls-key), listen on 127.0.0.1, or accept the risk with --insecure-network",
+      config.transport.listen_address,
+      !has_tokens ? "everybody there could read, change and delete every session, because the server has no tokens"
+                  : "tokens and images would be sent in clear text, because the server has no TLS");
+}
+
+// Every connection needs a file. 1024, a common default, is few.
+void RaiseFileLimit() {
+  rlimit files{};
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur >= files.rlim_max) return;
+  files.rlim_cur = files.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &files);
 }
 
 void SetUpLogging(const std::string& level) {
@@ -143,6 +195,23 @@ int Main(int argc, char** argv) {
     return 0;
   }
 
+  std::string token_file = config.access.token_file;
+  if (token_file.empty() && !config.store.ephemeral) token_file = TokenFileOf(config.store.data_dir);
+  if (const absl::Status status = CheckExposure(config, token_file, flags.insecure_network); !status.ok()) {
+    PrintError(Message(status));
+    return kUsageError;
+  }
+  if (flags.check_config) {
+    const absl::Status status = transport::CheckTlsFiles(config.transport);
+    if (status.ok()) {
+      fmt::print("the configuration is valid\n");
+      return 0;
+    }
+    PrintError(Message(status));
+    return ToExitCode(status);
+  }
+
+  RaiseFileLimit();
   SetUpLogging(config.log_level);
   const sigset_t signals = BlockStopSignals();
   std::unique_ptr<store::Store> store;
@@ -156,12 +225,15 @@ int Main(int argc, char** argv) {
   }
   const std::string data_dir = store ? store->path() : "";
   session::LocalMappingService service(config.server, std::move(store));
-  auto server = transport::GrpcServer::Start(&service, config.transport);
+  const access::Authenticator authenticator(&service, token_file, config.access);
+  auto server = transport::GrpcServer::Start(&authenticator, config.transport);
   if (!server.ok()) {
     PrintError(Message(server.status()));
     return absl::IsInvalidArgument(server.status()) ? kUsageError : kFailure;
   }
   spdlog::info("sessions are {}", data_dir.empty() ? "not stored" : "stored in " + data_dir);
+  spdlog::info("{}; {}", config.transport.tls_certificate.empty() ? "no TLS" : "TLS",
+               authenticator.NeedsToken() ? "calls need a token" : "calls need no token");
   fmt::print("romap-server listening on {}\n", (*server)->address());
   std::fflush(stdout);
 

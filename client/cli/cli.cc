@@ -14,6 +14,8 @@
 
 namespace romap::cli {
 int RunCli(int argc, const char* const* argv) {
+  // Otherwise gRPC prints every failed attempt to connect. See GRPC_VERBOSITY in its documentation.
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   CLI::App app{"romap: builds a map of objects from video with instance masks", "romap"};
   app.require_subcommand(1);
   app.fallthrough();  // accept --log-level after the command too

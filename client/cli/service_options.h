@@ -16,7 +16,10 @@ namespace romap::cli {
 struct ServiceOptions {
   std::string server = "127.0.0.1:50051";
   bool local = false;
-  double wait_s = 0;                  // for a server that is not there yet
+  double wait_s = 0;       // for a server that is not there yet
+  std::string token_file;  // the token for a server that wants one; also $ROMAP_TOKEN_FILE
+  bool tls = false;        // also by tls_ca
+  std::string tls_ca, tls_certificate, tls_key, tls_server_name;
   std::string config_file;            // --local only
   std::vector<std::string> settings;  // --local only
 

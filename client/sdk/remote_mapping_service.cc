@@ -2,12 +2,10 @@
 
 #include <grpcpp/channel.h>
 #include <grpcpp/client_context.h>
-#include <grpcpp/create_channel.h>
-#include <grpcpp/security/credentials.h>
-#include <grpcpp/support/channel_arguments.h>
 
 #include <utility>
 
+#include "client/sdk/internal/channel.h"
 #include "client/sdk/internal/remote_streams.h"
 #include "client/sdk/retry.h"
 #include "common/status.h"
@@ -19,23 +17,6 @@ namespace romap::client {
 namespace {
 
 using std::chrono::system_clock;
-
-grpc::ChannelArguments MakeChannelArguments(const RemoteOptions& options) {
-  constexpr int kKeepalive_ms = 20'000;
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(options.max_message_bytes);
-  arguments.SetMaxSendMessageSize(options.max_message_bytes);
-  // Detects a server that disappears without closing the connection (power or network failure).
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepalive_ms);
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // Connects quickly to a server that is still starting.
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
-  // The global pool would share reconnect backoff with other channels to the same address.
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return arguments;
-}
 
 // The context of a call with a deadline.
 struct TimedContext : grpc::ClientContext {
@@ -51,16 +32,22 @@ struct RemoteMappingService::Connection {
 
 absl::StatusOr<std::unique_ptr<RemoteMappingService>> RemoteMappingService::ConnectOnce(const std::string& host_port,
                                                                                         const RemoteOptions& options) {
-  const std::shared_ptr<grpc::Channel> channel =
-      grpc::CreateCustomChannel(host_port, grpc::InsecureChannelCredentials(), MakeChannelArguments(options));
+  ROMAP_ASSIGN_OR_RETURN(const std::shared_ptr<grpc::Channel> channel, MakeChannel(host_port, options));
   if (!channel->WaitForConnected(system_clock::now() + options.connect_timeout)) {
     return absl::UnavailableError(
-        fmt::format("cannot connect to romap-server at {0} (start it with: romap-server --listen {0})", host_port));
+        options.tls.enabled
+            ? fmt::format("cannot connect to romap-server at {} with TLS (does it run there, with TLS, and did the CA "
+                          "sign its certificate for this name?)",
+                          host_port)
+            : fmt::format("cannot connect to romap-server at {0} (start it with: romap-server --listen {0}; if it uses "
+                          "TLS: --tls or --tls-ca FILE)",
+                          host_port));
   }
   std::unique_ptr<Connection> connection(new Connection{options, v1::Mapping::NewStub(channel)});
   std::unique_ptr<RemoteMappingService> service(new RemoteMappingService(std::move(connection)));
   // A TCP connection does not prove that the peer is a romap-server.
   if (const absl::Status listed = service->ListSessions().status(); !listed.ok()) {
+    if (absl::IsUnauthenticated(listed) || absl::IsPermissionDenied(listed)) return listed;
     return absl::UnavailableError(
         fmt::format("{} accepts connections but is not a working romap-server: {}", host_port, Message(listed)));
   }
@@ -163,7 +150,7 @@ absl::Status RemoteMappingService::SaveSession(const std::string& session_id, co
   return wire::FromGrpc(finished);
 }
 
-absl::StatusOr<SessionInfo> RemoteMappingService::LoadSession(const PieceReader& read) {
+absl::StatusOr<SessionInfo> RemoteMappingService::LoadSession(const PieceReader& read, const std::string& /*tenant*/) {
   TimedContext context(connection_->options.export_timeout);
   v1::LoadSessionResponse response;
   const auto writer = connection_->stub->LoadSession(&context, &response);

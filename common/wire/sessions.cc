@@ -68,6 +68,7 @@ v1::SessionInfo ToProto(const SessionInfo& info) {
   proto.set_durable(info.durable);
   proto.set_pinned(info.pinned);
   proto.set_stored_bytes(info.stored_bytes);
+  proto.set_tenant(info.tenant);
   return proto;
 }
 
@@ -86,6 +87,7 @@ absl::StatusOr<SessionInfo> FromProto(const v1::SessionInfo& proto, const std::s
   info.durable = proto.durable();
   info.pinned = proto.pinned();
   info.stored_bytes = proto.stored_bytes();
+  info.tenant = proto.tenant();
   return info;
 }
 

@@ -54,8 +54,10 @@ find_package(TinyGLTF CONFIG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
 find_package(utf8cpp CONFIG REQUIRED)
 find_package(SQLiteCpp CONFIG REQUIRED)
+find_package(OpenSSL REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)
+pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 
 # OpenCV's headers cause warnings under C++20, so they are included as system headers.

@@ -49,19 +49,15 @@ struct ObjectsConfig {
 
  private:
   void DetectionFields(ConfigFields& fields) {
-    fields.Add("min_mask_area_px", &min_mask_area_px,
-               {.unit = "px",
-                .min = 4,
-                .max = 1e6,
-                .audience = Audience::kOperator,
-                .help = "Minimum number of pixels of a mask; smaller masks are ignored"});
+    fields.Add(
+        "min_mask_area_px", &min_mask_area_px,
+        {.unit = "px", .min = 4, .max = 1e6, .help = "Minimum number of pixels of a mask; smaller masks are ignored"});
     fields.Add("max_mask_area_share", &max_mask_area_share,
                {.min = 0.05, .max = 1, .help = "Maximum share of the image under a mask; larger masks are ignored"});
     fields.Add("max_detections", &max_detections,
                {.unit = "masks",
                 .min = 1,
                 .max = 254,
-                .audience = Audience::kOperator,
                 .help = "Maximum number of masks used per frame; beyond it, the smallest masks are ignored"});
     fields.Add("association", &association,
                {.choices = {"scored", "greedy_iou"},

@@ -330,12 +330,12 @@ absl::Status LocalMappingService::SaveSession(const std::string& session_id, con
   return store::SaveSession(*store_, session_id, write);
 }
 
-absl::StatusOr<SessionInfo> LocalMappingService::LoadSession(const PieceReader& read) {
+absl::StatusOr<SessionInfo> LocalMappingService::LoadSession(const PieceReader& read, const std::string& tenant) {
   ROMAP_RETURN_IF_ERROR(CheckStore());
   std::unique_lock lock(mutex_);
   const std::string id = NewId();
   lock.unlock();
-  ROMAP_ASSIGN_OR_RETURN(store::StoredSession stored, store::LoadSession(*store_, id, read));
+  ROMAP_ASSIGN_OR_RETURN(store::StoredSession stored, store::LoadSession(*store_, id, tenant, read));
   spdlog::info("session {}: loaded from a file, {} inputs", id, stored.inputs);
   lock.lock();
   shelf_->Add(std::move(stored));

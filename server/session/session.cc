@@ -233,6 +233,7 @@ SessionInfo Session::Info() const {
   SessionInfo info;
   info.id = id_;
   info.name = options_.name;
+  info.tenant = options_.tenant;
   info.camera = options_.camera;
   info.mode = options_.mode;
   info.state = lifecycle_.state();

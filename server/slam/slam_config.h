@@ -72,7 +72,6 @@ struct SlamConfig {
     fields.Add("object_features", &object_features,
                {.min = 0,
                 .max = 10000,
-                .audience = Audience::kOperator,
                 .help = "Maximum number of additional ORB features per frame inside the instance masks"});
     fields.Add("scene_fast_threshold", &scene_fast_threshold,
                {.unit = "gray levels", .min = 1, .max = 100, .help = "FAST corner threshold"});
@@ -118,7 +117,6 @@ struct SlamConfig {
                {.unit = "points",
                 .min = 100,
                 .max = 1e6,
-                .audience = Audience::kOperator,
                 .help = "Maximum number of map points; those observed least recently are removed above it"});
     fields.Add("min_parallax_deg", &min_parallax_deg,
                {.unit = "deg", .min = 0.1, .max = 30, .help = "Minimum angle between the rays of a new map point"});

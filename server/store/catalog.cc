@@ -14,7 +14,7 @@
 namespace romap::store {
 namespace {
 
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
 
 // Migration number i leads from schema i to schema i + 1.
 constexpr const char* kMigrations[] = {
@@ -47,7 +47,8 @@ CREATE TABLE objects(
   mesh_segment INTEGER, mesh_offset INTEGER, mesh_length INTEGER, mesh_hash BLOB,
   PRIMARY KEY(session, object)
 ) WITHOUT ROWID;
-)"};
+)",
+    "ALTER TABLE sessions ADD COLUMN tenant TEXT NOT NULL DEFAULT ''"};
 static_assert(std::size(kMigrations) == kSchemaVersion);
 
 std::string Text(const SQLite::Column& column) {
@@ -164,8 +165,8 @@ void Catalog::Rollback() {
 
 void Catalog::PutSession(const StoredSession& session) {
   static constexpr char kSql[] =
-      "INSERT INTO sessions(id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, complete) "
-      "VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)";
+      "INSERT INTO sessions(id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, complete, "
+      "tenant) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)";
   SQLite::Statement& statement = Prepared(kSql);
   statement.bind(1, session.id);
   BindBytes(statement, 2, wire::ToProto(session.options));
@@ -176,6 +177,7 @@ void Catalog::PutSession(const StoredSession& session) {
   BindBytes(statement, 7, wire::ToProto(session.statistics));
   statement.bind(8, session.pinned ? 1 : 0);
   statement.bind(9, session.complete ? 1 : 0);
+  statement.bind(10, session.options.tenant);
   Run(statement);
 }
 
@@ -280,7 +282,7 @@ std::vector<StoredSession> Catalog::Sessions() {
   SQLite::Statement statement(
       database_,
       "SELECT id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, "
-      "(SELECT count(*) FROM inputs WHERE session = id) FROM sessions WHERE complete ORDER BY created_unix_ns");
+      "(SELECT count(*) FROM inputs WHERE session = id), tenant FROM sessions WHERE complete ORDER BY created_unix_ns");
   std::vector<StoredSession> sessions;
   while (statement.executeStep()) {
     StoredSession session;
@@ -303,6 +305,7 @@ std::vector<StoredSession> Catalog::Sessions() {
       session.state = SessionState::kFailed;
       session.failure = "its stored options are damaged: " + Message(options.status());
     }
+    session.options.tenant = statement.getColumn(9).getString();
     if (counts.ok()) session.statistics = *std::move(counts);
     sessions.push_back(std::move(session));
   }

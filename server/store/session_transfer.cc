@@ -37,7 +37,7 @@ absl::Status InvalidRecord(const absl::Status& why) { return InvalidArgument("th
 // Writes the records of a file to the store.
 class SessionImport {
  public:
-  SessionImport(Store& store, const std::string& id) : store_(store) {
+  SessionImport(Store& store, const std::string& id, std::string tenant) : store_(store), tenant_(std::move(tenant)) {
     session_.id = id;
     session_.complete = false;
   }
@@ -92,6 +92,7 @@ class SessionImport {
     if (!options.ok()) return InvalidRecord(options.status());
     if (const absl::Status valid = ValidateCameraModel(options->camera); !valid.ok()) return InvalidRecord(valid);
     session_.options = *std::move(options);
+    session_.options.tenant = tenant_;
     return absl::OkStatus();
   }
 
@@ -111,6 +112,7 @@ class SessionImport {
   }
 
   Store& store_;
+  const std::string tenant_;
   StoredSession session_;
   bool created_ = false;
 };
@@ -141,9 +143,9 @@ absl::Status SaveSession(const Store& store, const std::string& session,
   return writer.Flush();
 }
 
-absl::StatusOr<StoredSession> LoadSession(Store& store, const std::string& new_id,
+absl::StatusOr<StoredSession> LoadSession(Store& store, const std::string& new_id, const std::string& tenant,
                                           const std::function<absl::StatusOr<std::string>()>& read) {
-  SessionImport import(store, new_id);
+  SessionImport import(store, new_id, tenant);
   SessionFileReader reader([&](FileRecord kind, std::string content) { return import.Add(kind, std::move(content)); });
   const auto load = [&]() -> absl::Status {
     while (true) {

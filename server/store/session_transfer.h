@@ -14,10 +14,10 @@ namespace romap::store {
 absl::Status SaveSession(const Store& store, const std::string& session,
                          const std::function<absl::Status(std::string piece)>& write);
 
-// Adds the session of a file to the store with another id. `read` returns the next piece, empty at the end. The session
-// is listed when it is complete; after an error or a crash nothing of it remains. INVALID_ARGUMENT: the file is damaged
-// or cut off, or has no session.
-absl::StatusOr<StoredSession> LoadSession(Store& store, const std::string& new_id,
+// Adds the session of a file to the store with another id, for `tenant`. `read` returns the next piece, empty at the
+// end. The session is listed when it is complete; after an error or a crash nothing of it remains. INVALID_ARGUMENT:
+// the file is damaged or cut off, or has no session.
+absl::StatusOr<StoredSession> LoadSession(Store& store, const std::string& new_id, const std::string& tenant,
                                           const std::function<absl::StatusOr<std::string>()>& read);
 
 }  // namespace romap::store

@@ -29,6 +29,7 @@ inline SessionInfo InfoOf(const StoredSession& session) {
   SessionInfo info;
   info.id = session.id;
   info.name = session.options.name;
+  info.tenant = session.options.tenant;
   info.camera = session.options.camera;
   info.mode = session.options.mode;
   info.state = session.state;

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "common/mapping_service.h"
+#include "server/access/authenticator.h"
 
 namespace romap::transport {
 
@@ -26,10 +26,12 @@ class StoppableCall {
 // gRPC's threads must not. Thread-safe.
 class CallHost {
  public:
-  CallHost(MappingService* service, int max_calls) : service_(service), max_calls_(max_calls) {}
+  // `authenticator` outlives the host.
+  CallHost(const access::Authenticator* authenticator, int max_calls)
+      : authenticator_(*authenticator), max_calls_(max_calls) {}
   ~CallHost() { JoinAll(); }
 
-  MappingService& service() const { return *service_; }
+  const access::Authenticator& authenticator() const { return authenticator_; }
 
   // Runs `body` on a new thread. StopAll() stops `call`, which may be null, until Unregister(call). RESOURCE_EXHAUSTED:
   // too many calls. After StopAll(): the status given there.
@@ -46,7 +48,7 @@ class CallHost {
 
   Threads TakeEnded();
 
-  MappingService* const service_;
+  const access::Authenticator& authenticator_;
   const size_t max_calls_;
 
   std::mutex mutex_;

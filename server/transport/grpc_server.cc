@@ -8,35 +8,27 @@
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
-#include <charconv>
 #include <chrono>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include "common/status.h"
 #include "server/transport/call_host.h"
+#include "server/transport/host_port.h"
+#include "server/transport/listener.h"
 #include "server/transport/mapping_rpcs.h"
+#include "server/transport/tls_files.h"
 
 namespace romap::transport {
 namespace {
 
 using std::chrono::system_clock;
 
-struct HostPort {
-  std::string_view host;
-  int port = 0;
-};
+// A client without calls is disconnected after this time. Its channel connects again when it makes a call.
+constexpr double kIdle_s = 60;
 
-std::optional<HostPort> SplitHostPort(std::string_view address) {
-  const size_t colon = address.rfind(':');
-  if (colon == std::string_view::npos || colon == 0) return std::nullopt;
-  const std::string_view digits = address.substr(colon + 1);
-  HostPort result{.host = address.substr(0, colon)};
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), result.port);
-  if (error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
-  if (result.port < 0 || result.port > 65535) return std::nullopt;
-  return result;
+bool UsesTls(const TransportConfig& config) {
+  return !config.tls_certificate.empty() || !config.tls_key.empty() || !config.tls_client_ca.empty();
 }
 
 int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
@@ -44,8 +36,8 @@ int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
 void Configure(grpc::ServerBuilder& builder, const TransportConfig& config) {
   builder.SetMaxReceiveMessageSize(config.max_message_bytes);
   builder.SetMaxSendMessageSize(config.max_message_bytes);
-  // Otherwise two servers could listen on one port, and clients would reach either of them at random.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, Milliseconds(config.handshake_timeout_s));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, Milliseconds(kIdle_s));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(config.keepalive_s));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(config.keepalive_s));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -57,29 +49,40 @@ void Configure(grpc::ServerBuilder& builder, const TransportConfig& config) {
 
 class GrpcServer::Impl {
  public:
-  Impl(MappingService* service, const TransportConfig& config)
-      : config_(config), host_(service, config.max_calls), rpcs_(&host_) {}
+  Impl(const access::Authenticator* authenticator, const TransportConfig& config)
+      : config_(config), host_(authenticator, config.max_calls), rpcs_(&host_, FirstRequestTimeout()) {}
+  Impl(std::unique_ptr<access::Authenticator> authenticator, const TransportConfig& config)
+      : own_authenticator_(std::move(authenticator)),
+        config_(config),
+        host_(own_authenticator_.get(), config.max_calls),
+        rpcs_(&host_, FirstRequestTimeout()) {}
 
   absl::Status Start() {
-    const std::optional<HostPort> host_port = SplitHostPort(config_.listen_address);
-    if (!host_port) {
+    const std::optional<HostPort> address = ParseHostPort(config_.listen_address);
+    if (!address) {
       return InvalidArgument("transport.listen_address: must be HOST:PORT, e.g. 127.0.0.1:50051, is '{}'",
                              config_.listen_address);
     }
+    ROMAP_ASSIGN_OR_RETURN(const auto credentials, MakeCredentials());
+    ROMAP_ASSIGN_OR_RETURN(listener_, Listener::Open(*address));
     // Both are process-wide settings that must be set before the first server is built.
     grpc::EnableDefaultHealthCheckService(true);
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    if (config_.reflection && IsLoopback(*address)) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
 
     grpc::ServerBuilder builder;
     Configure(builder, config_);
-    builder.AddListeningPort(config_.listen_address, grpc::InsecureServerCredentials(), &port_);
+    using FromListener = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+    acceptor_ = builder.experimental().AddExternalConnectionAcceptor(FromListener::FROM_FD, credentials);
     builder.RegisterService(&rpcs_);
     server_ = builder.BuildAndStart();
-    if (!server_ || port_ == 0) {
-      return absl::UnavailableError(
-          fmt::format("cannot listen on {}: the address is in use or not available", config_.listen_address));
-    }
-    address_ = fmt::format("{}:{}", host_port->host, port_);
+    if (!server_) return absl::UnavailableError("gRPC cannot start a server");
+    address_ = fmt::format("{}:{}", address->host, listener_->port());
+    listener_->Start(WithinFileLimit({.total = config_.max_connections, .per_peer = config_.max_connections_per_peer}),
+                     [this](int fd) {
+                       grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+                       connection.fd = fd;
+                       acceptor_->HandleNewConnection(&connection);
+                     });
     SetServing(true);
     return absl::OkStatus();
   }
@@ -87,32 +90,54 @@ class GrpcServer::Impl {
   void Shutdown() {
     if (!server_) return;
     SetServing(false);
+    listener_->Stop();
     host_.StopAll(absl::UnavailableError("the server is shutting down"));
     server_->Shutdown(system_clock::now() + std::chrono::milliseconds(Milliseconds(config_.shutdown_grace_s)));
     host_.JoinAll();
     server_.reset();
   }
 
-  int port() const { return port_; }
+  int port() const { return listener_->port(); }
   const std::string& address() const { return address_; }
 
  private:
+  std::chrono::milliseconds FirstRequestTimeout() const {
+    return std::chrono::milliseconds(Milliseconds(config_.handshake_timeout_s));
+  }
+
+  absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> MakeCredentials() {
+    if (!UsesTls(config_)) return grpc::InsecureServerCredentials();
+    ROMAP_ASSIGN_OR_RETURN(tls_, TlsFiles::Load(config_));
+    return tls_->Credentials();
+  }
+
   void SetServing(bool serving) {
     grpc::HealthCheckServiceInterface* health = server_->GetHealthCheckService();
     health->SetServingStatus(serving);
     health->SetServingStatus(v1::Mapping::service_full_name(), serving);
   }
 
+  const std::unique_ptr<access::Authenticator> own_authenticator_;  // null: somebody else's is used
   const TransportConfig config_;
-  transport::CallHost host_;
-  transport::MappingRpcs rpcs_;
+  CallHost host_;
+  MappingRpcs rpcs_;
+  std::unique_ptr<TlsFiles> tls_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> server_;
-  int port_ = 0;
+  std::unique_ptr<Listener> listener_;  // its thread uses the acceptor
   std::string address_;
 };
 
 absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(MappingService* service, const TransportConfig& config) {
-  auto impl = std::make_unique<Impl>(service, config);
+  auto everybody = std::make_unique<access::Authenticator>(service, /*token_file=*/"", access::AccessConfig{});
+  auto impl = std::make_unique<Impl>(std::move(everybody), config);
+  ROMAP_RETURN_IF_ERROR(impl->Start());
+  return std::unique_ptr<GrpcServer>(new GrpcServer(std::move(impl)));
+}
+
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(const access::Authenticator* authenticator,
+                                                              const TransportConfig& config) {
+  auto impl = std::make_unique<Impl>(authenticator, config);
   ROMAP_RETURN_IF_ERROR(impl->Start());
   return std::unique_ptr<GrpcServer>(new GrpcServer(std::move(impl)));
 }
@@ -123,6 +148,11 @@ GrpcServer::~GrpcServer() { Shutdown(); }
 int GrpcServer::port() const { return impl_->port(); }
 const std::string& GrpcServer::address() const { return impl_->address(); }
 void GrpcServer::Shutdown() { impl_->Shutdown(); }
+
+absl::Status CheckTlsFiles(const TransportConfig& config) {
+  if (!UsesTls(config)) return absl::OkStatus();
+  return TlsFiles::Load(config).status();
+}
 
 void RouteGrpcLogToSpdlog() {
   gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });

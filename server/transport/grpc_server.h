@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/mapping_service.h"
+#include "server/access/authenticator.h"
 #include "server/transport/transport_config.h"
 
 namespace romap::transport {
@@ -14,9 +15,14 @@ namespace romap::transport {
 // "romap.v1.Mapping") and server reflection. Calls the service from many threads.
 class GrpcServer {
  public:
-  // `service` outlives the server. INVALID_ARGUMENT: listen_address is not HOST:PORT. UNAVAILABLE: cannot listen there,
+  // `service` outlives the server. INVALID_ARGUMENT: listen_address is not HOST:PORT, or a TLS file is not what it must
+  // be. Otherwise as FileError() for a TLS file. UNAVAILABLE: cannot listen there,
   // e.g. because another process does.
+  // Everybody may do everything.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(MappingService* service, const TransportConfig& config);
+  // Every call is made by the caller that the authenticator finds. It outlives the server.
+  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(const access::Authenticator* authenticator,
+                                                           const TransportConfig& config);
 
   ~GrpcServer();  // Shutdown()
 
@@ -33,6 +39,9 @@ class GrpcServer {
 
   std::unique_ptr<Impl> impl_;
 };
+
+// Whether the TLS files of the configuration can be used; OK if it has none. Errors as GrpcServer::Start().
+absl::Status CheckTlsFiles(const TransportConfig& config);
 
 // Redirects gRPC's log from stderr to spdlog at debug level, for the whole process.
 void RouteGrpcLogToSpdlog();

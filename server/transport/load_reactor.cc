@@ -9,6 +9,7 @@
 namespace romap::transport {
 
 void LoadReactor::Start() {
+  if (!caller_.ok()) return Finish(wire::ToGrpc(caller_.status()));
   const absl::Status launched = host_->Launch(this, [this] {
     const absl::Status status = Guarded([this] { return Run(); });
     // gRPC may delete this object after Finish().
@@ -29,7 +30,7 @@ void LoadReactor::RequestStop(const absl::Status& reason) {
 }
 
 absl::Status LoadReactor::Run() {
-  ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().LoadSession([this] { return NextPiece(); }));
+  ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, caller_->service->LoadSession([this] { return NextPiece(); }));
   *response_->mutable_session() = wire::ToProto(info);
   return absl::OkStatus();
 }

@@ -13,7 +13,8 @@ namespace romap::transport {
 class LoadReactor : public grpc::ServerReadReactor<v1::LoadSessionRequest>, public StoppableCall {
  public:
   // gRPC keeps `response` until the call ends.
-  LoadReactor(CallHost* host, v1::LoadSessionResponse* response) : host_(host), response_(response) {}
+  LoadReactor(CallHost* host, absl::StatusOr<access::Caller> caller, v1::LoadSessionResponse* response)
+      : host_(host), caller_(std::move(caller)), response_(response) {}
 
   // Call once, after construction.
   void Start();
@@ -28,6 +29,7 @@ class LoadReactor : public grpc::ServerReadReactor<v1::LoadSessionRequest>, publ
   absl::StatusOr<std::string> NextPiece();
 
   CallHost* const host_;
+  const absl::StatusOr<access::Caller> caller_;  // an error ends the call
   v1::LoadSessionResponse* const response_;
   v1::LoadSessionRequest request_;
   Completion read_;

@@ -11,9 +11,7 @@
 namespace romap::transport {
 
 absl::Status MapReactor::Run() {
-  if (!Read().value_or(false) || !request_.has_start()) {
-    return InvalidArgument("map: first request must be `start`");
-  }
+  ROMAP_RETURN_IF_ERROR(ReadStart());
   const std::string session_id = request_.start().session_id();
   ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MapStream> stream,
                          service().OpenMap(session_id, request_.start().resume_token()));
@@ -26,6 +24,17 @@ absl::Status MapReactor::Run() {
   pump.join();
   // The call must not end earlier: the session accepts another stream only from here on.
   return status;
+}
+
+absl::Status MapReactor::ReadStart() {
+  StartRead(&request_);
+  const std::optional<bool> read = read_.WaitFor(first_request_timeout_);
+  if (!read && !stopping()) {
+    return absl::DeadlineExceededError(
+        fmt::format("map: the first request, `start`, did not come within {} ms", first_request_timeout_.count()));
+  }
+  if (read.value_or(false) && request_.has_start()) return absl::OkStatus();
+  return InvalidArgument("map: first request must be `start`");
 }
 
 void MapReactor::PumpRequests(MapStream& stream) {

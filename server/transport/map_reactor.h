@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <optional>
+#include <utility>
 
 #include "common/mapping_service.h"
 #include "romap/v1/mapping.grpc.pb.h"
@@ -13,7 +15,8 @@ namespace romap::transport {
 // session cannot keep up.
 class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>, v1::MapResponse> {
  public:
-  using StreamReactor::StreamReactor;
+  MapReactor(CallHost* host, absl::StatusOr<access::Caller> caller, std::chrono::milliseconds first_request_timeout)
+      : StreamReactor(host, std::move(caller)), first_request_timeout_(first_request_timeout) {}
 
   void OnReadDone(bool ok) override { read_.Complete(ok); }
 
@@ -21,6 +24,7 @@ class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, 
   absl::Status Run() override;
   void OnStop() override { read_.Abandon(); }
 
+  absl::Status ReadStart();
   // Waits for the next request and stores it in request_. False: the client has closed its side. nullopt: the call is
   // being stopped.
   std::optional<bool> Read();
@@ -32,6 +36,7 @@ class MapReactor : public StreamReactor<grpc::ServerBidiReactor<v1::MapRequest, 
   absl::Status HandleMasks(MapStream& stream);
   void WriteEvent(MapEvent event);
 
+  const std::chrono::milliseconds first_request_timeout_;
   Completion read_;
   v1::MapRequest request_;
 };

@@ -16,7 +16,8 @@ namespace {
 
 class WatchReactor : public StreamReactor<grpc::ServerWriteReactor<v1::WatchResponse>, v1::WatchResponse> {
  public:
-  WatchReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+  WatchReactor(CallHost* host, absl::StatusOr<access::Caller> caller, std::string session_id)
+      : StreamReactor(host, std::move(caller)), session_id_(std::move(session_id)) {}
 
  private:
   absl::Status Run() override {
@@ -29,7 +30,8 @@ class WatchReactor : public StreamReactor<grpc::ServerWriteReactor<v1::WatchResp
 
 class ExportReactor : public StreamReactor<grpc::ServerWriteReactor<v1::ExportMapResponse>, v1::ExportMapResponse> {
  public:
-  ExportReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+  ExportReactor(CallHost* host, absl::StatusOr<access::Caller> caller, std::string session_id)
+      : StreamReactor(host, std::move(caller)), session_id_(std::move(session_id)) {}
 
  private:
   absl::Status Run() override {
@@ -45,7 +47,8 @@ class ExportReactor : public StreamReactor<grpc::ServerWriteReactor<v1::ExportMa
 
 class SaveReactor : public StreamReactor<grpc::ServerWriteReactor<v1::SaveSessionResponse>, v1::SaveSessionResponse> {
  public:
-  SaveReactor(CallHost* host, std::string session_id) : StreamReactor(host), session_id_(std::move(session_id)) {}
+  SaveReactor(CallHost* host, absl::StatusOr<access::Caller> caller, std::string session_id)
+      : StreamReactor(host, std::move(caller)), session_id_(std::move(session_id)) {}
 
  private:
   absl::Status Run() override {
@@ -60,6 +63,11 @@ class SaveReactor : public StreamReactor<grpc::ServerWriteReactor<v1::SaveSessio
   const std::string session_id_;
 };
 
+std::string AuthorizationOf(const grpc::CallbackServerContext& context) {
+  const auto found = context.client_metadata().find("authorization");
+  return found == context.client_metadata().end() ? "" : std::string(found->second.data(), found->second.size());
+}
+
 template <class StreamReactor>
 StreamReactor* Started(StreamReactor* reactor) {
   reactor->Start();
@@ -68,10 +76,21 @@ StreamReactor* Started(StreamReactor* reactor) {
 
 }  // namespace
 
-grpc::ServerUnaryReactor* MappingRpcs::Run(grpc::CallbackServerContext* context, std::function<absl::Status()> body) {
+absl::StatusOr<access::Caller> MappingRpcs::CallerOf(const grpc::CallbackServerContext& context) const {
+  return host_->authenticator().Authenticate(AuthorizationOf(context));
+}
+
+grpc::ServerUnaryReactor* MappingRpcs::Run(grpc::CallbackServerContext* context,
+                                           std::function<absl::Status(MappingService& service)> body) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::Status launched =
-      host_->Launch(nullptr, [reactor, body = std::move(body)] { reactor->Finish(wire::ToGrpc(Guarded(body))); });
+  const absl::StatusOr<access::Caller> caller = CallerOf(*context);
+  if (!caller.ok()) {
+    reactor->Finish(wire::ToGrpc(caller.status()));
+    return reactor;
+  }
+  const absl::Status launched = host_->Launch(nullptr, [reactor, service = caller->service, body = std::move(body)] {
+    reactor->Finish(wire::ToGrpc(Guarded([&] { return body(*service); })));
+  });
   if (!launched.ok()) reactor->Finish(wire::ToGrpc(launched));
   return reactor;
 }
@@ -79,9 +98,9 @@ grpc::ServerUnaryReactor* MappingRpcs::Run(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* MappingRpcs::CreateSession(grpc::CallbackServerContext* context,
                                                      const v1::CreateSessionRequest* request,
                                                      v1::CreateSessionResponse* response) {
-  return Run(context, [=, this]() -> absl::Status {
+  return Run(context, [=](MappingService& service) -> absl::Status {
     ROMAP_ASSIGN_OR_RETURN(const SessionOptions options, wire::FromProto(*request));
-    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().CreateSession(options));
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service.CreateSession(options));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
   });
@@ -90,8 +109,8 @@ grpc::ServerUnaryReactor* MappingRpcs::CreateSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* MappingRpcs::ListSessions(grpc::CallbackServerContext* context,
                                                     const v1::ListSessionsRequest* /*request*/,
                                                     v1::ListSessionsResponse* response) {
-  return Run(context, [=, this]() -> absl::Status {
-    ROMAP_ASSIGN_OR_RETURN(const std::vector<SessionInfo> infos, host_->service().ListSessions());
+  return Run(context, [=](MappingService& service) -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const std::vector<SessionInfo> infos, service.ListSessions());
     for (const SessionInfo& info : infos) *response->add_sessions() = wire::ToProto(info);
     return absl::OkStatus();
   });
@@ -100,8 +119,8 @@ grpc::ServerUnaryReactor* MappingRpcs::ListSessions(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* MappingRpcs::GetSession(grpc::CallbackServerContext* context,
                                                   const v1::GetSessionRequest* request,
                                                   v1::GetSessionResponse* response) {
-  return Run(context, [=, this]() -> absl::Status {
-    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().GetSession(request->session_id()));
+  return Run(context, [=](MappingService& service) -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service.GetSession(request->session_id()));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
   });
@@ -110,8 +129,8 @@ grpc::ServerUnaryReactor* MappingRpcs::GetSession(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* MappingRpcs::FinishSession(grpc::CallbackServerContext* context,
                                                      const v1::FinishSessionRequest* request,
                                                      v1::FinishSessionResponse* response) {
-  return Run(context, [=, this]() -> absl::Status {
-    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, host_->service().FinishSession(request->session_id()));
+  return Run(context, [=](MappingService& service) -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service.FinishSession(request->session_id()));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
   });
@@ -120,39 +139,38 @@ grpc::ServerUnaryReactor* MappingRpcs::FinishSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* MappingRpcs::DeleteSession(grpc::CallbackServerContext* context,
                                                      const v1::DeleteSessionRequest* request,
                                                      v1::DeleteSessionResponse* /*response*/) {
-  return Run(context, [=, this] { return host_->service().DeleteSession(request->session_id()); });
+  return Run(context, [=](MappingService& service) { return service.DeleteSession(request->session_id()); });
 }
 
-grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>* MappingRpcs::Map(grpc::CallbackServerContext* /*context*/) {
-  return Started(new MapReactor(host_));
+grpc::ServerBidiReactor<v1::MapRequest, v1::MapResponse>* MappingRpcs::Map(grpc::CallbackServerContext* context) {
+  return Started(new MapReactor(host_, CallerOf(*context), first_request_timeout_));
 }
 
-grpc::ServerWriteReactor<v1::WatchResponse>* MappingRpcs::Watch(grpc::CallbackServerContext* /*context*/,
+grpc::ServerWriteReactor<v1::WatchResponse>* MappingRpcs::Watch(grpc::CallbackServerContext* context,
                                                                 const v1::WatchRequest* request) {
-  return Started(new WatchReactor(host_, request->session_id()));
+  return Started(new WatchReactor(host_, CallerOf(*context), request->session_id()));
 }
 
-grpc::ServerWriteReactor<v1::ExportMapResponse>* MappingRpcs::ExportMap(grpc::CallbackServerContext* /*context*/,
+grpc::ServerWriteReactor<v1::ExportMapResponse>* MappingRpcs::ExportMap(grpc::CallbackServerContext* context,
                                                                         const v1::ExportMapRequest* request) {
-  return Started(new ExportReactor(host_, request->session_id()));
+  return Started(new ExportReactor(host_, CallerOf(*context), request->session_id()));
 }
 
-grpc::ServerWriteReactor<v1::SaveSessionResponse>* MappingRpcs::SaveSession(grpc::CallbackServerContext* /*context*/,
+grpc::ServerWriteReactor<v1::SaveSessionResponse>* MappingRpcs::SaveSession(grpc::CallbackServerContext* context,
                                                                             const v1::SaveSessionRequest* request) {
-  return Started(new SaveReactor(host_, request->session_id()));
+  return Started(new SaveReactor(host_, CallerOf(*context), request->session_id()));
 }
 
-grpc::ServerReadReactor<v1::LoadSessionRequest>* MappingRpcs::LoadSession(grpc::CallbackServerContext* /*context*/,
+grpc::ServerReadReactor<v1::LoadSessionRequest>* MappingRpcs::LoadSession(grpc::CallbackServerContext* context,
                                                                           v1::LoadSessionResponse* response) {
-  return Started(new LoadReactor(host_, response));
+  return Started(new LoadReactor(host_, CallerOf(*context), response));
 }
 
 grpc::ServerUnaryReactor* MappingRpcs::PinSession(grpc::CallbackServerContext* context,
                                                   const v1::PinSessionRequest* request,
                                                   v1::PinSessionResponse* response) {
-  return Run(context, [=, this]() -> absl::Status {
-    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info,
-                           host_->service().PinSession(request->session_id(), request->pinned()));
+  return Run(context, [=](MappingService& service) -> absl::Status {
+    ROMAP_ASSIGN_OR_RETURN(const SessionInfo info, service.PinSession(request->session_id(), request->pinned()));
     *response->mutable_session() = wire::ToProto(info);
     return absl::OkStatus();
   });

@@ -2,6 +2,7 @@
 
 #include <absl/status/status.h>
 
+#include <chrono>
 #include <functional>
 
 #include "romap/v1/mapping.grpc.pb.h"
@@ -9,10 +10,13 @@
 
 namespace romap::transport {
 
-// The gRPC service. Every handler converts the request, calls the MappingService, and converts the result.
+// The gRPC service. Every handler converts the request, calls the MappingService of the caller, and converts the
+// result.
 class MappingRpcs : public v1::Mapping::CallbackService {
  public:
-  explicit MappingRpcs(CallHost* host) : host_(host) {}
+  // `first_request_timeout`: of a Map call; otherwise calls that never begin could take all threads.
+  MappingRpcs(CallHost* host, std::chrono::milliseconds first_request_timeout)
+      : host_(host), first_request_timeout_(first_request_timeout) {}
 
   grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context, const v1::CreateSessionRequest* request,
                                           v1::CreateSessionResponse* response) override;
@@ -37,11 +41,14 @@ class MappingRpcs : public v1::Mapping::CallbackService {
                                        v1::PinSessionResponse* response) override;
 
  private:
-  // Runs `body` on its own thread and finishes the call with the status that it returns. gRPC keeps request and
-  // response until then.
-  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context, std::function<absl::Status()> body);
+  absl::StatusOr<access::Caller> CallerOf(const grpc::CallbackServerContext& context) const;
+  // Runs `body` on its own thread, with the service as the caller sees it, and finishes the call with the status that
+  // it returns. gRPC keeps request and response until then.
+  grpc::ServerUnaryReactor* Run(grpc::CallbackServerContext* context,
+                                std::function<absl::Status(MappingService& service)> body);
 
   CallHost* const host_;
+  const std::chrono::milliseconds first_request_timeout_;
 };
 
 }  // namespace romap::transport

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -31,6 +33,12 @@ class Completion {
     changed_.wait(lock, [&] { return abandoned_ || result_.has_value(); });
     return abandoned_ ? std::nullopt : std::exchange(result_, std::nullopt);
   }
+  // The same, but nullopt after `timeout` too.
+  std::optional<bool> WaitFor(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, timeout, [&] { return abandoned_ || result_.has_value(); });
+    return abandoned_ ? std::nullopt : std::exchange(result_, std::nullopt);
+  }
   // Ends the current Wait() and all later ones.
   void Abandon() {
     std::lock_guard lock(mutex_);
@@ -51,10 +59,12 @@ class Completion {
 template <class Reactor, class Response>
 class StreamReactor : public Reactor, public StoppableCall {
  public:
-  explicit StreamReactor(CallHost* host) : host_(host) {}
+  // `caller`: an error ends the call.
+  StreamReactor(CallHost* host, absl::StatusOr<access::Caller> caller) : host_(host), caller_(std::move(caller)) {}
 
   // Call once, after construction.
   void Start() {
+    if (!caller_.ok()) return this->Finish(wire::ToGrpc(caller_.status()));
     const absl::Status launched = host_->Launch(this, [this] {
       absl::Status status = Guarded([this] { return Run(); });
       // gRPC may delete this object after Finish().
@@ -85,7 +95,7 @@ class StreamReactor : public Reactor, public StoppableCall {
   // Ends waits that EventStream::Cancel() does not end. Must not block.
   virtual void OnStop() {}
 
-  MappingService& service() const { return host_->service(); }
+  MappingService& service() const { return *caller_->service; }
 
   bool stopping() {
     std::lock_guard lock(mutex_);
@@ -107,7 +117,12 @@ class StreamReactor : public Reactor, public StoppableCall {
     Response opened;
     *opened.mutable_opened() = wire::ToProto(session_id, events.opening());
     bool writable = Write(opened);
+    auto next_check = std::chrono::steady_clock::now() + kCheckPeriod;
     while (writable && !stopping()) {
+      if (std::chrono::steady_clock::now() > next_check) {
+        next_check += kCheckPeriod;
+        if (!caller_->is_valid()) RequestStop(absl::UnauthenticatedError("the token is not valid any longer"));
+      }
       std::optional<MapEvent> event = events.Next(kLongWait);
       if (event) {
         Response response;
@@ -137,7 +152,10 @@ class StreamReactor : public Reactor, public StoppableCall {
     return stop_reason_.value_or(std::move(status));
   }
 
+  static constexpr std::chrono::seconds kCheckPeriod{2};  // of the caller's token
+
   CallHost* const host_;
+  const absl::StatusOr<access::Caller> caller_;
   std::mutex write_mutex_;
   Completion write_;
 

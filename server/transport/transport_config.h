@@ -10,6 +10,11 @@ struct TransportConfig {
   std::string listen_address = "127.0.0.1:50051";
   int max_message_bytes = 32 << 20;
   int max_calls = 256;
+  int max_connections = 512;
+  int max_connections_per_peer = 256;
+  std::string tls_certificate, tls_key, tls_client_ca;
+  bool reflection = true;
+  double handshake_timeout_s = 10;
   double keepalive_s = 20;
   double shutdown_grace_s = 2;
 
@@ -28,6 +33,32 @@ struct TransportConfig {
                 .max = 4096,
                 .audience = Audience::kOperator,
                 .help = "Maximum number of simultaneous calls and streams; each one uses a thread"});
+    fields.Add("max_connections", &max_connections,
+               {.unit = "connections",
+                .min = 1,
+                .max = 65536,
+                .help = "Maximum number of connections; fewer if the process may not open that many files"});
+    fields.Add(
+        "max_connections_per_peer", &max_connections_per_peer,
+        {.unit = "connections", .min = 1, .max = 65536, .help = "Maximum number of connections from one address"});
+    fields.Add("tls_certificate", &tls_certificate,
+               {.audience = Audience::kOperator,
+                .help = "PEM file with the certificate of the server and those that signed it; empty = no TLS. The "
+                        "three files are read again when they change"});
+    fields.Add("tls_key", &tls_key,
+               {.audience = Audience::kOperator, .help = "PEM file with the private key of the certificate"});
+    fields.Add("tls_client_ca", &tls_client_ca,
+               {.audience = Audience::kOperator,
+                .help = "PEM file with the certificates that must have signed those of the clients; empty = clients "
+                        "need no certificate"});
+    fields.Add("reflection", &reflection,
+               {.help = "Let clients list the calls of the service (gRPC server reflection); only on loopback "
+                        "addresses"});
+    fields.Add("handshake_timeout_s", &handshake_timeout_s,
+               {.unit = "s",
+                .min = 0.1,
+                .max = 600,
+                .help = "Time in which a new connection must be ready for calls, and a Map call must begin"});
     fields.Add("keepalive_s", &keepalive_s,
                {.unit = "s",
                 .min = 1,

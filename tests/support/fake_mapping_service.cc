@@ -335,6 +335,7 @@ absl::StatusOr<SessionInfo> FakeMappingService::CreateSession(const SessionOptio
   SessionInfo info;
   info.id = fmt::format("fake-{}", ++sessions_created_);
   info.name = options.name;
+  info.tenant = options.tenant;
   info.camera = options.camera;
   info.mode = options.mode;
   info.created_unix_ns = static_cast<int64_t>(sessions_created_);
@@ -423,7 +424,10 @@ absl::Status FakeMappingService::SaveSession(const std::string& session_id, cons
   return StoresNothing();
 }
 
-absl::StatusOr<SessionInfo> FakeMappingService::LoadSession(const PieceReader& /*read*/) { return StoresNothing(); }
+absl::StatusOr<SessionInfo> FakeMappingService::LoadSession(const PieceReader& /*read*/,
+                                                            const std::string& /*tenant*/) {
+  return StoresNothing();
+}
 
 absl::StatusOr<SessionInfo> FakeMappingService::PinSession(const std::string& session_id, bool /*pinned*/) {
   ROMAP_RETURN_IF_ERROR(Find(session_id).status());

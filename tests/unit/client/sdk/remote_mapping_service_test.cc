@@ -50,8 +50,9 @@ TEST_F(RemoteMappingServiceTest, ConnectWithoutServerReportsHowToStartIt) {
   server_->Shutdown();
   const auto client = RemoteMappingService::Connect(address, {.connect_timeout = std::chrono::milliseconds(200)});
   EXPECT_CODE(client.status(), StatusCode::kUnavailable);
-  EXPECT_EQ(Message(client.status()),
-            "cannot connect to romap-server at " + address + " (start it with: romap-server --listen " + address + ")");
+  EXPECT_EQ(Message(client.status()), "cannot connect to romap-server at " + address +
+                                          " (start it with: romap-server --listen " + address +
+                                          "; if it uses TLS: --tls or --tls-ca FILE)");
 }
 
 TEST_F(RemoteMappingServiceTest, ConnectRejectsAServerThatIsNotRomap) {

@@ -59,7 +59,7 @@ class SessionTransferTest : public ::testing::Test {
   // In pieces of `bytes`.
   absl::StatusOr<StoredSession> Load(const std::string& file, size_t bytes = 1000) {
     size_t begin = 0;
-    return LoadSession(*store_, "b", [&]() -> absl::StatusOr<std::string> {
+    return LoadSession(*store_, "b", "lab", [&]() -> absl::StatusOr<std::string> {
       const std::string piece = file.substr(std::min(begin, file.size()), bytes);
       begin += bytes;
       return piece;
@@ -119,7 +119,7 @@ TEST_F(SessionTransferTest, NothingRemainsOfAFileThatIsCutOffOrDamaged) {
 }
 
 TEST_F(SessionTransferTest, AnErrorOfTheReaderIsReturned) {
-  EXPECT_EQ(LoadSession(*store_, "b", [] { return absl::CancelledError("gone"); }).status().code(),
+  EXPECT_EQ(LoadSession(*store_, "b", "lab", [] { return absl::CancelledError("gone"); }).status().code(),
             absl::StatusCode::kCancelled);
 }
 

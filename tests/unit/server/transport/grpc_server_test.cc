@@ -58,8 +58,8 @@ TEST_F(GrpcServerTest, SecondServerOnThePortIsUnavailable) {
   config.listen_address = server_->address();
   const auto second = GrpcServer::Start(&fake_, config);
   EXPECT_CODE(second.status(), StatusCode::kUnavailable);
-  EXPECT_EQ(Message(second.status()),
-            "cannot listen on " + server_->address() + ": the address is in use or not available");
+  EXPECT_EQ(Message(second.status()), "cannot listen on " + server_->address() +
+                                          ": the address is in use or not available (Address already in use)");
   EXPECT_OK(client_->ListSessions().status());
 }
 

@@ -21,13 +21,14 @@ using testing_support::MakeFrame;
 
 class MapReactorTest : public ::testing::Test {
  protected:
-  MapReactorTest() {
-    TransportConfig config;
+  MapReactorTest() { Start({}); }
+  void Start(TransportConfig config) {
     config.listen_address = "127.0.0.1:0";
     server_ = GrpcServer::Start(&fake_, config).value();
     stub_ = v1::Mapping::NewStub(grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
     session_ = fake_.CreateSession({.name = "", .camera = testing_support::SmallCamera()})->id;
-    call_ = stub_->Map(&context_);
+    contexts_.push_back(std::make_unique<grpc::ClientContext>());
+    call_ = stub_->Map(contexts_.back().get());
   }
 
   bool WriteStart() {
@@ -59,7 +60,7 @@ class MapReactorTest : public ::testing::Test {
   std::unique_ptr<GrpcServer> server_;
   std::unique_ptr<v1::Mapping::Stub> stub_;
   std::string session_;
-  grpc::ClientContext context_;
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts_;  // of all calls; calls must end first
   std::unique_ptr<grpc::ClientReaderWriter<v1::MapRequest, v1::MapResponse>> call_;
 };
 
@@ -70,6 +71,18 @@ TEST_F(MapReactorTest, FirstResponseIsOpened) {
   EXPECT_EQ(response.opened().session_id(), session_);
   call_->WritesDone();
   EXPECT_TRUE(Finish().ok());
+}
+
+// Otherwise such calls could take all threads of the server.
+TEST_F(MapReactorTest, ACallThatNeverStartsIsEnded) {
+  contexts_.back()->TryCancel();
+  Finish();
+  TransportConfig impatient;
+  impatient.handshake_timeout_s = 0.2;
+  Start(impatient);
+  const grpc::Status status = Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_EQ(status.error_message(), "map: the first request, `start`, did not come within 200 ms");
 }
 
 TEST_F(MapReactorTest, FrameBeforeStartIsRejected) {
