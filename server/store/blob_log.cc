@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
@@ -126,15 +127,21 @@ absl::Status BlobLog::Sync() {
 
 void BlobLog::Discard() { pending_.clear(); }
 
-void BlobLog::RemoveSegmentsBefore(const std::string& folder, uint32_t segment) {
+std::set<uint32_t> BlobLog::Segments(const std::string& folder) {
+  std::set<uint32_t> segments;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    uint32_t segment = 0;
     const std::string name = entry.path().filename();
-    // Names have six digits, so that their order is that of the numbers.
-    if (name.ends_with(".seg") && name < fmt::format("{:06}.seg", segment)) {
-      std::filesystem::remove(entry.path(), error);
-    }
+    std::from_chars(name.data(), name.data() + name.size(), segment);
+    if (entry.path() == SegmentPath(folder, segment)) segments.insert(segment);
   }
+  return segments;
+}
+
+void BlobLog::RemoveSegments(const std::string& folder, const std::set<uint32_t>& segments) {
+  std::error_code error;
+  for (const uint32_t segment : segments) std::filesystem::remove(SegmentPath(folder, segment), error);
 }
 
 absl::StatusOr<std::string> BlobLog::Read(const std::string& folder, const BlobRef& blob) {

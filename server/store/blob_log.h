@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -40,8 +41,10 @@ class BlobLog {
   bool HasPending() const { return !pending_.empty(); }
   size_t pending_bytes() const { return pending_.size(); }
   uint32_t segment() const { return segment_; }
-  // Removes the segments before `segment`. Those that cannot be removed are left.
-  static void RemoveSegmentsBefore(const std::string& folder, uint32_t segment);
+  // Of the segments that exist.
+  static std::set<uint32_t> Segments(const std::string& folder);
+  // Those that cannot be removed are left.
+  static void RemoveSegments(const std::string& folder, const std::set<uint32_t>& segments);
 
   // NOT_FOUND etc. as FileError(). DATA_LOSS: the content is not what was written.
   static absl::StatusOr<std::string> Read(const std::string& folder, const BlobRef& blob);

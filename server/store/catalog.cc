@@ -163,6 +163,8 @@ void Catalog::Rollback() {
   if (sqlite3_get_autocommit(database_.getHandle()) == 0) database_.exec("ROLLBACK");
 }
 
+void Catalog::Synchronize() { database_.execAndGet("PRAGMA wal_checkpoint(FULL)"); }
+
 void Catalog::PutSession(const StoredSession& session) {
   static constexpr char kSql[] =
       "INSERT INTO sessions(id, options, created_unix_ns, used_unix_ns, state, failure, statistics, pinned, complete, "
@@ -342,6 +344,18 @@ std::vector<Catalog::StoredBlob> Catalog::Blobs(const std::string& session) {
   add(StoredBlob::Kind::kTrajectory,
       "SELECT 0, trajectory_segment, trajectory_offset, trajectory_length, trajectory_hash FROM sessions WHERE id = ?");
   return blobs;
+}
+
+std::set<uint32_t> Catalog::Segments(const std::string& session) {
+  SQLite::Statement statement(
+      database_,
+      "SELECT DISTINCT segment FROM inputs WHERE session = ?1 "
+      "UNION SELECT mesh_segment FROM objects WHERE session = ?1 AND mesh_segment NOT NULL "
+      "UNION SELECT trajectory_segment FROM sessions WHERE id = ?1 AND trajectory_segment NOT NULL");
+  statement.bind(1, session);
+  std::set<uint32_t> segments;
+  while (statement.executeStep()) segments.insert(static_cast<uint32_t>(statement.getColumn(0).getInt64()));
+  return segments;
 }
 
 void Catalog::MoveBlob(const std::string& session, const StoredBlob& moved) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,8 @@ class Catalog {
   void Begin();
   void Commit();
   void Rollback();
+  // Waits until the disk has what can be read, also commits of a process that was killed while it waited for the disk.
+  void Synchronize();
 
   // ------------------------------------------------------------------------------------------------------- writing
 
@@ -66,6 +69,8 @@ class Catalog {
   };
   std::vector<StoredBlob> Blobs(const std::string& session);
   void MoveBlob(const std::string& session, const StoredBlob& moved);
+  // Those with blobs of a session.
+  std::set<uint32_t> Segments(const std::string& session);
   // The end of the newest blob of a session.
   LogEnd EndOfBlobs(const std::string& session);
   std::optional<BlobRef> Input(const std::string& session, uint64_t number);

@@ -73,13 +73,31 @@ Store::~Store() {
 
 std::string Store::FolderOf(const std::string& session) const { return fs::path(path()) / "sessions" / session; }
 
-// A crash may leave the files of a session that was being created or removed.
+// A crash may leave the files of a session that was being created or removed, and old or new ones of a compaction.
 void Store::SweepFolders(const std::vector<StoredSession>& sessions) const {
   std::set<std::string> known;
   for (const StoredSession& session : sessions) known.insert(session.id);
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(fs::path(path()) / "sessions", error)) {
-    if (!known.contains(entry.path().filename())) fs::remove_all(entry.path(), error);
+    const std::string session = entry.path().filename();
+    if (known.contains(session)) {
+      SweepSegments(session);
+    } else {
+      fs::remove_all(entry.path(), error);
+    }
+  }
+}
+
+void Store::SweepSegments(const std::string& session) const {
+  std::set<uint32_t> unused = BlobLog::Segments(FolderOf(session));
+  if (unused.size() < 2) return;  // most sessions
+  try {
+    for (const uint32_t segment : writer_->Segments(session)) unused.erase(segment);
+    if (unused.empty()) return;
+    writer_->Synchronize();
+    BlobLog::RemoveSegments(FolderOf(session), unused);
+  } catch (const SQLite::Exception& e) {
+    spdlog::warn("store: cannot remove old files of session {}: {}", session, e.what());
   }
 }
 
@@ -333,7 +351,9 @@ absl::Status Store::CompactNow(const std::string& session) {
     for (const auto& stored : blobs) writer_->MoveBlob(session, stored);
     writer_->Commit();
     if (const auto log = logs_.find(session); log != logs_.end()) log->second.blobs = std::move(copy);
-    BlobLog::RemoveSegmentsBefore(folder, first);
+    std::set<uint32_t> old = BlobLog::Segments(folder);
+    old.erase(old.lower_bound(first), old.end());
+    BlobLog::RemoveSegments(folder, old);
   } catch (const SQLite::Exception& e) {
     status = absl::ResourceExhaustedError(fmt::format("{}: cannot compact: {}", path(), e.what()));
   }

@@ -139,6 +139,7 @@ class Store {
   void Notify(const std::string& session, const std::function<void(const Listener&)>& call);
   std::string FolderOf(const std::string& session) const;
   void SweepFolders(const std::vector<StoredSession>& sessions) const;
+  void SweepSegments(const std::string& session) const;
 
   const StoreConfig config_;
   const DataFolder folder_;

@@ -217,6 +217,32 @@ TEST_F(StoreTest, CompactionGivesBackTheSpaceOfOldMeshes) {
   EXPECT_EQ(store->BytesOf("a"), before) << "there is little to gain";
 }
 
+// A kill during a compaction leaves the new segments before its commit, and the old ones after it.
+TEST_F(StoreTest, SegmentsThatNothingRefersToAreSwept) {
+  for (const bool is_committed : {false, true}) {
+    const std::string session = is_committed ? "b" : "a";
+    const std::string used = folder_ / ("sessions/" + session + (is_committed ? "/000001.seg" : "/000000.seg"));
+    const std::string unused = folder_ / ("sessions/" + session + (is_committed ? "/000000.seg" : "/000001.seg"));
+    {
+      const auto store = OpenStore();
+      ASSERT_TRUE(store->Create(MakeSession(session)).ok());
+      store->AppendInput(session, testing_support::MakeFrame(1), true);
+      store->PutObject(session, MakeObject(1, 1));
+      for (int version = 1; version <= 5; ++version) store->PutMesh(session, MakeMesh(1, std::string(10'000, 'm')));
+      ASSERT_TRUE(store->Flush().ok());
+      if (is_committed) {
+        ASSERT_TRUE(store->Compact(session).ok());
+      }
+    }
+    std::filesystem::copy_file(used, unused);
+    const auto store = OpenStore();
+    EXPECT_TRUE(std::filesystem::exists(used));
+    EXPECT_FALSE(std::filesystem::exists(unused));
+    EXPECT_TRUE(store->LoadInput(session, 1).ok());
+    EXPECT_TRUE(store->LoadMap(session)->objects.at(0).mesh.has_value());
+  }
+}
+
 TEST_F(StoreTest, ADamagedSessionIsNotCompacted) {
   const auto store = OpenStore();
   ASSERT_TRUE(store->Create(MakeSession("a")).ok());
