@@ -32,6 +32,11 @@ class ServerProcess {
     process_->Signal(SIGKILL);
     process_->Wait();
   }
+  // As an operator stops it.
+  void Stop() {
+    process_->Signal(SIGTERM);
+    EXPECT_EQ(process_->Wait().exit_code, 0);
+  }
   void Start() {
     std::vector<std::string> command{"/usr/bin/env"};
     command.insert(command.end(), environment_.begin(), environment_.end());
