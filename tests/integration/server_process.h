@@ -2,6 +2,7 @@
 
 #include <signal.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -66,12 +67,14 @@ struct StoredIds {
   std::vector<uint64_t> frames, masks;
 };
 
-// Reads the whole session, so a failure is added if anything of it is damaged.
-inline StoredIds StoredInputs(MappingService& service, const std::string& session) {
+// Reads the whole session, so a failure is added if anything of it is damaged. `visit` (may be empty) gets the inputs.
+inline StoredIds StoredInputs(MappingService& service, const std::string& session,
+                              const std::function<void(const SessionInput&)>& visit = {}) {
   StoredIds ids;
   store::SessionFileReader reader([&](store::FileRecord kind, const std::string& content) -> absl::Status {
     if (kind != store::FileRecord::kInput) return absl::OkStatus();
     ROMAP_ASSIGN_OR_RETURN(const SessionInput input, store::ParseInput(content));
+    if (visit) visit(input);
     if (const auto* masks = std::get_if<MasksInput>(&input)) {
       ids.masks.push_back(masks->frame_id);
     } else {
