@@ -18,6 +18,7 @@ struct BlobRef {
   std::string hash;     // XXH3 of the content, 16 bytes in canonical (big-endian) order
 
   uint64_t EndOffset() const;
+  bool operator==(const BlobRef&) const = default;
 };
 
 // The images, masks, meshes and trajectories of one session, in append-only files of about 64 MiB (NNNNNN.seg). Layout

@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
@@ -123,6 +124,13 @@ class Store {
     Durable newest;  // of the committed writes
   };
   struct Commitment;
+  // Where the parts of a map are that are not in the catalog.
+  struct MapBlobs {
+    std::vector<std::optional<BlobRef>> meshes;  // of all objects
+    std::optional<BlobRef> trajectory;
+
+    bool operator==(const MapBlobs&) const = default;
+  };
 
   Store(StoreConfig config, DataFolder folder, std::unique_ptr<Catalog> writer, std::unique_ptr<Catalog> reader);
 
@@ -138,6 +146,8 @@ class Store {
   void Fail(std::deque<Write>& batch, const absl::Status& status);
   void Notify(const std::string& session, const std::function<void(const Listener&)>& call);
   std::string FolderOf(const std::string& session) const;
+  absl::StatusOr<MapBlobs> FindMap(const std::string& session, StoredMap* map) const;
+  bool ReadMap(const std::string& session, const MapBlobs& blobs, StoredMap* map) const;
   void SweepFolders(const std::vector<StoredSession>& sessions) const;
   void SweepSegments(const std::string& session) const;
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -215,6 +216,31 @@ TEST_F(StoreTest, CompactionGivesBackTheSpaceOfOldMeshes) {
   const uint64_t before = store->BytesOf("a");
   ASSERT_TRUE(store->Compact("a").ok());
   EXPECT_EQ(store->BytesOf("a"), before) << "there is little to gain";
+}
+
+TEST_F(StoreTest, AMapCanBeReadDuringCompactions) {
+  const auto store = OpenStore();
+  ASSERT_TRUE(store->Create(MakeSession("a")).ok());
+  for (uint64_t id = 1; id <= 50; ++id) {
+    store->PutObject("a", MakeObject(id, 1));
+    store->PutMesh("a", MakeMesh(id, std::string(5'000, 'm')));
+  }
+  ASSERT_TRUE(store->Flush().ok());
+  std::atomic<bool> compacting = true;
+  std::thread compactor([&] {
+    for (int round = 0; round < 20; ++round) {
+      for (uint64_t id = 1; id <= 10; ++id) store->PutMesh("a", MakeMesh(id, std::string(5'000, 'n')));
+      EXPECT_TRUE(store->Flush().ok());
+      EXPECT_TRUE(store->Compact("a").ok());
+    }
+    compacting = false;
+  });
+  while (compacting) {
+    const StoredMap map = store->LoadMap("a").value();
+    EXPECT_THAT(map.damage, IsEmpty());
+    EXPECT_THAT(map.objects, SizeIs(50));
+  }
+  compactor.join();
 }
 
 // A kill during a compaction leaves the new segments before its commit, and the old ones after it.
