@@ -1,18 +1,16 @@
 #include "common/color_image.h"
 
-#include <opencv2/imgcodecs.hpp>
+#include "common/image_bytes.h"
+#include "common/jpeg_reader.h"
+#include "common/png_reader.h"
+#include "common/status.h"
 
 namespace romap {
 
-cv::Mat DecodeColor(std::string_view bytes, SampleRange* range) {
-  if (bytes.empty()) return {};  // cv::imdecode throws
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-    const cv::Mat image = cv::imdecode(buffer, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-    return image.depth() == CV_16U ? range->To8Bit(image) : image;
-  } catch (const cv::Exception&) {
-    return {};
-  }
+absl::StatusOr<cv::Mat> DecodeColor(std::string_view bytes, SampleRange* range, const DecodeLimits& limits) {
+  if (!PngHeader(bytes)) return DecodeJpeg(bytes, limits);
+  ROMAP_ASSIGN_OR_RETURN(const cv::Mat image, DecodePng(bytes, PngPixels::kBgr, limits));
+  return image.depth() == CV_16U ? range->To8Bit(image) : image;
 }
 
 }  // namespace romap

@@ -18,27 +18,11 @@ uint32_t BigEndian(std::string_view bytes, size_t at, size_t count) {
 
 std::optional<EncodedSize> PngHeader(std::string_view bytes) {
   if (bytes.size() < 33 || !bytes.starts_with(kPngMagic) || bytes.substr(12, 4) != "IHDR") return std::nullopt;
+  const auto color_type = static_cast<uint8_t>(bytes[25]);
+  const bool is_color = color_type == 2 || color_type == 6;
+  const bool has_alpha = color_type == 4 || color_type == 6;
   return EncodedSize{static_cast<int>(BigEndian(bytes, 16, 4)), static_cast<int>(BigEndian(bytes, 20, 4)),
-                     static_cast<uint8_t>(bytes[24])};
-}
-
-std::optional<EncodedSize> JpegHeader(std::string_view bytes) {
-  if (bytes.size() < 4 || BigEndian(bytes, 0, 2) != 0xFFD8) return std::nullopt;
-  for (size_t at = 2; at + 9 < bytes.size();) {
-    if (static_cast<uint8_t>(bytes[at]) != 0xFF) return std::nullopt;
-    const auto marker = static_cast<uint8_t>(bytes[at + 1]);
-    if (marker == 0xFF) {  // fill byte
-      ++at;
-      continue;
-    }
-    const bool start_of_frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
-    if (start_of_frame) {
-      return EncodedSize{static_cast<int>(BigEndian(bytes, at + 7, 2)), static_cast<int>(BigEndian(bytes, at + 5, 2)),
-                         static_cast<uint8_t>(bytes[at + 4])};
-    }
-    at += 2 + BigEndian(bytes, at + 2, 2);
-  }
-  return std::nullopt;
+                     static_cast<uint8_t>(bytes[24]), (is_color ? 3 : 1) + (has_alpha ? 1 : 0)};
 }
 
 bool IsCompletePng(std::string_view bytes) {

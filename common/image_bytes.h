@@ -9,14 +9,12 @@ namespace romap {
 struct EncodedSize {
   int width_px = 0;
   int height_px = 0;
-  int bits = 8;  // per channel, or per palette index
+  int bits = 8;      // per channel, or per palette index
+  int channels = 0;  // 1 for a palette
 };
 
 // The header of a PNG file (PNG specification, section 11.2.2). nullopt: not a PNG file.
 std::optional<EncodedSize> PngHeader(std::string_view bytes);
-
-// The first start-of-frame segment of a JPEG file (ITU-T T.81, annex B.2.2). nullopt: not a JPEG file.
-std::optional<EncodedSize> JpegHeader(std::string_view bytes);
 
 // Whether a PNG file has all its chunks up to the last one, and a JPEG file its end marker. Decoders fill the missing
 // part of a truncated file with gray instead of reporting it.

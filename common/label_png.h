@@ -2,18 +2,16 @@
 
 #include <absl/status/statusor.h>
 
-#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <string_view>
 
-namespace romap {
+#include "common/decode_limits.h"
 
-inline constexpr int64_t kMaxLabelPixels = 1 << 27;
+namespace romap {
 
 // Decodes a PNG file whose stored integers are labels to CV_16UC1: gray with 1, 2, 4, 8 or 16 bits, or a palette, whose
 // colors are ignored. Unlike cv::imdecode, it neither scales small values nor replaces palette indices by colors.
-// INVALID_ARGUMENT: not a PNG file, truncated, damaged, more than one channel, or more than `max_pixels` pixels, which
-// is checked before memory is allocated.
-absl::StatusOr<cv::Mat> DecodeLabelPng(std::string_view bytes, int64_t max_pixels = kMaxLabelPixels);
+// Errors as DecodePng().
+absl::StatusOr<cv::Mat> DecodeLabelPng(std::string_view bytes, const DecodeLimits& limits = {});
 
 }  // namespace romap

@@ -52,11 +52,11 @@ Survey SurveyFrames(const files::Sequence& sequence) {
     ++survey.frames;
     survey.with_pose += frame->T_world_camera ? 1 : 0;
     for (const Instance& instance : frame->instances) survey.classes.insert(instance.class_name);
-    const cv::Mat image = DecodeColor(frame->image, &range);
-    if (image.empty()) continue;
+    const absl::StatusOr<cv::Mat> image = DecodeColor(frame->image, &range);
+    if (!image.ok()) continue;
     const auto labels =
         frame->label_png.empty() ? absl::StatusOr<cv::Mat>(cv::Mat()) : DecodeLabelPng(frame->label_png);
-    check.Add(frame->frame_id, image, labels.value_or(cv::Mat()));
+    check.Add(frame->frame_id, *image, labels.value_or(cv::Mat()));
   }
   survey.diagnostics = check.Diagnostics();
   return survey;

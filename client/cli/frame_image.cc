@@ -13,8 +13,9 @@ absl::StatusOr<FrameImage> LoadFrameImage(const files::Sequence& sequence, size_
   std::vector<files::UnreadableFile> unreadable;
   ROMAP_ASSIGN_OR_RETURN(const FrameInput frame, sequence.LoadReadable(index, &unreadable));
   SampleRange range;
-  FrameImage image{.color_bgr = DecodeColor(frame.image, &range)};
-  if (image.color_bgr.empty()) return InvalidArgument("{}: the image is damaged", sequence.paths(index).image);
+  absl::StatusOr<cv::Mat> color = DecodeColor(frame.image, &range);
+  if (!color.ok()) return InvalidArgument("{}: {}", sequence.paths(index).image, Message(color.status()));
+  FrameImage image{.color_bgr = *std::move(color)};
   if (frame.mask_encoding == MaskEncoding::kLabelPng) {
     if (auto labels = DecodeLabelPng(frame.label_png); labels.ok()) image.labels = *std::move(labels);
   }

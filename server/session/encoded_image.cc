@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "common/color_image.h"
+#include "common/decode_limits.h"
 #include "common/image_bytes.h"
+#include "common/jpeg_reader.h"
 #include "common/label_png.h"
+#include "common/png_reader.h"
 #include "common/status.h"
 
 namespace romap::session {
@@ -21,39 +23,54 @@ absl::Status CheckSize(const char* field, const EncodedSize& size, const CameraM
                          camera.height_px, size.width_px, size.height_px);
 }
 
-// The size in the header is checked before decoding, so that a small file cannot allocate a huge image.
-absl::Status CheckFile(const char* field, const char* format, const std::string& bytes,
-                       const std::optional<EncodedSize>& size, bool is_complete, const CameraModel& camera) {
-  if (!size) return InvalidArgument("{}: {} bytes are not a {} file", field, bytes.size(), format);
+absl::Status InField(const char* field, const absl::Status& status) {
+  return {status.code(), fmt::format("{}: {}", field, Message(status))};
+}
+
+// Checks the header before decoding, so that a small file cannot allocate a huge image.
+absl::Status CheckJpeg(const char* field, const std::string& bytes, const CameraModel& camera) {
+  const absl::StatusOr<EncodedSize> size = JpegHeader(bytes);
+  if (!size.ok()) return InField(field, size.status());
   ROMAP_RETURN_IF_ERROR(CheckSize(field, *size, camera));
-  if (!is_complete) return InvalidArgument("{}: {} file is truncated ({} bytes)", field, format, bytes.size());
+  if (!IsCompleteJpeg(bytes)) return InvalidArgument("{}: JPEG file is truncated ({} bytes)", field, bytes.size());
   return absl::OkStatus();
 }
 
 absl::Status CheckPng(const char* field, const std::string& bytes, const CameraModel& camera) {
-  return CheckFile(field, "PNG", bytes, PngHeader(bytes), IsCompletePng(bytes), camera);
+  const std::optional<EncodedSize> size = PngHeader(bytes);
+  if (!size) return InvalidArgument("{}: {} bytes are not a PNG file", field, bytes.size());
+  ROMAP_RETURN_IF_ERROR(CheckSize(field, *size, camera));
+  if (!IsCompletePng(bytes)) return InvalidArgument("{}: PNG file is truncated ({} bytes)", field, bytes.size());
+  return absl::OkStatus();
 }
 
-absl::StatusOr<cv::Mat> DecodeColorFile(const FrameInput& input, const CameraModel& camera, SampleRange* range) {
-  const bool is_jpeg = input.image_encoding == ImageEncoding::kJpeg;
-  ROMAP_RETURN_IF_ERROR(
-      is_jpeg ? CheckFile("image", "JPEG", input.image, JpegHeader(input.image), IsCompleteJpeg(input.image), camera)
-              : CheckPng("image", input.image, camera));
-  cv::Mat image = DecodeColor(input.image, range);
-  if (image.empty()) return InvalidArgument("image: {} file is damaged", is_jpeg ? "JPEG" : "PNG");
-  return image;
+DecodeLimits LimitsOf(const CameraModel& camera, const std::stop_token& stop) {
+  return {.max_pixels = int64_t{camera.width_px} * camera.height_px, .stop = stop};
 }
 
-absl::StatusOr<cv::Mat> DecodeDepthPng(const std::string& bytes) {
-  cv::Mat decoded;
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
-    decoded = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);  // ignores orientation tags
-  } catch (const cv::Exception& e) {
-    return InvalidArgument("depth: PNG file cannot be decoded: {}", e.err);
-  }
-  if (decoded.empty()) return InvalidArgument("depth: PNG file is damaged");
+// The result of a decoder, with the name of the field in its error.
+absl::StatusOr<cv::Mat> Checked(const char* field, absl::StatusOr<cv::Mat> decoded, const CameraModel& camera) {
+  if (!decoded.ok()) return InField(field, decoded.status());
+  ROMAP_RETURN_IF_ERROR(CheckSize(field, {.width_px = decoded->cols, .height_px = decoded->rows}, camera));
   return decoded;
+}
+
+absl::StatusOr<cv::Mat> DecodeColorFile(const FrameInput& input, const CameraModel& camera, SampleRange* range,
+                                        const std::stop_token& stop) {
+  const bool is_jpeg = input.image_encoding == ImageEncoding::kJpeg;
+  ROMAP_RETURN_IF_ERROR(is_jpeg ? CheckJpeg("image", input.image, camera) : CheckPng("image", input.image, camera));
+  return Checked("image", DecodeColor(input.image, range, LimitsOf(camera, stop)), camera);
+}
+
+absl::StatusOr<cv::Mat> DecodeDepthPng(const std::string& bytes, const CameraModel& camera,
+                                       const std::stop_token& stop) {
+  ROMAP_RETURN_IF_ERROR(CheckPng("depth", bytes, camera));
+  const std::optional<EncodedSize> header = PngHeader(bytes);
+  if (header->bits != 16 || header->channels != 1) {
+    return InvalidArgument("depth: PNG must have one channel of 16 bits, has {} of {} bits", header->channels,
+                           header->bits);
+  }
+  return Checked("depth", DecodePng(bytes, PngPixels::kStored, LimitsOf(camera, stop)), camera);
 }
 
 absl::StatusOr<cv::Mat> DecodeRawColor(const FrameInput& input, const CameraModel& camera) {
@@ -99,35 +116,33 @@ absl::StatusOr<cv::Mat> ExpandRuns(const std::vector<uint32_t>& runs, const Came
 
 }  // namespace
 
-absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera, SampleRange* range) {
+absl::StatusOr<cv::Mat> DecodeColorImage(const FrameInput& input, const CameraModel& camera, SampleRange* range,
+                                         const std::stop_token& stop) {
   switch (input.image_encoding) {
     case ImageEncoding::kJpeg:
     case ImageEncoding::kPng:
-      return DecodeColorFile(input, camera, range);
+      return DecodeColorFile(input, camera, range, stop);
     default:
       return DecodeRawColor(input, camera);
   }
 }
 
-absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera) {
+absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraModel& camera,
+                                     const std::stop_token& stop) {
   if (masks.mask_encoding == MaskEncoding::kNone) return cv::Mat();
   if (masks.mask_encoding == MaskEncoding::kRunLength) return ExpandRuns(masks.label_runs, camera);
   ROMAP_RETURN_IF_ERROR(CheckPng("masks", masks.label_png, camera));
-  absl::StatusOr<cv::Mat> labels = DecodeLabelPng(masks.label_png, int64_t{camera.width_px} * camera.height_px);
-  if (!labels.ok()) return InvalidArgument("masks: {}", Message(labels.status()));
-  return labels;
+  return Checked("masks", DecodeLabelPng(masks.label_png, LimitsOf(camera, stop)), camera);
 }
 
-absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera) {
+absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera, const std::stop_token& stop) {
   if (input.depth_encoding == DepthEncoding::kNone) return cv::Mat();
   if (!std::isfinite(input.depth_scale_mu) || input.depth_scale_mu <= 0) {
     return InvalidArgument("depth: scale_mu must be a positive number, is {}", input.depth_scale_mu);
   }
   cv::Mat raw;
   if (input.depth_encoding == DepthEncoding::kPng16) {
-    ROMAP_RETURN_IF_ERROR(CheckPng("depth", input.depth, camera));
-    ROMAP_ASSIGN_OR_RETURN(raw, DecodeDepthPng(input.depth));
-    if (raw.type() != CV_16UC1) return InvalidArgument("depth: PNG must have one channel of 16 bits");
+    ROMAP_ASSIGN_OR_RETURN(raw, DecodeDepthPng(input.depth, camera, stop));
   } else {
     const size_t expected = static_cast<size_t>(camera.width_px) * camera.height_px * 2;
     if (input.depth.size() != expected) {

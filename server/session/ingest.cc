@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
+#include <utility>
 
 #include "common/image_bytes.h"
 #include "common/label_image.h"
@@ -80,8 +81,8 @@ void AddUnlistedLabels(const cv::Mat& labels, std::vector<Instance>& instances) 
 
 }  // namespace
 
-Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s)
-    : camera_(camera), max_mask_delay_s_(max_mask_delay_s) {
+Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s, std::stop_token stop)
+    : camera_(camera), max_mask_delay_s_(max_mask_delay_s), stop_(std::move(stop)) {
   if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
 }
 
@@ -118,9 +119,9 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   frame->T_world_camera = input.T_world_camera;
   if (input.gravity_camera) frame->gravity_camera = input.gravity_camera->normalized();
   SampleRange range = range_;
-  ROMAP_ASSIGN_OR_RETURN(frame->image_bgr, DecodeColorImage(input, camera_, &range));
-  ROMAP_ASSIGN_OR_RETURN(frame->labels, DecodeLabels(input, camera_));
-  ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_));
+  ROMAP_ASSIGN_OR_RETURN(frame->image_bgr, DecodeColorImage(input, camera_, &range, stop_));
+  ROMAP_ASSIGN_OR_RETURN(frame->labels, DecodeLabels(input, camera_, stop_));
+  ROMAP_ASSIGN_OR_RETURN(frame->depth_mu, DecodeDepth(input, camera_, stop_));
   range_ = range;
   depth_sentinels_.Remove(frame->frame_id, input.depth_scale_mu, &frame->depth_mu);
   frame->has_masks = !frame->labels.empty();
@@ -149,7 +150,7 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   if (input.mask_encoding == MaskEncoding::kNone) return InvalidArgument("masks: missing");
   ROMAP_RETURN_IF_ERROR(CheckInstances(input.instances));
   FrameMasks masks{.frame_id = input.frame_id, .labels = {}, .instances = input.instances};
-  ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_));
+  ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_, stop_));
   if (camera_.HasDistortion()) UndistortNearest(masks.labels);
   AddUnlistedLabels(masks.labels, masks.instances);
   mask_interpreter_.Interpret(HasEightBits(input), &masks);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <stop_token>
 
 #include "common/client_input.h"
 #include "common/lens.h"
@@ -21,7 +22,8 @@ namespace romap::session {
 class Ingest {
  public:
   // Late masks are accepted for frames whose timestamp is at most `max_mask_delay_s` older than the newest one.
-  Ingest(const CameraModel& camera, double max_mask_delay_s);
+  // After a stop was requested, inputs are rejected with CANCELLED.
+  Ingest(const CameraModel& camera, double max_mask_delay_s, std::stop_token stop = {});
 
   // INVALID_ARGUMENT: the frame is malformed or out of order; the message names the field. A rejected frame has no
   // effect on later ones.
@@ -53,6 +55,7 @@ class Ingest {
   CameraModel camera_;     // of the client's images, with distortion
   UndistortionMaps maps_;  // empty for a pinhole
   double max_mask_delay_s_;
+  const std::stop_token stop_;
   SampleRange range_;  // of the accepted color images
   masks::MaskInterpreter mask_interpreter_;
   DepthSentinels depth_sentinels_;

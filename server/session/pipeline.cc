@@ -174,7 +174,7 @@ Pipeline::Pipeline(const SessionOptions& options, const ServerConfig& config, ne
       map_(map),
       ledger_(ledger),
       diagnostics_(diagnostics),
-      ingest_(options.camera, config.objects.max_mask_delay_s),
+      ingest_(options.camera, config.objects.max_mask_delay_s, stop_.get_token()),
       on_accepted_(std::move(on_accepted)),
       tracker_(config.slam, options.pose_use, &local_map_),
       sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session),

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <variant>
 
@@ -71,6 +72,8 @@ class Pipeline {
 
   // Decodes and checks a frame or late masks, and passes them to `on_accepted`.
   CheckedInput Check(Arrival arrival);
+  // Check() returns soon, and rejects this and all later inputs. Thread-safe.
+  void StopChecks() { stop_.request_stop(); }
   // Processes a checked input, or rejects it. `execute` is called at most once, before Process() returns: not at all
   // for an input that is rejected. Acknowledgments and rejections keep the order of the inputs.
   void Process(const CheckedInput& input, const MappingExecutor& execute);
@@ -106,6 +109,7 @@ class Pipeline {
 
   slam::LocalMapSlot local_map_;  // from the mapper to the tracker
   // Used by Check().
+  std::stop_source stop_;
   Ingest ingest_;
   const InputSink on_accepted_;
   // Used by Process().

@@ -66,6 +66,7 @@ bool Scheduler::Offer(SessionInput input) {
 
 void Scheduler::Stop() {
   stopping_ = true;
+  pipeline_->StopChecks();
   inputs_.Close();
   checked_.Close();
   steps_.Close();

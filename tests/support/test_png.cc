@@ -3,6 +3,7 @@
 #include <png.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <vector>
 
@@ -54,6 +55,37 @@ std::string EncodeLabels(const cv::Mat& labels, PngKind kind, int bits, bool int
   return bytes;
 }
 
+std::string PngChunk(const std::string& type, const std::string& data) {
+  const std::string body = type + data;
+  const auto checksum =
+      static_cast<uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size())));
+  return BigEndian32(static_cast<uint32_t>(data.size())) + body + BigEndian32(checksum);
+}
+
+std::string Deflate(const std::string& data, size_t zeros) {
+  z_stream stream{};
+  if (deflateInit(&stream, Z_BEST_COMPRESSION) != Z_OK) throw std::runtime_error("deflateInit failed");
+  std::string result;
+  const auto add = [&](const std::string& piece, int flush) {
+    std::vector<Bytef> out(piece.size() + 1024);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(piece.data()));
+    stream.avail_in = static_cast<uInt>(piece.size());
+    do {
+      stream.next_out = out.data();
+      stream.avail_out = static_cast<uInt>(out.size());
+      deflate(&stream, flush);
+      result.append(reinterpret_cast<const char*>(out.data()), out.size() - stream.avail_out);
+    } while (stream.avail_out == 0);
+  };
+  add(data, Z_NO_FLUSH);
+  for (const std::string block(1 << 20, '\0'); zeros > 0; zeros -= std::min(zeros, block.size())) {
+    add(block.substr(0, zeros), Z_NO_FLUSH);
+  }
+  add("", Z_FINISH);
+  deflateEnd(&stream);
+  return result;
+}
+
 std::string WithOrientation(const std::string& bytes, int orientation) {
   const std::string exif = ExifBlock(orientation);
   std::string result = bytes;
@@ -62,11 +94,8 @@ std::string WithOrientation(const std::string& bytes, int orientation) {
     const size_t length = data.size() + 2;
     result.insert(2, std::string("\xff\xe1") + static_cast<char>(length >> 8) + static_cast<char>(length) + data);
   } else {
-    const std::string data = "eXIf" + exif;
-    const auto checksum =
-        static_cast<uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(data.data()), static_cast<uInt>(data.size())));
     constexpr size_t kAfterHeader = 33;
-    result.insert(kAfterHeader, BigEndian32(static_cast<uint32_t>(exif.size())) + data + BigEndian32(checksum));
+    result.insert(kAfterHeader, PngChunk("eXIf", exif));
   }
   return result;
 }

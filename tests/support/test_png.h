@@ -11,6 +11,12 @@ enum class PngKind { kGray, kPalette };
 // labels. `interlaced`: in seven passes.
 std::string EncodeLabels(const cv::Mat& labels, PngKind kind, int bits, bool interlaced = false);
 
+// A chunk of a PNG file with its length and checksum.
+std::string PngChunk(const std::string& type, const std::string& data);
+
+// Compresses `data` followed by `zeros` zeros in the format of zlib.
+std::string Deflate(const std::string& data, size_t zeros);
+
 // Adds an orientation tag (Exif 2.32, tag 0x112; 1..8) to the bytes of a JPEG or PNG file.
 std::string WithOrientation(const std::string& bytes, int orientation);
 

@@ -16,7 +16,7 @@ std::string Encode(const char* extension, const cv::Mat& image) {
 
 cv::Mat Decode(const std::string& bytes) {
   SampleRange range;
-  return DecodeColor(bytes, &range);
+  return DecodeColor(bytes, &range).value_or(cv::Mat());
 }
 
 TEST(ColorImageTest, IgnoresOrientationTags) {

@@ -35,8 +35,8 @@ cv::Mat As16Bit(const cv::Mat& image) {
   return result;
 }
 
-std::string ErrorOf(const std::string& bytes, int64_t max_pixels = kMaxLabelPixels) {
-  const auto labels = DecodeLabelPng(bytes, max_pixels);
+std::string ErrorOf(const std::string& bytes, const DecodeLimits& limits = {}) {
+  const auto labels = DecodeLabelPng(bytes, limits);
   EXPECT_EQ(labels.status().code(), absl::StatusCode::kInvalidArgument);
   return Message(labels.status());
 }
@@ -87,8 +87,8 @@ TEST(LabelPngTest, RejectsDamage) {
 
 TEST(LabelPngTest, LimitsTheSizeBeforeAllocation) {
   std::string bytes = EncodeLabels(Values(8), PngKind::kGray, 8);
-  EXPECT_THAT(ErrorOf(bytes, 90), HasSubstr("13x7 px; expected at most 90 pixels"));
-  EXPECT_TRUE(DecodeLabelPng(bytes, 91).ok());
+  EXPECT_THAT(ErrorOf(bytes, {.max_pixels = 90}), HasSubstr("13x7 px; expected at most 90 pixels"));
+  EXPECT_TRUE(DecodeLabelPng(bytes, {.max_pixels = 91}).ok());
   for (const size_t at : {16, 20}) bytes.replace(at, 4, "\x7f\xff\xff\xff", 4);
   EXPECT_THAT(ErrorOf(bytes), HasSubstr("2147483647x2147483647"));
 }

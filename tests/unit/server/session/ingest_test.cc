@@ -5,8 +5,10 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <stop_token>
 
 #include "common/status.h"
+#include "tests/support/test_jpeg.h"
 #include "tests/support/test_png.h"
 
 namespace romap::session::ingest_test {
@@ -308,6 +310,34 @@ MasksInput ValidMasks(uint64_t frame_id) {
   input.label_png = Encode(".png", labels);
   input.instances = {{.label = 7, .class_name = "mug", .score = 0.5, .track_id = std::nullopt}};
   return input;
+}
+
+// Of more work than an image of this size needs, and one with a misleading header.
+TEST(IngestTest, RejectsHostileImages) {
+  Ingest ingest(kCamera, kMaxMaskDelay_s);
+  FrameInput scans = ValidFrame();
+  scans.image_encoding = ImageEncoding::kJpeg;
+  std::vector<uint8_t> progressive;
+  cv::imencode(".jpg", Gradient(64, 48), progressive, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  scans.image = testing_support::WithScans({progressive.begin(), progressive.end()}, 1000);
+  EXPECT_THAT(ErrorOf(ingest, scans), HasSubstr("image: JPEG file has 51 or more scans; must have at most 50"));
+
+  // TEM has no length. A reader that takes the next bytes for a length finds the size of the session in the comment.
+  FrameInput misleading = scans;
+  const std::string other = Encode(".jpg", Gradient(256, 256));
+  const std::string claim("\xff\xfe\x00\x0d\xff\xc0\x00\x11\x08\x00\x30\x00\x40\x03\x01", 15);
+  misleading.image = other.substr(0, 2) + std::string("\xff\x01", 2) + claim + other.substr(2);
+  EXPECT_THAT(ErrorOf(ingest, misleading),
+              HasSubstr("image: must be 64x48 px like the session's camera, is 256x256 px"));
+  EXPECT_EQ(ErrorOf(ingest, ValidFrame()), "accepted");
+}
+
+TEST(IngestTest, AStopEndsDecoding) {
+  std::stop_source stop;
+  Ingest ingest(kCamera, kMaxMaskDelay_s, stop.get_token());
+  ASSERT_TRUE(ingest.Accept(ValidFrame(1)).ok());
+  stop.request_stop();
+  EXPECT_EQ(ingest.Accept(ValidFrame(2)).status().code(), absl::StatusCode::kCancelled);
 }
 
 std::string MaskErrorOf(Ingest& ingest, const MasksInput& input) {
