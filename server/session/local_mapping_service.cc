@@ -23,6 +23,18 @@ int TrainingThreads(const ServerConfig& config) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+// Starts a session, new or restored. RESOURCE_EXHAUSTED: the server has no more threads or memory.
+template <class... Arguments>
+absl::StatusOr<std::shared_ptr<Session>> StartSession(const std::string& id, Arguments&&... arguments) {
+  try {
+    return std::make_shared<Session>(id, std::forward<Arguments>(arguments)...);
+  } catch (const std::exception& e) {
+    spdlog::error("session {}: cannot be started: {}", id, e.what());
+    return absl::ResourceExhaustedError(fmt::format(
+        "the server has too little memory or too few threads for one more session ({}); try again later", e.what()));
+  }
+}
+
 // A stream of a stored map that is not in memory otherwise.
 class ShelfStream : public EventStream {
  public:
@@ -182,7 +194,13 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
     lock.lock();
     --sessions_in_creation_;
   }
-  auto session = std::make_shared<Session>(id, options, now_unix_ns, config_, Services(), std::move(recorder));
+  auto started = StartSession(id, options, now_unix_ns, config_, Services(), std::move(recorder));
+  if (!started.ok()) {
+    lock.unlock();
+    if (store_) store_->Remove(id).IgnoreError();
+    return started.status();
+  }
+  const std::shared_ptr<Session> session = *std::move(started);
   sessions_[id] = session;
   spdlog::info("session {}: created, {}x{} px", id, options.camera.width_px, options.camera.height_px);
   return session->Info();
@@ -198,8 +216,13 @@ absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::FindLocked(const s
 absl::Status LocalMappingService::RestoreLocked(const std::string& session_id) {
   ROMAP_ASSIGN_OR_RETURN(auto taken, shelf_->Take(session_id));
   auto& [record, stored] = taken;
-  sessions_[session_id] = std::make_shared<Session>(session_id, record.options, record.created_unix_ns, config_,
-                                                    Services(), std::move(stored));
+  auto started =
+      StartSession(session_id, record.options, record.created_unix_ns, config_, Services(), std::move(stored));
+  if (!started.ok()) {
+    shelf_->Add(std::move(record));
+    return started.status();
+  }
+  sessions_[session_id] = *std::move(started);
   return absl::OkStatus();
 }
 
@@ -365,11 +388,15 @@ void LocalMappingService::KeepStored() {
   std::unique_lock lock(mutex_);
   while (!stopping_changed_.wait_for(lock, kPeriod, [&] { return stopping_; })) {
     lock.unlock();
-    StoreChanges();
-    const auto now = std::chrono::steady_clock::now();
-    if (now >= next_expiry) {
-      next_expiry = now + kExpiryPeriod;
-      DeleteExpired();
+    try {
+      StoreChanges();
+      const auto now = std::chrono::steady_clock::now();
+      if (now >= next_expiry) {
+        next_expiry = now + kExpiryPeriod;
+        DeleteExpired();
+      }
+    } catch (const std::exception& e) {  // out of memory: the changes are stored in the next round
+      spdlog::error("store: {}", e.what());
     }
     lock.lock();
   }

@@ -182,7 +182,12 @@ Pipeline::Pipeline(const SessionOptions& options, const ServerConfig& config, ne
       object_mapper_(config.objects) {
   mesher_session_ =
       mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
-  pool_session_ = pool_->AddSession([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
+  try {
+    pool_session_ = pool_->AddSession([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
+  } catch (...) {
+    mesher_->RemoveSession(mesher_session_);
+    throw;
+  }
 }
 
 Pipeline::~Pipeline() {

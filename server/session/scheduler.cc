@@ -32,12 +32,17 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
       inputs_(config.frame_queue),
       checked_(kCheckedQueue),
       steps_(config.mapping_queue) {
-  if (config_.single_thread) {
-    tracking_thread_ = std::thread([this] { RunSingleThread(); });
-  } else {
-    ingest_thread_ = std::thread([this] { RunIngest(); });
-    tracking_thread_ = std::thread([this] { RunTracking(); });
-    mapping_thread_ = std::thread([this] { RunMapping(); });
+  try {
+    if (config_.single_thread) {
+      tracking_thread_ = std::thread([this] { RunSingleThread(); });
+    } else {
+      ingest_thread_ = std::thread([this] { RunIngest(); });
+      tracking_thread_ = std::thread([this] { RunTracking(); });
+      mapping_thread_ = std::thread([this] { RunMapping(); });
+    }
+  } catch (...) {  // the process has no more threads or memory
+    Stop();
+    throw;
   }
 }
 

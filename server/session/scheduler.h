@@ -39,7 +39,8 @@ class Scheduler {
     std::function<void(const char* stage, const std::string& what)> failed;  // a stage threw; processing stops
   };
 
-  // Starts the threads. `pipeline` and `ledger` outlive the scheduler.
+  // Starts the threads. Throws std::system_error if one of them cannot be started. `pipeline` and `ledger` outlive the
+  // scheduler.
   Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger, Callbacks callbacks);
   ~Scheduler() { Stop(); }
 

@@ -120,6 +120,14 @@ store::Store::Listener Session::StoreListener() {
 
 // The restore thread.
 void Session::Restore(Stored stored) {
+  try {
+    RestoreMap(std::move(stored));
+  } catch (const std::exception& e) {
+    OnFailed("restoring", e.what());
+  }
+}
+
+void Session::RestoreMap(Stored stored) {
   OfferStoredInputs(stored.inputs);
   std::promise<void> settled;
   ledger_.WhenSettled([&] { settled.set_value(); });

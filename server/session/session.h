@@ -54,6 +54,8 @@ class Session {
     bool pinned = false;
   };
 
+  // The constructors throw if the process has no more threads or memory.
+  //
   // A new session. `recorder` gets every accepted input; null: not recorded.
   Session(std::string id, const SessionOptions& options, int64_t created_unix_ns, const ServerConfig& config,
           const Services& services, std::unique_ptr<wire::RecordingWriter> recorder = nullptr);
@@ -104,6 +106,7 @@ class Session {
   store::Store::Listener StoreListener();
   void OnAccepted(const SessionInput& input);
   void Restore(Stored stored);
+  void RestoreMap(Stored stored);
   void OfferStoredInputs(uint64_t inputs);
   SessionStorage::State StateToStore() const;
   void PublishStatisticsIfDue();

@@ -1,6 +1,10 @@
 #include "server/slam/adjustment_run.h"
 
+#include <spdlog/spdlog.h>
+
 #include <chrono>
+#include <exception>
+#include <system_error>
 #include <utility>
 
 #include "common/thread_priority.h"
@@ -12,10 +16,15 @@ AdjustmentRun::AdjustmentRun(MapProblem problem, Solver solver, bool run_inline,
   if (run_inline) {
     Solve();
   } else {
-    thread_ = std::thread([this, nice] {
-      LowerThreadPriority(nice);
-      Solve();
-    });
+    try {
+      thread_ = std::thread([this, nice] {
+        LowerThreadPriority(nice);
+        Solve();
+      });
+    } catch (const std::system_error& e) {  // no more threads
+      spdlog::warn("slam: an adjustment was given up: {}", e.what());
+      finished_ = true;
+    }
   }
 }
 
@@ -26,7 +35,12 @@ AdjustmentRun::~AdjustmentRun() {
 
 void AdjustmentRun::Solve() {
   const auto begin = std::chrono::steady_clock::now();
-  summary_ = solver_(problem_.bundle, abort_);
+  try {
+    summary_ = solver_(problem_.bundle, abort_);
+  } catch (const std::exception& e) {  // out of memory: the map stays as it is
+    spdlog::warn("slam: an adjustment was given up: {}", e.what());
+    summary_ = {.usable = false};
+  }
   time_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   finished_ = true;
 }

@@ -31,7 +31,7 @@ class AdjustmentRun {
   void Abort() { abort_ = true; }
   // The map was moved by a similarity: TakeSolution() returns the solution in the new world.
   void Move(const Sim3<World, World>& S_new_old) { S_new_old_ = S_new_old * S_new_old_; }
-  // Require IsFinished().
+  // Require IsFinished(). The summary is not usable if the process had no memory or thread for the adjustment.
   MapProblem TakeSolution();                                       // at most once
   const BundleProblem& bundle() const { return problem_.bundle; }  // in the world of its start
   const BundleSummary& summary() const { return summary_; }

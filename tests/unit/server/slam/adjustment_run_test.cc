@@ -4,6 +4,7 @@
 
 #include <future>
 #include <memory>
+#include <new>
 #include <thread>
 
 #include "tests/unit/server/slam/noisy_map.h"
@@ -25,6 +26,18 @@ TEST_F(AdjustmentRunTest, RunsOnTheRequestedThread) {
     run.Wait();
     EXPECT_TRUE(run.IsFinished());
     EXPECT_EQ(solver_thread == std::this_thread::get_id(), run_inline);
+  }
+}
+
+TEST_F(AdjustmentRunTest, AnExceptionMakesTheSolutionUnusable) {
+  for (const bool run_inline : {true, false}) {
+    AdjustmentRun run(
+        GlobalProblem(map_, SlamConfig{}, /*find_lens=*/false),
+        [](BundleProblem&, const std::atomic<bool>&) -> BundleSummary { throw std::bad_alloc(); }, run_inline,
+        /*nice=*/1);
+    run.Wait();
+    EXPECT_TRUE(run.IsFinished());
+    EXPECT_FALSE(run.summary().usable);
   }
 }
 
