@@ -82,9 +82,7 @@ void AddUnlistedLabels(const cv::Mat& labels, std::vector<Instance>& instances) 
 }  // namespace
 
 Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s, std::stop_token stop)
-    : camera_(camera), max_mask_delay_s_(max_mask_delay_s), stop_(std::move(stop)) {
-  if (camera_.HasDistortion()) maps_ = MakeUndistortionMaps(camera_);
-}
+    : camera_(camera), max_mask_delay_s_(max_mask_delay_s), stop_(std::move(stop)) {}
 
 bool Ingest::IsDuplicate(const SessionInput& input) const {
   if (const auto* masks = std::get_if<MasksInput>(&input)) {
@@ -125,7 +123,10 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
   range_ = range;
   depth_sentinels_.Remove(frame->frame_id, input.depth_scale_mu, &frame->depth_mu);
   frame->has_masks = !frame->labels.empty();
-  if (camera_.HasDistortion()) Undistort(*frame);
+  if (camera_.HasDistortion()) {
+    if (maps_.xy.empty()) maps_ = MakeUndistortionMaps(camera_);
+    Undistort(*frame);
+  }
   if (frame->has_masks) AddUnlistedLabels(frame->labels, frame->instances);
   mask_interpreter_.Interpret(HasEightBits(input), frame.get());
   AddAccepted(*frame);

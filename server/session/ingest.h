@@ -52,8 +52,9 @@ class Ingest {
   void Undistort(Frame& frame) const;
   void UndistortNearest(cv::Mat& image) const;
 
-  CameraModel camera_;     // of the client's images, with distortion
-  UndistortionMaps maps_;  // empty for a pinhole
+  CameraModel camera_;  // of the client's images, with distortion
+  // Made for the first valid image, because they are large: 6 bytes per pixel. Empty for a pinhole.
+  UndistortionMaps maps_;
   double max_mask_delay_s_;
   const std::stop_token stop_;
   SampleRange range_;  // of the accepted color images

@@ -23,6 +23,15 @@ int TrainingThreads(const ServerConfig& config) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+absl::Status CheckImageSize(const CameraModel& camera, double max_image_mpx) {
+  const double mpx = 1e-6 * camera.width_px * camera.height_px;
+  if (mpx <= max_image_mpx) return absl::OkStatus();
+  return InvalidArgument(
+      "camera: images must have at most {:.3g} megapixels (session.max_image_mpx), {}x{} px are {:.3g}; send smaller "
+      "images, with intrinsics that fit them",
+      max_image_mpx, camera.width_px, camera.height_px, mpx);
+}
+
 // Starts a session, new or restored. RESOURCE_EXHAUSTED: the server has no more threads or memory.
 template <class... Arguments>
 absl::StatusOr<std::shared_ptr<Session>> StartSession(const std::string& id, Arguments&&... arguments) {
@@ -165,6 +174,7 @@ std::string LocalMappingService::NewId() {
 
 absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
+  ROMAP_RETURN_IF_ERROR(CheckImageSize(options.camera, config_.session.max_image_mpx));
   if (options.up_world && !(options.up_world->norm() > 0 && options.up_world->allFinite())) {
     return InvalidArgument("up_world: must be finite and not zero");
   }
@@ -214,6 +224,7 @@ absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::FindLocked(const s
 }
 
 absl::Status LocalMappingService::RestoreLocked(const std::string& session_id) {
+  ROMAP_RETURN_IF_ERROR(CheckImageSize(shelf_->Info(session_id).camera, config_.session.max_image_mpx));
   ROMAP_ASSIGN_OR_RETURN(auto taken, shelf_->Take(session_id));
   auto& [record, stored] = taken;
   auto started =

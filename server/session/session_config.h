@@ -8,6 +8,7 @@ namespace romap::session {
 
 struct SessionConfig {
   int max_sessions = 16;
+  double max_image_mpx = 40;
   int frame_queue = 8;
   int mapping_queue = 8;
   int subscriber_queue = 65536;
@@ -23,6 +24,12 @@ struct SessionConfig {
                 .max = 10000,
                 .audience = Audience::kOperator,
                 .help = "Maximum number of sessions in memory: open ones, and without a store also finished ones"});
+    fields.Add("max_image_mpx", &max_image_mpx,
+               {.unit = "megapixels",
+                .min = 0.1,
+                .max = 67.2,
+                .help = "Largest images of a session; an image needs about 20 bytes of memory per pixel while it waits "
+                        "and is tracked"});
     fields.Add("frame_queue", &frame_queue,
                {.unit = "frames",
                 .min = 1,

@@ -1,0 +1,51 @@
+// What a service refuses, and what a session costs that nobody uses.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/status.h"
+#include "server/session/local_mapping_service.h"
+#include "tests/support/sanitizer.h"
+#include "tests/support/streams.h"
+
+namespace romap::session::session_limits_test {
+
+using ::testing::HasSubstr;
+
+SessionOptions SquareImages(int side_px) {
+  SessionOptions options;
+  options.camera = {.width_px = side_px,
+                    .height_px = side_px,
+                    .fx_px = 0.8 * side_px,
+                    .fy_px = 0.8 * side_px,
+                    .cx_px = 0.5 * side_px,
+                    .cy_px = 0.5 * side_px,
+                    .distortion = {0.01, 0, 0, 0, 0}};
+  return options;
+}
+
+TEST(SessionLimitsTest, LargerImagesThanTheServerTakesAreRefused) {
+  LocalMappingService service({});
+  EXPECT_EQ(
+      Message(service.CreateSession(SquareImages(8192)).status()),
+      "camera: images must have at most 40 megapixels (session.max_image_mpx), 8192x8192 px are 67.1; send smaller "
+      "images, with intrinsics that fit them");
+  EXPECT_TRUE(service.CreateSession(SquareImages(1000)).ok());
+  ServerConfig config;
+  config.session.max_image_mpx = 0.99;
+  LocalMappingService small(config);
+  EXPECT_THAT(Message(small.CreateSession(SquareImages(1000)).status()), HasSubstr("at most 0.99 megapixels"));
+}
+
+TEST(SessionLimitsTest, ASessionWithoutImagesHasNoUndistortionMaps) {
+  if (testing_support::kUnderSanitizer) GTEST_SKIP() << "a sanitizer keeps freed memory";
+  LocalMappingService service({});
+  const auto first = service.CreateSession(SquareImages(1000));
+  ASSERT_TRUE(first.ok()) << first.status();
+  const auto large = service.CreateSession(SquareImages(6300));
+  ASSERT_TRUE(large.ok()) << large.status();
+  // The maps need 6 bytes per pixel: 238 MB.
+  EXPECT_LT(large->statistics.resident_bytes, first->statistics.resident_bytes + (size_t{60} << 20));
+}
+
+}  // namespace romap::session::session_limits_test
