@@ -56,9 +56,9 @@ struct CameraModel {
 // Number of distortion coefficients of a lens.
 inline int CoefficientCount(LensModel lens) { return lens == LensModel::kFisheye ? 4 : 5; }
 
-// INVALID_ARGUMENT, with the first invalid field in the message: size outside 16..8192 px, focal length not positive or
-// not finite, principal point more than one image size outside the image, distortion not finite, or more coefficients
-// than the lens has; readout time outside 0..1 s.
+// INVALID_ARGUMENT, with the first invalid field and its range in the message: size outside 16..8192 px, focal length
+// outside 0.01..1000 sides of the image, principal point more than one image size outside the image, distortion outside
+// -1e6..1e6, or more coefficients than the lens has; readout time outside 0..1 s.
 absl::Status ValidateCameraModel(const CameraModel& camera);
 
 }  // namespace romap

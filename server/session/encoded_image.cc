@@ -1,7 +1,6 @@
 #include "server/session/encoded_image.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -16,6 +15,10 @@
 
 namespace romap::session {
 namespace {
+
+// Millimeters in a map in kilometers are 1e-6.
+constexpr double kMinDepthScale_mu = 1e-12;
+constexpr double kMaxDepthScale_mu = 1e3;
 
 absl::Status CheckSize(const char* field, const EncodedSize& size, const CameraModel& camera) {
   if (size.width_px == camera.width_px && size.height_px == camera.height_px) return absl::OkStatus();
@@ -100,6 +103,10 @@ absl::StatusOr<cv::Mat> ExpandRuns(const std::vector<uint32_t>& runs, const Came
   const size_t total = static_cast<size_t>(camera.width_px) * camera.height_px;
   if (runs.size() % 2 != 0)
     return InvalidArgument("masks: label_runs must be (label, length) pairs, has {} numbers", runs.size());
+  if (runs.size() / 2 > total) {
+    return InvalidArgument("masks: label_runs must have at most one run per pixel ({}), has {}", total,
+                           runs.size() / 2);
+  }
   cv::Mat labels(camera.height_px, camera.width_px, CV_16UC1);
   auto* out = labels.ptr<uint16_t>();
   size_t filled = 0;
@@ -137,8 +144,9 @@ absl::StatusOr<cv::Mat> DecodeLabels(const EncodedMasks& masks, const CameraMode
 
 absl::StatusOr<cv::Mat> DecodeDepth(const FrameInput& input, const CameraModel& camera, const std::stop_token& stop) {
   if (input.depth_encoding == DepthEncoding::kNone) return cv::Mat();
-  if (!std::isfinite(input.depth_scale_mu) || input.depth_scale_mu <= 0) {
-    return InvalidArgument("depth: scale_mu must be a positive number, is {}", input.depth_scale_mu);
+  if (!(input.depth_scale_mu >= kMinDepthScale_mu && input.depth_scale_mu <= kMaxDepthScale_mu)) {  // NaN is invalid
+    return InvalidArgument("depth: scale_mu must be in {:.0e}..{:.0e} map units, is {}", kMinDepthScale_mu,
+                           kMaxDepthScale_mu, input.depth_scale_mu);
   }
   cv::Mat raw;
   if (input.depth_encoding == DepthEncoding::kPng16) {

@@ -175,8 +175,8 @@ std::string LocalMappingService::NewId() {
 absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
   ROMAP_RETURN_IF_ERROR(CheckImageSize(options.camera, config_.session.max_image_mpx));
-  if (options.up_world && !(options.up_world->norm() > 0 && options.up_world->allFinite())) {
-    return InvalidArgument("up_world: must be finite and not zero");
+  if (options.up_world && !(options.up_world->norm() >= 1e-9 && options.up_world->norm() <= 1e9)) {
+    return InvalidArgument("up_world: must have a length in 1e-9..1e9, has {}", options.up_world->norm());
   }
   if (options.name.size() > kMaxNameLength) {
     return InvalidArgument("name: must have at most {} bytes, has {}", kMaxNameLength, options.name.size());

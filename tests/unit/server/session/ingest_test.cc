@@ -194,6 +194,8 @@ TEST(IngestTest, ErrorsNameWrongSizes) {
   EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("masks: run lengths must add up to 64x48"));
   runs.label_runs = {0};
   EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("pairs"));
+  runs.label_runs.assign(2 * 4000, 0);  // empty runs
+  EXPECT_THAT(ErrorOf(ingest, runs), HasSubstr("label_runs must have at most one run per pixel (3072), has 4000"));
   FrameInput raw = ValidFrame();
   raw.image_encoding = ImageEncoding::kRawGray8;
   raw.raw_width_px = 64;
@@ -218,11 +220,13 @@ TEST(IngestTest, InvalidNumbersAreRejected) {
   EXPECT_THAT(ErrorOf(ingest, pose), HasSubstr("t_world_camera: must be within 1e+08 map units of the origin"));
   FrameInput gravity = ValidFrame();
   gravity.gravity_camera = Eigen::Vector3d::Zero();
-  EXPECT_THAT(ErrorOf(ingest, gravity), HasSubstr("gravity_camera: must be a finite vector"));
+  EXPECT_THAT(ErrorOf(ingest, gravity), HasSubstr("gravity_camera: must have a length in 1e-9..1e9, has"));
   FrameInput depth = ValidFrame();
   depth.depth_encoding = DepthEncoding::kPng16;
   depth.depth_scale_mu = -1;
-  EXPECT_THAT(ErrorOf(ingest, depth), HasSubstr("depth: scale_mu must be a positive number, is -1"));
+  EXPECT_THAT(ErrorOf(ingest, depth), HasSubstr("depth: scale_mu must be in 1e-12..1e+03 map units, is -1"));
+  depth.depth_scale_mu = 1e308;
+  EXPECT_THAT(ErrorOf(ingest, depth), HasSubstr("depth: scale_mu must be in 1e-12..1e+03 map units, is 1e+308"));
   FrameInput score = ValidFrame();
   score.instances = {{.label = 3, .class_name = "cup", .score = std::nan(""), .track_id = std::nullopt}};
   EXPECT_THAT(ErrorOf(ingest, score), HasSubstr("masks: score of label 3 must be in 0..1"));
