@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <signal.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
@@ -19,6 +18,7 @@
 
 #include "common/config.h"
 #include "common/exit_code.h"
+#include "common/log_sink.h"
 #include "common/status.h"
 #include "common/version.h"
 #include "server/access/access_config.h"
@@ -155,8 +155,10 @@ void RaiseFileLimit() {
 }
 
 void SetUpLogging(const std::string& level) {
-  // Scripts read the address from standard output, so the log goes to standard error.
-  spdlog::set_default_logger(spdlog::stderr_color_mt("romap-server"));
+  // Scripts read the address from standard output, so the log goes to standard error. A reader that ends must not end
+  // the server.
+  signal(SIGPIPE, SIG_IGN);
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("romap-server", MakeLogSink(stderr)));
   spdlog::set_level(spdlog::level::from_str(level));
   transport::RouteGrpcLogToSpdlog();
 }

@@ -1,14 +1,16 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "client/cli/command.h"
 #include "client/cli/interrupt.h"
 #include "common/exit_code.h"
+#include "common/log_sink.h"
+#include "common/printable.h"
 #include "common/status.h"
 #include "common/version.h"
 
@@ -45,11 +47,11 @@ int RunCli(int argc, const char* const* argv) {
     fmt::print(stderr, "romap: {} (see romap --help)\n", fault);
     return kUsageError;
   }
-  spdlog::set_default_logger(spdlog::stderr_color_mt("romap"));
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("romap", MakeLogSink(stderr)));
   spdlog::set_level(spdlog::level::from_str(log_level));
   CatchInterrupts();
   const absl::Status status = chosen();
-  if (!status.ok()) fmt::print(stderr, "romap: {}\n", Message(status));
+  if (!status.ok()) fmt::print(stderr, "romap: {}\n", PrintableLines(Message(status)));
   return ToExitCode(status);
 }
 

@@ -17,6 +17,7 @@
 #include "client/files/sequence.h"
 #include "common/color_image.h"
 #include "common/label_png.h"
+#include "common/printable.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -117,7 +118,7 @@ std::string Describe(const files::Sequence& sequence, const Survey& survey) {
       sequence.dir(), sequence.size(), camera.width_px, camera.height_px,
       1e-9 * static_cast<double>(sequence.timestamp_ns(sequence.size() - 1) - sequence.timestamp_ns(0)), sequence.fps(),
       with_masks, survey.with_pose * sequence.size() / std::max<size_t>(1, survey.frames), with_depth,
-      survey.classes.empty() ? "none" : fmt::format("{}", fmt::join(survey.classes, ", ")));
+      survey.classes.empty() ? "none" : Printable(fmt::format("{}", fmt::join(survey.classes, ", "))));
 }
 
 absl::Status Diagnose(const SequenceArguments& arguments) {

@@ -8,6 +8,7 @@
 #include "client/cli/map_files.h"
 #include "client/cli/service_options.h"
 #include "client/files/pose_uncertainty_file.h"
+#include "common/printable.h"
 
 namespace romap::cli {
 namespace {
@@ -24,7 +25,7 @@ absl::Status RunExport(const ExportOptions& options) {
   ROMAP_ASSIGN_OR_RETURN(const MapSnapshot snapshot, service->ExportMap(options.session));
   std::vector<std::string> faults;
   const std::vector<MapObject> objects = DecodeObjects(snapshot.objects, &faults);
-  for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", fault);
+  for (const std::string& fault : faults) fmt::print(stderr, "romap: {}\n", PrintableLines(fault));
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
 
   const std::vector<files::StampedPose> trajectory = TrajectoryOf(snapshot);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/printable.h"
+
 namespace romap::cli {
 
 std::string SeverityName(Severity severity) {
@@ -22,9 +24,9 @@ std::string FormatDiagnostic(const Diagnostic& diagnostic) {
   if (diagnostic.first_frame_id > 0) {
     where += fmt::format("{}first in frame {}", where.empty() ? "" : ", ", diagnostic.first_frame_id);
   }
-  return fmt::format("{}: {}{}: {}{}{}", SeverityName(diagnostic.severity), diagnostic.code,
-                     where.empty() ? "" : fmt::format(" ({})", where), diagnostic.text,
-                     diagnostic.advice.empty() ? "" : "; ", diagnostic.advice);
+  return Printable(fmt::format("{}: {}{}: {}{}{}", SeverityName(diagnostic.severity), diagnostic.code,
+                               where.empty() ? "" : fmt::format(" ({})", where), diagnostic.text,
+                               diagnostic.advice.empty() ? "" : "; ", diagnostic.advice));
 }
 
 }  // namespace romap::cli

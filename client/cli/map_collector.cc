@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/printable.h"
+
 namespace romap::cli {
 namespace {
 
@@ -67,7 +69,8 @@ void MapCollector::NoteFault(const std::string& what, uint64_t frame_id, const s
   if (faults_.size() >= kMaxFaults) return;
   const auto sent = sent_.find(frame_id);
   const std::string file = sent == sent_.end() ? "" : FileOf(error, sent->second.paths);
-  faults_.push_back(fmt::format("{} {}{}: {}", what, frame_id, file.empty() ? "" : fmt::format(" ({})", file), error));
+  faults_.push_back(
+      fmt::format("{} {}{}: {}", what, frame_id, file.empty() ? "" : fmt::format(" ({})", file), Printable(error)));
 }
 
 void MapCollector::Apply(const MapEvent& event) {

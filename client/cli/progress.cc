@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "common/printable.h"
+
 namespace romap::cli {
 namespace {
 
@@ -23,7 +25,7 @@ Progress::~Progress() { Done(); }
 
 void Progress::Say(const std::string& text) {
   std::lock_guard lock(mutex_);
-  fmt::print(stderr, "{}romap: {}\n", shown_ && terminal_ ? "\r\x1b[2K" : "", text);
+  fmt::print(stderr, "{}romap: {}\n", shown_ && terminal_ ? "\r\x1b[2K" : "", PrintableLines(text));
   std::fflush(stderr);
   shown_ = false;
 }

@@ -16,6 +16,7 @@
 #include "client/cli/unreadable_files.h"
 #include "client/sdk/resuming_map_stream.h"
 #include "client/sdk/retry.h"
+#include "common/printable.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -289,7 +290,7 @@ class Run {
       result_.trajectory = TrajectoryOf(*map);
     } else {
       fmt::print(stderr, "romap: the trajectory lacks later corrections because the map could not be exported: {}\n",
-                 Message(map.status()));
+                 PrintableLines(Message(map.status())));
     }
   }
 

@@ -6,6 +6,7 @@
 #include "client/cli/command.h"
 #include "client/cli/service_options.h"
 #include "client/cli/session_file_transfer.h"
+#include "common/printable.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -61,9 +62,9 @@ absl::Status RunSessions(const SessionsOptions& options) {
   fmt::print("{:<14} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", "session", "state", "frames", "objects", "training",
              "stream", "stored", "name");
   for (const SessionInfo& info : sessions) {
-    fmt::print("{:<14} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", info.id, StateName(info.state),
+    fmt::print("{:<14} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", Printable(info.id), StateName(info.state),
                info.statistics.frames_processed, info.statistics.objects, info.statistics.objects_training,
-               info.stream_open ? "attached" : "-", StoredText(info), info.name);
+               info.stream_open ? "attached" : "-", StoredText(info), Printable(info.name));
   }
   if (sessions.empty()) fmt::print("(no sessions)\n");
   return absl::OkStatus();

@@ -17,6 +17,11 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+bool IsPowerOfTen(uint64_t count) {
+  while (count > 1 && count % 10 == 0) count /= 10;
+  return count == 1;
+}
+
 }  // namespace
 
 void FrameLedger::CountReceived(bool is_frame) {
@@ -75,13 +80,17 @@ std::optional<uint64_t> FrameLedger::newest_frame_id() const {
 
 void FrameLedger::Reject(const Arrival& arrival, const absl::Status& reason) {
   if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
-    ++frames_rejected_;
-    spdlog::info("session {}: frame {} rejected: {}", session_id_, frame->frame_id, Message(reason));
+    LogRejection("frame", frame->frame_id, ++frames_rejected_, reason);
   } else {
-    const uint64_t frame_id = std::get<MasksInput>(arrival.input).frame_id;
-    spdlog::info("session {}: masks of frame {} rejected: {}", session_id_, frame_id, Message(reason));
+    LogRejection("masks of frame", std::get<MasksInput>(arrival.input).frame_id, ++masks_rejected_, reason);
   }
   SendRejection(arrival, Message(reason), TrackingState::kLost);
+}
+
+void FrameLedger::LogRejection(const char* input, uint64_t frame_id, uint64_t count, const absl::Status& reason) const {
+  if (!IsPowerOfTen(count)) return;
+  spdlog::info("session {}: {} {} rejected{}: {}", session_id_, input, frame_id,
+               count > 1 ? fmt::format(", the {}th", count) : "", Message(reason));
 }
 
 void FrameLedger::Drop(const Arrival& arrival) {

@@ -55,6 +55,8 @@ class FrameLedger {
   void FillIn(Statistics* statistics) const;
 
  private:
+  // The 1st, 10th, 100th ..., because a client may send nothing else.
+  void LogRejection(const char* input, uint64_t frame_id, uint64_t count, const absl::Status& reason) const;
   void SendRejection(const Arrival& arrival, std::string reason, TrackingState state);
   void Settle();
 
@@ -63,6 +65,7 @@ class FrameLedger {
 
   std::atomic<uint64_t> inputs_received_ = 0;  // frames and late masks
   std::atomic<uint64_t> frames_received_ = 0, frames_processed_ = 0, frames_dropped_ = 0, frames_rejected_ = 0;
+  std::atomic<uint64_t> masks_rejected_ = 0;
   std::atomic<uint64_t> keyframes_ = 0, map_points_ = 0;
 
   mutable std::mutex mutex_;

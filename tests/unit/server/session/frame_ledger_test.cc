@@ -1,8 +1,12 @@
 #include "server/session/frame_ledger.h"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <optional>
+#include <sstream>
 
 #include "common/status.h"
 
@@ -120,6 +124,21 @@ TEST_F(FrameLedgerTest, SettleAllEndsAllWaits) {
   ledger_.CountReceived(/*is_frame=*/true);
   ledger_.WhenSettled([&] { later_done = true; });
   EXPECT_TRUE(later_done);
+}
+
+TEST_F(FrameLedgerTest, LogsFewOfManyRejections) {
+  std::ostringstream log;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  for (uint64_t id = 1; id <= 2500; ++id) ledger_.Reject(FrameArrival(id), InvalidArgument("image: missing"));
+  for (uint64_t id = 1; id <= 15; ++id) ledger_.Reject(MasksArrival(id), InvalidArgument("masks: missing"));
+  spdlog::set_default_logger(before);
+  const std::string text = log.str();
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
+  EXPECT_NE(text.find("session session: frame 1 rejected: image: missing"), std::string::npos) << text;
+  EXPECT_NE(text.find("session session: frame 1000 rejected, the 1000th: image: missing"), std::string::npos) << text;
+  EXPECT_NE(text.find("session session: masks of frame 10 rejected, the 10th: masks: missing"), std::string::npos);
 }
 
 }  // namespace romap::session::frame_ledger_test
