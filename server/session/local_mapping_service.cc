@@ -10,6 +10,7 @@
 #include "common/status.h"
 #include "common/unix_time.h"
 #include "common/wire/recording.h"
+#include "server/session/local_streams.h"
 #include "server/store/session_transfer.h"
 
 namespace romap::session {
@@ -44,89 +45,6 @@ absl::StatusOr<std::shared_ptr<Session>> StartSession(const std::string& id, Arg
   }
 }
 
-// A stream of a stored map that is not in memory otherwise.
-class ShelfStream : public EventStream {
- public:
-  ShelfStream(std::shared_ptr<MapState> map, uint64_t newest_frame_id) : map_(std::move(map)) {
-    if (newest_frame_id > 0) opening_.newest_frame_id = newest_frame_id;
-    outbox_ = map_->Subscribe(Outbox::Acks::kNewest, /*max_acks=*/1, &opening_.objects);
-    opening_.durable = true;
-  }
-  ~ShelfStream() override { Cancel(); }
-
-  const StreamOpening& opening() const override { return opening_; }
-  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
-  bool Done() const override { return outbox_->Done(); }
-  absl::Status status() const override { return outbox_->status(); }
-  void Cancel() override {
-    map_->Unsubscribe(outbox_);
-    outbox_->Close(absl::CancelledError("the stream was canceled"));
-  }
-
- private:
-  const std::shared_ptr<MapState> map_;
-  std::shared_ptr<Outbox> outbox_;
-  StreamOpening opening_;
-};
-
-class LocalEventStream : public MapStream {
- public:
-  // `holder`: null for a stream that only watches.
-  LocalEventStream(std::shared_ptr<Session> session, std::shared_ptr<Outbox> outbox, StreamOpening opening,
-                   std::shared_ptr<SenderClaim::Holder> holder)
-      : session_(std::move(session)),
-        outbox_(std::move(outbox)),
-        opening_(std::move(opening)),
-        holder_(std::move(holder)),
-        sending_(holder_ != nullptr) {}
-
-  ~LocalEventStream() override { Cancel(); }
-
-  const StreamOpening& opening() const override { return opening_; }
-  std::optional<MapEvent> Next(std::chrono::milliseconds timeout) override { return outbox_->Next(timeout); }
-  bool Done() const override { return outbox_->Done(); }
-  absl::Status status() const override { return outbox_->status(); }
-
-  absl::Status Send(FrameInput frame) override { return Offer(std::move(frame)); }
-  absl::Status SendMasks(MasksInput masks) override { return Offer(std::move(masks)); }
-
-  absl::Status CloseSend() override {
-    if (!StopSending()) return SendingEnded();
-    session_->WhenSettled([outbox = outbox_] { outbox->Close(); });
-    return absl::OkStatus();
-  }
-
-  void Cancel() override {
-    StopSending();
-    session_->Unsubscribe(outbox_);
-    outbox_->Close(absl::CancelledError("the stream was canceled"));
-  }
-
- private:
-  absl::Status Offer(SessionInput input) {
-    if (!sending_) return SendingEnded();
-    absl::Status status;
-    if (holder_->Run([&] { status = session_->Offer(std::move(input)); })) return status;
-    return outbox_->status().ok() ? SendingEnded() : outbox_->status();
-  }
-
-  static absl::Status SendingEnded() {
-    return FailedPrecondition("sending has ended on this stream: CloseSend() or Cancel() was called");
-  }
-
-  bool StopSending() {
-    if (!sending_.exchange(false)) return false;
-    session_->sender().Release(holder_);
-    return true;
-  }
-
-  const std::shared_ptr<Session> session_;
-  const std::shared_ptr<Outbox> outbox_;
-  const StreamOpening opening_;
-  const std::shared_ptr<SenderClaim::Holder> holder_;
-  std::atomic<bool> sending_;
-};
-
 }  // namespace
 
 LocalMappingService::LocalMappingService(const ServerConfig& config, std::unique_ptr<store::Store> store)
@@ -134,7 +52,11 @@ LocalMappingService::LocalMappingService(const ServerConfig& config, std::unique
       store_(std::move(store)),
       pool_(config.nerf, TrainingThreads(config)),
       mesher_(config.mesh, config.session.single_thread ? Mesher::Threading::kCaller : Mesher::Threading::kOwnThread) {
-  if (!store_) return;
+  if (store_) LoadShelf();
+  keeper_thread_ = std::thread([this] { KeepSessions(); });
+}
+
+void LocalMappingService::LoadShelf() {
   auto stored = store_->Sessions();
   if (!stored.ok()) spdlog::error("store: {}", Message(stored.status()));
   shelf_ = std::make_unique<SessionShelf>(store_.get(),
@@ -145,7 +67,6 @@ LocalMappingService::LocalMappingService(const ServerConfig& config, std::unique
       spdlog::error("session {}: cannot be restored: {}", id, Message(status));
     }
   }
-  store_thread_ = std::thread([this] { KeepStored(); });
 }
 
 LocalMappingService::~LocalMappingService() {
@@ -154,7 +75,7 @@ LocalMappingService::~LocalMappingService() {
     stopping_ = true;
     stopping_changed_.notify_all();
   }
-  if (store_thread_.joinable()) store_thread_.join();
+  if (keeper_thread_.joinable()) keeper_thread_.join();
   // Sessions use the pool and the mesher, so they must end first.
   std::lock_guard lock(mutex_);
   for (const auto& [id, session] : sessions_) {
@@ -390,9 +311,9 @@ absl::StatusOr<SessionInfo> LocalMappingService::PinSession(const std::string& s
   return session->Info();
 }
 
-// --------------------------------------------------------------------------------------------------- the store thread
+// -------------------------------------------------------------------------------------------------- the keeper thread
 
-void LocalMappingService::KeepStored() {
+void LocalMappingService::KeepSessions() {
   constexpr std::chrono::milliseconds kPeriod{100};
   constexpr std::chrono::minutes kExpiryPeriod{10};
   auto next_expiry = std::chrono::steady_clock::now();
@@ -400,16 +321,41 @@ void LocalMappingService::KeepStored() {
   while (!stopping_changed_.wait_for(lock, kPeriod, [&] { return stopping_; })) {
     lock.unlock();
     try {
-      StoreChanges();
+      DeleteAbandoned();
+      if (store_) StoreChanges();
       const auto now = std::chrono::steady_clock::now();
-      if (now >= next_expiry) {
+      if (store_ && now >= next_expiry) {
         next_expiry = now + kExpiryPeriod;
         DeleteExpired();
       }
     } catch (const std::exception& e) {  // out of memory: the changes are stored in the next round
-      spdlog::error("store: {}", e.what());
+      spdlog::error("sessions: {}", e.what());
     }
     lock.lock();
+  }
+}
+
+void LocalMappingService::DeleteAbandoned() {
+  if (config_.session.abandon_after_s == 0) return;
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> limit(config_.session.abandon_after_s);
+  std::map<std::string, std::chrono::steady_clock::time_point> empty_since;
+  std::vector<std::string> abandoned;
+  {
+    std::lock_guard lock(mutex_);
+    for (const auto& [id, session] : sessions_) {
+      if (!session->IsEmpty()) continue;
+      const auto known = empty_since_.find(id);
+      const auto since = known == empty_since_.end() ? now : known->second;
+      empty_since[id] = since;
+      if (now - since > limit) abandoned.push_back(id);
+    }
+  }
+  empty_since_ = std::move(empty_since);
+  for (const std::string& id : abandoned) {
+    spdlog::info("session {}: is deleted, because it got no input for {} s (session.abandon_after_s)", id,
+                 config_.session.abandon_after_s);
+    DeleteSession(id).IgnoreError();  // somebody else may have deleted it
   }
 }
 

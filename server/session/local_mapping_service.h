@@ -55,8 +55,12 @@ class LocalMappingService : public MappingService {
   Session::Services Services() { return {.pool = &pool_, .mesher = &mesher_, .store = store_.get()}; }
   absl::Status RestoreLocked(const std::string& session_id);
 
-  // The store thread: stores changes, and puts sessions that ended or that nobody uses on the shelf.
-  void KeepStored();
+  void LoadShelf();
+
+  // The keeper thread: deletes empty sessions that nobody uses, stores changes, and puts sessions that ended or that
+  // nobody uses on the shelf.
+  void KeepSessions();
+  void DeleteAbandoned();
   void StoreChanges();
   bool IsUnused(const std::string& session_id, const Session& session);
   void Shelve(const std::string& session_id, std::shared_ptr<Session> session);
@@ -73,8 +77,9 @@ class LocalMappingService : public MappingService {
   std::unique_ptr<SessionShelf> shelf_;  // null without a store
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
-  std::map<std::string, std::chrono::steady_clock::time_point> unused_since_;  // the store thread
-  std::thread store_thread_;
+  std::map<std::string, std::chrono::steady_clock::time_point> unused_since_;  // the keeper thread
+  std::map<std::string, std::chrono::steady_clock::time_point> empty_since_;   // the same
+  std::thread keeper_thread_;
 };
 
 }  // namespace romap::session

@@ -95,6 +95,8 @@ class Session {
   void SetPinned(bool pinned) { pinned_ = pinned; }
   // Nobody sends or watches, and everything is mapped and trained.
   bool IsIdle() const;
+  // The same, and no input was ever accepted. Never a pinned session.
+  bool IsEmpty() const { return !pinned_ && !newest_frame_id() && state() == SessionState::kOpen && IsIdle(); }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -14,6 +14,7 @@ struct SessionConfig {
   int subscriber_queue = 65536;
   double statistics_period_s = 0.5;
   double unload_after_s = 600;
+  double abandon_after_s = 600;
   std::string record_dir;
   bool single_thread = false;
 
@@ -53,6 +54,11 @@ struct SessionConfig {
                 .max = 1e6,
                 .help = "Time after which an open session that nobody uses gives back its memory; it is restored from "
                         "the store when a client opens it"});
+    fields.Add("abandon_after_s", &abandon_after_s,
+               {.unit = "s",
+                .min = 0,
+                .max = 1e6,
+                .help = "Time after which a session is deleted that got no frame and has no stream; 0 = never"});
     fields.Add("record_dir", &record_dir,
                {.help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "
                         "replay; empty = no recording"});

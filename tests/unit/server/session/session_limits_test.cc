@@ -48,4 +48,29 @@ TEST(SessionLimitsTest, ASessionWithoutImagesHasNoUndistortionMaps) {
   EXPECT_LT(large->statistics.resident_bytes, first->statistics.resident_bytes + (size_t{60} << 20));
 }
 
+TEST(SessionLimitsTest, AnEmptySessionThatNobodyUsesIsDeleted) {
+  ServerConfig config;
+  config.session.abandon_after_s = 0.3;
+  LocalMappingService service(config);
+  SessionOptions options;
+  options.camera = testing_support::SmallCamera();
+  const std::string abandoned = service.CreateSession(options)->id;
+  const std::string mapped = service.CreateSession(options)->id;
+  {
+    const auto stream = service.OpenMap(mapped).value();
+    ASSERT_TRUE(stream->Send(testing_support::MakeFrame(1)).ok());
+    const auto ack = testing_support::NextOf<FrameAck>(*stream);
+    ASSERT_TRUE(ack && ack->accepted);
+  }
+  const std::string open = service.CreateSession(options)->id;
+  auto stream = service.OpenMap(open).value();
+  const auto exists = [&](const std::string& id) { return service.GetSession(id).ok(); };
+  EXPECT_TRUE(testing_support::Eventually([&] { return !exists(abandoned); }));
+  EXPECT_TRUE(exists(mapped));
+  EXPECT_TRUE(exists(open));
+  stream = nullptr;
+  EXPECT_TRUE(testing_support::Eventually([&] { return !exists(open); }));
+  EXPECT_TRUE(exists(mapped));
+}
+
 }  // namespace romap::session::session_limits_test
