@@ -73,6 +73,7 @@ absl::StatusOr<std::vector<Diagnostic>> CheckByMapping(const files::Sequence& se
   StreamOptions options;
   arguments.SetPoseUse(&options);
   options.max_training_s = 30;
+  options.say_diagnostics = false;  // they are printed together, most severe first
   if (use_poses) {
     options.stride = (sequence.size() + kMaxMappedFrames - 1) / kMaxMappedFrames;
   } else {

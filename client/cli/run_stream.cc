@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <optional>
 #include <thread>
 
+#include "client/cli/diagnostic_lines.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/map_files.h"
 #include "client/cli/mask_schedule.h"
@@ -40,7 +42,7 @@ bool IsHeldOut(const StreamOptions& options, size_t frame) {
 class Sender {
  public:
   Sender(const files::Sequence& sequence, const StreamOptions& options, MapStream& stream, MapCollector& collector,
-         std::mutex& collector_mutex)
+         std::mutex& collector_mutex, std::function<void(const Diagnostic&)> on_first_unreadable)
       : sequence_(sequence),
         options_(options),
         stream_(stream),
@@ -48,6 +50,7 @@ class Sender {
         collector_mutex_(collector_mutex),
         end_(std::min(sequence.size(), options.first_frame + std::min(options.frame_count, sequence.size()))),
         unreadable_(sequence, options.first_frame, end_),
+        on_first_unreadable_(std::move(on_first_unreadable)),
         thread_([this] {
           status_ = Run();
           done_ = true;
@@ -99,7 +102,10 @@ class Sender {
     std::vector<files::UnreadableFile> unreadable;
     absl::StatusOr<FrameInput> frame = sequence_.LoadReadable(index, &unreadable);
     if (!frame.ok()) unreadable.push_back({files::FileKind::kImage, frame.status()});
-    for (const files::UnreadableFile& file : unreadable) ROMAP_RETURN_IF_ERROR(unreadable_.Note(index + 1, file));
+    for (const files::UnreadableFile& file : unreadable) {
+      ROMAP_RETURN_IF_ERROR(unreadable_.Note(index + 1, file));
+      if (const auto first = unreadable_.FirstOf(file.kind, index + 1)) on_first_unreadable_(*first);
+    }
     return frame.ok() ? std::optional(*std::move(frame)) : std::nullopt;
   }
 
@@ -129,7 +135,8 @@ class Sender {
   std::mutex& collector_mutex_;
   const size_t end_;  // of the frames to send
   UnreadableFiles unreadable_;
-  std::vector<uint64_t> held_out_;  // ids of frames
+  const std::function<void(const Diagnostic&)> on_first_unreadable_;  // of each kind of file
+  std::vector<uint64_t> held_out_;                                    // ids of frames
   MaskSchedule schedule_{options_.mask_rate_hz, options_.mask_delay_s};
   const Clock::time_point start_ = Clock::now();
   std::atomic<bool> stop_ = false;
@@ -179,11 +186,13 @@ class Run {
       result_.session_id = info.id;
     }
     ROMAP_RETURN_IF_ERROR(OpenStream());
+    for (const Diagnostic& diagnostic : sequence_.diagnostics()) lines_.Say(diagnostic);
     result_.status = SendFrames();
     if (result_.status.ok() && !options_.leave_open) result_.status = Train();
     progress_.Done();
     stream_.reset();
     if (result_.status.ok()) FetchTrajectory();
+    result_.said = lines_.Said();
     return result_;
   }
 
@@ -223,7 +232,8 @@ class Run {
   }
 
   absl::Status SendFrames() {
-    Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_);
+    Sender sender(sequence_, options_, *stream_, collector_, collector_mutex_,
+                  [this](const Diagnostic& diagnostic) { lines_.Say(diagnostic); });
     const absl::Status status = AwaitAcknowledgements(sender);
     sender.Join();
     result_.diagnostics = sender.unreadable().Diagnostics();
@@ -297,8 +307,18 @@ class Run {
   void ReceiveEvent() {
     std::optional<MapEvent> event = stream_->Next(kEventWait);
     if (!event) return;
+    SayNews(*event);
     std::lock_guard lock(collector_mutex_);
     collector_.Apply(*event);
+  }
+
+  // The statistics have those that were sent as events before a continued stream was opened.
+  void SayNews(const MapEvent& event) {
+    if (const auto* diagnostic = std::get_if<Diagnostic>(&event)) {
+      lines_.SayNews(*diagnostic);
+    } else if (const auto* statistics = std::get_if<Statistics>(&event)) {
+      for (const Diagnostic& present : statistics->diagnostics) lines_.SayNews(present);
+    }
   }
 
   bool AllAcknowledged() {
@@ -341,6 +361,9 @@ class Run {
   std::mutex collector_mutex_;  // shared with the sender thread
   StreamResult result_;
   Progress progress_{"mapping"};
+  DiagnosticLines lines_{[this](const std::string& line) {
+    if (options_.say_diagnostics) progress_.Say(line);
+  }};
   LinkMessages link_;
   std::unique_ptr<MapStream> stream_;                    // its threads use the members above
   const client::ResumingMapStream* resuming_ = nullptr;  // stream_, if it resumes

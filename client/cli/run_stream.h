@@ -28,6 +28,7 @@ struct StreamOptions {
   double max_training_s = 600;    // maximum wait for training after the last frame
   std::string session_id;         // the open session to continue; empty: a new one
   bool leave_open = false;        // do not finish the session, so that it can be continued
+  bool say_diagnostics = true;    // print each when it arrives
   bool resume = false;            // over a network: survive a broken connection and a restart of the server
 };
 
@@ -45,6 +46,7 @@ struct StreamResult {
   double mapping_s = 0;                  // from the first sent frame to the last acknowledgement
   double training_s = 0;                 // from then to the end of training
   std::vector<Diagnostic> diagnostics;   // about files that could not be read
+  std::vector<Diagnostic> said;          // diagnostics that were printed, as they were then
   std::vector<uint64_t> skipped_frames;  // ids of the frames whose image could not be read, or that are held out
 };
 
@@ -54,9 +56,9 @@ std::vector<size_t> HeldOutFrames(const files::Sequence& sequence, const StreamO
 // Streams a sequence to a mapping service and collects the map: creates a session, sends every frame, waits for all
 // acknowledgements, finishes the session and waits for the training. An interrupt ends sending and training early. The
 // caller deletes the session when it has saved the map.
-// Shows a progress bar. Skips images, masks and depth images that cannot be read; too many of them end sending with an
-// error. Returns an error if no session could be opened. Later errors are in StreamResult::status; the
-// session then stays on the server.
+// Shows a progress bar, and above it each diagnostic when it arrives. Skips images, masks and depth images that cannot
+// be read; too many of them end sending with an error. Returns an error if no session could be opened. Later errors are
+// in StreamResult::status; the session then stays on the server.
 absl::StatusOr<StreamResult> StreamSequence(const files::Sequence& sequence, MappingService& service,
                                             const StreamOptions& options, MapCollector& collector);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "client/cli/diagnostic_lines.h"
 #include "client/cli/format_diagnostic.h"
 #include "client/cli/format_length.h"
 #include "client/cli/trackable.h"
@@ -89,6 +90,7 @@ RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream
   summary.diagnostics = sequence.diagnostics();
   const std::vector<Diagnostic> of_stream = DiagnosticsOf(stream, collector);
   summary.diagnostics.insert(summary.diagnostics.end(), of_stream.begin(), of_stream.end());
+  summary.said = stream.said;
   if (collector.statistics()) {
     summary.frames_dropped = collector.statistics()->frames_dropped;
     summary.map_points = collector.statistics()->map_points;
@@ -207,7 +209,7 @@ std::string FormatSummary(const RunSummary& summary) {
   text += fmt::format("peak memory: mapping {} MiB, client {} MiB\n", summary.server_peak_bytes >> 20,
                       summary.client_peak_bytes >> 20);
   text += FormatObjects(summary.objects) + FormatNextView(summary.objects);
-  for (const Diagnostic& diagnostic : summary.diagnostics) text += FormatDiagnostic(diagnostic) + "\n";
+  text += FormatFinalDiagnostics(summary.diagnostics, summary.said);
   for (const std::string& fault : summary.faults) text += "error: " + fault + "\n";
   return text;
 }

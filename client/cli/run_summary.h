@@ -48,13 +48,14 @@ struct RunSummary {
   uint64_t server_peak_bytes = 0, client_peak_bytes = 0;
   std::vector<Object> objects;
   std::vector<Diagnostic> diagnostics;  // of the client, then of the server at the end of the session
+  std::vector<Diagnostic> said;         // those that were printed during the run, as they were then
   std::vector<std::string> faults;
 };
 
 RunSummary Summarize(const files::Sequence& sequence, const StreamResult& stream, const MapCollector& collector,
                      const std::vector<MapObject>& objects);
 nlohmann::json ToJson(const RunSummary& summary);
-// Formats the summary as text.
+// Formats the summary as text. Diagnostics that were printed during the run are only counted.
 std::string FormatSummary(const RunSummary& summary);
 
 }  // namespace romap::cli

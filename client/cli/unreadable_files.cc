@@ -45,18 +45,28 @@ absl::Status UnreadableFiles::Note(uint64_t frame_id, const files::UnreadableFil
                   kind.first_reason));
 }
 
+std::optional<Diagnostic> UnreadableFiles::FirstOf(files::FileKind kind, uint64_t frame_id) const {
+  const Kind& files = kinds_[static_cast<size_t>(kind)];
+  if (files.unreadable != 1 || files.first_frame_id != frame_id) return std::nullopt;
+  return DiagnosticOf(kind);
+}
+
+Diagnostic UnreadableFiles::DiagnosticOf(files::FileKind kind) const {
+  const Kind& files = kinds_[static_cast<size_t>(kind)];
+  const KindText& texts = kKindTexts[static_cast<size_t>(kind)];
+  return {.code = "file_unreadable",
+          .severity = Severity::kWarning,
+          .first_frame_id = files.first_frame_id,
+          .count = files.unreadable,
+          .text = fmt::format("{} of {} {} cannot be read, the first: {}", files.unreadable, files.listed, texts.plural,
+                              files.first_reason),
+          .advice = fmt::format("{}; replace the files", texts.consequence)};
+}
+
 std::vector<Diagnostic> UnreadableFiles::Diagnostics() const {
   std::vector<Diagnostic> diagnostics;
   for (size_t index = 0; index < kinds_.size(); ++index) {
-    const Kind& kind = kinds_[index];
-    if (kind.unreadable == 0) continue;
-    diagnostics.push_back({.code = "file_unreadable",
-                           .severity = Severity::kWarning,
-                           .first_frame_id = kind.first_frame_id,
-                           .count = kind.unreadable,
-                           .text = fmt::format("{} of {} {} cannot be read, the first: {}", kind.unreadable,
-                                               kind.listed, kKindTexts[index].plural, kind.first_reason),
-                           .advice = fmt::format("{}; replace the files", kKindTexts[index].consequence)});
+    if (kinds_[index].unreadable > 0) diagnostics.push_back(DiagnosticOf(static_cast<files::FileKind>(index)));
   }
   return diagnostics;
 }

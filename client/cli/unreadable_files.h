@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ class UnreadableFiles {
   // of this kind are unreadable; the message states the count and the first file.
   absl::Status Note(uint64_t frame_id, const files::UnreadableFile& file);
 
+  // The diagnostic about a file of this kind in this frame, if it is the first one of its kind.
+  std::optional<Diagnostic> FirstOf(files::FileKind kind, uint64_t frame_id) const;
+
   // One for each kind of file: file_unreadable.
   std::vector<Diagnostic> Diagnostics() const;
   // Ids of the frames that were not sent because their image is unreadable.
@@ -34,6 +38,8 @@ class UnreadableFiles {
     uint64_t first_frame_id = 0;
     std::string first_reason;  // names the file
   };
+
+  Diagnostic DiagnosticOf(files::FileKind kind) const;
 
   std::array<Kind, 3> kinds_;  // by files::FileKind
   std::vector<uint64_t> skipped_frames_;

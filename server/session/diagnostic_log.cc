@@ -30,7 +30,7 @@ void DiagnosticLog::Announce(const Diagnostic& diagnostic) {
   const auto [it, is_new] = announced_.try_emplace(diagnostic.code, diagnostic.severity);
   if (!is_new && it->second >= diagnostic.severity) return;
   it->second = diagnostic.severity;
-  // The same severity for all, because a program that maps in its own process shows them at the end.
+  // The same severity for all, because a program that maps in its own process shows them itself.
   spdlog::info("session {}: {}: {}{}{}", session_id_, diagnostic.code, diagnostic.text,
                diagnostic.advice.empty() ? "" : "; ", diagnostic.advice);
   map_->Publish(diagnostic);

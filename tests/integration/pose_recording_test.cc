@@ -21,7 +21,7 @@ class PoseRecordingTest : public recordings::RecordingTest {
  protected:
   static void ExpectContradiction(const RunResult& result, const char* convention) {
     EXPECT_THAT(result.Codes(), Contains("poses_contradict_images")) << result.process.out;
-    EXPECT_THAT(result.process.out, HasSubstr(convention));
+    EXPECT_THAT(result.process.err, HasSubstr(convention));
     EXPECT_EQ(result.objects(), 0u) << result.process.out;
   }
 };
@@ -45,7 +45,7 @@ TEST_F(PoseRecordingTest, TheClockOfThePosesIsAnotherOne) {
   recording().WritePoses(poses);
   const RunResult result = Run();
   EXPECT_THAT(result.Warnings(), Contains("poses_unmatched"));
-  EXPECT_THAT(result.process.out, HasSubstr("1403715271.7"));
+  EXPECT_THAT(result.process.err, HasSubstr("1403715271.7"));
   EXPECT_THAT(result.process.out, HasSubstr("0 of 60 frames have one"));
 }
 

@@ -17,6 +17,7 @@ namespace romap::cli::run_stream_test {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 namespace fs = std::filesystem;
 
 // A sequence of ten frames at 10 Hz with masks and poses.
@@ -102,6 +103,13 @@ TEST_F(RunStreamTest, GoesOnWithoutAFewUnreadableFiles) {
   EXPECT_THAT(images.text, AllOf(HasSubstr("2 of 10 images"), HasSubstr("rgb/3.png: the file is empty")));
   EXPECT_EQ(summary.diagnostics[1].first_frame_id, 5u);
   EXPECT_THAT(summary.diagnostics[1].text, AllOf(HasSubstr("1 of 10 masks"), HasSubstr("mask/4.png")));
+  // Printed when the first of each kind was found.
+  ASSERT_EQ(result->said.size(), 2u);
+  EXPECT_EQ(result->said[0].first_frame_id, 4u);
+  EXPECT_EQ(result->said[0].count, 1u);
+  EXPECT_EQ(result->said[1].first_frame_id, 5u);
+  EXPECT_THAT(FormatSummary(summary),
+              HasSubstr("diagnostics: 2 warnings: file_unreadable (2 times), file_unreadable\n"));
   const nlohmann::json json = ToJson(summary);
   EXPECT_EQ(json["frames"]["skipped"], nlohmann::json({4, 6}));
   EXPECT_EQ(json["diagnostics"].size(), 2u);
@@ -125,8 +133,11 @@ TEST_F(RunStreamTest, SummaryHasTheDiagnosticsOfTheSequenceAndOfTheServer) {
   statistics.diagnostics.push_back({.code = "up_unknown", .text = "up is not known"});
   collector_.Apply(statistics);
   const std::string text = FormatSummary(Summarize(*sequence_, *result, collector_, {}));
-  EXPECT_THAT(text, AllOf(HasSubstr("poses: 0 of 10 frames have one"), HasSubstr("warning: poses_unmatched"),
-                          HasSubstr("warning: up_unknown")));
+  EXPECT_THAT(text, AllOf(HasSubstr("poses: 0 of 10 frames have one"), Not(HasSubstr("none of the 1 poses")),
+                          HasSubstr("warning: up_unknown: up is not known\n"),
+                          HasSubstr("diagnostics: 2 warnings: poses_unmatched, up_unknown\n")));
+  ASSERT_EQ(result->said.size(), 1u);
+  EXPECT_EQ(result->said[0].code, "poses_unmatched");
 }
 
 }  // namespace romap::cli::run_stream_test
