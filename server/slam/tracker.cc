@@ -196,11 +196,14 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
     const auto agreeing = pose_check_.AddFrame(image.features, pose);
     if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
     if (agreeing) pose_noise_.AddPair(converted.camera, *agreeing);
+    if (agreeing) focal_check_.AddPair(converted.camera, *agreeing);
     if (depth_check_.IsContradicted() && !depth_was_wrong) RefuseDepth(image);
   }
   image.diagnostics = Diagnostics(*frame);
   if (pose_check_.IsContradicted()) {
-    RefuseGivenPose(image);
+    RefuseGivenPose(image, "the given pose contradicts the images", pose_check_.contradicted_since_frame());
+  } else if (focal_check_.IsContradicted()) {
+    RefuseGivenPose(image, "the focal length contradicts the images", focal_check_.contradicted_since_frame());
   } else if (image.tracked.is_keyframe) {
     image.points.resize(image.features->size());
     ++keyframes_sent_;
@@ -208,13 +211,13 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
   return image;
 }
 
-void Tracker::RefuseGivenPose(TrackedImage& image) {
+void Tracker::RefuseGivenPose(TrackedImage& image, const char* reason, uint64_t since_frame) {
   TrackedFrame& tracked = image.tracked;
   status_.OnLost(tracked.frame->frame_id, tracked.frame->timestamp_ns);
   tracked.state = TrackingState::kLost;
   tracked.is_keyframe = false;
-  tracked.reason = "the given pose contradicts the images";
-  tracked.contradicted_since_frame = pose_check_.contradicted_since_frame();
+  tracked.reason = reason;
+  tracked.contradicted_since_frame = since_frame;
   image.features = nullptr;
 }
 
@@ -229,8 +232,9 @@ void Tracker::RefuseDepth(TrackedImage& image) {
 
 std::vector<Diagnostic> Tracker::Diagnostics(const Frame& frame) const {
   std::vector<Diagnostic> diagnostics;
-  for (auto& diagnostic :
-       {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(), pose_noise_.Check(), depth_check_.Check()}) {
+  for (auto& diagnostic : {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(),
+                           pose_check_.IsContradicted() ? std::nullopt : focal_check_.Check(), pose_noise_.Check(),
+                           depth_check_.Check()}) {
     if (diagnostic) diagnostics.push_back(*diagnostic);
   }
   return diagnostics;

@@ -10,6 +10,7 @@
 #include "server/slam/depth_check.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/fixed_features.h"
+#include "server/slam/focal_check.h"
 #include "server/slam/frame_converter.h"
 #include "server/slam/frame_features.h"
 #include "server/slam/given_pose_tracker.h"
@@ -82,7 +83,7 @@ class Tracker {
 
   std::vector<Feature> RemoveFixed(const Frame& frame, std::vector<Feature> features);
   TrackedImage UseGivenPose(std::shared_ptr<const Frame> frame, const cv::Mat& depth_mu);
-  void RefuseGivenPose(TrackedImage& image);
+  void RefuseGivenPose(TrackedImage& image, const char* reason, uint64_t since_frame);
   void RefuseDepth(TrackedImage& image);
   TrackedImage Initialize(std::shared_ptr<const Frame> frame, std::shared_ptr<const FrameFeatures> features);
   void FindInitialViews(TrackedImage& image, std::string* reason);
@@ -135,6 +136,7 @@ class Tracker {
   PoseCheck pose_check_;
   PoseNoise pose_noise_;
   DepthCheck depth_check_;
+  FocalCheck focal_check_;
   FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
 };
