@@ -63,7 +63,8 @@ void SessionMap::Absorb(SessionMap& from, bool has_camera) {
 
 std::vector<Diagnostic> SessionMap::Diagnostics() const {
   if (map.keyframes().empty()) return {};
-  if (world_is_given) return given_up_is_estimated ? up.Diagnostics() : std::vector<Diagnostic>{};
+  if (world_is_given && given_up_is_estimated) return up.Diagnostics();
+  if (world_is_given) return given_up_contradiction ? std::vector{*given_up_contradiction} : std::vector<Diagnostic>{};
   std::vector<Diagnostic> diagnostics = up.Diagnostics();
   if (!has_depth_scale && parallax_rad < kMinParallax_rad) {
     diagnostics.push_back(

@@ -39,7 +39,8 @@ struct SessionMap {
   // Takes over everything of `from`, which is in the same world and gets empty, except what depends on the place of the
   // camera. `has_camera`: the camera is in `from`, and that is taken over too.
   void Absorb(SessionMap& from, bool has_camera);
-  // What the client should know about the accuracy of this map. Empty if the client's poses define the world.
+  // What the client should know about the accuracy of this map. If the client's poses define the world, that is only
+  // whether up is right.
   std::vector<Diagnostic> Diagnostics() const;
 
   const SparseMapId id;
@@ -63,10 +64,11 @@ struct SessionMap {
   std::deque<std::pair<KeyframeId, std::shared_ptr<const Frame>>> unsearched = {};  // for points by their patches
   Eigen::Vector3d given_up_world = Eigen::Vector3d::UnitZ();  // unit length; in a world of given poses
   bool given_up_is_estimated = false;
-  bool world_is_given = false;      // the client's poses, given or as priors, define the world
-  bool has_depth_scale = false;     // depth images define the scale
-  uint64_t next_global_adjustment;  // number of keyframes at which it runs even without a loop
-  double parallax_rad = 0;          // see UpperParallax_rad(); as of the newest keyframe
+  std::optional<Diagnostic> given_up_contradiction = {};  // see CheckGivenUp()
+  bool world_is_given = false;                            // the client's poses, given or as priors, define the world
+  bool has_depth_scale = false;                           // depth images define the scale
+  uint64_t next_global_adjustment;                        // number of keyframes at which it runs even without a loop
+  double parallax_rad = 0;                                // see UpperParallax_rad(); as of the newest keyframe
 };
 
 // The parallax that a quarter of the map points exceed. A camera that moves forward sees most points from similar

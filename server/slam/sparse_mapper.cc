@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/slam/given_up.h"
 #include "server/slam/keyframe_view.h"
 #include "server/slam/local_map_builder.h"
 #include "server/slam/loop_closer.h"
@@ -432,6 +433,9 @@ void SparseMapper::UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool i
   } else {
     current.given_up_world = tracked_up_world;
   }
+  if (current.given_up_is_estimated || tracked_up_world != Eigen::Vector3d::UnitZ()) return;  // gravity is right
+  current.up.ProposeRotation(current.map, is_last);
+  current.given_up_contradiction = CheckGivenUp(current.up, current.given_up_world);
 }
 
 // Poses that began after the map, whose world is another one.
@@ -442,6 +446,7 @@ void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyfr
   const auto S_given_map = current.given_world.ProposeMotion(current.map, current.has_depth_scale);
   if (!S_given_map) return;
   MoveMap(*S_given_map);
+  current.up.Rotate(S_given_map->rotation());
   current.world_is_given = true;
   current.uncertainty.RequestUpdate();
 }

@@ -34,6 +34,7 @@ constexpr double kSmallTurn_rad = 5 * kRadPerDeg;
 // Up is known if it is right with this probability and within this standard deviation.
 constexpr double kKnownConfidence = 0.7;
 constexpr double kKnownSigma_rad = 0.7 * kRadPerDeg;  // per axis: about 1 degree in total
+constexpr double kSupportConfidence = 0.7;
 constexpr uint64_t kPeriod_keyframes = 5;
 constexpr uint64_t kLongPeriod_keyframes = 20;  // once the confidence is high
 constexpr double kHighConfidence = 0.8;
@@ -156,6 +157,8 @@ bool WorldUp::UpdateFromMap(const SlamMap& map, bool is_last) {
   up_world_ = fused.direction_world;
   confidence_ = fused.confidence;
   sigma_rad_ = fused.sigma_rad;
+  rests_on_support_ =
+      plane && plane->confidence >= kSupportConfidence && plane->normal_world.dot(up_world_) > std::cos(kSmallTurn_rad);
   return true;
 }
 

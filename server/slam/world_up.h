@@ -42,6 +42,8 @@ class WorldUp {
   // Whether the evidence determines up. If not, Diagnostics() says so.
   bool is_known() const;
   std::vector<Diagnostic> Diagnostics() const;
+  // Whether the estimate is about the normal of the surface under the objects.
+  bool rests_on_support() const { return rests_on_support_; }
 
  private:
   bool UpdateFromMap(const SlamMap& map, bool is_last);
@@ -51,6 +53,7 @@ class WorldUp {
   Eigen::Vector3d up_world_ = Eigen::Vector3d::UnitZ();
   double confidence_ = 0;
   double sigma_rad_ = std::numbers::pi;
+  bool rests_on_support_ = false;
   uint64_t next_fit_;  // number of keyframes at which the map is evaluated again
 };
 

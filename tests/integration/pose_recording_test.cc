@@ -73,6 +73,17 @@ TEST_F(PoseRecordingTest, QuaternionsWithWFirst) {
   ExpectTheMap(Run({"--pose-convention", "wxyz"}));
 }
 
+TEST_F(PoseRecordingTest, TheFocalLengthIsThatOfAnotherImageSize) {
+  const std::string camera = recording().Read("camera.yaml");
+  for (const char* key : {"fx", "fy"}) {
+    const double focal_px = std::stod(camera.substr(camera.find(std::string(key) + ": ") + 4));
+    recording().Replace("camera.yaml", std::string("^") + key + ": (\\S+)", fmt::format("{}: {}", key, 1.5 * focal_px));
+  }
+  const RunResult result = Run();
+  EXPECT_THAT(result.Codes(), Contains("calibration_contradicts_images")) << result.process.out;
+  EXPECT_EQ(result.objects(), 0u) << result.process.out;
+}
+
 TEST_F(PoseRecordingTest, TimestampsInNanoseconds) {
   std::string text;
   for (const files::StampedPose& pose : recording().Poses()) {
@@ -91,7 +102,9 @@ TEST_F(PoseRecordingTest, YIsUp) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(-0.5 * EIGEN_PI, Eigen::Vector3d::UnitX()));
   ChangePoses([&](const Pose& pose) { return Pose{turn * pose.rotation(), turn * pose.translation()}; });
   recording().Remove("objects.yaml");
+  EXPECT_THAT(Run().process.err, HasSubstr("run with --up y"));
   const RunResult result = Run({"--up", "y"});
+  EXPECT_THAT(result.Codes(), Not(Contains("up_contradicts_images")));
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;
   EXPECT_EQ(result.objects(), static_cast<size_t>(kObjects)) << result.process.out;
   const auto up = result.cuboids["objects"][0]["T_world_object"];

@@ -96,6 +96,32 @@ TEST_F(ContradictionTest, UpOfGivenPosesReachesAllResults) {
   EXPECT_EQ(mapper_->Finish().up_world, -Eigen::Vector3d::UnitY());
 }
 
+TEST_F(ContradictionTest, AnotherUpIsNamed) {
+  const auto process = [&](double angle_rad) {
+    slot_ = std::make_unique<LocalMapSlot>();
+    tracker_ = std::make_unique<Tracker>(SlamConfig{}, PoseUse::kGiven, slot_.get());
+    mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing);
+    const Eigen::Quaterniond R_given_world(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
+    for (int i = 0; i < 40; ++i) {
+      const auto frame = RenderGiven(i);
+      LabelTile(*frame);
+      const SE3<World, Camera>& pose = *frame->T_world_camera;
+      frame->T_world_camera = SE3<World, Camera>(R_given_world * pose.rotation(), R_given_world * pose.translation());
+      Process(frame);
+    }
+    mapper_->Finish();
+    return mapper_->Diagnostics();
+  };
+  EXPECT_THAT(process(0), IsEmpty());
+  std::vector<Diagnostic> diagnostics = process(-0.5 * EIGEN_PI);
+  ASSERT_EQ(diagnostics.size(), 1u);
+  EXPECT_EQ(diagnostics[0].code, "up_contradicts_images");
+  EXPECT_EQ(diagnostics[0].advice, "run with --up y");
+  diagnostics = process(0.8 * EIGEN_PI);
+  ASSERT_EQ(diagnostics.size(), 1u);
+  EXPECT_EQ(diagnostics[0].advice, "run with --up auto");
+}
+
 TEST_F(ContradictionTest, UpOfGivenPosesIsEstimated) {
   mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing,
                                            GivenUp{.estimate = true});
