@@ -13,6 +13,7 @@
 #include "client/cli/service_options.h"
 #include "client/doctor/camera_check.h"
 #include "client/doctor/image_check.h"
+#include "client/doctor/mask_time_check.h"
 #include "client/doctor/stamps_check.h"
 #include "client/files/sequence.h"
 #include "common/color_image.h"
@@ -26,6 +27,7 @@ namespace {
 // Enough to see what is wrong; mapping all frames would take minutes.
 constexpr size_t kMaxMappedFrames = 150;
 constexpr size_t kMaxCheckedImages = 100;
+constexpr size_t kMaskTimeImages = 60;  // consecutive
 
 // What evenly spaced frames of a recording contain.
 struct Survey {
@@ -40,6 +42,24 @@ std::vector<size_t> Spread(size_t frames, size_t count) {
   const size_t step = std::max<size_t>(1, (frames + count - 1) / count);
   for (size_t i = 0; i < frames; i += step) indices.push_back(i);
   return indices;
+}
+
+// Whether the masks belong to their frames.
+std::optional<Diagnostic> CheckMaskTimes(const files::Sequence& sequence) {
+  doctor::MaskTimeCheck check;
+  SampleRange range;
+  for (size_t index = 0; index < std::min(sequence.size(), kMaskTimeImages); ++index) {
+    std::vector<files::UnreadableFile> unreadable;
+    const auto frame = sequence.LoadReadable(index, &unreadable);
+    if (!frame.ok()) continue;
+    const absl::StatusOr<cv::Mat> decoded = DecodeColor(frame->image, &range);
+    if (!decoded.ok()) continue;
+    const cv::Mat& image = *decoded;
+    auto labels = frame->label_png.empty() ? absl::StatusOr<cv::Mat>(cv::Mat()) : DecodeLabelPng(frame->label_png);
+    if (!labels.ok() || labels->size() != image.size()) labels = cv::Mat();
+    check.Add(frame->timestamp_ns, image, *labels);
+  }
+  return check.Check();
 }
 
 Survey SurveyFrames(const files::Sequence& sequence) {
@@ -60,6 +80,7 @@ Survey SurveyFrames(const files::Sequence& sequence) {
     check.Add(frame->frame_id, *image, labels.value_or(cv::Mat()));
   }
   survey.diagnostics = check.Diagnostics();
+  if (const auto displaced = CheckMaskTimes(sequence)) survey.diagnostics.push_back(*displaced);
   return survey;
 }
 
