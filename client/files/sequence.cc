@@ -133,7 +133,8 @@ void Sequence::AttachDetections(const std::string& name, const DetectionFile& de
     frames_with_mask[k]->instances = detections.sets[set].instances;
   }
   if (std::ranges::count(matched, false) > 0) {
-    diagnostics_.push_back(DetectionsUnmatched(name, detections, matched));
+    const auto masks_without = static_cast<size_t>(std::ranges::count(match, -1));
+    diagnostics_.push_back(DetectionsUnmatched(name, detections, matched, masks_without));
   }
 }
 

@@ -51,7 +51,7 @@ Diagnostic PosesPartial(const std::string& file, size_t posed, size_t frames, ui
 }
 
 Diagnostic DetectionsUnmatched(const std::string& file, const DetectionFile& detections,
-                               const std::vector<bool>& matched) {
+                               const std::vector<bool>& matched, size_t masks_without) {
   size_t rows = 0, unmatched = 0;
   const DetectionSet* first = nullptr;
   for (size_t k = 0; k < detections.sets.size(); ++k) {
@@ -60,13 +60,15 @@ Diagnostic DetectionsUnmatched(const std::string& file, const DetectionFile& det
     unmatched += detections.sets[k].rows;
     if (first == nullptr) first = &detections.sets[k];
   }
-  return {.code = "detections_unmatched",
-          .severity = Severity::kWarning,
-          .count = unmatched,
-          .text = fmt::format("{} of {} rows of {} match no mask in time, the first at {:.3f} s in line {}", unmatched,
-                              rows, file, first == nullptr ? 0 : ToSeconds(first->timestamp_ns),
-                              first == nullptr ? 0 : first->line),
-          .advice = "use the timestamps of the masks"};
+  return {
+      .code = "detections_unmatched",
+      .severity = masks_without > 0 ? Severity::kWarning : Severity::kInfo,
+      .count = unmatched,
+      .text = fmt::format(
+          "{} of {} rows of {} match no mask in time, the first at {:.3f} s in line {}; {}", unmatched, rows, file,
+          first == nullptr ? 0 : ToSeconds(first->timestamp_ns), first == nullptr ? 0 : first->line,
+          masks_without > 0 ? fmt::format("{} masks have no row", masks_without) : "all masks have rows of their own"),
+      .advice = masks_without > 0 ? "use the timestamps of the masks" : ""};
 }
 
 Diagnostic DetectionsRepeat(const std::string& file, const DetectionFile& detections) {

@@ -29,7 +29,7 @@ Diagnostic PosesPartial(const std::string& file, size_t posed, size_t frames, ui
 
 // Rows that match no mask. `matched`: for each set, whether it belongs to a mask.
 Diagnostic DetectionsUnmatched(const std::string& file, const DetectionFile& detections,
-                               const std::vector<bool>& matched);
+                               const std::vector<bool>& matched, size_t masks_without);
 
 Diagnostic DetectionsRepeat(const std::string& file, const DetectionFile& detections);
 Diagnostic ScoresInPercent(const std::string& file);

@@ -17,6 +17,9 @@ constexpr double kNearShare = 0.005;     // of the value: what is close to it
 constexpr int kMinNear = 3;              // units
 constexpr double kMaxNearPixels = 0.02;  // pixels with values close to it, per pixel with the value
 
+constexpr uint64_t kMinEmpty = 5;  // images; a sensor may lose a few
+constexpr double kMinEmptyShare = 0.2;
+
 // Whether many pixels have this value and hardly any have one close to it.
 bool IsIsolated(const std::vector<int>& counts, int value, int total) {
   const int count = counts[static_cast<size_t>(value)];
@@ -42,6 +45,8 @@ void DepthSentinels::Remove(uint64_t frame_id, double scale_mu, cv::Mat* depth_m
     for (int u = 0; u < depth_mu->cols; ++u) ++counts[static_cast<size_t>(to_units(row[u]))];
   }
   const int total = depth_mu->rows * depth_mu->cols - counts[0];
+  ++images_;
+  if (total == 0 && empty_++ == 0) first_empty_ = frame_id;
   int sentinel = counts[kSaturated] > 0 ? kSaturated : 0;
   if (sentinel == 0) {
     const auto has_pixels = [](int count) { return count > 0; };
@@ -72,6 +77,19 @@ void DepthSentinels::Remove(uint64_t frame_id, double scale_mu, cv::Mat* depth_m
   } else {
     ++diagnostic_->count;
   }
+}
+
+std::optional<Diagnostic> DepthSentinels::CheckEmpty() const {
+  if (empty_ < kMinEmpty || static_cast<double>(empty_) < kMinEmptyShare * static_cast<double>(images_)) {
+    return std::nullopt;
+  }
+  return Diagnostic{
+      .code = "depth_empty",
+      .severity = Severity::kWarning,
+      .first_frame_id = first_empty_,
+      .count = empty_,
+      .text = fmt::format("{} of {} depth images have no pixel with depth, so they do not help", empty_, images_),
+      .advice = "check the depth sensor and the conversion of its images"};
 }
 
 }  // namespace romap::session

@@ -20,9 +20,13 @@ class DepthSentinels {
 
   // What was removed. nullopt: nothing.
   const std::optional<Diagnostic>& diagnostic() const { return diagnostic_; }
+  // depth_empty: many depth images have no pixel with depth. nullopt: they have.
+  std::optional<Diagnostic> CheckEmpty() const;
 
  private:
   std::optional<Diagnostic> diagnostic_;
+  uint64_t images_ = 0, empty_ = 0;
+  uint64_t first_empty_ = 0;  // frame
 };
 
 }  // namespace romap::session

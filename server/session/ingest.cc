@@ -63,21 +63,6 @@ bool HasEightBits(const EncodedMasks& masks) {
   return header && header->bits <= 8;
 }
 
-// Adds an entry for every label of the mask that has none, so that later stages find one for each label.
-void AddUnlistedLabels(const cv::Mat& labels, std::vector<Instance>& instances) {
-  std::vector<bool> listed(65536, false);
-  listed[0] = listed[kIgnoreLabel] = true;
-  for (const Instance& instance : instances) listed[instance.label] = true;
-  for (int y = 0; y < labels.rows; ++y) {
-    const auto* row = labels.ptr<uint16_t>(y);
-    for (int x = 0; x < labels.cols; ++x) {
-      if (listed[row[x]]) continue;
-      listed[row[x]] = true;
-      instances.push_back({.label = row[x], .class_name = "object", .score = 1.0, .track_id = std::nullopt});
-    }
-  }
-}
-
 }  // namespace
 
 Ingest::Ingest(const CameraModel& camera, double max_mask_delay_s, std::stop_token stop)
@@ -126,7 +111,7 @@ absl::StatusOr<std::shared_ptr<const Frame>> Ingest::Accept(const FrameInput& in
     if (maps_.xy.empty()) maps_ = MakeUndistortionMaps(camera_);
     Undistort(*frame);
   }
-  if (frame->has_masks) AddUnlistedLabels(frame->labels, frame->instances);
+  if (frame->has_masks) unlisted_labels_.Add(frame->frame_id, HasEightBits(input), frame->labels, &frame->instances);
   mask_interpreter_.Interpret(HasEightBits(input), frame.get());
   AddAccepted(*frame);
   return std::shared_ptr<const Frame>(std::move(frame));
@@ -152,7 +137,7 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
   FrameMasks masks{.frame_id = input.frame_id, .labels = {}, .instances = input.instances};
   ROMAP_ASSIGN_OR_RETURN(masks.labels, DecodeLabels(input, camera_, stop_));
   if (camera_.HasDistortion()) UndistortNearest(masks.labels);
-  AddUnlistedLabels(masks.labels, masks.instances);
+  unlisted_labels_.Add(masks.frame_id, HasEightBits(input), masks.labels, &masks.instances);
   mask_interpreter_.Interpret(HasEightBits(input), &masks);
   frame->has_masks = true;
   newest_late_masks_ = std::max(newest_late_masks_, input.frame_id);
@@ -161,7 +146,9 @@ absl::StatusOr<FrameMasks> Ingest::AcceptMasks(const MasksInput& input) {
 
 std::vector<Diagnostic> Ingest::Diagnostics() const {
   std::vector<Diagnostic> diagnostics = mask_interpreter_.Diagnostics();
-  if (depth_sentinels_.diagnostic()) diagnostics.push_back(*depth_sentinels_.diagnostic());
+  for (auto& found : {depth_sentinels_.diagnostic(), depth_sentinels_.CheckEmpty(), unlisted_labels_.Check()}) {
+    if (found) diagnostics.push_back(*found);
+  }
   return diagnostics;
 }
 

@@ -13,6 +13,7 @@
 #include "common/stage_messages.h"
 #include "server/masks/mask_interpreter.h"
 #include "server/session/depth_sentinels.h"
+#include "server/session/unlisted_labels.h"
 
 namespace romap::session {
 
@@ -60,6 +61,7 @@ class Ingest {
   SampleRange range_;  // of the accepted color images
   masks::MaskInterpreter mask_interpreter_;
   DepthSentinels depth_sentinels_;
+  UnlistedLabels unlisted_labels_;
   bool any_expired_ = false;
   uint64_t newest_late_masks_ = 0;      // id of their frame; 0: none
   std::deque<AcceptedFrame> accepted_;  // by id and time: the newest and those that may still get masks

@@ -59,6 +59,18 @@ TEST(DepthSentinelsTest, KeepsAnImageWithOneValueAlone) {
   EXPECT_FLOAT_EQ(depth_mu.at<float>(5, 5), 1.5F);
 }
 
+TEST(DepthSentinelsTest, NamesImagesWithoutDepth) {
+  DepthSentinels sentinels;
+  for (uint64_t frame = 1; frame <= 12; ++frame) {
+    cv::Mat depth_mu = frame > 4 && frame <= 9 ? cv::Mat(60, 80, CV_32FC1, cv::Scalar(0)) : SlopeWith(1.2);
+    sentinels.Remove(frame, kScale_mu, &depth_mu);
+    EXPECT_EQ(sentinels.CheckEmpty().has_value(), frame >= 9);
+  }
+  EXPECT_EQ(sentinels.CheckEmpty()->code, "depth_empty");
+  EXPECT_EQ(sentinels.CheckEmpty()->first_frame_id, 5u);
+  EXPECT_EQ(sentinels.CheckEmpty()->count, 5u);
+}
+
 TEST(DepthSentinelsTest, CountsFrames) {
   DepthSentinels sentinels;
   for (uint64_t frame = 3; frame < 6; ++frame) {
