@@ -33,12 +33,28 @@ void DiagnosticLines::Say(const Diagnostic& diagnostic) {
   say_(FormatDiagnostic(diagnostic));
 }
 
-void DiagnosticLines::SayNews(const Diagnostic& diagnostic) {
+void DiagnosticLines::SayNews(const Diagnostic& diagnostic, Clock::time_point now) {
   std::lock_guard lock(mutex_);
+  SayNewsLocked(diagnostic, now);
+}
+
+void DiagnosticLines::SayPresent(const std::vector<Diagnostic>& present, Clock::time_point now) {
+  std::lock_guard lock(mutex_);
+  std::erase_if(first_seen_, [&](const auto& entry) {
+    return std::ranges::none_of(present, [&](const Diagnostic& d) { return d.code == entry.first; });
+  });
+  for (const Diagnostic& diagnostic : present) SayNewsLocked(diagnostic, now);
+}
+
+void DiagnosticLines::SayNewsLocked(const Diagnostic& diagnostic, Clock::time_point now) {
   const bool is_known = std::ranges::any_of(said_, [&](const Diagnostic& known) {
     return known.code == diagnostic.code && known.severity >= diagnostic.severity;
   });
   if (is_known) return;
+  if (diagnostic.severity == Severity::kWarning && diagnostic.first_frame_id == 0) {
+    const auto [seen, is_new] = first_seen_.try_emplace(diagnostic.code, now);
+    if (now - seen->second < kMinPresence) return;
+  }
   said_.push_back(diagnostic);
   say_(FormatDiagnostic(diagnostic));
 }

@@ -317,7 +317,7 @@ class Run {
     if (const auto* diagnostic = std::get_if<Diagnostic>(&event)) {
       lines_.SayNews(*diagnostic);
     } else if (const auto* statistics = std::get_if<Statistics>(&event)) {
-      for (const Diagnostic& present : statistics->diagnostics) lines_.SayNews(present);
+      lines_.SayPresent(statistics->diagnostics);
     }
   }
 

@@ -19,9 +19,12 @@ using testing_support::Recording;
 
 class PoseRecordingTest : public recordings::RecordingTest {
  protected:
+  // Diagnostics are printed on stderr when they arrive, and on stdout if they are new at the end.
+  static std::string TerminalOf(const RunResult& result) { return result.process.err + result.process.out; }
+
   static void ExpectContradiction(const RunResult& result, const char* convention) {
     EXPECT_THAT(result.Codes(), Contains("poses_contradict_images")) << result.process.out;
-    EXPECT_THAT(result.process.err, HasSubstr(convention));
+    EXPECT_THAT(TerminalOf(result), HasSubstr(convention));
     EXPECT_EQ(result.objects(), 0u) << result.process.out;
   }
 };
@@ -102,7 +105,7 @@ TEST_F(PoseRecordingTest, YIsUp) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(-0.5 * EIGEN_PI, Eigen::Vector3d::UnitX()));
   ChangePoses([&](const Pose& pose) { return Pose{turn * pose.rotation(), turn * pose.translation()}; });
   recording().Remove("objects.yaml");
-  EXPECT_THAT(Run().process.err, HasSubstr("run with --up y"));
+  EXPECT_THAT(TerminalOf(Run()), HasSubstr("run with --up y"));
   const RunResult result = Run({"--up", "y"});
   EXPECT_THAT(result.Codes(), Not(Contains("up_contradicts_images")));
   ASSERT_EQ(result.process.exit_code, 0) << result.process.err;

@@ -17,14 +17,31 @@ class DiagnosticLinesTest : public ::testing::Test {
   DiagnosticLines lines_{[this](const std::string& line) { printed_.push_back(line); }};
 };
 
+Diagnostic OfFrame(uint64_t frame_id, Diagnostic diagnostic) {
+  diagnostic.first_frame_id = frame_id;
+  return diagnostic;
+}
+
+TEST_F(DiagnosticLinesTest, PrintsWarningsAboutTheMapIfTheyLast) {
+  const DiagnosticLines::Clock::time_point start;
+  const Diagnostic up = Warning("up_unknown", "no evidence"), lens = Warning("readout_time", "contradicted");
+  lines_.SayNews(up, start);
+  lines_.SayPresent({up}, start + std::chrono::seconds(2));
+  lines_.SayPresent({lens}, start + std::chrono::seconds(4));
+  lines_.SayPresent({lens, up}, start + std::chrono::seconds(6));
+  EXPECT_THAT(printed_, IsEmpty());
+  lines_.SayPresent({lens, up}, start + std::chrono::seconds(9));
+  EXPECT_THAT(printed_, ElementsAre("warning: readout_time: contradicted"));
+}
+
 TEST_F(DiagnosticLinesTest, PrintsACodeOfTheServerOnceAndAgainWhenItGetsWorse) {
-  lines_.SayNews(Warning("frames_rejected", "1 frame was rejected"));
-  lines_.SayNews(Warning("frames_rejected", "2 frames were rejected"));
+  lines_.SayNews(OfFrame(7, Warning("frames_rejected", "1 frame was rejected")));
+  lines_.SayNews(OfFrame(7, Warning("frames_rejected", "2 frames were rejected")));
   Diagnostic worse = Warning("frames_rejected", "30 frames were rejected");
   worse.severity = Severity::kError;
   lines_.SayNews(worse);
-  lines_.SayNews(Warning("frames_rejected", "31 frames were rejected"));
-  EXPECT_THAT(printed_, ElementsAre("warning: frames_rejected: 1 frame was rejected",
+  lines_.SayNews(OfFrame(7, Warning("frames_rejected", "31 frames were rejected")));
+  EXPECT_THAT(printed_, ElementsAre("warning: frames_rejected (first in frame 7): 1 frame was rejected",
                                     "error: frames_rejected: 30 frames were rejected"));
   EXPECT_EQ(lines_.Said().size(), 2u);
 }
