@@ -184,6 +184,7 @@ void SparseMapper::MapTrackedFrame(const TrackedImage& image, MappedFrame& mappe
     AddKeyframe(image, mapped);
   } else if (!current().world_is_given) {
     current().mask_voter.ObserveFrame(mapped.tracked, current().map);
+    if (current().given_world.NeedsPoseAt(image.tracked.frame->timestamp_ns)) ObserveGivenPose(image, mapped.tracked);
   }
   mapped.tracked.up_world = UpWorld();
   current().last_reference = mapped.tracked.reference;
@@ -262,7 +263,8 @@ void SparseMapper::AddKeyframe(const TrackedImage& image, MappedFrame& mapped) {
   }
   CompleteKeyframe(image, keyframe);
   if (!is_live) CheckNextLoop();
-  AlignWithGivenPoses(image, keyframe);
+  ObserveGivenPose(image, mapped.tracked);
+  AlignWithGivenPoses();
   AlignWithUp();
   UpdateGivenUp(image.tracked.up_world);
   mapped.tracked.up_world = UpWorld();
@@ -439,10 +441,15 @@ void SparseMapper::UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool i
 }
 
 // Poses that began after the map, whose world is another one.
-void SparseMapper::AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe) {
+void SparseMapper::ObserveGivenPose(const TrackedImage& image, const TrackedFrame& tracked) {
+  if (!image.pose_ignored || current().world_is_given) return;
+  current().given_world.Observe(tracked.frame->timestamp_ns, tracked.reference, tracked.T_reference_camera,
+                                *tracked.frame->T_world_camera);
+}
+
+void SparseMapper::AlignWithGivenPoses() {
   SessionMap& current = this->current();
-  if (!image.pose_ignored || current.world_is_given) return;
-  current.given_world.Observe(keyframe.id, *image.tracked.frame->T_world_camera);
+  if (current.world_is_given) return;
   const auto S_given_map = current.given_world.ProposeMotion(current.map, current.has_depth_scale);
   if (!S_given_map) return;
   MoveMap(*S_given_map);

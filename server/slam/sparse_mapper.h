@@ -106,7 +106,8 @@ class SparseMapper {
   void StartGlobalAdjustment();
   bool ApplyGlobalAdjustment(bool wait);
   bool CanEstimateLens() const;
-  void AlignWithGivenPoses(const TrackedImage& image, const MapKeyframe& keyframe);
+  void ObserveGivenPose(const TrackedImage& image, const TrackedFrame& tracked);
+  void AlignWithGivenPoses();
   void AlignWithUp(bool is_last = false);
   void UpdateGivenUp(const Eigen::Vector3d& tracked_up_world, bool is_last = false);
   void MoveMap(const Sim3<World, World>& S_new_old);

@@ -114,6 +114,8 @@ std::optional<WorldAlignment> AlignWorlds(std::span<const TwoWorldPose> pairs, b
   }
   alignment.position_sigma_mu = kSigmaPerMedianLength * Median(residuals_mu);
   alignment.rotation_sigma_rad = kSigmaPerMedianLength * Median(residuals_rad);
+  alignment.max_position_mu = *std::max_element(residuals_mu.begin(), residuals_mu.end());
+  alignment.max_rotation_rad = *std::max_element(residuals_rad.begin(), residuals_rad.end());
   const double max_mu = kSigmasToAgree * std::sqrt(3.0) * alignment.position_sigma_mu + 1e-9;
   const double max_rad = kSigmasToAgree * std::sqrt(3.0) * alignment.rotation_sigma_rad + 1e-9;
   size_t agreeing = 0;

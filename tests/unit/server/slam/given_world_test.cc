@@ -48,6 +48,28 @@ TEST_F(LatePosesTest, MoveTheMapIntoTheirWorld) {
   EXPECT_NEAR(Error().second, 1, 0.01) << "frames before the poses moved, too";
 }
 
+// Most frames with a pose are no keyframes.
+TEST_F(LatePosesTest, AFewPosesSuffice) {
+  for (int next = StartWithoutPoses(); next < 70; ++next) {
+    auto frame = Render(next);
+    if (next % 15 != 0) frame->T_world_camera.reset();
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
+  }
+  EXPECT_EQ(PosesIgnoredText(), "");
+  EXPECT_NEAR(Error().second, 1, 0.02);
+}
+
+TEST_F(LatePosesTest, AFewPosesThatContradictTheImagesAreRefused) {
+  for (int next = StartWithoutPoses(); next < 70; ++next) {
+    auto frame = Render(next);
+    const SE3<Camera, World> inverse = frame->T_world_camera->Inverse();
+    frame->T_world_camera = SE3<World, Camera>(inverse.rotation(), inverse.translation());
+    if (next % 15 != 0) frame->T_world_camera.reset();
+    EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
+  }
+  EXPECT_NE(PosesIgnoredText(), "");
+}
+
 // T_camera_world instead of T_world_camera: a usual mistake.
 TEST_F(LatePosesTest, AreRefusedIfTheyContradictTheImages) {
   for (int next = StartWithoutPoses(); next < 90; ++next) {

@@ -101,7 +101,7 @@ TEST(AlignWorlds, KeepsTheScaleOfMetricMaps) {
 }
 
 TEST(AlignWorlds, NeedsSeveralPosesAndMotion) {
-  EXPECT_FALSE(AlignWorlds(MakePairs(5, false, {}, 1), false));
+  EXPECT_FALSE(AlignWorlds(MakePairs(2, false, {}, 1), false));
   std::vector<TwoWorldPose> pairs = MakePairs(12, false, {}, 1);
   for (TwoWorldPose& pair : pairs) pair.T_map_camera = pairs[0].T_map_camera;
   EXPECT_FALSE(AlignWorlds(pairs, false));
