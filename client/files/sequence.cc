@@ -7,6 +7,7 @@
 #include "client/files/associate.h"
 #include "client/files/image_file.h"
 #include "client/files/permute_labels.h"
+#include "client/files/pose_placeholders.h"
 #include "client/files/sequence_diagnostics.h"
 
 namespace romap::files {
@@ -143,6 +144,9 @@ absl::Status Sequence::OpenPoses(const SequenceOptions& options) {
   TimeUnit unit = TimeUnit::kSeconds;
   ROMAP_ASSIGN_OR_RETURN(poses_, ReadTum(Path(options.poses), &unit));
   NoteUnit(options.poses, unit);
+  if (const size_t removed = RemovePlaceholders(&poses_); removed > 0) {
+    diagnostics_.push_back(PosesPlaceholder(options.poses, removed));
+  }
   for (StampedPose& pose : poses_) pose.T_world_camera = ApplyConvention(options.convention, pose.T_world_camera);
   size_t posed = 0;
   std::optional<uint64_t> first_without;

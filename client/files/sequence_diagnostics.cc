@@ -39,6 +39,16 @@ Diagnostic UnmatchedInTime(const std::string& code, const std::string& entries, 
                                 entries == "poses" ? "; the camera was tracked from the images instead" : "")};
 }
 
+Diagnostic PosesPlaceholder(const std::string& file, size_t rows) {
+  return {.code = "poses_placeholder",
+          .severity = Severity::kInfo,
+          .count = rows,
+          .text = fmt::format("{} rows of {} have position 0 0 0 and no rotation, far from the poses around them; they "
+                              "are read as \"no pose\"",
+                              rows, file),
+          .advice = "omit the rows of frames without a pose"};
+}
+
 Diagnostic PosesPartial(const std::string& file, size_t posed, size_t frames, uint64_t first_frame_id) {
   const bool usual = static_cast<double>(posed) >= kUsualPosedShare * static_cast<double>(frames);
   return {.code = "poses_partial",

@@ -24,6 +24,9 @@ Diagnostic TimestampsConverted(std::span<const std::pair<std::string, TimeUnit>>
 Diagnostic UnmatchedInTime(const std::string& code, const std::string& entries, const std::string& file,
                            std::span<const int64_t> times_ns, std::span<const int64_t> frame_times_ns);
 
+// Rows that RemovePlaceholders() removed.
+Diagnostic PosesPlaceholder(const std::string& file, size_t rows);
+
 // `posed` of `frames` frames have a pose; `first_frame_id` is the first without.
 Diagnostic PosesPartial(const std::string& file, size_t posed, size_t frames, uint64_t first_frame_id);
 
