@@ -119,7 +119,8 @@ TEST_F(FileRecordingTest, RoundedDetections) {
   recording().Replace("detections.csv", "^([0-9]+\\.[0-9])[0-9]*", "$1");
   const RunResult result = Run();
   ExpectTheMap(result);
-  EXPECT_THAT(result.Codes(), ElementsAre("detections_repeat"));
+  EXPECT_THAT(result.Codes(), Contains("detections_repeat"));
+  EXPECT_THAT(result.Warnings(), IsEmpty()) << "a few masks have no row; their labels have no class";
 }
 
 }  // namespace romap::file_recording_test
