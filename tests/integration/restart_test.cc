@@ -31,10 +31,11 @@ class RestartTest : public ::testing::Test {
     ASSERT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
     Start("127.0.0.1:0");
   }
-  // The port of the first start is used again, because clients come back to it.
+  // The port of the first start is used again, because clients come back to it. The queue holds the whole sequence, so
+  // that a slow machine drops no live frame.
   void Start(const std::string& address) {
-    server_ = std::make_unique<BackgroundProcess>(
-        integration::Quick({ROMAP_SERVER, "--listen", address, "--data-dir", folder_ / "data"}));
+    server_ = std::make_unique<BackgroundProcess>(integration::Quick(
+        {ROMAP_SERVER, "--listen", address, "--data-dir", folder_ / "data", "--set", "session.frame_queue=64"}));
     address_ = server_->WaitForLine("romap-server listening on ");
     ASSERT_NE(address_, "");
   }
