@@ -18,6 +18,7 @@
 
 #include "common/config.h"
 #include "common/exit_code.h"
+#include "common/host_port.h"
 #include "common/log_sink.h"
 #include "common/status.h"
 #include "common/version.h"
@@ -29,7 +30,6 @@
 #include "server/store/store.h"
 #include "server/store/store_config.h"
 #include "server/transport/grpc_server.h"
-#include "server/transport/host_port.h"
 #include "server/transport/transport_config.h"
 
 namespace romap {
@@ -133,8 +133,8 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
 
 // Sessions are not offered to a network in which everybody can take them.
 absl::Status CheckExposure(const Config& config, const std::string& token_file, bool is_allowed) {
-  const auto address = transport::ParseHostPort(config.transport.listen_address);
-  if (!address || transport::IsLoopback(*address) || is_allowed) return absl::OkStatus();
+  const auto address = ParseHostPort(config.transport.listen_address);
+  if (!address || IsLoopback(*address) || is_allowed) return absl::OkStatus();
   const bool has_tls = !config.transport.tls_certificate.empty();
   const bool has_tokens = access::TokenStore(token_file).Exists();
   if (has_tls && has_tokens) return absl::OkStatus();

@@ -12,9 +12,9 @@
 #include <optional>
 #include <utility>
 
+#include "common/host_port.h"
 #include "common/status.h"
 #include "server/transport/call_host.h"
-#include "server/transport/host_port.h"
 #include "server/transport/listener.h"
 #include "server/transport/mapping_rpcs.h"
 #include "server/transport/tls_files.h"

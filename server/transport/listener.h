@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/transport/host_port.h"
+#include "common/host_port.h"
 
 namespace romap::transport {
 

@@ -7,10 +7,12 @@
 
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "common/file_status.h"
+#include "common/host_port.h"
 #include "common/status.h"
 
 namespace romap::client {
@@ -80,15 +82,15 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const 
   return grpc::SslCredentials(options);
 }
 
-bool IsLoopback(const std::string& host_port) {
-  return host_port.starts_with("127.") || host_port.starts_with("localhost:") || host_port.starts_with("[::1]:") ||
-         host_port.starts_with("unix:");
+bool StaysOnThisMachine(const std::string& host_port) {
+  const std::optional<HostPort> address = ParseHostPort(host_port);
+  return host_port.starts_with("unix:") || (address && IsLoopback(*address));
 }
 
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& host_port, const RemoteOptions& options) {
-  if (!options.token.empty() && !options.tls.enabled && !IsLoopback(host_port)) {
+  if (!options.token.empty() && !options.tls.enabled && !StaysOnThisMachine(host_port)) {
     return InvalidArgument("the token is not sent to {} in clear text; connect with TLS", host_port);
   }
   ROMAP_ASSIGN_OR_RETURN(const auto credentials, MakeCredentials(options.tls));

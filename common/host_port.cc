@@ -1,8 +1,10 @@
-#include "server/transport/host_port.h"
+#include "common/host_port.h"
+
+#include <arpa/inet.h>
 
 #include <charconv>
 
-namespace romap::transport {
+namespace romap {
 
 std::optional<HostPort> ParseHostPort(std::string_view address) {
   const size_t colon = address.rfind(':');
@@ -16,7 +18,9 @@ std::optional<HostPort> ParseHostPort(std::string_view address) {
 }
 
 bool IsLoopback(const HostPort& address) {
-  return address.host == "localhost" || address.host == "[::1]" || address.host.starts_with("127.");
+  in_addr v4{};
+  const bool is_v4 = inet_pton(AF_INET, address.host.c_str(), &v4) == 1;
+  return address.host == "localhost" || address.host == "[::1]" || (is_v4 && address.host.starts_with("127."));
 }
 
-}  // namespace romap::transport
+}  // namespace romap
