@@ -37,16 +37,8 @@ Damage DamageToDo() {
 
 class LinkCutTest : public ::testing::Test {
  protected:
-  static SyntheticWorldOptions WorldOptions() {
-    SyntheticWorldOptions options;
-    options.width_px = 160;
-    options.height_px = 120;
-    options.focal_px = 150;
-    return options;
-  }
-
   LinkCutTest() {
-    const SyntheticWorld world(WorldOptions());
+    const SyntheticWorld world(integration::SmallWorld());
     camera_ = world.camera();
     for (int i = 0; i < world.frame_count(); ++i) inputs_.push_back(testing_support::MakeWorldInput(world, i));
   }

@@ -19,11 +19,21 @@
 #include "tests/support/checked_copy.h"
 #include "tests/support/sanitizer.h"
 #include "tests/support/streams.h"
+#include "tests/support/synthetic_world.h"
 
 namespace romap::integration {
 
 // Of a live camera. Under a sanitizer, a server could process only few of the frames of a faster one.
 inline constexpr std::chrono::milliseconds kFramePeriod{testing_support::kUnderSanitizer ? 400 : 40};
+
+// Small images, for tests that are about the service and not about the map.
+inline SyntheticWorldOptions SmallWorld() {
+  SyntheticWorldOptions options;
+  options.width_px = 160;
+  options.height_px = 120;
+  options.focal_px = 150;
+  return options;
+}
 
 // Reads the events of a Map stream on a thread of its own and keeps what they said. Thread-safe.
 class RecordingClient {

@@ -24,13 +24,6 @@ using testing_support::Eventually;
 
 class SlowDiskTest : public ::testing::Test {
  protected:
-  static SyntheticWorldOptions WorldOptions() {
-    SyntheticWorldOptions options;
-    options.width_px = 160;
-    options.height_px = 120;
-    options.focal_px = 150;
-    return options;
-  }
   // A live session: it must never wait for the disk.
   std::string NewSession(MappingService& service) const {
     SessionOptions options;
@@ -58,7 +51,7 @@ class SlowDiskTest : public ::testing::Test {
   testing_support::TemporaryFolder folder_;
   integration::SlowDisk disk_{folder_ / "disk"};
   integration::ServerProcess server_{folder_ / "data", disk_.environment()};
-  const SyntheticWorld world_{WorldOptions()};
+  const SyntheticWorld world_{integration::SmallWorld()};
 };
 
 TEST_F(SlowDiskTest, TheSessionGoesOnWhileTheDiskHangs) {

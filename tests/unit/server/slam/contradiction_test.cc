@@ -27,6 +27,16 @@ class ContradictionTest : public TrackingTest {
     image_ = tracker_->Track(std::move(frame));
     mapped_ = mapper_->Process(image_);
   }
+  // Forty frames whose poses are in a turned world.
+  void ProcessTurned(const Eigen::Quaterniond& R_given_world) {
+    for (int i = 0; i < 40; ++i) {
+      const auto frame = RenderGiven(i);
+      LabelTile(*frame);
+      const SE3<World, Camera>& pose = *frame->T_world_camera;
+      frame->T_world_camera = SE3<World, Camera>(R_given_world * pose.rotation(), R_given_world * pose.translation());
+      Process(frame);
+    }
+  }
 };
 
 TEST_F(ContradictionTest, SoundPosesAndDepthGiveNoDiagnostic) {
@@ -102,13 +112,7 @@ TEST_F(ContradictionTest, AnotherUpIsNamed) {
     tracker_ = std::make_unique<Tracker>(SlamConfig{}, PoseUse::kGiven, slot_.get());
     mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing);
     const Eigen::Quaterniond R_given_world(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()));
-    for (int i = 0; i < 40; ++i) {
-      const auto frame = RenderGiven(i);
-      LabelTile(*frame);
-      const SE3<World, Camera>& pose = *frame->T_world_camera;
-      frame->T_world_camera = SE3<World, Camera>(R_given_world * pose.rotation(), R_given_world * pose.translation());
-      Process(frame);
-    }
+    ProcessTurned(R_given_world);
     mapper_->Finish();
     return mapper_->Diagnostics();
   };
@@ -126,13 +130,7 @@ TEST_F(ContradictionTest, UpOfGivenPosesIsEstimated) {
   mapper_ = std::make_unique<SparseMapper>(SlamConfig{}, slot_.get(), SparseMapper::Background::kNothing,
                                            GivenUp{.estimate = true});
   const Eigen::Quaterniond R_given_world(Eigen::AngleAxisd(-1.3, Eigen::Vector3d::UnitX()));
-  for (int i = 0; i < 40; ++i) {
-    const auto frame = RenderGiven(i);
-    LabelTile(*frame);
-    const SE3<World, Camera>& pose = *frame->T_world_camera;
-    frame->T_world_camera = SE3<World, Camera>(R_given_world * pose.rotation(), R_given_world * pose.translation());
-    Process(frame);
-  }
+  ProcessTurned(R_given_world);
   const Eigen::Vector3d up_world = R_given_world * Eigen::Vector3d::UnitZ();
   EXPECT_LT(AngleBetween(mapper_->Finish().up_world, up_world), 0.03);
   EXPECT_THAT(mapper_->Diagnostics(), IsEmpty());
