@@ -47,15 +47,6 @@ size_t IndexOf(double log_factor) {
   return static_cast<size_t>(static_cast<long>(kGivenFactor) + steps);
 }
 
-double MedianDistance_px(const CameraModel& camera, const Motion& motion, std::span<const TwoViewMatch> matches) {
-  const Eigen::Matrix3d essential = motion.Essential();
-  std::vector<double> distances_px;
-  for (const RayMatch& match : ToRays(camera, matches)) {
-    distances_px.push_back(match.sigma_px * std::sqrt(SampsonChi2(camera, essential, match)));
-  }
-  return Median(std::move(distances_px));
-}
-
 }  // namespace
 
 std::optional<FocalCheck::Pair> FocalCheck::Measure(const CameraModel& camera, const PoseCheck::AgreeingPair& pair) {
@@ -67,7 +58,8 @@ std::optional<FocalCheck::Pair> FocalCheck::Measure(const CameraModel& camera, c
     CameraModel scaled = camera;
     scaled.fx_px *= factor;
     scaled.fy_px *= factor;
-    measured.distances.push_back(MedianDistance_px(scaled, motion, pair.matches) / camera.width_px);
+    measured.distances.push_back(MedianEpipolarDistance_px(scaled, motion, ToRays(scaled, pair.matches)) /
+                                 camera.width_px);
   }
   const auto best = std::min_element(measured.distances.begin(), measured.distances.end());
   measured.log_factor = std::log(Factors()[static_cast<size_t>(best - measured.distances.begin())]);

@@ -212,10 +212,18 @@ std::optional<size_t> PoseCheck::BestHypothesis() const {
     }
     better += pair.fits_better ? 1 : 0;
   }
-  const size_t best = static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
+  const double margin = kNamedMargin * better;
+  const auto is_flip = [](size_t i) { return AllPoseHypotheses()[i].IsFlip(); };
+  size_t best = static_cast<size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
+  // While the camera only rotates, flipped images look like other camera axes, which are far more common.
+  const double most = sums[best];
+  for (size_t i = count; is_flip(best) && i-- > 0;) {
+    if (!is_flip(i) && sums[i] > most - margin) best = i;
+  }
   if (fitting[best] < kNamedPairs * static_cast<double>(pairs_.size())) return std::nullopt;
   for (size_t i = 0; i < count; ++i) {
-    if (i != best && sums[i] > sums[best] - kNamedMargin * better) return std::nullopt;
+    const bool is_rival = i != best && (is_flip(best) || !is_flip(i));
+    if (is_rival && sums[i] > sums[best] - margin) return std::nullopt;
   }
   return best;
 }
@@ -262,9 +270,10 @@ std::optional<Diagnostic> PoseCheck::Check() const {
       "the given poses do not fit the images: {:.0f} % of the feature matches of {} pairs of frames agree with them",
       given_percent, pairs);
   if (best_) {
-    diagnostic.text +=
-        fmt::format("; {:.0f} % agree when the poses are taken {}", alternative_percent, Describe(hypothesis));
-    diagnostic.advice = "run with --pose-convention " + ConventionOption(hypothesis);
+    diagnostic.text += fmt::format("; {:.0f} % agree when the {} are taken {}", alternative_percent,
+                                   hypothesis.IsFlip() ? "images" : "poses", Describe(hypothesis));
+    diagnostic.advice =
+        hypothesis.IsFlip() ? kFlipAdvice : "run with --pose-convention " + ConventionOption(hypothesis);
   } else if (const auto R_body_camera = BodyRotation()) {
     diagnostic.text +=
         "; their rotations fit if the camera is turned by a constant rotation on the body whose poses "

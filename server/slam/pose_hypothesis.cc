@@ -22,6 +22,9 @@ std::vector<PoseHypothesis> MakeHypotheses() {
     };
     return count(a) < count(b);
   });
+  hypotheses.push_back({.mirrored = true});
+  hypotheses.push_back({.upside_down = true});
+  hypotheses.push_back({.mirrored = true, .upside_down = true});
   // Ratios of usual image sizes.
   for (const double factor : {0.5, 2.0, 2.0 / 3, 1.5, 1.0 / 3, 3.0, 0.25, 4.0}) {
     hypotheses.push_back({.resolution_factor = factor});
@@ -61,6 +64,15 @@ CameraModel ReadCamera(const PoseHypothesis& hypothesis, const CameraModel& give
   // Pixel centers are at integers, the image begins at -0.5.
   camera.cx_px = (given.cx_px + 0.5) * hypothesis.resolution_factor - 0.5;
   camera.cy_px = (given.cy_px + 0.5) * hypothesis.resolution_factor - 0.5;
+  // A negative focal length maps a pixel of the flipped image to the ray of the pixel from where it came.
+  if (hypothesis.mirrored) {
+    camera.fx_px = -camera.fx_px;
+    camera.cx_px = given.width_px - 1 - camera.cx_px;
+  }
+  if (hypothesis.upside_down) {
+    camera.fy_px = -camera.fy_px;
+    camera.cy_px = given.height_px - 1 - camera.cy_px;
+  }
   return camera;
 }
 
@@ -92,6 +104,11 @@ std::string Describe(const PoseHypothesis& hypothesis) {
   if (hypothesis.world_to_camera) parts.emplace_back("as world-to-camera");
   if (hypothesis.wxyz) parts.emplace_back("with w first in the quaternions");
   if (hypothesis.opengl) parts.emplace_back("with OpenGL camera axes");
+  if (hypothesis.mirrored && hypothesis.upside_down) {
+    parts.emplace_back("as turned by 180 degrees");
+  } else if (hypothesis.IsFlip()) {
+    parts.emplace_back(hypothesis.mirrored ? "as mirrored left to right" : "as mirrored top to bottom");
+  }
   return fmt::format("{}", fmt::join(parts, " and "));
 }
 

@@ -17,12 +17,15 @@ struct PoseHypothesis {
   bool opengl = false;           // the camera has OpenGL's axes: x right, y up, z backward
   double resolution_factor = 1;  // focal length and principal point belong to another resolution
   double focal_factor = 1;       // only the focal length does
+  bool mirrored = false;         // left and right of the images are exchanged
+  bool upside_down = false;      // top and bottom of the images are exchanged; with `mirrored`: a half turn
 
   bool IsCalibration() const { return resolution_factor != 1 || focal_factor != 1; }
+  bool IsFlip() const { return mirrored || upside_down; }
   bool operator==(const PoseHypothesis&) const = default;
 };
 
-// As given first, then the conventions, alone before combined, then calibrations.
+// As given first, then the conventions, alone before combined, then flipped images and calibrations.
 const std::vector<PoseHypothesis>& AllPoseHypotheses();
 
 // The pose or camera that a client means, if the hypothesis is true.
@@ -39,8 +42,10 @@ std::vector<bool> Explained(const CameraModel& camera, const SE3<Camera, Camera>
 // Share of the true values.
 double ShareOf(const std::vector<bool>& explained);
 
-// For users: "world-to-camera and OpenGL camera axes".
+// For users: "as world-to-camera and with OpenGL camera axes".
 std::string Describe(const PoseHypothesis& hypothesis);
+// What a user does about flipped images.
+inline constexpr const char* kFlipAdvice = "send the images and masks as the camera took them, not flipped or turned";
 // Of the option --pose-convention of the client: "world_to_camera,opengl".
 std::string ConventionOption(const PoseHypothesis& hypothesis);
 

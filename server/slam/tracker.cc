@@ -57,13 +57,12 @@ Tracker::Tracker(const SlamConfig& config, PoseUse pose_use, const LocalMapSlot*
       selector_(config),
       tentative_points_(config),
       rotation_(config),
-      pose_check_(config),
-      pose_noise_(config) {}
+      given_checks_(config) {}
 
 TrackedImage Tracker::Track(std::shared_ptr<const Frame> frame) {
   TakeNewestMap();
   const cv::Mat depth_mu = frame->depth_mu;
-  if (depth_check_.IsContradicted() && !depth_mu.empty()) frame = WithoutDepth(*frame);
+  if (given_checks_.IsDepthContradicted() && !depth_mu.empty()) frame = WithoutDepth(*frame);
   if (ShouldUseGivenPose(*frame)) return UseGivenPose(std::move(frame), depth_mu);
   auto features = MakeFrameFeatures(*frame, RemoveFixed(*frame, extractor_.ExtractScene(*frame)),
                                     map_ ? map_->lens : RadialCorrection{});
@@ -192,18 +191,13 @@ TrackedImage Tracker::UseGivenPose(std::shared_ptr<const Frame> frame, const cv:
     const Frame& converted = *image.tracked.frame;
     image.features = MakeFrameFeatures(converted, RemoveFixed(converted, extractor_.Extract(converted)),
                                        RadialCorrection{}, shutter);
-    const bool depth_was_wrong = depth_check_.IsContradicted();
-    const auto agreeing = pose_check_.AddFrame(image.features, pose);
-    if (agreeing) depth_check_.AddPair(converted.camera, *agreeing, depth_mu);
-    if (agreeing) pose_noise_.AddPair(converted.camera, *agreeing);
-    if (agreeing) focal_check_.AddPair(converted.camera, *agreeing);
-    if (depth_check_.IsContradicted() && !depth_was_wrong) RefuseDepth(image);
+    const bool depth_was_wrong = given_checks_.IsDepthContradicted();
+    given_checks_.AddFrame(*frame, image.features, pose, depth_mu);
+    if (given_checks_.IsDepthContradicted() && !depth_was_wrong) RefuseDepth(image);
   }
   image.diagnostics = Diagnostics(*frame);
-  if (pose_check_.IsContradicted()) {
-    RefuseGivenPose(image, "the given pose contradicts the images", pose_check_.contradicted_since_frame());
-  } else if (focal_check_.IsContradicted()) {
-    RefuseGivenPose(image, "the focal length contradicts the images", focal_check_.contradicted_since_frame());
+  if (const auto contradiction = given_checks_.PosesOrCamera()) {
+    RefuseGivenPose(image, contradiction->reason, contradiction->since_frame);
   } else if (image.tracked.is_keyframe) {
     image.points.resize(image.features->size());
     ++keyframes_sent_;
@@ -225,18 +219,14 @@ void Tracker::RefuseGivenPose(TrackedImage& image, const char* reason, uint64_t 
 void Tracker::RefuseDepth(TrackedImage& image) {
   image.tracked.frame = WithoutDepth(*image.tracked.frame);
   image.tracked.is_keyframe = false;
-  image.tracked.contradicted_since_frame = depth_check_.contradicted_since_frame();
+  image.tracked.contradicted_since_frame = given_checks_.depth_contradicted_since_frame();
   image.features = nullptr;
   image.discard_points = true;
 }
 
 std::vector<Diagnostic> Tracker::Diagnostics(const Frame& frame) const {
-  std::vector<Diagnostic> diagnostics;
-  for (auto& diagnostic : {readout_check_.Check(frame.camera.readout_s), pose_check_.Check(),
-                           pose_check_.IsContradicted() ? std::nullopt : focal_check_.Check(), pose_noise_.Check(),
-                           depth_check_.Check()}) {
-    if (diagnostic) diagnostics.push_back(*diagnostic);
-  }
+  std::vector<Diagnostic> diagnostics = given_checks_.Diagnostics();
+  if (const auto readout = readout_check_.Check(frame.camera.readout_s)) diagnostics.push_back(*readout);
   return diagnostics;
 }
 

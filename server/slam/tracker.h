@@ -7,20 +7,17 @@
 #include <vector>
 
 #include "common/stage_messages.h"
-#include "server/slam/depth_check.h"
 #include "server/slam/features/feature_extractor.h"
 #include "server/slam/fixed_features.h"
-#include "server/slam/focal_check.h"
 #include "server/slam/frame_converter.h"
 #include "server/slam/frame_features.h"
+#include "server/slam/given_pose_checks.h"
 #include "server/slam/given_pose_tracker.h"
 #include "server/slam/keyframe_selector.h"
 #include "server/slam/local_map.h"
 #include "server/slam/local_map_tracking.h"
 #include "server/slam/monocular_initializer.h"
 #include "server/slam/motion_model.h"
-#include "server/slam/pose_check.h"
-#include "server/slam/pose_noise.h"
 #include "server/slam/readout_check.h"
 #include "server/slam/rolling_shutter.h"
 #include "server/slam/rotation_tracker.h"
@@ -133,10 +130,7 @@ class Tracker {
   SparseMapId newest_map_;  // of those that the camera was in
   std::optional<PendingMap> pending_map_;
   ReadoutCheck readout_check_;
-  PoseCheck pose_check_;
-  PoseNoise pose_noise_;
-  DepthCheck depth_check_;
-  FocalCheck focal_check_;
+  GivenPoseChecks given_checks_;
   FrameConverter converter_;
   double scene_depth_mu_ = 0;  // in the last frame; 0: unknown
 };

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "common/statistics.h"
 #include "server/slam/geometry/rotation.h"
 
 namespace romap::slam {
@@ -92,6 +94,15 @@ Eigen::Matrix3d Motion::Essential() const { return Skew(direction) * rotation; }
 double SampsonChi2(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {
   const EpipolarLines lines = ComputeLines(camera, essential, match);
   return lines.algebraic * lines.algebraic / (lines.slope2 * match.sigma_px * match.sigma_px);
+}
+
+double MedianEpipolarDistance_px(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches) {
+  const Eigen::Matrix3d essential = motion.Essential();
+  std::vector<double> distances_px;
+  for (const RayMatch& match : matches) {
+    distances_px.push_back(match.sigma_px * std::sqrt(SampsonChi2(camera, essential, match)));
+  }
+  return Median(std::move(distances_px));
 }
 
 RayMatch ClosestEpipolarMatch(const CameraModel& camera, const Eigen::Matrix3d& essential, const RayMatch& match) {

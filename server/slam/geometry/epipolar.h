@@ -27,6 +27,9 @@ struct Motion {
   Eigen::Matrix3d Essential() const;
 };
 
+// Median distance of the matches from their epipolar lines. `matches` must not be empty.
+double MedianEpipolarDistance_px(const CameraModel& camera, const Motion& motion, std::span<const RayMatch> matches);
+
 // 95 % bound of chi-square with one degree of freedom: a match is one constraint on a motion.
 inline constexpr double kEpipolarChi2Bound = 3.841;
 

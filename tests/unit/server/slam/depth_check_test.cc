@@ -14,8 +14,9 @@ CameraModel Vga() {
   return {.width_px = 640, .height_px = 480, .fx_px = 560, .fy_px = 560, .cx_px = 319.5, .cy_px = 239.5};
 }
 
-// Pairs of a camera that moves sideways. `factor`: of the depth image over the true depth.
-DepthCheck Feed(double factor, double baseline_mu, double depth_noise, int pairs) {
+// Pairs of a camera that moves sideways. `factor`: of the depth image over the true depth. `along_ray`: the image holds
+// distances from the camera's center instead.
+DepthCheck Feed(double factor, double baseline_mu, double depth_noise, int pairs, bool along_ray = false) {
   DepthCheck check;
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u(20, 620), v(20, 460), depth(1, 4);
@@ -33,7 +34,8 @@ DepthCheck Feed(double factor, double baseline_mu, double depth_noise, int pairs
       const auto column = static_cast<int>(std::lround(second_px.x()));
       const auto row = static_cast<int>(std::lround(second_px.y()));
       if (column < 0 || column > 639 || row < 0 || row > 479) continue;
-      depth_mu.at<float>(row, column) = static_cast<float>(factor * p_second.z() * (1 + depth_noise * noise(random)));
+      depth_mu.at<float>(row, column) =
+          static_cast<float>(factor * (along_ray ? p_second.norm() : p_second.z()) * (1 + depth_noise * noise(random)));
     }
     check.AddPair(Vga(), pair, depth_mu);
   }
@@ -53,6 +55,19 @@ TEST(DepthCheck, NamesTheFactor) {
   EXPECT_THAT(check.Check()->text, HasSubstr("times too small"));
   EXPECT_THAT(check.Check()->advice, HasSubstr("multiply the depth scale"));
   EXPECT_THAT(Feed(1.3, 0.3, 0.03, 4).Check()->text, HasSubstr("times too large"));
+}
+
+TEST(DepthCheck, NamesDistancesAlongTheRays) {
+  for (const double depth_noise : {0.0, 0.03}) {
+    const auto diagnostic = Feed(1, 0.3, depth_noise, 12, /*along_ray=*/true).Check();
+    ASSERT_TRUE(diagnostic.has_value()) << depth_noise;
+    EXPECT_EQ(diagnostic->code, "depth_contradicts_images");
+    EXPECT_THAT(diagnostic->text, HasSubstr("along the viewing rays"));
+    EXPECT_THAT(diagnostic->advice, HasSubstr("divide the depth at pixel (u, v)"));
+  }
+  EXPECT_FALSE(Feed(1, 0.3, 0.15, 12).IsContradicted());
+  EXPECT_FALSE(Feed(1, 0.3, 0, 12).IsContradicted());
+  EXPECT_FALSE(Feed(1, 0.3, 0.03, 5, /*along_ray=*/true).IsContradicted());
 }
 
 TEST(DepthCheck, ACameraThatHardlyMovesGivesNoDecision) { EXPECT_FALSE(Feed(0.2, 0.01, 0.03, 10).IsContradicted()); }

@@ -205,6 +205,34 @@ TEST(PoseCheck, NamesCombinedConventions) {
   EXPECT_EQ(diagnostic.advice, "run with --pose-convention world_to_camera,opengl");
 }
 
+std::shared_ptr<const FrameFeatures> Flipped(const FrameFeatures& features, bool left_right, bool top_bottom) {
+  auto flipped = std::make_shared<FrameFeatures>(features);
+  for (Feature& feature : flipped->features) {
+    if (left_right) feature.pixel_px.x() = 639 - feature.pixel_px.x();
+    if (top_bottom) feature.pixel_px.y() = 479 - feature.pixel_px.y();
+  }
+  return flipped;
+}
+
+std::string TextOfFlippedImages(bool left_right, bool top_bottom) {
+  PointRoom room;
+  PoseCheck check{SlamConfig{}};
+  for (int i = 0; i < kFrames; i += 2) {
+    const Pose pose = HandPose(kFrame_s * i);
+    check.AddFrame(Flipped(*room.See(static_cast<uint64_t>(i + 1), pose, 0.5), left_right, top_bottom), pose);
+  }
+  const auto diagnostic = check.Check();
+  EXPECT_TRUE(diagnostic.has_value());
+  return diagnostic ? diagnostic->text + ": " + diagnostic->advice : "";
+}
+
+TEST(PoseCheck, NamesFlippedImages) {
+  EXPECT_THAT(TextOfFlippedImages(true, false), HasSubstr("agree when the images are taken as mirrored left to right"));
+  EXPECT_THAT(TextOfFlippedImages(false, true), HasSubstr("as mirrored top to bottom"));
+  EXPECT_THAT(TextOfFlippedImages(true, true), HasSubstr("as turned by 180 degrees"));
+  EXPECT_THAT(TextOfFlippedImages(true, false), HasSubstr("send the images and masks as the camera took them"));
+}
+
 TEST(PoseCheck, NamesTheRotationOfTheCameraOnABody) {
   const Eigen::Quaterniond R_body_camera(0.5, -0.5, 0.5, -0.5);  // x forward, y left, z up
   const Diagnostic diagnostic = Contradiction(
