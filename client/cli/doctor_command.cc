@@ -13,13 +13,14 @@
 #include "client/cli/service_options.h"
 #include "client/doctor/camera_check.h"
 #include "client/doctor/image_check.h"
-#include "client/doctor/mask_time_check.h"
 #include "client/doctor/stamps_check.h"
 #include "client/files/sequence.h"
 #include "common/color_image.h"
 #include "common/label_png.h"
 #include "common/printable.h"
 #include "common/status.h"
+#include "server/masks/mask_image_check.h"
+#include "server/masks/mask_thumbnail.h"
 
 namespace romap::cli {
 namespace {
@@ -27,7 +28,7 @@ namespace {
 // Enough to see what is wrong; mapping all frames would take minutes.
 constexpr size_t kMaxMappedFrames = 150;
 constexpr size_t kMaxCheckedImages = 100;
-constexpr size_t kMaskTimeImages = 60;  // consecutive
+constexpr size_t kMaskCheckImages = 100;  // consecutive
 
 // What evenly spaced frames of a recording contain.
 struct Survey {
@@ -45,19 +46,21 @@ std::vector<size_t> Spread(size_t frames, size_t count) {
 }
 
 // Whether the masks belong to their frames.
-std::optional<Diagnostic> CheckMaskTimes(const files::Sequence& sequence) {
-  doctor::MaskTimeCheck check;
+std::optional<Diagnostic> CheckMaskImages(const files::Sequence& sequence) {
+  masks::MaskImageCheck check;
   SampleRange range;
-  for (size_t index = 0; index < std::min(sequence.size(), kMaskTimeImages); ++index) {
+  for (size_t index = 0; index < std::min(sequence.size(), kMaskCheckImages); ++index) {
     std::vector<files::UnreadableFile> unreadable;
     const auto frame = sequence.LoadReadable(index, &unreadable);
     if (!frame.ok()) continue;
     const absl::StatusOr<cv::Mat> decoded = DecodeColor(frame->image, &range);
     if (!decoded.ok()) continue;
     const cv::Mat& image = *decoded;
-    auto labels = frame->label_png.empty() ? absl::StatusOr<cv::Mat>(cv::Mat()) : DecodeLabelPng(frame->label_png);
-    if (!labels.ok() || labels->size() != image.size()) labels = cv::Mat();
-    check.Add(frame->timestamp_ns, image, *labels);
+    const cv::Mat gray = masks::MakeGray(image);
+    check.AddImage(frame->frame_id, frame->timestamp_ns, gray);
+    const auto labels = DecodeLabelPng(frame->label_png);
+    if (!labels.ok() || labels->size() != image.size()) continue;
+    check.AddMasks(frame->frame_id, masks::MakeThumbnail(*labels, gray));
   }
   return check.Check();
 }
@@ -80,7 +83,7 @@ Survey SurveyFrames(const files::Sequence& sequence) {
     check.Add(frame->frame_id, *image, labels.value_or(cv::Mat()));
   }
   survey.diagnostics = check.Diagnostics();
-  if (const auto displaced = CheckMaskTimes(sequence)) survey.diagnostics.push_back(*displaced);
+  if (const auto contradiction = CheckMaskImages(sequence)) survey.diagnostics.push_back(*contradiction);
   return survey;
 }
 

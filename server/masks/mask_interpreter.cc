@@ -22,6 +22,11 @@ constexpr double kBackgroundShare = 0.6;  // of its frames in which a mask looks
 constexpr double kObjectShare = 0.3;      // below it, a mask is not background any more
 constexpr double kFollowIou = 0.4;        // of a mask in two frames
 
+// A mask without background.
+constexpr double kFewBackground = 0.02;  // of the pixels
+constexpr double kMuchUnknown = 0.2;
+constexpr uint64_t kMinFramesWithoutBackground = 10;
+
 // A client may send a new class name with every mask.
 constexpr size_t kMaxClasses = 1000;
 constexpr size_t kMaxNamedClasses = 5;  // in the text of a diagnostic
@@ -44,6 +49,7 @@ cv::Rect FullBox(const MaskThumbnail& thumbnail, const cv::Rect& box, const cv::
 
 void MaskInterpreter::Interpret(bool eight_bit, Frame* frame) {
   const cv::Mat gray = MakeGray(frame->image_bgr);
+  image_check_.AddImage(frame->frame_id, frame->timestamp_ns, gray);
   if (!frame->has_masks) {
     waiting_.emplace_back(frame->frame_id, gray);
     if (waiting_.size() > kMaxWaiting) waiting_.pop_front();
@@ -64,6 +70,8 @@ std::vector<NonObjectMask> MaskInterpreter::InterpretLabels(uint64_t frame_id, c
   if (eight_bit) IgnoreVoid(frame_id, labels, instances);
   std::erase_if(*instances, [](const Instance& instance) { return instance.label == kIgnoreLabel; });
   MaskThumbnail thumbnail = MakeThumbnail(*labels, gray);
+  image_check_.AddMasks(frame_id, thumbnail);
+  CountBackground(frame_id, thumbnail);
   std::vector<FollowedMask> masks = Follow(thumbnail, *instances);
   for (FollowedMask& mask : masks) Decide(frame_id, thumbnail, &mask);
   const SceneMotion::CameraFixed fixed = scene_motion_.Find(thumbnail);
@@ -189,6 +197,28 @@ void MaskInterpreter::Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, 
   }
 }
 
+void MaskInterpreter::CountBackground(uint64_t frame_id, const MaskThumbnail& thumbnail) {
+  ++mask_frames_;
+  const int background = cv::countNonZero(thumbnail.labels == 0);
+  const int unknown = cv::countNonZero(thumbnail.labels == kIgnoreLabel);
+  if (background > kFewBackground * thumbnail.pixels() || unknown < kMuchUnknown * thumbnail.pixels()) return;
+  if (frames_without_background_++ == 0) first_frame_without_background_ = frame_id;
+}
+
+std::optional<Diagnostic> MaskInterpreter::MissingBackground() const {
+  if (frames_without_background_ < kMinFramesWithoutBackground || 2 * frames_without_background_ < mask_frames_) {
+    return std::nullopt;
+  }
+  return Diagnostic{.code = "masks_without_background",
+                    .severity = Severity::kWarning,
+                    .first_frame_id = first_frame_without_background_,
+                    .count = frames_without_background_,
+                    .text =
+                        "the masks have no background: nearly all pixels outside the objects are unknown (65535, or "
+                        "255 in 8-bit masks), so nothing bounds the shapes of the objects",
+                    .advice = "give pixels that show no object the label 0"};
+}
+
 void MaskInterpreter::Note(uint64_t frame_id, const Finding& finding) {
   const auto [it, is_new] = findings_.try_emplace(finding.code, finding);
   Finding& known = it->second;
@@ -215,6 +245,8 @@ std::vector<Diagnostic> MaskInterpreter::Diagnostics() const {
                            .text = text + finding.text,
                            .advice = finding.advice});
   }
+  if (const auto missing = MissingBackground()) diagnostics.push_back(*missing);
+  if (const auto contradiction = image_check_.Check()) diagnostics.push_back(*contradiction);
   return diagnostics;
 }
 

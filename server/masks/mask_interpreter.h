@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 
 #include "common/diagnostic.h"
 #include "common/stage_messages.h"
+#include "server/masks/mask_image_check.h"
 #include "server/masks/mask_thumbnail.h"
 #include "server/masks/scene_motion.h"
 
@@ -70,6 +72,8 @@ class MaskInterpreter {
   std::vector<FollowedMask> Follow(const MaskThumbnail& thumbnail, const std::vector<Instance>& instances);
   FollowedMask Begin(uint16_t label, const std::string& class_name) const;
   void Decide(uint64_t frame_id, const MaskThumbnail& thumbnail, FollowedMask* mask);
+  void CountBackground(uint64_t frame_id, const MaskThumbnail& thumbnail);
+  std::optional<Diagnostic> MissingBackground() const;
   void Note(uint64_t frame_id, const Finding& finding);
 
   bool void_is_ignored_ = false;
@@ -77,6 +81,10 @@ class MaskInterpreter {
   std::vector<FollowedMask> followed_;            // the masks of `previous_`
   std::map<std::string, ClassEvidence> classes_;  // by class name, without "object"; of the first kMaxClasses
   SceneMotion scene_motion_;
+  uint64_t mask_frames_ = 0;
+  uint64_t frames_without_background_ = 0;       // of these
+  uint64_t first_frame_without_background_ = 0;  // frame id
+  MaskImageCheck image_check_;
   std::deque<std::pair<uint64_t, cv::Mat>> waiting_;  // frame id and MakeGray() of recent frames without masks
   std::map<std::string, Finding> findings_;           // by code
 };

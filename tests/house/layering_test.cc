@@ -64,6 +64,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/session/", {"server/", "common/"}},
     {"server/access/", {"server/access/", "common/"}},
     {"server/transport/", {"server/transport/", "server/access/", "common/", "romap/v1/"}},
+    {"server/process/", {"server/process/", "common/"}},
     {"server/main.cc", {"server/", "common/"}},
     {"client/files/", {"client/files/", "common/"}},
     {"client/eval/", {"client/eval/", "client/files/", "common/"}},
@@ -74,7 +75,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"client/sdk/", {"client/sdk/", "common/", "romap/v1/"}},
     {"client/bench/",
      {"client/bench/", "client/eval/", "client/files/", "server/session/", "server/nerf/", "server/mesh/", "common/"}},
-    {"client/cli/", {"client/", "server/session/", "common/"}},
+    {"client/cli/", {"client/", "server/masks/", "server/session/", "common/"}},
     {"tests/", {"common/", "server/", "client/", "tests/", "romap/v1/"}},
 };
 
@@ -135,6 +136,7 @@ std::string NamespaceOf(const std::string& path) {
       {"server/session/", "romap::session"},
       {"server/access/", "romap::access"},
       {"server/transport/", "romap::transport"},
+      {"server/process/", "romap::process"},
       {"client/files/", "romap::files"},
       {"client/eval/", "romap::eval"},
       {"client/render/", "romap::render"},

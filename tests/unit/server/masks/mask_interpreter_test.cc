@@ -204,6 +204,16 @@ TEST_F(MaskInterpreterTest, TheValue255IsIgnoredAmongOtherLabels) {
   EXPECT_TRUE(HasDiagnostic("mask_value_255_ignored"));
 }
 
+TEST_F(MaskInterpreterTest, NamesMasksWithoutBackground) {
+  InterpretFrames(12, [](Frame* f) { f->labels.setTo(kIgnoreLabel, f->labels == 0); });
+  EXPECT_TRUE(HasDiagnostic("masks_without_background"));
+}
+
+TEST_F(MaskInterpreterTest, UnknownBordersLeaveABackground) {
+  InterpretFrames(12, [](Frame* f) { f->labels(cv::Rect(10, 10, 200, 40)).setTo(kIgnoreLabel); });
+  EXPECT_FALSE(HasDiagnostic("masks_without_background"));
+}
+
 TEST_F(MaskInterpreterTest, TheValue255IsAnObjectInBinaryMasks) {
   const Frame frame = InterpretFrames(10, [](Frame* f) {
     f->labels.setTo(255, f->labels > 0);
