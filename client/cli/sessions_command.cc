@@ -59,10 +59,10 @@ absl::Status RunSessions(const SessionsOptions& options) {
     fmt::print("the copy of session {} is session {}\n", options.copy, copied.id);
   }
   ROMAP_ASSIGN_OR_RETURN(const auto sessions, service->ListSessions());
-  fmt::print("{:<14} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", "session", "state", "frames", "objects", "training",
+  fmt::print("{:<34} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", "session", "state", "frames", "objects", "training",
              "stream", "stored", "name");
   for (const SessionInfo& info : sessions) {
-    fmt::print("{:<14} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", Printable(info.id), StateName(info.state),
+    fmt::print("{:<34} {:<10} {:>9} {:>8} {:>8} {:>9} {:>12} {}\n", Printable(info.id), StateName(info.state),
                info.statistics.frames_processed, info.statistics.objects, info.statistics.objects_training,
                info.stream_open ? "attached" : "-", StoredText(info), Printable(info.name));
   }

@@ -7,9 +7,11 @@
 #include <thread>
 #include <utility>
 
+#include "common/random_id.h"
 #include "common/status.h"
 #include "common/unix_time.h"
 #include "common/wire/recording.h"
+#include "server/session/admission.h"
 #include "server/session/local_streams.h"
 #include "server/store/session_transfer.h"
 
@@ -24,8 +26,10 @@ int TrainingThreads(const ServerConfig& config) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+double Megapixels(const CameraModel& camera) { return 1e-6 * camera.width_px * camera.height_px; }
+
 absl::Status CheckImageSize(const CameraModel& camera, double max_image_mpx) {
-  const double mpx = 1e-6 * camera.width_px * camera.height_px;
+  const double mpx = Megapixels(camera);
   if (mpx <= max_image_mpx) return absl::OkStatus();
   return InvalidArgument(
       "camera: images must have at most {:.3g} megapixels (session.max_image_mpx), {}x{} px are {:.3g}; send smaller "
@@ -85,14 +89,6 @@ LocalMappingService::~LocalMappingService() {
   sessions_.clear();
 }
 
-std::string LocalMappingService::NewId() {
-  std::string id;
-  do {
-    id = fmt::format("{:012x}", random_() >> 16);
-  } while (sessions_.contains(id) || (shelf_ && shelf_->Contains(id)));
-  return id;
-}
-
 absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOptions& options) {
   ROMAP_RETURN_IF_ERROR(ValidateCameraModel(options.camera));
   ROMAP_RETURN_IF_ERROR(CheckImageSize(options.camera, config_.session.max_image_mpx));
@@ -108,7 +104,8 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
         fmt::format("the limit of {} sessions (session.max_sessions) is reached; delete a session first",
                     config_.session.max_sessions));
   }
-  const std::string id = NewId();
+  if (options.mode == FrameMode::kLive) ROMAP_RETURN_IF_ERROR(CheckLiveLoadLocked(options.camera));
+  const std::string id = RandomId();
   std::unique_ptr<wire::RecordingWriter> recorder;
   if (!config_.session.record_dir.empty()) {
     const std::filesystem::path path = std::filesystem::path(config_.session.record_dir) / (id + ".romaprec");
@@ -135,6 +132,16 @@ absl::StatusOr<SessionInfo> LocalMappingService::CreateSession(const SessionOpti
   sessions_[id] = session;
   spdlog::info("session {}: created, {}x{} px", id, options.camera.width_px, options.camera.height_px);
   return session->Info();
+}
+
+absl::Status LocalMappingService::CheckLiveLoadLocked(const CameraModel& camera) const {
+  if (config_.session.live_load <= 0) return absl::OkStatus();
+  std::vector<LiveSession> live;
+  for (const auto& [id, session] : sessions_) {
+    const std::optional<double> cores = session->LiveCores();
+    if (cores != 0.0) live.push_back({.image_mpx = Megapixels(session->camera()), .cores = cores});
+  }
+  return AdmitLiveSession(live, Megapixels(camera), config_.session.live_load * std::thread::hardware_concurrency());
 }
 
 absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::FindLocked(const std::string& session_id) {
@@ -287,12 +294,10 @@ absl::Status LocalMappingService::SaveSession(const std::string& session_id, con
 
 absl::StatusOr<SessionInfo> LocalMappingService::LoadSession(const PieceReader& read, const std::string& tenant) {
   ROMAP_RETURN_IF_ERROR(CheckStore());
-  std::unique_lock lock(mutex_);
-  const std::string id = NewId();
-  lock.unlock();
+  const std::string id = RandomId();
   ROMAP_ASSIGN_OR_RETURN(store::StoredSession stored, store::LoadSession(*store_, id, tenant, read));
   spdlog::info("session {}: loaded from a file, {} inputs", id, stored.inputs);
-  lock.lock();
+  std::lock_guard lock(mutex_);
   shelf_->Add(std::move(stored));
   return shelf_->Info(id);
 }

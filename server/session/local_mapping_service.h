@@ -5,7 +5,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -48,9 +47,10 @@ class LocalMappingService : public MappingService {
   absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) override;
 
  private:
+  // RESOURCE_EXHAUSTED: the processor cannot take another live session.
+  absl::Status CheckLiveLoadLocked(const CameraModel& camera) const;
   // Null: it is on the shelf. NOT_FOUND: there is no such session.
   absl::StatusOr<std::shared_ptr<Session>> FindLocked(const std::string& session_id);
-  std::string NewId();
   absl::Status CheckStore() const;
   Session::Services Services() { return {.pool = &pool_, .mesher = &mesher_, .store = store_.get()}; }
   absl::Status RestoreLocked(const std::string& session_id);
@@ -71,7 +71,6 @@ class LocalMappingService : public MappingService {
   nerf::TrainingPool pool_;
   Mesher mesher_;
   std::mutex mutex_;
-  std::mt19937_64 random_{std::random_device{}()};
   std::map<std::string, std::shared_ptr<Session>> sessions_;  // in memory
   size_t sessions_in_creation_ = 0;
   std::unique_ptr<SessionShelf> shelf_;  // null without a store

@@ -5,6 +5,8 @@
 #include <utility>
 #include <variant>
 
+#include "common/thread_time.h"
+
 namespace romap::session {
 namespace {
 
@@ -46,6 +48,13 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
   }
 }
 
+template <class Work>
+void Scheduler::Measure(bool is_live, const Work& work) {
+  const double start_s = ThreadCpuSeconds();
+  work();
+  if (is_live) live_load_.Add(ThreadCpuSeconds() - start_s, std::chrono::steady_clock::now());
+}
+
 bool Scheduler::IsLive(const SessionInput& input) const {
   return mode_ == FrameMode::kLive && !restoring_ && !IsResent(input);
 }
@@ -85,7 +94,9 @@ void Scheduler::RunIngest() {
     while (std::optional<Arrival> arrival = inputs_.Pop()) {
       if (IsResent(arrival->input)) --resent_waiting_;
       if (stopping_) continue;
-      checked_.Push(pipeline_->Check(*std::move(arrival)));
+      CheckedInput checked;
+      Measure(IsLive(arrival->input), [&] { checked = pipeline_->Check(*std::move(arrival)); });
+      checked_.Push(std::move(checked));
     }
   } catch (const std::exception& e) {
     Fail("ingest", e.what());
@@ -98,8 +109,10 @@ void Scheduler::RunTracking() {
     while (const std::optional<CheckedInput> input = checked_.Pop()) {
       if (stopping_) continue;
       const bool is_live = IsLive(input->arrival.input);
-      pipeline_->Process(
-          *input, [&](MappingStep step) { is_live ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step)); });
+      Measure(is_live, [&] {
+        pipeline_->Process(
+            *input, [&](MappingStep step) { is_live ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step)); });
+      });
     }
   } catch (const std::exception& e) {
     Fail("tracking", e.what());
@@ -176,7 +189,7 @@ void Scheduler::RunStep(const QueuedStep& queued) {
   const MappingStep& step = queued.step;
   if (queued.is_live && step.is_keyframe) pipeline_->SetKeyframesWait(--keyframes_waiting_ > 0);
   if (queued.is_live && step.relocalizes) --lost_frames_waiting_;
-  if (!stopping_) step.run();
+  if (!stopping_) Measure(queued.is_live, step.run);
   if (!queued.is_live && step.changes_local_map) {
     std::lock_guard lock(mutex_);
     --map_changes_waiting_;

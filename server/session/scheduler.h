@@ -12,6 +12,7 @@
 #include "common/mapping_service.h"
 #include "server/session/arrival.h"
 #include "server/session/frame_ledger.h"
+#include "server/session/live_load.h"
 #include "server/session/pipeline.h"
 #include "server/session/session_config.h"
 
@@ -51,6 +52,8 @@ class Scheduler {
   void EndRestoring() { restoring_ = false; }
   // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
+  // Of the inputs of a live client.
+  const LiveLoad& live_load() const { return live_load_; }
   // Ends and joins the threads without processing the waiting inputs or completing the training. Must not be called by
   // a callback.
   void Stop();
@@ -73,6 +76,9 @@ class Scheduler {
   void ExecuteReplay(MappingStep step);
   void ExecuteLive(MappingStep step);
   void RunStep(const QueuedStep& queued);
+  // Runs `work`, and counts its CPU time if it is for a live input.
+  template <class Work>
+  void Measure(bool is_live, const Work& work);
 
   void TrainToCompletion();
   void Fail(const char* stage, const std::string& what);
@@ -84,6 +90,7 @@ class Scheduler {
   FrameLedger* const ledger_;
   const Callbacks callbacks_;
 
+  LiveLoad live_load_;
   BoundedQueue<Arrival> inputs_;
   BoundedQueue<CheckedInput> checked_;
   BoundedQueue<QueuedStep> steps_;

@@ -1,9 +1,5 @@
 #include "server/session/sender_claim.h"
 
-#include <fmt/format.h>
-
-#include <cstdint>
-#include <random>
 #include <utility>
 
 namespace romap::session {
@@ -39,13 +35,6 @@ std::shared_ptr<SenderClaim::Holder> SenderClaim::Attach(const std::string& toke
 void SenderClaim::Release(const std::shared_ptr<Holder>& holder) {
   std::lock_guard lock(mutex_);
   if (holder == last_) held_ = false;
-}
-
-std::string MakeRandomToken() {
-  std::random_device random;
-  std::string token;
-  for (int i = 0; i < 4; ++i) token += fmt::format("{:08x}", static_cast<uint32_t>(random()));
-  return token;
 }
 
 }  // namespace romap::session

@@ -46,7 +46,4 @@ class SenderClaim {
   std::shared_ptr<Holder> last_;  // also after its release: its last input may still be in progress
 };
 
-// 128 random bits in hexadecimal digits.
-std::string MakeRandomToken();
-
 }  // namespace romap::session

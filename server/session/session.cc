@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/status.h"
+#include "common/unix_time.h"
 
 namespace romap::session {
 namespace {
@@ -184,6 +185,15 @@ bool Session::IsIdle() const {
   // The storage is one subscriber.
   return !restoring_ && !sender_.IsHeld() && map_.Subscribers() <= (storage_ ? 1 : 0) && ledger_.IsSettled() &&
          pipeline_.TrainingProgress().objects_training == 0;
+}
+
+std::optional<double> Session::LiveCores() const {
+  if (options_.mode != FrameMode::kLive || state() != SessionState::kOpen) return 0;
+  const std::optional<double> cores = scheduler_.live_load().Cores(Clock::now());
+  // A client opens its stream soon after it created the session.
+  constexpr int64_t kPatience_ns = 30'000'000'000;
+  const bool may_begin = sender_.IsHeld() || UnixNow_ns() - created_unix_ns_ < kPatience_ns;
+  return may_begin ? cores : cores.value_or(0);
 }
 
 void Session::Unsubscribe(const std::shared_ptr<Outbox>& outbox) {

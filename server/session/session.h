@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/mapping_service.h"
+#include "common/random_id.h"
 #include "common/wire/recording.h"
 #include "server/nerf/training_pool.h"
 #include "server/session/frame_ledger.h"
@@ -91,8 +92,12 @@ class Session {
   std::shared_ptr<Outbox> Subscribe(Outbox::Acks acks, size_t max_acks, std::vector<ObjectId>* objects);
   void Unsubscribe(const std::shared_ptr<Outbox>& outbox);
   const SessionConfig& config() const { return config_; }
+  const CameraModel& camera() const { return options_.camera; }
   bool is_durable() const { return storage_ != nullptr; }
   void SetPinned(bool pinned) { pinned_ = pinned; }
+  // The cores that the session needs for its live client, see LiveLoad; nullopt: not known yet. 0 for a session that
+  // has no live client.
+  std::optional<double> LiveCores() const;
   // Nobody sends or watches, and everything is mapped and trained.
   bool IsIdle() const;
   // The same, and no input was ever accepted. Never a pinned session.
@@ -129,7 +134,7 @@ class Session {
   store::Store* const store_;
 
   SessionLifecycle lifecycle_;
-  SenderClaim sender_{MakeRandomToken()};
+  SenderClaim sender_{RandomId()};
   Clock::time_point next_statistics_ = Clock::now();  // the scheduler's mapping thread
 
   MapState map_;

@@ -9,6 +9,7 @@ namespace romap::session {
 struct SessionConfig {
   int max_sessions = 16;
   double max_image_mpx = 40;
+  double live_load = 0.85;
   int frame_queue = 8;
   int mapping_queue = 8;
   int subscriber_queue = 65536;
@@ -31,6 +32,11 @@ struct SessionConfig {
                 .max = 67.2,
                 .help = "Largest images of a session; an image needs about 20 bytes of memory per pixel while it waits "
                         "and is tracked"});
+    fields.Add("live_load", &live_load,
+               {.min = 0,
+                .max = 100,
+                .help = "Share of all cores that tracking and mapping of live sessions may need; a live session that "
+                        "would exceed it is refused; 0 = no limit"});
     fields.Add("frame_queue", &frame_queue,
                {.unit = "frames",
                 .min = 1,

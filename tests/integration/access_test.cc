@@ -81,7 +81,7 @@ TEST_F(AccessTest, AMapIsMadeAndReadWithTokensOverTls) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string listed = Client("sessions", {"--token-file", viewer}).out;
   EXPECT_THAT(listed, HasSubstr("finished"));
-  const std::string id = listed.substr(listed.find('\n') + 1, 12);
+  const std::string id = listed.substr(listed.find('\n') + 1, 32);
   EXPECT_EQ(Client("export", {id, "--out", folder_ / "copy", "--token-file", viewer}).exit_code, 0);
 
   EXPECT_THAT(Client("sessions", {}).err, HasSubstr("this server needs a token"));

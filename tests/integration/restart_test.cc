@@ -106,7 +106,7 @@ TEST_F(RestartTest, ASessionIsContinuedAfterARestartAndCarriedToAnotherServer) {
 
   EXPECT_THAT(Sessions({"--delete", id}).out, HasSubstr("(no sessions)"));
   const std::string loaded = Sessions({"--load", folder_ / "table.romap"}).out;
-  const std::string copy = loaded.substr(loaded.find("is session ") + 11, 12);
+  const std::string copy = loaded.substr(loaded.find("is session ") + 11, 32);
   const ProcessResult continued = RunProcess(RunCommand({"--session", copy}));
   ASSERT_EQ(continued.exit_code, 0) << continued.err;
   ExpectWholeMap();

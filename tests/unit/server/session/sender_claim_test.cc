@@ -53,9 +53,4 @@ TEST(SenderClaimTest, TheNextStreamWaitsForTheInputInProgress) {
   releaser.join();
 }
 
-TEST(SenderClaimTest, TokensDiffer) {
-  EXPECT_EQ(MakeRandomToken().size(), 32u);
-  EXPECT_NE(MakeRandomToken(), MakeRandomToken());
-}
-
 }  // namespace romap::session::sender_claim_test
