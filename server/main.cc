@@ -25,6 +25,7 @@
 #include "server/access/access_config.h"
 #include "server/access/authenticator.h"
 #include "server/access/token_command.h"
+#include "server/process/service_manager.h"
 #include "server/session/local_mapping_service.h"
 #include "server/session/server_config.h"
 #include "server/store/store.h"
@@ -239,7 +240,10 @@ int Main(int argc, char** argv) {
   fmt::print("romap-server listening on {}\n", (*server)->address());
   std::fflush(stdout);
 
+  // A service that does not answer any more hangs in a lock that all calls need.
+  auto manager = std::make_unique<process::ServiceManager>([&service] { service.ListSessions().IgnoreError(); });
   WaitForStop(signals);
+  manager.reset();
   (*server)->Shutdown();
   return 0;
 }

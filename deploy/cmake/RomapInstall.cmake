@@ -5,6 +5,7 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS romap-server RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT server)
 install(FILES deploy/server.yaml DESTINATION ${CMAKE_INSTALL_DATADIR}/romap COMPONENT server)
+install(FILES deploy/systemd/romap-server.service DESTINATION lib/systemd/system COMPONENT server)
 install(TARGETS romap RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT client)
 
 # The SDK. Its headers include each other as "common/..." and "client/sdk/...", so they are installed as a separate tree
