@@ -1,0 +1,1 @@
+"""The stubs of mapping.proto, which the installation generates."""
