@@ -42,6 +42,7 @@ class EventStream:
         self._rejected = 0
         self._send_error: Optional[Error] = None  # the session accepts no more inputs, although its stream goes on
         self._ended = False
+        self._closed = False  # by this program
         self._end_error: Optional[Error] = None
         # Waits for the first opening, as for later ones.
         first = self._establish(None)
@@ -53,7 +54,8 @@ class EventStream:
     # ----------------------------------------------------------------------------------------------------- the caller
 
     def events(self) -> Iterator[Event]:
-        """The events until the session is finished. Raises Error if the stream ends for another reason."""
+        """The events until the session is finished or close() is called. Raises Error if the stream ends for another
+        reason."""
         while True:
             event = self.next_event()
             if event is None:
@@ -65,8 +67,8 @@ class EventStream:
         with self._changed:
             self._changed.wait_for(lambda: self._ended or len(self._buffer) > 0, timeout)
             event = self._buffer.pop()
-            if event is None and self._ended and self._end_error is not None:
-                raise self._end_error
+            if event is None:
+                self._raise_unless_closed()
             return event
 
     @property
@@ -79,12 +81,17 @@ class EventStream:
         """Waits until the session is finished; False: not within `timeout` seconds. Raises Error as events()."""
         with self._changed:
             ended = self._changed.wait_for(lambda: self._ended, timeout)
-            if ended and self._end_error is not None:
-                raise self._end_error
+            self._raise_unless_closed()
             return ended
+
+    def _raise_unless_closed(self) -> None:
+        """What reads the events of a stream that this program closed simply ends."""
+        if self._ended and self._end_error is not None and not self._closed:
+            raise self._end_error
 
     def close(self) -> None:
         """Ends the stream, not the session. Inputs that are not known to be safe are forgotten."""
+        self._closed = True
         self._end(Error("CANCELLED", "the stream was closed"))
         if threading.current_thread() is not self._receiver:
             self._receiver.join()
