@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # run.sh install       fetches the packages of the JavaScript client and packs it, as client/js/README.md says
 # run.sh types         checks the types of the client
-# run.sh unit|link|server   runs the test of that name
+# run.sh unit|link|...   runs the test of that name
 #
 # Exits with 77 (skipped) without Node.js, and if the packages cannot be fetched because there is no network.
 set -euo pipefail

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # run.sh install       installs the Python client into an environment of its own, as client/python/README.md says
 # run.sh types         checks the types of the client and its examples
-# run.sh unit|link|server   runs the test of that name with the installed client
+# run.sh unit|link|...   runs the test of that name with the installed client
 #
 # Exits with 77 (skipped) if a package is missing that deploy/setup.sh tests installs.
 set -euo pipefail
@@ -28,6 +28,7 @@ case $1 in
     # pip writes into the folder that it builds, so it gets a copy.
     cp -r "$ROMAP_SOURCE_DIR/client/python" "$work/tree/client/python"
     ln -s "$ROMAP_SOURCE_DIR/proto" "$ROMAP_SOURCE_DIR/common" "$work/tree"
+    PATH=/usr/lib/ccache:$PATH  # Debian's ccache in the place of the compiler, if it is installed
     "$python" -m venv --system-site-packages "$work/env"
     "$work/env/bin/python" -m pip install --no-index --no-build-isolation "$work/tree/client/python"
     ;;

@@ -322,6 +322,15 @@ class ConventionsTest(unittest.TestCase):
                 conventions.gravity_from_opengl(down_camera), conventions.gravity_of_pose(pose), atol=1e-12
             )
 
+    def test_opengl_as_two_rotations_about_x(self) -> None:
+        # As client/integration.md has it for ARKit and ARCore.
+        rng = np.random.default_rng(7)
+        up, flip = romap.pose([np.sqrt(0.5), 0, 0, np.sqrt(0.5)], [0, 0, 0]), romap.pose([1, 0, 0, 0], [0, 0, 0])
+        given = random_pose(rng)
+        pose = conventions.pose_from_opengl(given)
+        np.testing.assert_allclose(up @ given @ flip, pose, atol=1e-12)
+        np.testing.assert_allclose(pose[:3, :3].T @ [0, 0, -1], conventions.gravity_of_pose(pose), atol=1e-12)
+
     def test_arkit_intrinsics_are_columns(self) -> None:
         columns = [[1500, 0, 0], [0, 1501, 0], [960.5, 720.25, 1]]
         camera = conventions.camera_from_arkit(columns, 1920, 1440)
