@@ -74,6 +74,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"client/pictures/", {"client/pictures/", "client/render/", "common/"}},
     {"client/sdk/", {"client/sdk/", "common/", "romap/v1/"}},
     {"client/python/", {"common/"}},
+    {"client/examples/", {}},  // built against the installed headers
     {"client/bench/",
      {"client/bench/", "client/eval/", "client/files/", "server/session/", "server/nerf/", "server/mesh/", "common/"}},
     {"client/cli/", {"client/", "server/masks/", "server/session/", "common/"}},

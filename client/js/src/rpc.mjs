@@ -104,6 +104,7 @@ function tlsCredentials(address, tls, options) {
 /** Every call throws RomapError. */
 export class Rpc {
   #client;
+  #closed = false;
   #metadata = new grpc.Metadata();
 
   /**
@@ -156,7 +157,8 @@ export class Rpc {
    * @param {object} [request]
    * @returns {Promise<any>}
    */
-  call(method, request = {}) {
+  async call(method, request = {}) {
+    this.#checkOpen();
     return new Promise((resolve, reject) => {
       const options = {deadline: Date.now() + CALL_TIMEOUT_MS};
       this.#client[method](request, this.#metadata, options, (/** @type {any} */ failure, /** @type {any} */ answer) =>
@@ -172,6 +174,7 @@ export class Rpc {
    * @returns {AsyncGenerator<any>}
    */
   async *read(method, request) {
+    this.#checkOpen();
     const call = this.#client[method](request, this.#metadata, {deadline: Date.now() + EXPORT_TIMEOUT_MS});
     try {
       yield* call;
@@ -189,6 +192,7 @@ export class Rpc {
    * @returns {Promise<any>}
    */
   async write(method, requests) {
+    this.#checkOpen();
     /** @type {any} */
     let call;
     const answer = new Promise((resolve, reject) => {
@@ -215,6 +219,7 @@ export class Rpc {
    * @returns {Promise<{call: any, opened: any}>}
    */
   async open(method, first) {
+    this.#checkOpen();
     const call = method === 'Map' ? this.#client.Map(this.#metadata) : this.#client.Watch(first, this.#metadata);
     if (method === 'Map') call.write(first);
     let isLate = false;
@@ -241,7 +246,12 @@ export class Rpc {
     }
   }
 
+  #checkOpen() {
+    if (this.#closed) throw new RomapError('FAILED_PRECONDITION', 'this connection was closed by the program');
+  }
+
   close() {
+    this.#closed = true;
     this.#client.close();
   }
 }

@@ -77,6 +77,7 @@ class Rpc:
             raise invalid(f"the token is not sent to {address} in clear text; connect with TLS")
         self.address = address
         self.tls = tls
+        self._closed = False
         self._metadata: List[Tuple[str, str]] = [("authorization", f"Bearer {token}")] if token else []
         options: List[Tuple[str, Any]] = [
             ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
@@ -118,6 +119,7 @@ class Rpc:
 
     def call(self, method: str, request: Any, timeout_s: float = CALL_TIMEOUT_S) -> Any:
         """A call with one answer."""
+        self._check_open()
         try:
             return getattr(self.stub, method)(request, timeout=timeout_s, metadata=self._metadata)
         except grpc.RpcError as failure:
@@ -125,6 +127,7 @@ class Rpc:
 
     def read(self, method: str, request: Any, timeout_s: float = EXPORT_TIMEOUT_S) -> Iterator[Any]:
         """The answers of a call that ends by itself."""
+        self._check_open()
         call = getattr(self.stub, method)(request, timeout=timeout_s, metadata=self._metadata)
         try:
             yield from call
@@ -135,6 +138,7 @@ class Rpc:
 
     def open(self, method: str, request: Any) -> Tuple[Any, Any]:
         """Opens a stream and waits for its first answer. Returns the call and StreamOpened."""
+        self._check_open()
         call = getattr(self.stub, method)(request, metadata=self._metadata)
         is_late = threading.Event()
 
@@ -156,5 +160,10 @@ class Rpc:
         finally:
             timer.cancel()
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise Error("FAILED_PRECONDITION", "this connection was closed by the program")
+
     def close(self) -> None:
+        self._closed = True
         self._channel.close()

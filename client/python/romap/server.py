@@ -94,7 +94,8 @@ class Server:
         pose_use     poses of the frames: "given" (exact), "prior" (corrected by the images), "ignore"
         up_world     up in the world of the poses, if it is not z
         estimate_up  estimate it from the images
-        on_event     is called with every event on another thread, instead of events()
+        on_event     is called with every event on another thread, instead of events(); for frames of a live session that
+                     are dropped, on the thread of send()
         on_link      is called with (is_up, reason, attempt) when the connection breaks and when it is back
         """
         if mode not in _MODES:

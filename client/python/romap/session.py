@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Iterable, Optional, Type, Union
+from typing import TYPE_CHECKING, Any, Iterable, List, Optional, Type, Union
 
 import romap.v1.mapping_pb2 as pb
 
@@ -106,8 +106,9 @@ class Session(EventStream):
             frame.frame_id = self._newest_frame_id + 1 if frame_id is None else frame_id
             if frame.frame_id <= self._newest_frame_id:
                 raise invalid(f"frame_id: must increase; is {frame_id} after {self._newest_frame_id}")
-            self._add(pb.MapRequest(frame=frame))
+            dropped = self._add(pb.MapRequest(frame=frame))
             self._newest_frame_id, self._newest_time_ns = frame.frame_id, timestamp_ns
+        self._report(dropped)
         new_id: int = frame.frame_id
         return new_id
 
@@ -115,9 +116,11 @@ class Session(EventStream):
         """Sends the masks of a frame that was sent without them. They are acknowledged with MasksAck."""
         late = pb.LateMasks(frame_id=frame_id, masks=masks_to_proto(masks, instances, self.camera))
         with self._changed:
-            self._add(pb.MapRequest(late_masks=late))
+            dropped = self._add(pb.MapRequest(late_masks=late))
+        self._report(dropped)
 
-    def _add(self, request: Any) -> None:
+    def _add(self, request: Any) -> List[int]:
+        """Returns the frames that were dropped for it."""
         size = request.ByteSize()
         if size > MAX_MESSAGE_BYTES:
             raise Error("RESOURCE_EXHAUSTED", f"the message has {size} bytes; the limit is {MAX_MESSAGE_BYTES}")
@@ -129,9 +132,9 @@ class Session(EventStream):
         if self._send_error is not None:
             raise self._send_error
         self._inputs.add(request)
-        if self._is_live:
-            self._drop_to_fit()
+        dropped = self._drop_to_fit() if self._is_live else []
         self._changed.notify_all()
+        return dropped
 
     def _is_full(self, size: int) -> bool:
         """An input that alone exceeds the limit is sent when no other is kept."""
@@ -139,14 +142,21 @@ class Session(EventStream):
             return False
         return self._inputs.bytes + size > self._limits.max_bytes or self._inputs.waiting() >= self._limits.max_waiting
 
-    def _drop_to_fit(self) -> None:
+    def _drop_to_fit(self) -> List[int]:
+        dropped: List[int] = []
         while self._inputs.bytes > self._limits.max_bytes or self._inputs.waiting() > self._limits.max_waiting:
             frame_id = self._inputs.drop_oldest_unsent_frame()
             if frame_id is None:
-                return
+                break
             self.dropped += 1
+            dropped.append(frame_id)
+        return dropped
+
+    def _report(self, dropped: List[int]) -> None:
+        """Without the lock, because a callback may wait."""
+        for frame_id in dropped:
             reason = "dropped: the connection is broken or too slow, and the client's memory for frames is full"
-            self._buffer.add(rejection(frame_id, reason))
+            self._deliver(rejection(frame_id, reason))
 
     # ---------------------------------------------------------------------------------------------------------- its end
 

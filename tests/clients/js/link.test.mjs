@@ -174,6 +174,15 @@ test('callbacks get all events, and their errors end the session', async (t) => 
   await assert.rejects(send(session, 4), /the callback of the session failed/);
 });
 
+test('a connection that the program closed', async (t) => {
+  const {scripted, server} = await serve(t, acknowledgeAll);
+  const session = await open(t, server);
+  server.close();
+  await assert.rejects(server.sessions(), /FAILED_PRECONDITION: this connection was closed by the program/);
+  scripted.stop();
+  await assert.rejects(session.wait(LIMIT_MS), /closed by the program/);
+});
+
 test('gives up after the time of retry', async (t) => {
   const {scripted, server} = await serve(t, acknowledgeAll);
   const session = await open(t, server, {retry: {...retry, maxDownMs: 300}});

@@ -209,6 +209,19 @@ class LinkTest(unittest.TestCase):
         with self.assertRaisesRegex(romap.Error, "the callback of the session failed"):
             self.send(session, 4)
 
+    def test_a_connection_that_the_program_closed(self) -> None:
+        def script(requests: Any) -> Any:
+            yield opened()
+            yield from until_closed(requests)
+
+        self.serve(script)
+        session = self.session()
+        self.server.close()
+        with self.assertRaisesRegex(romap.Error, "FAILED_PRECONDITION: this connection was closed by the program"):
+            session.wait(LIMIT_S)
+        with self.assertRaisesRegex(romap.Error, "closed by the program"):
+            self.server.sessions()
+
     def test_gives_up_after_the_time_of_retry(self) -> None:
         def script(requests: Any) -> Any:
             yield opened()
