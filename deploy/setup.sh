@@ -15,8 +15,8 @@ packages=(
 )
 if [ "${1:-}" = tests ]; then
   packages+=(libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev clang-format dpkg-dev file openssl
-             python3-dev python3-grpcio python3-matplotlib python3-mypy python3-numpy python3-pip python3-protobuf
-             python3-setuptools python3-venv python3-wheel)
+             python3-dev python3-grpcio python3-matplotlib python3-mypy python3-numpy python3-opencv python3-pip
+             python3-protobuf python3-setuptools python3-venv python3-wheel)
   # npm fetches the packages of the JavaScript client.
   command -v node >/dev/null || packages+=(nodejs npm)
 fi

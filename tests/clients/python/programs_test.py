@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import subprocess
 import sys
@@ -28,6 +29,18 @@ class ProgramsTest(FolderTest):
         printed = self.program(str(program), server.address, str(SEQUENCE)).splitlines()
         self.assertEqual(len(printed), 2, printed)
 
+    def test_the_example_of_a_camera(self) -> None:
+        if importlib.util.find_spec("cv2") is None:
+            self.skipTest("camera.py: python3-opencv is not installed")
+        server = self.start("--ephemeral")
+        video = str(SEQUENCE / "rgb/%06d.png")
+        command = [str(EXAMPLES / "camera.py"), "--server", server.address, "--device", video, "--focal", "288"]
+        self.program(*command, "--box", "100,80,60,60")
+        with romap.connect(server.address) as connection:
+            (info,) = connection.sessions()
+        self.assertEqual((info.name, info.state), ("camera", "finished"))
+        self.assertEqual(info.statistics.frames_processed, len(list((SEQUENCE / "rgb").iterdir())))
+
     def test_the_examples(self) -> None:
         server = self.start("--ephemeral")
         printed = self.program(str(EXAMPLES / "stream_folder.py"), str(SEQUENCE), "--server", server.address)
@@ -35,9 +48,7 @@ class ProgramsTest(FolderTest):
         with romap.connect(server.address) as connection:
             session = connection.sessions()[0].id
         run(CLIENT, "export", session, "--server", server.address, "--out", str(self.folder / "exported"))
-        try:
-            import matplotlib  # noqa: F401
-        except ImportError:
+        if importlib.util.find_spec("matplotlib") is None:
             self.skipTest("show_map.py: python3-matplotlib is not installed")
         picture = self.folder / "map.png"
         self.program(str(EXAMPLES / "show_map.py"), session, str(picture), "--server", server.address)

@@ -23,7 +23,7 @@ SOURCE_DIR = Path(os.environ["ROMAP_SOURCE_DIR"])
 SERVER = os.environ["ROMAP_SERVER"]
 CLIENT = os.environ["ROMAP_CLIENT"]
 SEQUENCE = Path(os.environ["ROMAP_SEQUENCE"])  # of `romap synth`, with two objects
-LIMIT_S = 60.0
+LIMIT_S = 200.0
 LITTLE_TRAINING = [
     argument
     for setting in (
