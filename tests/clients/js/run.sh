@@ -24,7 +24,7 @@ case $1 in
     ln -sfn "$ROMAP_SOURCE_DIR/proto" "$ROMAP_CLIENT_DIR/proto"
     cd "$work/romap"
     if ! cmp -s package-lock.json node_modules/of-package-lock.json; then
-      npm ci --ignore-scripts --no-audit --no-fund >"$work/npm.log" 2>&1 || {
+      npm ci --ignore-scripts --no-audit --no-fund --fetch-retries=1 >"$work/npm.log" 2>&1 || {
         cat "$work/npm.log"
         ! grep -qE 'ENOTFOUND|EAI_AGAIN|ECONNREFUSED|ECONNRESET|ETIMEDOUT|ENETUNREACH|E403|network' "$work/npm.log" ||
           skip "the packages cannot be fetched"

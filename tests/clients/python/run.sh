@@ -17,7 +17,7 @@ require_module() {
 
 case $1 in
   install)
-    require_module grpc google.protobuf numpy pip setuptools venv wheel
+    require_module grpc google.protobuf numpy pip setuptools ensurepip wheel
     for tool in protoc grpc_python_plugin pkg-config; do
       command -v "$tool" >/dev/null || { echo "skipped: $tool is missing; see deploy/setup.sh"; exit 77; }
     done
