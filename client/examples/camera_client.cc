@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
     frame.image.assign(jpeg.begin(), jpeg.end());
     frame.mask_encoding = romap::MaskEncoding::kRunLength;
     frame.label_runs = MasksOf(image);
-    frame.instances.push_back({.label = 1, .class_name = "object"});
+    frame.instances.push_back({.label = 1, .class_name = "object", .track_id = {}});
     feed.Send(std::move(frame));
     if (!video.read(image)) break;
   }
