@@ -1,0 +1,6 @@
+/** What the app shows at a time. */
+export interface Page {
+  readonly element: HTMLElement;
+  start(): void;
+  stop(): void;
+}
