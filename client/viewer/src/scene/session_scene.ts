@@ -103,9 +103,14 @@ export class SessionScene {
     this.camera.setPath(poses, this.colors);
     const ack = this.store.lastAck;
     this.camera.setPose(newest, !ack || ack.tWorldCamera !== null, this.colors);
-    this.camera.setImageVisible(this.settings.image);
+    this.refreshImage();
     this.controls.follow(newest?.pose ?? null);
     if (this.box.isEmpty() && newest) this.refreshExtent();
+  }
+
+  refreshImage(): void {
+    // Behind the camera of the session, the image would hide the objects.
+    this.camera.setImageVisible(this.settings.image && this.controls.mode !== 'follow');
   }
 
   select(id: string | null): void {
@@ -206,11 +211,15 @@ export class SessionScene {
       }
     }
     if (box.isEmpty()) return;
+    // A long path would make the objects small: only what is near them decides on the view.
+    if (!objectsBox.isEmpty()) {
+      box.intersect(objectsBox.clone().expandByScalar(0.45 * objectsBox.getSize(new Vector3()).length()));
+    }
     const size = Math.max(1e-6, box.getSize(new Vector3()).length());
     const grew = this.box.isEmpty() || !this.box.clone().expandByScalar(0.05 * size).containsBox(box);
     this.box = box;
     this.controls.sceneSize = size;
-    this.camera.setDepth(0.11 * size);
+    this.camera.setDepth(0.08 * size);
     this.grid.group.visible = this.settings.grid;
     this.grid.set(objectsBox.isEmpty() ? box : objectsBox, confirmed.flatMap(({ update }) => (update.cuboid
       ? [update.cuboid.tWorldObject.translation.z - update.cuboid.halfExtents.z] : [])), this.colors.grid);

@@ -162,7 +162,10 @@ export class SessionPage implements Page {
       scene.onSelect = (id) => this.select(id);
       scene.onMeasured = () => this.showMeasureHint();
       scene.objects.onMesh = () => this.queueUpdate();
-      scene.controls.onMode = (mode) => this.toolbar.update(mode, scene.measure.isActive);
+      scene.controls.onMode = (mode) => {
+        this.toolbar.update(mode, scene.measure.isActive);
+        scene.refreshPath();
+      };
       scene.stage.onContextLost = (isLost) => this.overlay.fault(
         isLost ? 'The browser took the graphics memory away. The map is drawn again when it gives it back; else reload the page.' : '');
       this.scene = scene;
@@ -254,7 +257,7 @@ export class SessionPage implements Page {
     this.overlay.setImage(blob);
     if (this.scene && this.settings.image && this.settings.path) {
       this.scene.camera.setImage(await createImageBitmap(blob));
-      this.scene?.camera.setImageVisible(this.settings.image);
+      this.scene?.refreshImage();
     }
   }
 
