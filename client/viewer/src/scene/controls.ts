@@ -78,7 +78,7 @@ export class ViewControls {
     const radius = Math.max(1e-3, box.getSize(new Vector3()).length() / 2);
     const fov = MathUtils.degToRad(this.stage.camera.fov);
     const narrow = Math.min(1, this.stage.camera.aspect);
-    const distance = (radius / Math.sin(fov / 2) / narrow) * 0.88;
+    const distance = (radius / Math.sin(fov / 2) / narrow) * 0.92;
     const direction = this.stage.camera.position.clone().sub(this.orbit.target);
     if (!this.hasMoved || direction.lengthSq() < 1e-12) direction.set(-0.75, -1, 0.75);
     const position = center.clone().add(direction.normalize().multiplyScalar(distance));

@@ -1,6 +1,8 @@
 // One shader for all meshes: colors of the images, normals or observation confidence, with a light at the viewer.
 // Colors stay in sRGB from the file to the screen, so that they are those of the images.
-import { DoubleSide, ShaderMaterial, type Texture } from 'three';
+import {
+  BufferGeometry, DoubleSide, Mesh, ShaderMaterial, Texture, type Camera, type Scene, type WebGLRenderer,
+} from 'three';
 
 export type ColorMode = 'rgb' | 'normal' | 'confidence';
 
@@ -111,3 +113,17 @@ export function makeMeshMaterial(features: MeshFeatures, texture: Texture | null
   material.uniforms.uMode = sharedMode;
   return material;
 }
+
+/** Compiles the shaders for the meshes of the server ahead, so that the first mesh does not stop the page. */
+export async function warmUp(renderer: WebGLRenderer, camera: Camera, scene: Scene): Promise<void> {
+  const texture = new Texture();
+  const features = { hasNormal: true, hasColor: true, hasConfidence: true };
+  for (const map of [null, texture]) {
+    const mesh = new Mesh(new BufferGeometry(), makeMeshMaterial(features, map));
+    await renderer.compileAsync(mesh, camera, scene);
+    // Not disposed of: the renderer would drop the compiled shader with its last material.
+    kept.push(mesh.material);
+  }
+}
+
+const kept: ShaderMaterial[] = [];

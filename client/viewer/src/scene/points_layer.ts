@@ -39,6 +39,7 @@ export class PointsLayer {
     }
     const buffer = await response.arrayBuffer();
     const count = Math.min(kMaxPoints, Math.floor(buffer.byteLength / 12));
+    if (count === 0 && this.count > 0) return;  // the server forgets the points of a finished session
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(new Float32Array(buffer, 0, count * 3), 3));
     this.points.geometry.dispose();

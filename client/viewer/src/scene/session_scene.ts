@@ -12,7 +12,7 @@ import { toVector3 } from './convert';
 import { GroundGrid } from './ground_grid';
 import { LabelLayer, type Label } from './labels';
 import { MeasureTool } from './measure';
-import { setColorMode } from './mesh_material';
+import { setColorMode, warmUp } from './mesh_material';
 import { NextViewArrows, nextViewDirection } from './next_view_arrows';
 import { ObjectLayer } from './object_layer';
 import { PointsLayer } from './points_layer';
@@ -54,6 +54,9 @@ export class SessionScene {
       this.objects.updateLevels();
       return isMoving;
     };
+    this.stage.onResized = () => {
+      if (!this.controls.hasMoved) this.controls.fit(this.box, false);
+    };
     this.stage.onRendered = () => this.labels.place();
     const moved = this.stage.noteMotion.bind(this.stage);
     this.stage.noteMotion = () => {
@@ -63,6 +66,7 @@ export class SessionScene {
     this.stage.canvas.addEventListener('pointerdown', this.onDown);
     this.stage.canvas.addEventListener('pointerup', this.onUp);
     this.stage.canvas.addEventListener('dblclick', () => this.zoomTo(this.objects.selected));
+    void warmUp(this.stage.renderer, this.stage.camera, this.stage.scene).catch(() => undefined);
     this.controls.fit(new Box3(new Vector3(-1, -1, 0), new Vector3(1, 1, 1)), false);
   }
 

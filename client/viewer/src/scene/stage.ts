@@ -15,6 +15,7 @@ export class Stage {
   /** Called before each drawing; returns true if another one is needed after it (an animation). */
   onFrame: (seconds: number) => boolean = () => false;
   onRendered: () => void = () => undefined;
+  onResized: () => void = () => undefined;
   onContextLost: (isLost: boolean) => void = () => undefined;
 
   private isQueued = false;
@@ -26,10 +27,11 @@ export class Stage {
 
   /** Throws if the browser has no WebGL 2. */
   constructor(readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: 'high-performance' });
+    this.isSoftware = /swiftshader|llvmpipe|software|basic render/i.test(probeWebGl2() ?? '');
+    // Without a graphics card, smooth edges would cost half of the frames.
+    this.renderer = new WebGLRenderer({ antialias: !this.isSoftware, powerPreference: 'high-performance' });
     // Asking for the result of a compilation would wait for the graphics process.
     this.renderer.debug.checkShaderErrors = false;
-    this.isSoftware = /swiftshader|llvmpipe|software|basic render/i.test(this.rendererName());
     this.camera.up.set(0, 0, 1);
     host.prepend(this.canvas);
     this.canvas.addEventListener('webglcontextlost', (event) => {
@@ -117,6 +119,7 @@ export class Stage {
 
   private resize(): void {
     this.applySize();
+    this.onResized();
     this.invalidate();
   }
 
@@ -129,18 +132,18 @@ export class Stage {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
   }
-
-  private rendererName(): string {
-    const gl = this.renderer.getContext();
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    return info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  }
 }
 
-export function hasWebGl2(): boolean {
+/** The name of the renderer; null if the browser has no WebGL 2. */
+export function probeWebGl2(): string | null {
   try {
-    return document.createElement('canvas').getContext('webgl2') !== null;
+    const gl = document.createElement('canvas').getContext('webgl2');
+    if (!gl) return null;
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+    gl.getExtension('WEBGL_lose_context')?.loseContext();
+    return name;
   } catch {
-    return false;
+    return null;
   }
 }

@@ -1,6 +1,6 @@
 // Chooses the page by the hash of the address: "#session/ID", else the list.
 import { ApiClient } from '../api/client';
-import { hasWebGl2 } from '../scene/stage';
+import { probeWebGl2 } from '../scene/stage';
 import { h, replaceChildren } from './dom';
 import type { Page } from './page';
 import { SessionPage } from './session_page';
@@ -33,7 +33,7 @@ export class App {
     } catch {
       // Not a valid address: the list is shown.
     }
-    this.page = id !== '' ? new SessionPage(this.api, id, askToken, hasWebGl2()) : new SessionsPage(this.api, askToken);
+    this.page = id !== '' ? new SessionPage(this.api, id, askToken, probeWebGl2() !== null) : new SessionsPage(this.api, askToken);
     replaceChildren(this.host, this.page.element);
     this.page.start();
   }

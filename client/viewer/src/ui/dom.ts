@@ -58,3 +58,7 @@ export function replaceChildren(parent: Element, ...children: (Child | Child[])[
 export function setText(element: Element, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
+
+export function setAttribute(element: Element, name: string, value: string): void {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}

@@ -1,9 +1,11 @@
 // The list of objects in the panel.
 import type { MapObject } from '../state/map_store';
 import { count } from './format';
-import { h, icon, setText } from './dom';
+import { h, icon, setAttribute, setText } from './dom';
 
 interface Row { element: HTMLButtonElement; name: HTMLElement; detail: HTMLElement; badge: HTMLElement }
+
+const kOrder = new Intl.Collator('en');
 
 export class ObjectList {
   readonly element: HTMLElement;
@@ -37,7 +39,7 @@ export class ObjectList {
   /** Confirmed objects first, then by class and id. */
   static sorted(objects: readonly MapObject[]): MapObject[] {
     const rank = (o: MapObject): number => (o.update.state === 'PROVISIONAL' ? 1 : 0);
-    return [...objects].sort((a, b) => rank(a) - rank(b) || a.update.className.localeCompare(b.update.className) ||
+    return [...objects].sort((a, b) => rank(a) - rank(b) || kOrder.compare(a.update.className, b.update.className) ||
       Number(a.update.id) - Number(b.update.id));
   }
 
@@ -55,16 +57,15 @@ export class ObjectList {
 
   private fill(row: Row, object: MapObject, isSelected: boolean, fault: string): void {
     const { update, mesh } = object;
-    row.element.classList.toggle('selected', isSelected);
-    row.element.setAttribute('aria-current', String(isSelected));
-    row.element.dataset.state = update.state.toLowerCase();
+    setAttribute(row.element, 'aria-current', String(isSelected));
+    setAttribute(row.element, 'data-state', update.state.toLowerCase());
     setText(row.name, `${update.className} #${update.id}`);
     setText(row.detail, mesh ? `${count(update.observations)} views · ${count(mesh.triangleCount)} triangles`
       : `${count(update.observations)} views · no mesh yet`);
     const badge = fault ? 'mesh damaged' : update.state === 'PROVISIONAL' ? 'not confirmed'
       : update.state === 'LOST' ? 'not seen' : mesh?.isFinal ? 'final' : mesh ? `${shortCount(mesh.steps)} steps` : '';
     setText(row.badge, badge);
-    row.badge.dataset.kind = fault ? 'error' : mesh?.isFinal && update.state === 'CONFIRMED' ? 'good' : '';
+    setAttribute(row.badge, 'data-kind', fault ? 'error' : mesh?.isFinal && update.state === 'CONFIRMED' ? 'good' : '');
   }
 }
 

@@ -200,6 +200,9 @@ export class SessionPage implements Page {
     if (event.kind === 'diagnostic' && event.diagnostic.severity !== 'INFO') {
       notify(event.diagnostic.text, event.diagnostic.severity === 'ERROR' ? 'error' : 'info');
     }
+    if (event.kind === 'statistics' && event.statistics.mapPoints > 0 && this.scene?.points.count === 0) {
+      this.pollers.points.poke();
+    }
     this.store.apply(event);
     this.queueUpdate();
   }
@@ -212,7 +215,8 @@ export class SessionPage implements Page {
       for (const poller of Object.values(this.pollers)) poller.poke();
     }
     if (status.kind === 'ended') {
-      for (const poller of Object.values(this.pollers)) poller.poke();  // their last state
+      this.pollers.info.poke();
+      this.pollers.trajectory.poke();
     }
     if (status.kind === 'gone') {
       this.overlay.fault('This session does not exist (any more). It was deleted, or the server stores no sessions and was ' +
@@ -242,7 +246,8 @@ export class SessionPage implements Page {
   private async loadInfo(): Promise<void> {
     const info = await this.api.session(this.sessionId);
     if (this.isStopped) return;
-    if (!this.info && info.statistics.framesProcessed > 0) this.mayHaveImage = true;
+    // Without a client, the server may have no image, and browsers log every answer that is none.
+    if (!this.info && info.streamOpen && info.statistics.framesProcessed > 0) this.mayHaveImage = true;
     this.info = info;
     if (!this.store.statistics || this.status.kind !== 'live') this.store.applyStatistics(info.statistics);
     document.title = `${info.name || 'Session'} – romap`;
