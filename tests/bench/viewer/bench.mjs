@@ -64,7 +64,7 @@ try {
   const listPaint_ms = await firstPaint();
   await page.goto('about:blank');
   const trace = path.join(os.tmpdir(), `romap-viewer-trace-${process.pid}.json`);
-  await browser.startTracing(page, { path: trace, categories: ['toplevel', 'disabled-by-default-devtools.timeline'] });
+  await browser.startTracing(page, { path: trace, categories: ['toplevel', 'devtools.timeline'] });
   await page.goto(`${server.url}#session/bench`);
   await page.waitForFunction((n) => {
     const scene = window.romap?.session?.scene;

@@ -114,13 +114,13 @@ export function makeMeshMaterial(features: MeshFeatures, texture: Texture | null
   return material;
 }
 
-/** Compiles the shaders for the meshes of the server ahead, so that the first mesh does not stop the page. */
-export async function warmUp(renderer: WebGLRenderer, camera: Camera, scene: Scene): Promise<void> {
+/** Begins to compile the shaders for the meshes of the server, so that the first mesh does not wait for them. */
+export function warmUp(renderer: WebGLRenderer, camera: Camera, scene: Scene): void {
   const texture = new Texture();
   const features = { hasNormal: true, hasColor: true, hasConfidence: true };
   for (const map of [null, texture]) {
     const mesh = new Mesh(new BufferGeometry(), makeMeshMaterial(features, map));
-    await renderer.compileAsync(mesh, camera, scene);
+    renderer.compile(mesh, camera, scene);
     // Not disposed of: the renderer would drop the compiled shader with its last material.
     kept.push(mesh.material);
   }

@@ -66,7 +66,7 @@ export class SessionScene {
     this.stage.canvas.addEventListener('pointerdown', this.onDown);
     this.stage.canvas.addEventListener('pointerup', this.onUp);
     this.stage.canvas.addEventListener('dblclick', () => this.zoomTo(this.objects.selected));
-    void warmUp(this.stage.renderer, this.stage.camera, this.stage.scene).catch(() => undefined);
+    warmUp(this.stage.renderer, this.stage.camera, this.stage.scene);
     this.controls.fit(new Box3(new Vector3(-1, -1, 0), new Vector3(1, 1, 1)), false);
   }
 
@@ -217,7 +217,7 @@ export class SessionScene {
     if (box.isEmpty()) return;
     // A long path would make the objects small: only what is near them decides on the view.
     if (!objectsBox.isEmpty()) {
-      box.intersect(objectsBox.clone().expandByScalar(0.45 * objectsBox.getSize(new Vector3()).length()));
+      box.intersect(objectsBox.clone().expandByScalar(0.15 * objectsBox.getSize(new Vector3()).length()));
     }
     const size = Math.max(1e-6, box.getSize(new Vector3()).length());
     const grew = this.box.isEmpty() || !this.box.clone().expandByScalar(0.05 * size).containsBox(box);
