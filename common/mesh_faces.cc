@@ -1,5 +1,9 @@
 #include "common/mesh_faces.h"
 
+#include <algorithm>
+
+#include "common/status.h"
+
 namespace romap {
 
 FaceShapes::FaceShapes(const Mesh& mesh) {
@@ -37,6 +41,21 @@ Eigen::AlignedBox3f BoundsOf(const Mesh& mesh) {
   Eigen::AlignedBox3f bounds;
   for (const Eigen::Vector3f& vertex : mesh.vertices) bounds.extend(vertex);
   return bounds;
+}
+
+absl::Status ValidateMesh(const Mesh& mesh, const std::string& name) {
+  if (mesh.vertices.empty()) return InvalidArgument("{}: no vertices", name);
+  const auto broken = std::count_if(mesh.vertices.begin(), mesh.vertices.end(),
+                                    [](const Eigen::Vector3f& vertex) { return !vertex.allFinite(); });
+  if (broken > 0) return InvalidArgument("{}: {} vertices are not finite", name, broken);
+  for (const auto& triangle : mesh.triangles) {
+    for (const uint32_t index : triangle) {
+      if (index < mesh.vertices.size()) continue;
+      return InvalidArgument("{}: vertex index {} in a face is out of range 0..{}", name, index,
+                             mesh.vertices.size() - 1);
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace romap

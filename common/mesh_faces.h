@@ -1,10 +1,13 @@
 #pragma once
 
+#include <absl/status/status.h>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/mesh.h"
@@ -38,5 +41,9 @@ class VertexTriangles {
 
 // The bounding box of the vertices; empty without vertices.
 Eigen::AlignedBox3f BoundsOf(const Mesh& mesh);
+
+// INVALID_ARGUMENT if the mesh has no vertices, a vertex that is not finite, or a triangle with a vertex index out of
+// range. `name` prefixes the message.
+absl::Status ValidateMesh(const Mesh& mesh, const std::string& name);
 
 }  // namespace romap

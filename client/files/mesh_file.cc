@@ -58,21 +58,6 @@ absl::StatusOr<std::map<std::string, MeshFile>> ReadMeshFolder(const std::string
   return meshes;
 }
 
-absl::Status ValidateMesh(const Mesh& mesh, const std::string& name) {
-  if (mesh.vertices.empty()) return InvalidArgument("{}: no vertices", name);
-  const auto broken = std::count_if(mesh.vertices.begin(), mesh.vertices.end(),
-                                    [](const Eigen::Vector3f& vertex) { return !vertex.allFinite(); });
-  if (broken > 0) return InvalidArgument("{}: {} vertices are not finite", name, broken);
-  for (const auto& triangle : mesh.triangles) {
-    for (const uint32_t index : triangle) {
-      if (index < mesh.vertices.size()) continue;
-      return InvalidArgument("{}: vertex index {} in a face is out of range 0..{}", name, index,
-                             mesh.vertices.size() - 1);
-    }
-  }
-  return absl::OkStatus();
-}
-
 void SetPositions(const std::array<std::vector<double>, 3>& columns, MeshFile* file) {
   file->mesh.vertices.resize(columns[0].size());
   for (int axis = 0; axis < 3; ++axis) {

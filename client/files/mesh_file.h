@@ -30,10 +30,6 @@ absl::StatusOr<MeshFile> ReadMeshFile(const std::string& path);
 // NOT_FOUND if there are none or INVALID_ARGUMENT if two have the same name.
 absl::StatusOr<std::map<std::string, MeshFile>> ReadMeshFolder(const std::string& dir);
 
-// INVALID_ARGUMENT if the mesh has no vertices, a vertex that is not finite, or a triangle with a vertex index out of
-// range. `name` prefixes the message.
-absl::Status ValidateMesh(const Mesh& mesh, const std::string& name);
-
 // Sets the vertices and their origin from the x, y and z coordinates of a file. The columns have the same length.
 void SetPositions(const std::array<std::vector<double>, 3>& columns, MeshFile* file);
 

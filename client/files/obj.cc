@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "client/files/text_file.h"
+#include "common/mesh_faces.h"
 
 namespace romap::files {
 namespace {

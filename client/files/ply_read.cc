@@ -9,6 +9,7 @@
 
 #include "client/files/ply.h"
 #include "client/files/text_file.h"
+#include "common/mesh_faces.h"
 
 namespace romap::files {
 namespace {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "client/files/text_file.h"
+#include "common/mesh_faces.h"
 
 namespace romap::files::ply_test {
 
