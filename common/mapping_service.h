@@ -76,6 +76,19 @@ struct MapSnapshot {
   Statistics statistics;
 };
 
+// Points of the sparse map that the camera is tracked against.
+struct SparsePoints {
+  uint64_t revision = 0;                         // increases with every change; 0: there was no map yet
+  SparseMapId map_id = {};                       // the map that the points belong to; 0: none
+  std::vector<Eigen::Vector3f> positions_world;  // map units, in no order
+};
+
+// A camera image as a session processed it: without the distortion of the lens.
+struct CameraImage {
+  uint64_t frame_id = 0;
+  std::string jpeg;
+};
+
 // What a service says when it opens a stream.
 struct StreamOpening {
   std::string resume_token;  // map streams only: lets OpenMap() replace this stream
@@ -142,6 +155,16 @@ class MappingService {
   // Returns the map of a session, in any state.
   virtual absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) = 0;
 
+  // For viewers of a service in the same process; over gRPC UNIMPLEMENTED. They do not delay the session.
+  //
+  // At most kMaxSparsePoints points, evenly chosen, as of the last half second. None while the session is not in
+  // memory.
+  static constexpr size_t kMaxSparsePoints = 20'000;
+  virtual absl::StatusOr<SparsePoints> Points(const std::string& session_id);
+  // The newest tracked image, scaled so that its sides are at most `max_side_px` (>= 16). NOT_FOUND: none since the
+  // session is in memory.
+  virtual absl::StatusOr<CameraImage> NewestImage(const std::string& session_id, int max_side_px);
+
   // Only for services that store sessions; otherwise FAILED_PRECONDITION.
   using PieceWriter = std::function<absl::Status(std::string piece)>;
   using PieceReader = std::function<absl::StatusOr<std::string>()>;  // the next piece; empty at the end
@@ -154,5 +177,12 @@ class MappingService {
   // A pinned session is not deleted by age or size.
   virtual absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) = 0;
 };
+
+inline absl::StatusOr<SparsePoints> MappingService::Points(const std::string& /*session_id*/) {
+  return absl::UnimplementedError("this service does not send the points of the sparse map");
+}
+inline absl::StatusOr<CameraImage> MappingService::NewestImage(const std::string& /*session_id*/, int /*max_side_px*/) {
+  return absl::UnimplementedError("this service does not send images");
+}
 
 }  // namespace romap

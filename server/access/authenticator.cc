@@ -16,7 +16,8 @@ absl::StatusOr<Caller> Authenticator::Authenticate(std::string_view authorizatio
   if (!NeedsToken()) {
     // The service outlives all callers.
     return Caller{.service = std::shared_ptr<MappingService>(service_, [](MappingService*) {}),
-                  .is_valid = [this] { return !NeedsToken(); }};
+                  .is_valid = [this] { return !NeedsToken(); },
+                  .is_admin = true};
   }
   if (!authorization.starts_with(kScheme)) {
     return absl::UnauthenticatedError(
@@ -25,9 +26,11 @@ absl::StatusOr<Caller> Authenticator::Authenticate(std::string_view authorizatio
   std::string token(authorization.substr(kScheme.size()));
   std::optional<Identity> identity = tokens_.Find(token);
   if (!identity) return absl::UnauthenticatedError("the token is not valid: it is unknown or was revoked");
+  const bool is_admin = identity->role == Role::kAdmin;
   return Caller{
       .service = std::make_shared<TenantService>(service_, *std::move(identity), config_.max_sessions_per_tenant),
-      .is_valid = [this, token = std::move(token)] { return tokens_.Find(token).has_value(); }};
+      .is_valid = [this, token = std::move(token)] { return tokens_.Find(token).has_value(); },
+      .is_admin = is_admin};
 }
 
 }  // namespace romap::access

@@ -18,6 +18,7 @@ namespace romap::access {
 struct Caller {
   std::shared_ptr<MappingService> service;  // as the caller sees it
   std::function<bool()> is_valid;           // false once the caller's token was revoked
+  bool is_admin = false;                    // may see what concerns all tenants
 };
 
 // Finds out who makes a call. Thread-safe.

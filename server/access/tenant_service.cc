@@ -86,6 +86,16 @@ absl::StatusOr<MapSnapshot> TenantService::ExportMap(const std::string& session_
   return service_->ExportMap(session_id);
 }
 
+absl::StatusOr<SparsePoints> TenantService::Points(const std::string& session_id) {
+  ROMAP_RETURN_IF_ERROR(CheckSession(Role::kViewer, "Points", session_id));
+  return service_->Points(session_id);
+}
+
+absl::StatusOr<CameraImage> TenantService::NewestImage(const std::string& session_id, int max_side_px) {
+  ROMAP_RETURN_IF_ERROR(CheckSession(Role::kViewer, "NewestImage", session_id));
+  return service_->NewestImage(session_id, max_side_px);
+}
+
 absl::Status TenantService::SaveSession(const std::string& session_id, const PieceWriter& write) {
   ROMAP_RETURN_IF_ERROR(CheckSession(Role::kViewer, "SaveSession", session_id));
   return service_->SaveSession(session_id, write);

@@ -28,6 +28,8 @@ class TenantService : public MappingService {
                                                      const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
+  absl::StatusOr<SparsePoints> Points(const std::string& session_id) override;
+  absl::StatusOr<CameraImage> NewestImage(const std::string& session_id, int max_side_px) override;
   absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) override;
   using MappingService::LoadSession;
   // `tenant` is ignored: the session belongs to the caller's.

@@ -26,7 +26,9 @@ bool IsPowerOfTen(uint64_t count) {
 
 void FrameLedger::CountReceived(bool is_frame) {
   ++inputs_received_;
-  if (is_frame) ++frames_received_;
+  if (!is_frame) return;
+  ++frames_received_;
+  if (counters_ != nullptr) counters_->CountReceived();
 }
 
 void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& tracked) {
@@ -42,6 +44,7 @@ void FrameLedger::AcknowledgeFrame(const Arrival& arrival, const TrackedFrame& t
   if (!has_pose) ack.R_world_camera = tracked.R_world_camera;
   ack.is_keyframe = tracked.is_keyframe;
   ack.latency_s = SecondsSince(arrival.time);
+  if (counters_ != nullptr) counters_->CountAcknowledged(ack.latency_s);
   ack.state_reason = tracked.reason;
   ack.uncertainty = tracked.uncertainty;
   {
@@ -80,6 +83,7 @@ std::optional<uint64_t> FrameLedger::newest_frame_id() const {
 
 void FrameLedger::Reject(const Arrival& arrival, const absl::Status& reason) {
   if (const auto* frame = std::get_if<FrameInput>(&arrival.input)) {
+    if (counters_ != nullptr) counters_->CountRejected();
     LogRejection("frame", frame->frame_id, ++frames_rejected_, reason);
   } else {
     LogRejection("masks of frame", std::get<MasksInput>(arrival.input).frame_id, ++masks_rejected_, reason);
@@ -94,7 +98,10 @@ void FrameLedger::LogRejection(const char* input, uint64_t frame_id, uint64_t co
 }
 
 void FrameLedger::Drop(const Arrival& arrival) {
-  if (std::holds_alternative<FrameInput>(arrival.input)) ++frames_dropped_;
+  if (std::holds_alternative<FrameInput>(arrival.input)) {
+    ++frames_dropped_;
+    if (counters_ != nullptr) counters_->CountDropped();
+  }
   SendRejection(arrival, "dropped: the server cannot keep up with the live stream", TrackingState::kTracking);
 }
 
@@ -118,6 +125,7 @@ void FrameLedger::CountMappedFrame(bool is_keyframe, size_t map_points) {
   if (is_keyframe) ++keyframes_;
   map_points_ = map_points;
   ++frames_processed_;
+  if (counters_ != nullptr) counters_->CountProcessed();
   Settle();
 }
 

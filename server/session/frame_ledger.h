@@ -15,6 +15,7 @@
 #include "common/stage_messages.h"
 #include "server/session/arrival.h"
 #include "server/session/map_state.h"
+#include "server/session/service_counters.h"
 
 namespace romap::session {
 
@@ -23,8 +24,9 @@ namespace romap::session {
 // skipped. Thread-safe.
 class FrameLedger {
  public:
-  // `map` sends the acknowledgements and outlives the ledger.
-  FrameLedger(std::string session_id, MapState* map) : session_id_(std::move(session_id)), map_(map) {}
+  // `map` sends the acknowledgements and outlives the ledger, as do the `counters` of the service, which may be null.
+  FrameLedger(std::string session_id, MapState* map, ServiceCounters* counters = nullptr)
+      : session_id_(std::move(session_id)), map_(map), counters_(counters) {}
 
   void CountReceived(bool is_frame);
 
@@ -62,6 +64,7 @@ class FrameLedger {
 
   const std::string session_id_;
   MapState* const map_;
+  ServiceCounters* const counters_;
 
   std::atomic<uint64_t> inputs_received_ = 0;  // frames and late masks
   std::atomic<uint64_t> frames_received_ = 0, frames_processed_ = 0, frames_dropped_ = 0, frames_rejected_ = 0;

@@ -277,6 +277,30 @@ absl::StatusOr<MapSnapshot> LocalMappingService::ExportMap(const std::string& se
   return session->Export();
 }
 
+absl::StatusOr<SparsePoints> LocalMappingService::Points(const std::string& session_id) {
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  lock.unlock();
+  return session ? session->live_view().Points() : SparsePoints{};
+}
+
+absl::StatusOr<CameraImage> LocalMappingService::NewestImage(const std::string& session_id, int max_side_px) {
+  std::unique_lock lock(mutex_);
+  ROMAP_ASSIGN_OR_RETURN(const auto session, FindLocked(session_id));
+  lock.unlock();
+  if (!session) return NotFound("session '{}' is not in memory, so it has no newest image", session_id);
+  return session->live_view().Image(max_side_px);
+}
+
+ServiceMetrics LocalMappingService::Metrics() const {
+  ServiceMetrics metrics = counters_.Read();
+  if (!store_) return metrics;
+  const store::Store::Backlog backlog = store_->GetBacklog();
+  metrics.store_waiting_bytes = backlog.bytes;
+  metrics.store_oldest_wait_s = backlog.oldest_wait_s;
+  return metrics;
+}
+
 absl::Status LocalMappingService::CheckStore() const {
   if (store_) return absl::OkStatus();
   return FailedPrecondition("this service stores no sessions (romap-server --ephemeral, or romap --local)");

@@ -42,9 +42,13 @@ class LocalMappingService : public MappingService {
                                                      const std::string& resume_token) override;
   absl::StatusOr<std::unique_ptr<EventStream>> Watch(const std::string& session_id) override;
   absl::StatusOr<MapSnapshot> ExportMap(const std::string& session_id) override;
+  absl::StatusOr<SparsePoints> Points(const std::string& session_id) override;
+  absl::StatusOr<CameraImage> NewestImage(const std::string& session_id, int max_side_px) override;
   absl::Status SaveSession(const std::string& session_id, const PieceWriter& write) override;
   absl::StatusOr<SessionInfo> LoadSession(const PieceReader& read, const std::string& tenant) override;
   absl::StatusOr<SessionInfo> PinSession(const std::string& session_id, bool pinned) override;
+
+  ServiceMetrics Metrics() const;
 
  private:
   // RESOURCE_EXHAUSTED: the processor cannot take another live session.
@@ -52,7 +56,9 @@ class LocalMappingService : public MappingService {
   // Null: it is on the shelf. NOT_FOUND: there is no such session.
   absl::StatusOr<std::shared_ptr<Session>> FindLocked(const std::string& session_id);
   absl::Status CheckStore() const;
-  Session::Services Services() { return {.pool = &pool_, .mesher = &mesher_, .store = store_.get()}; }
+  Session::Services Services() {
+    return {.pool = &pool_, .mesher = &mesher_, .store = store_.get(), .counters = &counters_};
+  }
   absl::Status RestoreLocked(const std::string& session_id);
 
   void LoadShelf();
@@ -68,6 +74,7 @@ class LocalMappingService : public MappingService {
 
   const ServerConfig config_;
   const std::unique_ptr<store::Store> store_;  // null: nothing is stored
+  ServiceCounters counters_;
   nerf::TrainingPool pool_;
   Mesher mesher_;
   std::mutex mutex_;

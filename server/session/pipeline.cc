@@ -76,6 +76,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
   if (!tracked_image) return;
   slam::TrackedImage& image = *tracked_image;
   ledger_->AcknowledgeFrame(arrival, image.tracked);
+  live_view_.SetImage(frame);
   rejections_.CountAcceptedFrame();
   diagnostics_->SetConditions("input", rejections_.Diagnostics());
   const bool is_lost = image.tracked.state == TrackingState::kLost;
@@ -88,6 +89,7 @@ void Pipeline::ProcessFrame(const Arrival& arrival, const std::shared_ptr<const 
   step.run = [this, image = std::move(image)] {
     // Map.
     const slam::MappedFrame mapped = sparse_mapper_.Process(image);
+    points_changed_ |= mapped.correction || mapped.view;
     if (mapped.correction) Correct(*mapped.correction);
     // Objects. Publish() sends them to the clients, and their new views to the fields.
     Publish(object_mapper_.ObserveFrame(mapped.tracked));
@@ -157,8 +159,15 @@ void Pipeline::MeshField(FieldSnapshot snapshot) { mesher_->Offer(mesher_session
 // Meshes -> clients. Called by the mesher.
 void Pipeline::PublishMesh(MeshUpdate mesh, const MeshPose& pose) { map_->PublishMesh(std::move(mesh), pose); }
 
+void Pipeline::PublishPoints() {
+  if (!std::exchange(points_changed_, false)) return;
+  live_view_.SetPoints({.map_id = sparse_mapper_.current_map(),
+                        .positions_world = sparse_mapper_.CurrentPoints(MappingService::kMaxSparsePoints)});
+}
+
 void Pipeline::FinishMapping() {
   Correct(sparse_mapper_.Finish());
+  points_changed_ = true;
   diagnostics_->SetConditions("slam", sparse_mapper_.Diagnostics());
   Publish(object_mapper_.Finish());
   diagnostics_->SetConditions("objects", object_mapper_.Diagnostics());

@@ -18,6 +18,7 @@
 #include "server/session/failure_guard.h"
 #include "server/session/frame_ledger.h"
 #include "server/session/ingest.h"
+#include "server/session/live_view.h"
 #include "server/session/map_state.h"
 #include "server/session/mesh_pose.h"
 #include "server/session/mesher.h"
@@ -85,6 +86,10 @@ class Pipeline {
   // For a training pool without threads: trains for at most `count` slices.
   void TrainSlices(int count);
 
+  // Call on the mapping thread now and then: shows changed points to viewers.
+  void PublishPoints();
+  const LiveView& live_view() const { return live_view_; }
+
   // Live: whether keyframes wait to be mapped. Thread-safe.
   void SetKeyframesWait(bool wait) { sparse_mapper_.SetKeyframesWait(wait); }
 
@@ -116,7 +121,9 @@ class Pipeline {
   slam::Tracker tracker_;
   FailureGuard tracker_guard_{/*max_failures_in_a_row=*/10};
   Rejections rejections_;
+  LiveView live_view_;
   // Used by the mapping steps.
+  bool points_changed_ = false;  // since PublishPoints()
   slam::SparseMapper sparse_mapper_;
   objects::ObjectMapper object_mapper_;
 

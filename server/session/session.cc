@@ -33,7 +33,7 @@ Session::Session(std::string id, const SessionOptions& options, int64_t created_
       store_(services.store),
       lifecycle_(id_, state),
       stored_map_(std::move(stored_map)),
-      ledger_(id_, &map_),
+      ledger_(id_, &map_, services.counters),
       diagnostics_(id_, &map_),
       storage_(store_ == nullptr ? nullptr
                                  : std::make_unique<SessionStorage>(store_, id_, options.mode, StoreListener())),
@@ -202,6 +202,7 @@ void Session::Unsubscribe(const std::shared_ptr<Outbox>& outbox) {
 }
 
 void Session::OnFinished() {
+  pipeline_.PublishPoints();
   map_.Publish(CurrentStatistics());
   lifecycle_.Finish();
   map_.Close(absl::OkStatus());
@@ -231,6 +232,7 @@ void Session::PublishStatisticsIfDue() {
   next_statistics_ =
       now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(config_.statistics_period_s));
   map_.Publish(CurrentStatistics());
+  pipeline_.PublishPoints();
 }
 
 Statistics Session::CurrentStatistics() const {

@@ -24,6 +24,7 @@
 #include "server/session/scheduler.h"
 #include "server/session/sender_claim.h"
 #include "server/session/server_config.h"
+#include "server/session/service_counters.h"
 #include "server/session/session_lifecycle.h"
 #include "server/session/session_storage.h"
 #include "server/store/store.h"
@@ -43,7 +44,8 @@ class Session {
   struct Services {
     nerf::TrainingPool* pool = nullptr;
     Mesher* mesher = nullptr;
-    store::Store* store = nullptr;  // null: the session is not stored
+    store::Store* store = nullptr;        // null: the session is not stored
+    ServiceCounters* counters = nullptr;  // may be null
   };
   // A stored session to restore.
   struct Stored {
@@ -67,6 +69,8 @@ class Session {
 
   SessionInfo Info() const;
   MapSnapshot Export() const;
+  // Its newest image and points.
+  const LiveView& live_view() const { return pipeline_.live_view(); }
   SessionState state() const { return lifecycle_.state(); }
 
   // As SessionLifecycle::CheckOpen().

@@ -14,6 +14,7 @@
 #include "server/slam/loop_trial.h"
 #include "server/slam/map_atlas.h"
 #include "server/slam/map_merger.h"
+#include "server/slam/point_positions.h"
 #include "server/slam/slam_config.h"
 #include "server/slam/slam_map.h"
 #include "server/slam/tracker.h"
@@ -64,6 +65,11 @@ class SparseMapper {
   void SetKeyframesWait(bool wait) { keyframes_wait_ = wait; }
 
   size_t points() const { return atlas_.points(); }
+  // Of the current map, see PointPositions().
+  std::vector<Eigen::Vector3f> CurrentPoints(size_t max_points) const {
+    return PointPositions(current().map, max_points);
+  }
+  SparseMapId current_map() const { return current().id; }
   // What the client should know about the accuracy of the map. Empty while there is no map.
   std::vector<Diagnostic> Diagnostics() const;
 

@@ -105,6 +105,7 @@ void Store::SweepSegments(const std::string& session) const {
 
 void Store::Enqueue(Write write) {
   std::lock_guard lock(mutex_);
+  if (!queue_since_) queue_since_ = Clock::now();
   queued_bytes_ += write.bytes;
   urgent_ = urgent_ || write.done != nullptr;
   queue_.push_back(std::move(write));
@@ -180,6 +181,7 @@ void Store::Run() {
       const absl::Status status = Commit(batch, &commitment);
       if (status.ok()) {
         Finish(batch, commitment);
+        EndBatch();
         break;
       }
       Fail(batch, status);
@@ -187,6 +189,20 @@ void Store::Run() {
       if (queued_.wait_for(lock, kRetryPeriod, [&] { return closing_; })) return;
     }
   }
+}
+
+void Store::EndBatch() {
+  std::lock_guard lock(mutex_);
+  batch_bytes_ = 0;
+  batch_since_.reset();
+}
+
+Store::Backlog Store::GetBacklog() const {
+  std::lock_guard lock(mutex_);
+  Backlog backlog{.bytes = queued_bytes_ + batch_bytes_};
+  const auto since = batch_since_ ? batch_since_ : queue_since_;
+  if (since) backlog.oldest_wait_s = std::chrono::duration<double>(Clock::now() - *since).count();
+  return backlog;
 }
 
 std::deque<Store::Write> Store::TakeBatch() {
@@ -198,7 +214,8 @@ std::deque<Store::Write> Store::TakeBatch() {
                        [&] { return closing_ || urgent_; });
     }
     urgent_ = false;
-    queued_bytes_ = 0;
+    batch_bytes_ = std::exchange(queued_bytes_, 0);
+    batch_since_ = std::exchange(queue_since_, std::nullopt);
     return std::exchange(queue_, {});
   }
 }

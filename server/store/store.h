@@ -3,6 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -80,6 +81,13 @@ class Store {
   // False while the disk fails or is too slow: changes of maps should wait then, because they would fill the memory.
   bool AcceptsChanges() const;
 
+  // The writes that are not durable yet.
+  struct Backlog {
+    size_t bytes = 0;
+    double oldest_wait_s = 0;  // since the oldest of them was queued
+  };
+  Backlog GetBacklog() const;
+
   // Waits until all writes that were queued before are durable. An error: the disk fails.
   absl::Status Flush();
 
@@ -90,6 +98,7 @@ class Store {
   absl::StatusOr<StoredMap> LoadMap(const std::string& session) const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct InputWrite {
     SessionInput input;
   };
@@ -138,6 +147,7 @@ class Store {
   absl::Status EnqueueAndWait(Write write);
   void Run();
   std::deque<Write> TakeBatch();
+  void EndBatch();
   absl::Status Commit(const std::deque<Write>& batch, Commitment* commitment);
   void Apply(const Write& write, Commitment* commitment);
   absl::Status CompactNow(const std::string& session);
@@ -166,6 +176,9 @@ class Store {
   std::condition_variable written_;  // the queue became shorter
   std::deque<Write> queue_;
   size_t queued_bytes_ = 0;
+  // When the oldest write was queued, of the queue and of the batch that is being committed; nullopt: there is none.
+  std::optional<Clock::time_point> queue_since_, batch_since_;
+  size_t batch_bytes_ = 0;
   bool failing_ = false;
   bool urgent_ = false;  // somebody waits for the next commit
   bool closing_ = false;

@@ -68,6 +68,21 @@ class StoreTest : public ::testing::Test {
   testing_support::TemporaryFolder folder_;
 };
 
+TEST_F(StoreTest, TheBacklogIsWhatIsNotDurableYet) {
+  StoreConfig config = Config();
+  config.commit_period_s = 30;  // Flush() does not wait for it
+  const auto store = Store::Open(config).value();
+  ASSERT_TRUE(store->Create(MakeSession("a")).ok());
+  const FrameInput frame = testing_support::MakeFrame(5, "mug");
+  store->AppendInput("a", frame, true);
+  EXPECT_GE(store->GetBacklog().bytes, frame.image.size());
+  EXPECT_GT(store->GetBacklog().oldest_wait_s, 0);
+  EXPECT_OK(store->Flush());
+  // The promise of Flush() is fulfilled a moment before the batch has ended.
+  EXPECT_TRUE(testing_support::Eventually([&] { return store->GetBacklog().bytes == 0; }));
+  EXPECT_EQ(store->GetBacklog().oldest_wait_s, 0);
+}
+
 TEST_F(StoreTest, EverythingIsThereAfterReopening) {
   {
     const auto store = OpenStore();
