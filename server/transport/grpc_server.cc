@@ -99,6 +99,7 @@ class GrpcServer::Impl {
 
   int port() const { return listener_->port(); }
   const std::string& address() const { return address_; }
+  int OpenConnections() const { return listener_->OpenConnections(); }
 
  private:
   std::chrono::milliseconds FirstRequestTimeout() const {
@@ -147,6 +148,7 @@ GrpcServer::~GrpcServer() { Shutdown(); }
 
 int GrpcServer::port() const { return impl_->port(); }
 const std::string& GrpcServer::address() const { return impl_->address(); }
+int GrpcServer::OpenConnections() const { return impl_->OpenConnections(); }
 void GrpcServer::Shutdown() { impl_->Shutdown(); }
 
 absl::Status CheckTlsFiles(const TransportConfig& config) {

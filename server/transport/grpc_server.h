@@ -28,6 +28,7 @@ class GrpcServer {
 
   int port() const;                    // the chosen port if the configuration has port 0
   const std::string& address() const;  // HOST:PORT with port()
+  int OpenConnections() const;
 
   // Rejects new calls, ends the streams with UNAVAILABLE (accepted inputs stay in the service) and waits for all calls.
   // A second call has no effect. Must not be called on the thread of a call.

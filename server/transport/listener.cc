@@ -154,15 +154,30 @@ void Listener::Accept(int listening_fd) {
     std::this_thread::sleep_for(kPauseWithoutFiles);
     return;
   }
-  const std::string peer = AddressOf(address);
+  if (const std::string peer = AddressOf(address); !Register(fd, peer)) {
+    close(fd);
+    return;
+  }
+  handler_(fd);
+}
+
+// False: the limits are reached.
+bool Listener::Register(int fd, const std::string& peer) {
+  std::lock_guard lock(mutex_);
   connections_.erase(fd);  // it is a new file, so the old one was closed
   if (!HasRoomFor(peer)) ForgetClosed();
   if (!HasRoomFor(peer)) {
-    close(fd);
-    return NoteRefused(peer);
+    NoteRefused(peer);
+    return false;
   }
   connections_[fd] = {.inode = InodeOf(fd), .peer = peer};
-  handler_(fd);
+  return true;
+}
+
+int Listener::OpenConnections() {
+  std::lock_guard lock(mutex_);
+  ForgetClosed();
+  return static_cast<int>(connections_.size());
 }
 
 void Listener::ForgetClosed() {

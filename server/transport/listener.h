@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -36,6 +37,8 @@ class Listener {
   ~Listener();  // Stop()
 
   int port() const { return port_; }
+  // Accepted and not closed yet. Thread-safe.
+  int OpenConnections();
   // Begins to accept.
   void Start(const ConnectionLimits& limits, Handler handler);
   // Ends listening; the handler is not called any more.
@@ -54,6 +57,7 @@ class Listener {
   bool Bind(const void* addrinfo);
   void Run();
   void Accept(int listening_fd);
+  bool Register(int fd, const std::string& peer);
   void ForgetClosed();
   bool HasRoomFor(const std::string& peer) const;
   void NoteRefused(const std::string& peer);
@@ -65,9 +69,10 @@ class Listener {
   Handler handler_;
   std::thread thread_;
 
+  std::mutex mutex_;
+  std::map<int, Connection> connections_;  // by descriptor; guarded by mutex_
   // The thread's.
-  std::map<int, Connection> connections_;  // by descriptor
-  uint64_t refused_ = 0;                   // since the last message
+  uint64_t refused_ = 0;  // since the last message
   Clock::time_point next_message_ = Clock::now();
 };
 

@@ -107,6 +107,11 @@ std::shared_ptr<grpc::ServerCredentials> TlsFiles::Credentials() const {
   return grpc::experimental::TlsServerCredentials(options);
 }
 
+std::shared_ptr<const TlsFiles::Contents> TlsFiles::installed() const {
+  std::lock_guard lock(mutex_);
+  return installed_;
+}
+
 absl::StatusOr<TlsFiles::Contents> TlsFiles::Read() const {
   Contents contents;
   ROMAP_ASSIGN_OR_RETURN(contents.certificate, ReadText(config_.tls_certificate));
@@ -146,7 +151,7 @@ absl::Status TlsFiles::Install(const Contents& contents) {
   if (!error) fs::rename(fs::path(folder_) / "next", current, error);
   if (error) return FileError(current.string(), "replace", error);
   fs::remove_all(fs::path(folder_) / std::to_string(version_ - 2), error);  // gRPC may still read the last one
-  installed_ = contents;
+  installed_ = std::make_shared<const Contents>(contents);
   return absl::OkStatus();
 }
 
@@ -156,7 +161,7 @@ void TlsFiles::Watch() {
   while (!stopping_changed_.wait_for(lock, kWatchPeriod, [&] { return stopping_; })) {
     const absl::StatusOr<Contents> contents = Read();
     // A missing file is probably about to be written.
-    if (!contents.ok() || *contents == installed_ || *contents == rejected_) continue;
+    if (!contents.ok() || *contents == *installed_ || *contents == rejected_) continue;
     absl::Status status = Check(*contents);
     if (status.ok()) status = Install(*contents);
     if (status.ok()) {

@@ -24,15 +24,18 @@ class TlsFiles {
   static absl::StatusOr<std::unique_ptr<TlsFiles>> Load(const TransportConfig& config);
   ~TlsFiles();
 
-  std::shared_ptr<grpc::ServerCredentials> Credentials() const;
-
- private:
+  // PEM texts that belong together.
   struct Contents {
-    std::string certificate, key, client_ca;
+    std::string certificate, key, client_ca;  // the last one may be empty
 
     bool operator==(const Contents&) const = default;
   };
 
+  std::shared_ptr<grpc::ServerCredentials> Credentials() const;
+  // What is in use now, never null. Another object after every change.
+  std::shared_ptr<const Contents> installed() const;
+
+ private:
   explicit TlsFiles(const TransportConfig& config) : config_(config) {}
   absl::StatusOr<Contents> Read() const;
   absl::Status Check(const Contents& contents) const;
@@ -42,8 +45,9 @@ class TlsFiles {
   const TransportConfig config_;
   std::string folder_;  // private; its link `current` leads to the newest copies
   int version_ = 0;
-  Contents installed_, rejected_;
-  std::mutex mutex_;
+  std::shared_ptr<const Contents> installed_;
+  Contents rejected_;
+  mutable std::mutex mutex_;
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
   std::thread thread_;

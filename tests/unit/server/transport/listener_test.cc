@@ -73,6 +73,7 @@ TEST_F(ListenerTest, AcceptsUpToTheLimitAndAgainWhenConnectionsWereClosed) {
   for (int i = 0; i < 5; ++i) peers.emplace_back(listener_->port());
   EXPECT_TRUE(Eventually([&] { return peers[3].IsClosed() && peers[4].IsClosed(); }));
   EXPECT_EQ(Accepted(), 3u);
+  EXPECT_EQ(listener_->OpenConnections(), 3);
   EXPECT_FALSE(peers[0].IsClosed());
   {
     std::lock_guard lock(mutex_);
