@@ -25,7 +25,7 @@ mkdir -p "$out"
 
 heading "4/4 server and client"
 server_log=$out/server.log
-"$bin/server/romap-server" --ephemeral --listen 127.0.0.1:0 >"$server_log" 2>&1 &
+"$bin/server/romap-server" --ephemeral --listen 127.0.0.1:0 --http "" >"$server_log" 2>&1 &
 server=$!
 trap 'kill $server 2>/dev/null || true; wait $server 2>/dev/null || true' EXIT
 for _ in $(seq 100); do

@@ -1,4 +1,4 @@
-// romap-server: serves the mapping service of this process over gRPC until SIGINT or SIGTERM.
+// romap-server: serves the mapping service of this process over gRPC and HTTP until SIGINT or SIGTERM.
 // Exit status: 0 after SIGINT or SIGTERM, 1 server could not start, 2 invalid flags or configuration,
 // 3 configuration file cannot be read.
 
@@ -9,6 +9,7 @@
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -25,6 +26,8 @@
 #include "server/access/access_config.h"
 #include "server/access/authenticator.h"
 #include "server/access/token_command.h"
+#include "server/http/http_config.h"
+#include "server/http/http_server.h"
 #include "server/process/service_manager.h"
 #include "server/session/local_mapping_service.h"
 #include "server/session/server_config.h"
@@ -47,6 +50,7 @@ struct Flags {
 
 struct Config {
   transport::TransportConfig transport;
+  http::HttpConfig http;
   access::AccessConfig access;
   std::string log_level = "info";
   store::StoreConfig store;
@@ -56,6 +60,8 @@ struct Config {
     ConfigFields fields;
     fields.Section("transport");
     transport.Fields(fields);
+    fields.Section("http");
+    http.Fields(fields);
     fields.Section("access");
     access.Fields(fields);
     fields.Section("log");
@@ -79,13 +85,15 @@ std::string TokenFileOf(const std::string& data_dir) {
 // The flags, or the exit status if the program must exit (--help, --version, token commands, invalid flags).
 std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   Flags flags;
-  std::optional<std::string> listen_address, log_level, data_dir, tls_certificate, tls_key, tls_client_ca;
+  std::optional<std::string> listen_address, http_address, log_level, data_dir, tls_certificate, tls_key, tls_client_ca;
   bool ephemeral = false;
   std::optional<int> threads;
   CLI::App app{"Turns video with instance masks into a live map of objects.", "romap-server"};
   app.add_option(
       "--listen", listen_address,
       "HOST:PORT of the gRPC service; port 0 = any free port. Same as --set transport.listen_address=HOST:PORT");
+  app.add_option("--http", http_address,
+                 "HOST:PORT of the page that shows the maps; \"\" = none. Same as --set http.listen_address=HOST:PORT");
   app.add_option("--data-dir", data_dir,
                  "Folder where sessions are stored; default: $XDG_DATA_HOME/romap or ~/.local/share/romap. Same as "
                  "--set store.data_dir=DIR");
@@ -125,6 +133,7 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   if (tls_key) flags.assignments.push_back("transport.tls_key=" + *tls_key);
   if (tls_client_ca) flags.assignments.push_back("transport.tls_client_ca=" + *tls_client_ca);
   if (listen_address) flags.assignments.push_back("transport.listen_address=" + *listen_address);
+  if (http_address) flags.assignments.push_back("http.listen_address=" + *http_address);
   if (data_dir) flags.assignments.push_back("store.data_dir=" + *data_dir);
   if (ephemeral) flags.assignments.push_back("store.ephemeral=true");
   if (log_level) flags.assignments.push_back("log.level=" + *log_level);
@@ -133,8 +142,9 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
 }
 
 // Sessions are not offered to a network in which everybody can take them.
-absl::Status CheckExposure(const Config& config, const std::string& token_file, bool is_allowed) {
-  const auto address = ParseHostPort(config.transport.listen_address);
+absl::Status CheckExposure(const std::string& listen_address, const Config& config, const std::string& token_file,
+                           bool is_allowed) {
+  const auto address = ParseHostPort(listen_address);
   if (!address || IsLoopback(*address) || is_allowed) return absl::OkStatus();
   const bool has_tls = !config.transport.tls_certificate.empty();
   const bool has_tokens = access::TokenStore(token_file).Exists();
@@ -142,9 +152,28 @@ absl::Status CheckExposure(const Config& config, const std::string& token_file, 
   return InvalidArgument(
       "{} is reachable from other machines, but {}. Use tokens (romap-server token create) and TLS (--tls-cert, "
       "--tls-key), listen on 127.0.0.1, or accept the risk with --insecure-network",
-      config.transport.listen_address,
+      listen_address,
       !has_tokens ? "everybody there could read, change and delete every session, because the server has no tokens"
                   : "tokens and images would be sent in clear text, because the server has no TLS");
+}
+
+bool WasSet(const ConfigFields& fields, const std::string& name) {
+  return std::ranges::any_of(fields.fields(),
+                             [&](const ConfigField& field) { return field.name == name && !field.origin.empty(); });
+}
+
+// Null: there is none. The default address may belong to another program, which is no reason to map nothing.
+absl::StatusOr<std::unique_ptr<http::HttpServer>> StartHttp(const access::Authenticator& authenticator,
+                                                            const Config& config, bool address_was_set,
+                                                            http::MetricSources metrics) {
+  if (config.http.listen_address.empty()) return nullptr;
+  auto server = http::HttpServer::Start(
+      &authenticator,
+      {.config = config.http, .tls = config.transport, .assets = http::ViewerAssets(), .metrics = std::move(metrics)});
+  if (server.ok() || address_was_set || !absl::IsUnavailable(server.status())) return server;
+  spdlog::warn("there is no page to show the maps: {}. Choose another address with --http HOST:PORT",
+               Message(server.status()));
+  return nullptr;
 }
 
 // Every connection needs a file. 1024, a common default, is few.
@@ -200,7 +229,9 @@ int Main(int argc, char** argv) {
 
   std::string token_file = config.access.token_file;
   if (token_file.empty() && !config.store.ephemeral) token_file = TokenFileOf(config.store.data_dir);
-  if (const absl::Status status = CheckExposure(config, token_file, flags.insecure_network); !status.ok()) {
+  for (const std::string& address : {config.transport.listen_address, config.http.listen_address}) {
+    const absl::Status status = CheckExposure(address, config, token_file, flags.insecure_network);
+    if (status.ok()) continue;
     PrintError(Message(status));
     return kUsageError;
   }
@@ -234,16 +265,25 @@ int Main(int argc, char** argv) {
     PrintError(Message(server.status()));
     return absl::IsInvalidArgument(server.status()) ? kUsageError : kFailure;
   }
+  auto page = StartHttp(authenticator, config, WasSet(fields, "http.listen_address"),
+                        {.service = [&service] { return service.Metrics(); },
+                         .grpc_connections = [&server] { return (*server)->OpenConnections(); }});
+  if (!page.ok()) {
+    PrintError(Message(page.status()));
+    return absl::IsInvalidArgument(page.status()) ? kUsageError : kFailure;
+  }
   spdlog::info("sessions are {}", data_dir.empty() ? "not stored" : "stored in " + data_dir);
   spdlog::info("{}; {}", config.transport.tls_certificate.empty() ? "no TLS" : "TLS",
                authenticator.NeedsToken() ? "calls need a token" : "calls need no token");
   fmt::print("romap-server listening on {}\n", (*server)->address());
+  if (*page) fmt::print("romap-server page at {}\n", (*page)->url());
   std::fflush(stdout);
 
   // A service that does not answer any more hangs in a lock that all calls need.
   auto manager = std::make_unique<process::ServiceManager>([&service] { service.ListSessions().IgnoreError(); });
   WaitForStop(signals);
   manager.reset();
+  if (*page) (*page)->Shutdown();
   (*server)->Shutdown();
   return 0;
 }

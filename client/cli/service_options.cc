@@ -18,6 +18,7 @@ absl::StatusOr<session::ServerConfig> LoadConfig(const ServiceOptions& options) 
   config.Fields(fields);
   // The file may also be used by romap-server, which has these additional sections.
   fields.IgnoreSection("transport");
+  fields.IgnoreSection("http");
   fields.IgnoreSection("access");
   fields.IgnoreSection("log");
   fields.IgnoreSection("store");

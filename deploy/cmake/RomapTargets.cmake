@@ -56,10 +56,12 @@ find_package(tinyobjloader CONFIG REQUIRED)
 find_package(utf8cpp CONFIG REQUIRED)
 find_package(SQLiteCpp CONFIG REQUIRED)
 find_package(OpenSSL REQUIRED)
+find_package(prometheus-cpp CONFIG REQUIRED COMPONENTS core)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(STB REQUIRED IMPORTED_TARGET stb)
 pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(LIBEVENT REQUIRED IMPORTED_TARGET libevent_core libevent_extra libevent_openssl libevent_pthreads)
 
 # OpenCV's headers cause warnings under C++20, so they are included as system headers.
 add_library(romap_opencv INTERFACE)

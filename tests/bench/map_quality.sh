@@ -23,7 +23,7 @@ if [ ${#sequences[@]} -eq 0 ]; then
   done
 fi
 
-"$build/server/romap-server" --ephemeral --listen 127.0.0.1:0 --log-level warning >"$out/server.out" 2>"$out/server.err" &
+"$build/server/romap-server" --ephemeral --listen 127.0.0.1:0 --http "" --log-level warning >"$out/server.out" 2>"$out/server.err" &
 server=$!
 trap 'kill $server 2>/dev/null || true' EXIT
 for _ in $(seq 100); do

@@ -36,7 +36,7 @@ class AccessTest : public ::testing::Test {
     return Write(tenant + "_" + role + ".token", created.out);
   }
   std::vector<std::string> ServerCommand(const std::string& address, std::vector<std::string> arguments = {}) {
-    std::vector<std::string> command{ROMAP_SERVER, "--listen", address, "--data-dir", folder_ / "data"};
+    std::vector<std::string> command{ROMAP_SERVER, "--listen", address, "--http", "", "--data-dir", folder_ / "data"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     return integration::Quick(command);
   }

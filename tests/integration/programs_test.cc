@@ -86,7 +86,7 @@ TEST(ProgramsTest, ServerAndClientMapASequence) {
   const testing_support::TemporaryFolder folder;
   MakeSmallSequence(folder / "sequence");
   testing_support::BackgroundProcess server(
-      integration::Quick({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0"}));
+      integration::Quick({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0", "--http", ""}));
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
 
@@ -278,10 +278,10 @@ TEST(InvalidInputTest, UnreadableConfigurationAndConflictingSettings) {
 TEST(InvalidInputTest, NoServerAndPortInUse) {
   const testing_support::TemporaryFolder folder;
   MakeTinySequence(folder / "sequence");
-  testing_support::BackgroundProcess server({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0"});
+  testing_support::BackgroundProcess server({ROMAP_SERVER, "--ephemeral", "--listen", "127.0.0.1:0", "--http", ""});
   const std::string address = server.WaitForLine("romap-server listening on ");
   ASSERT_NE(address, "");
-  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--ephemeral", "--listen", address}), 1,
+  ExpectOneLine(testing_support::RunProcess({ROMAP_SERVER, "--ephemeral", "--listen", address, "--http", ""}), 1,
                 "cannot listen on " + address);
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait().exit_code, 0);

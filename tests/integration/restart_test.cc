@@ -34,8 +34,9 @@ class RestartTest : public ::testing::Test {
   // The port of the first start is used again, because clients come back to it. The queue holds the whole sequence, so
   // that a slow machine drops no live frame.
   void Start(const std::string& address) {
-    server_ = std::make_unique<BackgroundProcess>(integration::Quick(
-        {ROMAP_SERVER, "--listen", address, "--data-dir", folder_ / "data", "--set", "session.frame_queue=64"}));
+    server_ = std::make_unique<BackgroundProcess>(
+        integration::Quick({ROMAP_SERVER, "--listen", address, "--http", "", "--data-dir", folder_ / "data", "--set",
+                            "session.frame_queue=64"}));
     address_ = server_->WaitForLine("romap-server listening on ");
     ASSERT_NE(address_, "");
   }
@@ -113,7 +114,8 @@ TEST_F(RestartTest, ASessionIsContinuedAfterARestartAndCarriedToAnotherServer) {
 }
 
 TEST_F(RestartTest, ASecondServerOnTheDataFolderIsRefused) {
-  const ProcessResult second = RunProcess({ROMAP_SERVER, "--listen", "127.0.0.1:0", "--data-dir", folder_ / "data"});
+  const ProcessResult second =
+      RunProcess({ROMAP_SERVER, "--listen", "127.0.0.1:0", "--http", "", "--data-dir", folder_ / "data"});
   EXPECT_EQ(second.exit_code, 1);
   EXPECT_THAT(second.err, HasSubstr("the data folder is used by process "));
 }

@@ -41,7 +41,7 @@ class ServerProcess {
   void Start() {
     std::vector<std::string> command{"/usr/bin/env"};
     command.insert(command.end(), environment_.begin(), environment_.end());
-    command.insert(command.end(), {ROMAP_SERVER, "--listen", address_, "--data-dir", data_dir_});
+    command.insert(command.end(), {ROMAP_SERVER, "--listen", address_, "--http", "", "--data-dir", data_dir_});
     process_ = std::make_unique<testing_support::BackgroundProcess>(WithLittleTraining(std::move(command)));
     address_ = process_->WaitForLine("romap-server listening on ");
   }

@@ -27,7 +27,7 @@ cmake -S "$here/../../../client/examples" -B "$work/examples" -DCMAKE_PREFIX_PAT
   >"$work/examples.log" 2>&1 &&
   cmake --build "$work/examples" >>"$work/examples.log" 2>&1 || { cat "$work/examples.log"; exit 1; }
 
-"$prefix/bin/romap-server" --config "$prefix/share/romap/server.yaml" --ephemeral --listen 127.0.0.1:0 \
+"$prefix/bin/romap-server" --config "$prefix/share/romap/server.yaml" --ephemeral --listen 127.0.0.1:0 --http "" \
   --set nerf.first_budget_steps=40 --set nerf.full_budget_steps=40 --set mesh.min_side_nodes=32 --set mesh.resolution=32 \
   >"$work/server.log" 2>&1 &
 server=$!
