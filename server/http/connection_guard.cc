@@ -38,6 +38,12 @@ ino_t InodeAt(int fd) {
 // evhttp notices it and frees the connection.
 void Close(int fd) { shutdown(fd, SHUT_RDWR); }
 
+// The same at once, without reading what the peer sends on.
+void Abort(int fd) {
+  const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
+  if (connect(fd, &nobody, sizeof(nobody)) != 0) Close(fd);
+}
+
 }  // namespace
 
 ConnectionGuard::~ConnectionGuard() {
@@ -85,7 +91,7 @@ void ConnectionGuard::OnInput(evbuffer* /*buffer*/, const evbuffer_cb_info* info
   if (info->n_added == 0) return;
   // While its request is answered, a client has little to say.
   const bool is_flood = receiving.state != State::kReceiving && info->orig_size + info->n_added > kMaxEarlyBytes;
-  if (is_flood || guard.received_bytes_ > guard.limits_.received_bytes) Close(receiving.fd);
+  if (is_flood || guard.received_bytes_ > guard.limits_.received_bytes) Abort(receiving.fd);
 }
 
 void ConnectionGuard::SetState(int fd, State state) {

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "client/files/sequence.h"
 #include "client/sdk/remote_mapping_service.h"
+#include "client/synth/synth.h"
 #include "common/mesh_codec.h"
 #include "tests/integration/quick_run.h"
 #include "tests/integration/recording_client.h"
@@ -92,29 +94,34 @@ TEST_F(HttpTest, AViewerSeesAMapFromItsBeginningToItsEnd) {
   EXPECT_GT(acks, 0u);
   ASSERT_FALSE(meshes.empty());
 
-  // The same bytes as over gRPC.
-  std::map<std::string, MeshUpdate> streamed;
+  // The same bytes as over gRPC, for all objects of the final map.
+  std::map<uint64_t, MeshUpdate> streamed;
   for (const MeshUpdate& mesh : testing_support::Only<MeshUpdate>(testing_support::ReadToEnd(*watched))) {
-    streamed[std::to_string(mesh.id.value)] = mesh;
+    streamed[mesh.id.value] = mesh;
   }
-  ASSERT_EQ(meshes.size(), streamed.size());
+  const MapSnapshot map = (*service)->ExportMap(session).value();
   const std::string base = "/api/v1/sessions/" + session;
-  for (const auto& [id, data] : meshes) {
-    const std::string path = base + "/objects/" + id + "/mesh/" + data["mesh"]["revision"].get<std::string>();
-    const HttpReply mesh = Get(path);
+  size_t with_mesh = 0;
+  for (const ObjectSnapshot& object : map.objects) {
+    if (!object.mesh) continue;
+    ++with_mesh;
+    const uint64_t id = object.object.id.value;
+    const nlohmann::json& data = meshes.at(std::to_string(id));
+    EXPECT_EQ(data["mesh"]["revision"], std::to_string(streamed.at(id).revision));
+    const HttpReply mesh = Get(fmt::format("{}/objects/{}/mesh/{}", base, id, streamed.at(id).revision));
     EXPECT_EQ(mesh.code, 200) << mesh.body;
     EXPECT_TRUE(mesh.body == streamed.at(id).draco) << "object " << id;
     EXPECT_EQ(mesh.body.size(), data["bytes"]["draco"].get<size_t>());
     EXPECT_OK(DecodeDraco(mesh.body).status());
-    EXPECT_EQ(Get(base + "/objects/" + id + ".glb").body.substr(0, 4), "glTF");
+    EXPECT_EQ(Get(fmt::format("{}/objects/{}.glb", base, id)).body.substr(0, 4), "glTF");
   }
+  EXPECT_GT(with_mesh, 0u);
   const HttpReply glb = Get(base + "/map.glb");
   uint32_t json_bytes = 0;
   ASSERT_GT(glb.body.size(), 20u);
   std::memcpy(&json_bytes, glb.body.data() + 12, sizeof(json_bytes));
-  EXPECT_EQ(nlohmann::json::parse(glb.body.substr(20, json_bytes))["meshes"].size(),
-            (*service)->ExportMap(session)->objects.size());
-  EXPECT_EQ(Json(Get(base + "/trajectory")).size(), (*service)->ExportMap(session)->trajectory.size());
+  EXPECT_EQ(nlohmann::json::parse(glb.body.substr(20, json_bytes))["meshes"].size(), with_mesh);
+  EXPECT_EQ(Json(Get(base + "/trajectory")).size(), map.trajectory.size());
   EXPECT_EQ(Json(Get(base))["state"], "SESSION_STATE_FINISHED");
   EXPECT_EQ(Json(Send("POST", base + "/pin", "X-Romap: 1\r\n", R"({"pinned": true})"))["pinned"], true);
 
@@ -129,8 +136,13 @@ TEST_F(HttpTest, AViewerSeesAMapFromItsBeginningToItsEnd) {
 }
 
 TEST_F(HttpTest, ACameraFeedsALiveSession) {
+  constexpr int kImages = 60;
+  synth::SynthOptions options{.seed = 3, .objects = 2, .frames = kImages, .width_px = 320, .height_px = 240};
+  options.rounds = 0.3;
+  ASSERT_TRUE(synth::MakeSequence(options, folder_ / "sequence").ok());
+  const files::Sequence sequence = files::Sequence::Open(folder_ / "sequence", {}).value();
+  const CameraModel camera = sequence.camera();
   Start();
-  const CameraModel camera = world_.camera();
   const nlohmann::json request = {{"name", "phone"},
                                   {"mode", "FRAME_MODE_LIVE"},
                                   {"poseUse", "POSE_USE_IGNORE"},
@@ -146,26 +158,30 @@ TEST_F(HttpTest, ACameraFeedsALiveSession) {
   const std::string base = "/api/v1/sessions/" + Json(created)["session"]["id"].get<std::string>();
   EXPECT_EQ(Get(base + "/frame.jpg").code, 404) << "there is no image yet";
   const auto post = [&](int index, const std::string& image) {
-    return Send("POST", fmt::format("{}/frames?frame_id={}&timestamp_ns={}", base, index + 1, 40'000'000 * (index + 1)),
-                "Content-Type: image/jpeg\r\n", image);
+    return Send(
+        "POST",
+        fmt::format("{}/frames?frame_id={}&timestamp_ns={}", base, index + 1, int64_t{40'000'000} * (index + 1)),
+        "Content-Type: image/jpeg\r\n", image);
   };
   const auto jpeg = [&](int index) {
+    const std::string image = sequence.Load(index)->image;
     std::vector<unsigned char> bytes;
-    cv::imencode(".jpg", world_.MakeFrame(index).frame->image_bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 95});
+    cv::imencode(".jpg", cv::imdecode(std::vector<char>(image.begin(), image.end()), cv::IMREAD_COLOR), bytes,
+                 {cv::IMWRITE_JPEG_QUALITY, 95});
     return std::string(bytes.begin(), bytes.end());
   };
   bool is_tracked = false;
-  for (int i = 0; i < kFrames; ++i) {
-    const HttpReply reply = post(i, jpeg(i));
+  for (int i = 0; i < kImages; ++i) {
+    HttpReply reply = post(i, jpeg(i));
     ASSERT_EQ(reply.code, 200) << reply.body;
     EXPECT_EQ(Json(reply)["accepted"], true) << reply.body;
     is_tracked |= Json(reply).contains("tWorldCamera");
   }
-  const HttpReply damaged = post(kFrames, "no image");
+  const HttpReply damaged = post(kImages, "no image");
   EXPECT_EQ(damaged.code, 200);
   EXPECT_EQ(Json(damaged)["accepted"], false);
   const HttpReply image = Get(base + "/frame.jpg");
-  EXPECT_EQ(image.headers.at("x-romap-frame-id"), std::to_string(kFrames));
+  EXPECT_EQ(image.headers.at("x-romap-frame-id"), std::to_string(kImages));
   const cv::Mat decoded = cv::imdecode(std::vector<char>(image.body.begin(), image.body.end()), cv::IMREAD_COLOR);
   EXPECT_EQ(decoded.size(), cv::Size(camera.width_px, camera.height_px));
   EXPECT_TRUE(is_tracked) << "the frames show a scene that can be tracked";

@@ -5,6 +5,8 @@
 #include <openssl/pem.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
+#include <pthread.h>
+#include <signal.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -58,6 +60,11 @@ struct HttpConnection::Tls {
   Tls& operator=(const Tls&) = delete;
 
   bool Connect(int fd, const HttpTls& options) {
+    // OpenSSL writes to connections that the server has closed. The signal goes to the thread that writes.
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGPIPE);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     X509* ca = PEM_read_bio_X509(BioOf(options.ca).get(), nullptr, nullptr, nullptr);
     X509_STORE_add_cert(SSL_CTX_get_cert_store(context), ca);
     X509_free(ca);
