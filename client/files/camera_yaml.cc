@@ -72,6 +72,11 @@ absl::StatusOr<CameraYaml> ReadCameraYaml(const std::string& path) {
   }
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "fps", path, &result.fps));
   ROMAP_RETURN_IF_ERROR(ReadOptionalNumber(root, "depth_scale", path, &result.depth_scale));
+  result.world_up = YamlText(root, "world_up", "");
+  if (root["world_up"] && std::ranges::count(kWorldUps, result.world_up) == 0) {
+    return InvalidArgument("{}:{}: 'world_up' is '{}'; expected {}", path, root["world_up"].Mark().line + 1,
+                           result.world_up, fmt::join(kWorldUps, ", "));
+  }
   if (absl::Status status = ValidateCameraModel(camera); !status.ok()) {
     return InvalidArgument("{}: {}", path, Message(status));
   }
@@ -93,6 +98,7 @@ absl::Status WriteCameraYaml(const std::string& path, const CameraYaml& value) {
   if (value.depth_scale > 0) {
     text += fmt::format("depth_scale: {}  # z = value * depth_scale; z depth, not ray length\n", value.depth_scale);
   }
+  if (!value.world_up.empty()) text += fmt::format("world_up: {}  # in the world of the poses\n", value.world_up);
   return WriteFile(path, text);
 }
 

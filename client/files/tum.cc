@@ -10,9 +10,6 @@
 namespace romap::files {
 namespace {
 
-// Interpolation over longer gaps would be unreliable.
-constexpr int64_t kMaxInterpolationGap_ns = 100'000'000;
-
 absl::StatusOr<StampedPose> ParsePose(const TableLine& line, TimeUnit unit, const std::string& path) {
   if (line.fields.size() != 8) {
     return InvalidArgument("{}:{}: {} fields; expected 8 (t tx ty tz qx qy qz qw)", path, line.number,
@@ -74,7 +71,8 @@ absl::Status WriteTum(const std::string& path, std::span<const StampedPose> pose
   return WriteFile(path, text);
 }
 
-std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int64_t timestamp_ns, int64_t max_dt_ns) {
+std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int64_t timestamp_ns, int64_t max_dt_ns,
+                                         int64_t max_gap_ns) {
   const auto after = std::lower_bound(poses.begin(), poses.end(), timestamp_ns,
                                       [](const StampedPose& pose, int64_t t_ns) { return pose.timestamp_ns < t_ns; });
   const auto distance_ns = [&](auto it) { return std::abs(it->timestamp_ns - timestamp_ns); };
@@ -87,7 +85,7 @@ std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int
   const auto before = after - 1;
   const auto nearest = distance_ns(before) <= distance_ns(after) ? before : after;
   if (distance_ns(nearest) > max_dt_ns) return std::nullopt;
-  if (after->timestamp_ns - before->timestamp_ns > kMaxInterpolationGap_ns) return nearest->T_world_camera;
+  if (after->timestamp_ns - before->timestamp_ns > max_gap_ns) return nearest->T_world_camera;
   return Interpolate(*before, *after, timestamp_ns);
 }
 

@@ -29,8 +29,12 @@ absl::StatusOr<std::vector<StampedPose>> ReadTum(const std::string& path, TimeUn
 // Writes the format of ReadTum. Errors as WriteFile.
 absl::Status WriteTum(const std::string& path, std::span<const StampedPose> poses);
 
+// Interpolation over longer gaps of an unknown motion would be unreliable.
+inline constexpr int64_t kMaxInterpolationGap_ns = 100'000'000;
+
 // Returns the pose at a time. `poses` must be sorted by time. Interpolates between the neighboring poses if they are at
-// most 0.1 s apart; otherwise returns the nearest. nullopt if no pose is within max_dt_ns.
-std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int64_t timestamp_ns, int64_t max_dt_ns);
+// most max_gap_ns apart; otherwise returns the nearest. nullopt if no pose is within max_dt_ns.
+std::optional<SE3<World, Camera>> PoseAt(std::span<const StampedPose> poses, int64_t timestamp_ns, int64_t max_dt_ns,
+                                         int64_t max_gap_ns = kMaxInterpolationGap_ns);
 
 }  // namespace romap::files
