@@ -10,7 +10,7 @@ packages=(
   ccache cmake g++ git ninja-build pkg-config
   libgrpc++-dev libgrpc-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libabsl-dev
   libopencv-dev libopencv-contrib-dev libeigen3-dev libceres-dev libhwy-dev libtbb-dev libnanoflann-dev
-  libmeshoptimizer-dev libstb-dev libdraco-dev libjpeg62-turbo-dev libpng-dev libspdlog-dev libfmt-dev libyaml-cpp-dev
+  libmeshoptimizer-dev libstb-dev libdraco-dev libexif-dev libjpeg62-turbo-dev libpng-dev libspdlog-dev libfmt-dev libyaml-cpp-dev
   libcli11-dev nlohmann-json3-dev libtinygltf-dev libtinyobjloader-dev libutfcpp-dev libsqlitecpp-dev libsqlite3-dev libxxhash-dev libsodium-dev libssl-dev libsystemd-dev libevent-dev prometheus-cpp-dev
 )
 if [ "${1:-}" = tests ]; then

@@ -1,0 +1,86 @@
+#include "client/importers/json_file.h"
+
+#include <cmath>
+
+#include "client/files/text_file.h"
+
+namespace romap::importers {
+namespace {
+
+bool AppendNumbers(const nlohmann::json& value, std::vector<double>* numbers) {
+  if (value.is_number()) {
+    numbers->push_back(value.get<double>());
+    return true;
+  }
+  if (!value.is_array()) return false;
+  for (const nlohmann::json& item : value) {
+    if (!AppendNumbers(item, numbers)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+absl::StatusOr<nlohmann::json> LoadJson(const std::string& path) {
+  ROMAP_ASSIGN_OR_RETURN(const std::string text, files::ReadTextFile(path));
+  try {
+    return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+  } catch (const nlohmann::json::exception& e) {
+    return InvalidArgument("{}: invalid JSON: {}", path, e.what());
+  }
+}
+
+absl::StatusOr<double> JsonNumber(const nlohmann::json& object, const std::string& key, const std::string& where) {
+  const auto value = object.is_object() ? object.find(key) : object.end();
+  if (value == object.end()) return InvalidArgument("{}: '{}' is missing; expected a number", where, key);
+  if (!value->is_number() || !std::isfinite(value->get<double>())) {
+    return InvalidArgument("{}: '{}' is {}; expected a number", where, key, value->dump());
+  }
+  return value->get<double>();
+}
+
+absl::StatusOr<double> JsonNumberOr(const nlohmann::json& object, const std::string& key, double fallback,
+                                    const std::string& where) {
+  if (!object.is_object() || !object.contains(key)) return fallback;
+  return JsonNumber(object, key, where);
+}
+
+absl::StatusOr<int> JsonSide(const nlohmann::json& object, const std::string& key, const std::string& where) {
+  ROMAP_ASSIGN_OR_RETURN(const double side_px, JsonNumber(object, key, where));
+  if (side_px < 1 || side_px > 1e6 || side_px != std::floor(side_px)) {
+    return InvalidArgument("{}: '{}' is {}; expected a whole number of pixels", where, key, side_px);
+  }
+  return static_cast<int>(side_px);
+}
+
+absl::StatusOr<std::string> JsonText(const nlohmann::json& object, const std::string& key, const std::string& where) {
+  const auto value = object.is_object() ? object.find(key) : object.end();
+  if (value == object.end() || !value->is_string()) {
+    return InvalidArgument("{}: '{}' is missing or not a text", where, key);
+  }
+  return value->get<std::string>();
+}
+
+absl::StatusOr<std::vector<double>> JsonNumbers(const nlohmann::json& object, const std::string& key,
+                                                const std::string& where) {
+  const auto value = object.is_object() ? object.find(key) : object.end();
+  std::vector<double> numbers;
+  if (value == object.end() || !value->is_array() || !AppendNumbers(*value, &numbers)) {
+    return InvalidArgument("{}: '{}' is missing or not a list of numbers", where, key);
+  }
+  return numbers;
+}
+
+absl::StatusOr<const nlohmann::json*> JsonObjects(const nlohmann::json& object, const std::string& key,
+                                                  const std::string& where) {
+  const auto value = object.is_object() ? object.find(key) : object.end();
+  if (value == object.end() || !value->is_array()) {
+    return InvalidArgument("{}: the list '{}' is missing", where, key);
+  }
+  for (const nlohmann::json& item : *value) {
+    if (!item.is_object()) return InvalidArgument("{}: '{}' contains something that is no object", where, key);
+  }
+  return &*value;
+}
+
+}  // namespace romap::importers

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "client/importers/sequence_reader.h"
+
+namespace romap::importers {
+
+std::unique_ptr<SequenceReader> MakeNativeReader();
+std::unique_ptr<SequenceReader> MakeVideoReader();
+std::unique_ptr<SequenceReader> MakeImageFolderReader();
+
+// All readers. The first that fits reads a recording, so layouts with few characteristic files come last.
+const std::vector<std::unique_ptr<SequenceReader>>& AllReaders();
+
+}  // namespace romap::importers
