@@ -95,7 +95,7 @@ absl::StatusOr<std::vector<Diagnostic>> CheckByMapping(const files::Sequence& se
   service_options.settings = {"objects.confirm_frames=1000"};  // no object is confirmed, so none is trained
   ROMAP_ASSIGN_OR_RETURN(const auto service, service_options.Connect());
   StreamOptions options;
-  arguments.SetPoseUse(&options);
+  arguments.SetPoseUse(sequence, &options);
   options.max_training_s = 30;
   options.say_diagnostics = false;  // they are printed together, most severe first
   if (use_poses) {
@@ -147,8 +147,7 @@ std::string Describe(const files::Sequence& sequence, const Survey& survey) {
 }
 
 absl::Status Diagnose(const SequenceArguments& arguments) {
-  ROMAP_ASSIGN_OR_RETURN(const files::SequenceOptions options, arguments.FileOptions());
-  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(arguments.dir, options));
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, arguments.Open());
   const Survey survey = SurveyFrames(sequence);
   fmt::print("{}", Describe(sequence, survey));
   std::vector<Diagnostic> found = sequence.diagnostics();
@@ -180,7 +179,8 @@ void AddDoctorCommand(CLI::App& app, Command* chosen) {
       app.add_subcommand("doctor",
                          "Check a recorded sequence before mapping: calibration, timestamps, poses, masks, "
                          "images and depth");
-  options->AddTo(*command);
+  options->AddSourceTo(*command);
+  options->AddUseTo(*command);
   command->callback([options, chosen] { *chosen = [options] { return Diagnose(*options); }; });
 }
 

@@ -139,10 +139,10 @@ absl::Status SaveMap(const RunOptions& options, const files::Sequence& sequence,
   return absl::OkStatus();
 }
 
-absl::Status RunSequence(const RunOptions& options) {
-  ROMAP_ASSIGN_OR_RETURN(files::SequenceOptions sequence_options, options.sequence.FileOptions());
-  if (options.permute_labels_seed >= 0) sequence_options.permute_labels_seed = options.permute_labels_seed;
-  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, files::Sequence::Open(options.sequence.dir, sequence_options));
+absl::Status RunSequence(RunOptions options) {
+  if (options.permute_labels_seed >= 0) options.sequence.read.files.permute_labels_seed = options.permute_labels_seed;
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, options.sequence.Open());
+  options.sequence.SetPoseUse(sequence, &options.stream);
   ROMAP_RETURN_IF_ERROR(PrepareOutput(options.out));
   ROMAP_ASSIGN_OR_RETURN(const auto service, options.service.Connect());
 
@@ -196,7 +196,8 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_option("--out", options->out, "Output folder for meshes, cuboids, trajectory, images and summary")
       ->required();
   options->service.AddTo(*command, /*offer_local=*/true);
-  options->sequence.AddTo(*command);
+  options->sequence.AddSourceTo(*command);
+  options->sequence.AddUseTo(*command);
   AddDetectorOptions(options.get(), command);
   command->add_flag("--realtime", options->stream.realtime,
                     "Send frames at the recorded rate; the server drops frames when overloaded");
@@ -221,7 +222,6 @@ void AddRunCommand(CLI::App& app, Command* chosen) {
   command->add_flag("--no-pictures", options->no_pictures, "Do not write images");
   options->map_files.AddTo(*command);
   command->callback([options, chosen] {
-    options->sequence.SetPoseUse(&options->stream);
     options->stream.resume = !options->service.local;
     *chosen = [options] { return RunSequence(*options); };
   });
