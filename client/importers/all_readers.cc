@@ -7,6 +7,7 @@ const std::vector<std::unique_ptr<SequenceReader>>& AllReaders() {
     std::vector<std::unique_ptr<SequenceReader>> readers;
     readers.push_back(MakeNativeReader());
     readers.push_back(MakeTransformsReader());
+    readers.push_back(MakeColmapReader());
     readers.push_back(MakeVideoReader());
     readers.push_back(MakeImageFolderReader());
     return readers;

@@ -9,6 +9,7 @@ namespace romap::importers {
 
 std::unique_ptr<SequenceReader> MakeNativeReader();
 std::unique_ptr<SequenceReader> MakeTransformsReader();
+std::unique_ptr<SequenceReader> MakeColmapReader();
 std::unique_ptr<SequenceReader> MakeVideoReader();
 std::unique_ptr<SequenceReader> MakeImageFolderReader();
 
