@@ -8,8 +8,17 @@
 namespace romap::importers {
 
 std::unique_ptr<SequenceReader> MakeNativeReader();
+std::unique_ptr<SequenceReader> MakeEurocReader();
+std::unique_ptr<SequenceReader> MakeScanNetReader();
+std::unique_ptr<SequenceReader> MakeSevenScenesReader();
+std::unique_ptr<SequenceReader> MakeReplicaReader();
+std::unique_ptr<SequenceReader> MakeVmapReader();
+std::unique_ptr<SequenceReader> MakeBopReader();
+std::unique_ptr<SequenceReader> MakeArkitScenesReader();
+std::unique_ptr<SequenceReader> MakePolycamReader();
 std::unique_ptr<SequenceReader> MakeTransformsReader();
 std::unique_ptr<SequenceReader> MakeColmapReader();
+std::unique_ptr<SequenceReader> MakeTumReader();
 std::unique_ptr<SequenceReader> MakeVideoReader();
 std::unique_ptr<SequenceReader> MakeImageFolderReader();
 
