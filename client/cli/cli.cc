@@ -30,6 +30,7 @@ int RunCli(int argc, const char* const* argv) {
   Command chosen;
   AddRunCommand(app, &chosen);
   AddDoctorCommand(app, &chosen);
+  AddImportCommand(app, &chosen);
   AddReplayCommand(app, &chosen);
   AddEvalCommand(app, &chosen);
   AddBenchCommand(app, &chosen);

@@ -20,6 +20,7 @@ void AddEvalCommand(CLI::App& app, Command* chosen);
 void AddReplayCommand(CLI::App& app, Command* chosen);
 void AddSynthCommand(CLI::App& app, Command* chosen);
 void AddDoctorCommand(CLI::App& app, Command* chosen);
+void AddImportCommand(CLI::App& app, Command* chosen);
 void AddExportCommand(CLI::App& app, Command* chosen);
 void AddSessionsCommand(CLI::App& app, Command* chosen);
 
