@@ -99,8 +99,11 @@ class RecordingTest : public ::testing::Test {
     return RunTrained(options);
   }
 
-  RunResult RunTrained(std::vector<std::string> options = {}) {
-    std::vector<std::string> command = {ROMAP_CLIENT,    "run",     recording().dir(), "--out",
+  RunResult RunTrained(const std::vector<std::string>& options = {}) { return RunOn(recording().dir(), options); }
+
+  // The same with another recording.
+  RunResult RunOn(const std::string& source, const std::vector<std::string>& options) {
+    std::vector<std::string> command = {ROMAP_CLIENT,    "run",     source,         "--out",
                                         folder_ / "map", "--local", "--no-pictures"};
     command.insert(command.end(), options.begin(), options.end());
     RunResult result;
