@@ -106,6 +106,7 @@ test('an object is picked in the view and with keys, and its panel shows its fig
   await fill(server.add('pick'), 6);
   const page = await openPage(t, `${server.url}#session/pick`);
   await until(page, ...meshesShown(6));
+  await page.getByLabel('Hide or show the image').click();  // it may hide the object
   const at = await objectOnScreen(page, '5');
   await page.mouse.click(at.x, at.y);
   await page.getByRole('heading', { name: 'book #5' }).waitFor();
@@ -128,6 +129,7 @@ test('the distance of two picked points is measured in map units', async (t) => 
   await fill(server.add('measure'), 3);
   const page = await openPage(t, `${server.url}#session/measure`);
   await until(page, ...meshesShown(3));
+  await page.getByLabel('Hide or show the image').click();
   await page.keyboard.press('m');
   for (const id of ['1', '3']) {
     const at = await objectOnScreen(page, id);

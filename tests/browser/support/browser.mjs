@@ -9,6 +9,7 @@ const { chromium } = fromViewer('playwright-core');
 export const kChromium = process.env.ROMAP_CHROMIUM ?? '/usr/bin/chromium';
 const kFlags = ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'];
 export const kSoftwareGl = ['--disable-gpu', '--enable-unsafe-swiftshader'];
+const kWaitMs = 60000;  // the machine may do other things
 const pictures = process.env.ROMAP_PICTURES_DIR ?? path.join(viewerDir, 'pictures');
 
 // What the headless browser itself writes when a screenshot is taken.
@@ -32,7 +33,7 @@ export async function openPage(t, url, { browser, flags, ...context } = {}) {
   browser ??= await openBrowser(t, flags);
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, colorScheme: 'dark', ...context });
   t.after(() => page.context().close());
-  page.setDefaultTimeout(20000);
+  page.setDefaultTimeout(kWaitMs);
   page.problems = [];
   page.on('console', (message) => {
     if (['error', 'warning'].includes(message.type()) && !kNoise.test(message.text())) page.problems.push(`${message.type()}: ${message.text()}`);
@@ -52,7 +53,7 @@ export async function openPage(t, url, { browser, flags, ...context } = {}) {
 }
 
 /** Waits until `done` (runs in the page) is true. */
-export async function until(page, what, done, argument, timeout = 20000) {
+export async function until(page, what, done, argument, timeout = kWaitMs) {
   try {
     return await page.waitForFunction(done, argument, { timeout, polling: 50 });
   } catch (error) {
@@ -79,5 +80,8 @@ export const objectOnScreen = (page, id) => page.evaluate((objectId) => {
   const point = scene.controls.target.clone().set(x, y, z);
   const at = scene.stage.project(point);
   const rect = scene.stage.canvas.getBoundingClientRect();
-  return { x: at.x + rect.left, y: at.y + rect.top };
+  const place = { x: at.x + rect.left, y: at.y + rect.top };
+  const top = document.elementFromPoint(place.x, place.y);
+  if (top !== scene.stage.canvas) throw new Error(`object ${objectId} is behind ${top?.className}`);
+  return place;
 }, id);
