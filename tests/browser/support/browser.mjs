@@ -36,7 +36,9 @@ export async function openPage(t, url, { browser, flags, ...context } = {}) {
   page.setDefaultTimeout(kWaitMs);
   page.problems = [];
   page.on('console', (message) => {
-    if (['error', 'warning'].includes(message.type()) && !kNoise.test(message.text())) page.problems.push(`${message.type()}: ${message.text()}`);
+    if (['error', 'warning'].includes(message.type()) && !kNoise.test(message.text())) {
+      page.problems.push(`${message.type()}: ${message.text()} ${message.location().url}`);
+    }
   });
   page.on('pageerror', (error) => page.problems.push(`exception: ${error}`));
   page.foreign = [];

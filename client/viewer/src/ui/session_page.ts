@@ -41,7 +41,7 @@ export class SessionPage implements Page {
   private selected: string | null = null;
   private status: FeedStatus = { kind: 'connecting' };
   private updateIsQueued = false;
-  private mayHaveImage = false;  // the server has processed a frame
+  private hasNewImage = false;  // the server has processed a frame since the last request
   private isStopped = false;
   private readonly host = h('div', { class: 'stage' });
   private readonly name = h('span', { class: 'session-name' });
@@ -94,7 +94,7 @@ export class SessionPage implements Page {
     const isLive = (): boolean => this.status.kind !== 'ended' && this.status.kind !== 'gone';
     this.pollers = {
       info: new Poller(() => this.loadInfo(), () => (isLive() ? 5000 : null)),
-      frame: new Poller((signal) => this.loadFrame(signal), () => (isLive() && this.mayHaveImage ? 500 : null)),
+      frame: new Poller((signal) => this.loadFrame(signal), () => (isLive() ? 500 : null)),
       points: new Poller((signal) => this.loadPoints(signal), () => (isLive() ? 4000 : null)),
       trajectory: new Poller(() => this.loadTrajectory(),
                              () => (isLive() ? Math.max(10000, 20000 * this.trajectory.lastSeconds) : null)),
@@ -192,10 +192,7 @@ export class SessionPage implements Page {
   private applyEvent(event: MapEvent): void {
     if (event.kind === 'frameAck') {
       this.path.addAck(event.ack);
-      if (!this.mayHaveImage) {
-        this.mayHaveImage = true;
-        this.pollers.frame.poke();
-      }
+      this.hasNewImage = true;
     }
     if (event.kind === 'diagnostic' && event.diagnostic.severity !== 'INFO') {
       notify(event.diagnostic.text, event.diagnostic.severity === 'ERROR' ? 'error' : 'info');
@@ -247,7 +244,7 @@ export class SessionPage implements Page {
     const info = await this.api.session(this.sessionId);
     if (this.isStopped) return;
     // Without a client, the server may have no image, and browsers log every answer that is none.
-    if (!this.info && info.streamOpen && info.statistics.framesProcessed > 0) this.mayHaveImage = true;
+    if (!this.info && info.streamOpen && info.statistics.framesProcessed > 0) this.hasNewImage = true;
     this.info = info;
     if (!this.store.statistics || this.status.kind !== 'live') this.store.applyStatistics(info.statistics);
     document.title = `${info.name || 'Session'} – romap`;
@@ -255,9 +252,9 @@ export class SessionPage implements Page {
   }
 
   private async loadFrame(signal: AbortSignal): Promise<void> {
-    if (!this.mayHaveImage) return;
+    if (!this.hasNewImage) return;
+    this.hasNewImage = false;
     const blob = await loadFrame(this.api, this.sessionId, signal);
-    if (!blob) this.mayHaveImage = false;  // not before the next frame
     if (!blob || this.isStopped) return;
     this.overlay.setImage(blob);
     if (this.scene && this.settings.image && this.settings.path) {
