@@ -134,15 +134,20 @@ export class Stage {
   }
 }
 
+let probed: string | null | undefined;
+
 /** The name of the renderer; null if the browser has no WebGL 2. */
 export function probeWebGl2(): string | null {
+  if (probed === undefined) probed = probe();
+  return probed;
+}
+
+function probe(): string | null {
   try {
     const gl = document.createElement('canvas').getContext('webgl2');
     if (!gl) return null;
     const info = gl.getExtension('WEBGL_debug_renderer_info');
-    const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-    gl.getExtension('WEBGL_lose_context')?.loseContext();
-    return name;
+    return info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
   } catch {
     return null;
   }
