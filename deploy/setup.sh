@@ -17,10 +17,10 @@ if [ "${1:-}" = tests ]; then
   packages+=(libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev chromium clang-format dpkg-dev file openssl
              python3-dev python3-grpcio python3-matplotlib python3-mypy python3-numpy python3-opencv python3-pip
              python3-protobuf python3-setuptools python3-venv python3-wheel)
-  # For the page and the JavaScript client. Another Node.js than that of the distribution will do, too.
-  command -v node >/dev/null || packages+=(nodejs)
-  command -v npm >/dev/null || packages+=(npm)
 fi
+# For the page and the JavaScript client. Another Node.js than that of the distribution will do, too.
+command -v node >/dev/null || packages+=(nodejs)
+command -v npm >/dev/null || packages+=(npm)
 
 missing=()
 for package in "${packages[@]}"; do

@@ -193,9 +193,11 @@ TEST(InvalidInputTest, IncompleteSequenceFolder) {
   const testing_support::TemporaryFolder folder;
   ExpectOneLine(Romap({"run", folder / "nowhere", "--local", "--out", folder / "map"}), 3, "nowhere");
   fs::create_directory(folder / "empty");
-  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 3, "rgb.txt");
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 2,
+                "looked for romap sequence (rgb.txt and camera.yaml)");
   std::ofstream(folder / "empty/rgb.txt") << "0.0 rgb/1.png\n";
-  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 3, "camera.yaml");
+  ExpectOneLine(Romap({"run", folder / "empty", "--local", "--out", folder / "map"}), 3,
+                "1 of 1 listed files are missing");
 }
 
 TEST(InvalidInputTest, OutputFolderThatCannotBeCreated) {
