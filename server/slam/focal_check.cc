@@ -114,10 +114,15 @@ std::optional<FocalCheck::Best> FocalCheck::FindBest() const {
       pairs_.size(), std::exp(median), sigma, best_distance * camera_.width_px);
   if (std::abs(median) < std::log(kMaxFocalFactor) || std::abs(median) < kFocalSigmas * sigma) return std::nullopt;
   if (static_cast<double>(on_same_side) < kSameSideShare * static_cast<double>(pairs_.size())) return std::nullopt;
-  if (Median(std::move(ratios)) < kMinDistanceRatio || best_distance > kExactDistance) return std::nullopt;
+  // Both per pair and for all pairs together: few matches on small objects give pairs with much noise.
+  const double given_distance = Median(std::move(given_distances));
+  if (Median(std::move(ratios)) < kMinDistanceRatio || given_distance < kMinDistanceRatio * best_distance) {
+    return std::nullopt;
+  }
+  if (best_distance > kExactDistance) return std::nullopt;
   return Best{.factor = std::exp(median),
               .distance_px = best_distance * camera_.width_px,
-              .given_distance_px = Median(std::move(given_distances)) * camera_.width_px};
+              .given_distance_px = given_distance * camera_.width_px};
 }
 
 std::optional<Diagnostic> FocalCheck::Check() const {
