@@ -83,4 +83,16 @@ absl::StatusOr<const nlohmann::json*> JsonObjects(const nlohmann::json& object, 
   return &*value;
 }
 
+absl::StatusOr<CameraModel> JsonCamera(const nlohmann::json& object, const std::string& width_key,
+                                       const std::string& height_key, const std::string& where) {
+  CameraModel camera;
+  ROMAP_ASSIGN_OR_RETURN(camera.width_px, JsonSide(object, width_key, where));
+  ROMAP_ASSIGN_OR_RETURN(camera.height_px, JsonSide(object, height_key, where));
+  ROMAP_ASSIGN_OR_RETURN(camera.fx_px, JsonNumber(object, "fx", where));
+  ROMAP_ASSIGN_OR_RETURN(camera.fy_px, JsonNumber(object, "fy", where));
+  ROMAP_ASSIGN_OR_RETURN(camera.cx_px, JsonNumber(object, "cx", where));
+  ROMAP_ASSIGN_OR_RETURN(camera.cy_px, JsonNumber(object, "cy", where));
+  return camera;
+}
+
 }  // namespace romap::importers

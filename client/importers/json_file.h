@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/camera_model.h"
 #include "common/status.h"
 
 namespace romap::importers {
@@ -24,6 +25,10 @@ absl::StatusOr<std::string> JsonText(const nlohmann::json& object, const std::st
 // All numbers of a list, or of a list of lists.
 absl::StatusOr<std::vector<double>> JsonNumbers(const nlohmann::json& object, const std::string& key,
                                                 const std::string& where);
+// The pinhole camera of the keys fx, fy, cx, cy and of those of its sides, e.g. "width" and "height"; the principal
+// point as in the file.
+absl::StatusOr<CameraModel> JsonCamera(const nlohmann::json& object, const std::string& width_key,
+                                       const std::string& height_key, const std::string& where);
 // A list of objects.
 absl::StatusOr<const nlohmann::json*> JsonObjects(const nlohmann::json& object, const std::string& key,
                                                   const std::string& where);

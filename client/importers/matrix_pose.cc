@@ -1,5 +1,7 @@
 #include "client/importers/matrix_pose.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -60,6 +62,12 @@ absl::StatusOr<std::vector<double>> ReadNumbers(const std::string& path) {
   std::vector<double> all;
   for (const std::vector<double>& line : lines) all.insert(all.end(), line.begin(), line.end());
   return all;
+}
+
+absl::StatusOr<std::optional<SE3<World, Camera>>> PoseOfLine(const std::vector<std::vector<double>>& lines, size_t line,
+                                                             const std::string& path) {
+  if (line >= lines.size()) return std::optional<SE3<World, Camera>>();
+  return PoseOfMatrix(lines[line], fmt::format("{}:{}", path, line + 1));
 }
 
 absl::StatusOr<std::optional<SE3<World, Camera>>> ReadMatrixPose(const std::string& path) {

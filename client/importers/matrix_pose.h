@@ -22,6 +22,10 @@ absl::StatusOr<std::vector<double>> ReadNumbers(const std::string& path);
 // The same by lines, without empty lines.
 absl::StatusOr<std::vector<std::vector<double>>> ReadNumberLines(const std::string& path);
 
+// The pose in one line of ReadNumberLines(path). nullopt: there is no such line, or no pose in it.
+absl::StatusOr<std::optional<SE3<World, Camera>>> PoseOfLine(const std::vector<std::vector<double>>& lines, size_t line,
+                                                             const std::string& path);
+
 // Reads a file with one matrix.
 absl::StatusOr<std::optional<SE3<World, Camera>>> ReadMatrixPose(const std::string& path);
 

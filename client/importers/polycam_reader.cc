@@ -33,13 +33,7 @@ std::optional<PolycamFolders> FindPolycamFolders(const std::string& source) {
 // The corner of the image is (0, 0). The camera has the axes of OpenGL.
 absl::Status ReadPolycamCamera(const std::string& path, RecordedFrame* frame) {
   ROMAP_ASSIGN_OR_RETURN(const nlohmann::json values, LoadJson(path));
-  CameraModel camera;
-  ROMAP_ASSIGN_OR_RETURN(camera.width_px, JsonSide(values, "width", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.height_px, JsonSide(values, "height", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.fx_px, JsonNumber(values, "fx", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.fy_px, JsonNumber(values, "fy", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.cx_px, JsonNumber(values, "cx", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.cy_px, JsonNumber(values, "cy", path));
+  ROMAP_ASSIGN_OR_RETURN(CameraModel camera, JsonCamera(values, "width", "height", path));
   camera.cx_px -= 0.5;
   camera.cy_px -= 0.5;
   frame->camera = camera;

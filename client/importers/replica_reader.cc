@@ -20,13 +20,7 @@ absl::Status ReadCameraParameters(const std::string& path, files::CameraYaml* ca
   ROMAP_ASSIGN_OR_RETURN(const nlohmann::json root, LoadJson(path));
   if (!root.contains("camera")) return InvalidArgument("{}: 'camera' is missing", path);
   const nlohmann::json& values = root["camera"];
-  CameraModel& camera = calibration->camera;
-  ROMAP_ASSIGN_OR_RETURN(camera.width_px, JsonSide(values, "w", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.height_px, JsonSide(values, "h", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.fx_px, JsonNumber(values, "fx", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.fy_px, JsonNumber(values, "fy", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.cx_px, JsonNumber(values, "cx", path));
-  ROMAP_ASSIGN_OR_RETURN(camera.cy_px, JsonNumber(values, "cy", path));
+  ROMAP_ASSIGN_OR_RETURN(calibration->camera, JsonCamera(values, "w", "h", path));
   ROMAP_ASSIGN_OR_RETURN(const double scale, JsonNumber(values, "scale", path));
   if (scale <= 0) return InvalidArgument("{}: 'scale' is {}; expected depth units per meter", path, scale);
   calibration->depth_scale = 1 / scale;
@@ -56,9 +50,7 @@ class ReplicaReader : public SequenceReader {
         SetDepth(depth, {}, contents.camera.camera, &frame);
       }
       const auto line = static_cast<size_t>(LastNumber(number).value_or(static_cast<int64_t>(lines.size())));
-      if (line >= lines.size()) continue;
-      ROMAP_ASSIGN_OR_RETURN(frame.T_world_camera,
-                             PoseOfMatrix(lines[line], fmt::format("{}:{}", trajectory, line + 1)));
+      ROMAP_ASSIGN_OR_RETURN(frame.T_world_camera, PoseOfLine(lines, line, trajectory));
     }
     SetTimesByRate(options, &contents);
     return contents;

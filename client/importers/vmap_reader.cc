@@ -75,9 +75,7 @@ class VmapReader : public SequenceReader {
       }
       SetInstances(source, *number, size_px, &frame);
       const auto line = static_cast<size_t>(*number);
-      if (line >= lines.size()) continue;
-      ROMAP_ASSIGN_OR_RETURN(frame.T_world_camera,
-                             PoseOfMatrix(lines[line], fmt::format("{}:{}", trajectory, line + 1)));
+      ROMAP_ASSIGN_OR_RETURN(frame.T_world_camera, PoseOfLine(lines, line, trajectory));
     }
     SetTimesByRate(options, &contents);
     return contents;

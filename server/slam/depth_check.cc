@@ -66,11 +66,11 @@ DepthCheck::Pair DepthCheck::Summarize(const std::vector<double>& log_ratios, co
 
 void DepthCheck::AddPair(const CameraModel& camera, const PoseCheck::AgreeingPair& pair, const cv::Mat& depth_mu) {
   const double baseline_mu = pair.T_second_first.translation().norm();
-  if (depth_mu.empty() || !(baseline_mu > 0)) return;
-  const Motion motion{pair.T_second_first.RotationMatrix(), pair.T_second_first.translation() / baseline_mu};
+  const std::optional<Motion> motion = pair.GivenMotion();
+  if (depth_mu.empty() || !motion) return;
   std::vector<double> log_ratios, log_lengths;
   for (const TwoViewMatch& match : pair.matches) {
-    const double log_ratio = LogDepthRatio(camera, motion, baseline_mu, match, depth_mu);
+    const double log_ratio = LogDepthRatio(camera, *motion, baseline_mu, match, depth_mu);
     if (!std::isfinite(log_ratio)) continue;
     log_ratios.push_back(log_ratio);
     log_lengths.push_back(std::log(camera.Unproject(match.second_px.x(), match.second_px.y()).norm()));

@@ -26,11 +26,10 @@ constexpr double kExactDistortionDistance = 1.6 / 640;
 }  // namespace
 
 void DistortionCheck::AddPair(const CameraModel& source_camera, const PoseCheck::AgreeingPair& pair) {
-  const double distance_mu = pair.T_second_first.translation().norm();
-  if (!source_camera.HasDistortion() || !(distance_mu > 0) || pair.matches.empty()) return;
+  const std::optional<Motion> motion = pair.GivenMotion();
+  if (!source_camera.HasDistortion() || !motion) return;
   camera_ = source_camera;
   const CameraModel pinhole = source_camera.Pinhole();
-  const Motion motion{pair.T_second_first.RotationMatrix(), pair.T_second_first.translation() / distance_mu};
   std::vector<TwoViewMatch> in_image = pair.matches;
   for (TwoViewMatch& match : in_image) {
     match.first_px = DistortPixel(source_camera, match.first_px);
@@ -38,8 +37,8 @@ void DistortionCheck::AddPair(const CameraModel& source_camera, const PoseCheck:
   }
   pairs_.push_back(
       {.first_frame_id = pair.first_frame_id,
-       .with = MedianEpipolarDistance_px(pinhole, motion, ToRays(pinhole, pair.matches)) / pinhole.width_px,
-       .without = MedianEpipolarDistance_px(pinhole, motion, ToRays(pinhole, in_image)) / pinhole.width_px});
+       .with = MedianEpipolarDistance_px(pinhole, *motion, ToRays(pinhole, pair.matches)) / pinhole.width_px,
+       .without = MedianEpipolarDistance_px(pinhole, *motion, ToRays(pinhole, in_image)) / pinhole.width_px});
   spdlog::debug("slam: the matches are {:.2f} px from their epipolar lines with the lens distortion, {:.2f} px without",
                 pairs_.back().with * pinhole.width_px, pairs_.back().without * pinhole.width_px);
   if (pairs_.size() > kDistortionWindowPairs) {

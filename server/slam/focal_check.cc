@@ -50,15 +50,14 @@ size_t IndexOf(double log_factor) {
 }  // namespace
 
 std::optional<FocalCheck::Pair> FocalCheck::Measure(const CameraModel& camera, const PoseCheck::AgreeingPair& pair) {
-  const double distance_mu = pair.T_second_first.translation().norm();
-  if (!(distance_mu > 0) || pair.matches.empty()) return std::nullopt;
-  const Motion motion{pair.T_second_first.RotationMatrix(), pair.T_second_first.translation() / distance_mu};
+  const std::optional<Motion> motion = pair.GivenMotion();
+  if (!motion) return std::nullopt;
   Pair measured{.first_frame_id = pair.first_frame_id, .distances = {}};
   for (const double factor : Factors()) {
     CameraModel scaled = camera;
     scaled.fx_px *= factor;
     scaled.fy_px *= factor;
-    measured.distances.push_back(MedianEpipolarDistance_px(scaled, motion, ToRays(scaled, pair.matches)) /
+    measured.distances.push_back(MedianEpipolarDistance_px(scaled, *motion, ToRays(scaled, pair.matches)) /
                                  camera.width_px);
   }
   const auto best = std::min_element(measured.distances.begin(), measured.distances.end());

@@ -81,6 +81,12 @@ Eigen::Vector3d RotationVector(const Eigen::Quaterniond& rotation) {
 
 }  // namespace
 
+std::optional<Motion> PoseCheck::AgreeingPair::GivenMotion() const {
+  const double distance_mu = T_second_first.translation().norm();
+  if (!(distance_mu > 0) || matches.empty()) return std::nullopt;
+  return Motion{T_second_first.RotationMatrix(), T_second_first.translation() / distance_mu};
+}
+
 std::optional<PoseCheck::AgreeingPair> PoseCheck::AddFrame(const std::shared_ptr<const FrameFeatures>& frame,
                                                            const SE3<World, Camera>& T_world_camera) {
   const CheckedFrame newest{frame, T_world_camera};

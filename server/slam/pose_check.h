@@ -10,6 +10,7 @@
 #include "common/stage_messages.h"
 #include "server/slam/body_rotation.h"
 #include "server/slam/frame_features.h"
+#include "server/slam/geometry/epipolar.h"
 #include "server/slam/geometry/two_view.h"
 #include "server/slam/pose_hypothesis.h"
 #include "server/slam/slam_config.h"
@@ -44,6 +45,9 @@ class PoseCheck {
     uint64_t first_frame_id = 0;
     SE3<Camera, Camera> T_second_first = {};
     std::vector<TwoViewMatch> matches = {};
+
+    // From the given poses. nullopt: the camera did not move, or there are no matches.
+    std::optional<Motion> GivenMotion() const;
   };
 
   explicit PoseCheck(const SlamConfig& config) : config_(config) {}

@@ -24,12 +24,11 @@ constexpr double kMinNoiseRatio = 2.5;  // of the distances for the given and fo
 }  // namespace
 
 void PoseNoise::AddPair(const CameraModel& camera, const PoseCheck::AgreeingPair& pair) {
-  const double distance_mu = pair.T_second_first.translation().norm();
-  if (!(distance_mu > 0) || pair.matches.empty()) return;
+  const std::optional<Motion> given = pair.GivenMotion();
+  if (!given) return;
   width_px_ = camera.width_px;
   const std::vector<RayMatch> rays = ToRays(camera, pair.matches);
-  const Motion given{pair.T_second_first.RotationMatrix(), pair.T_second_first.translation() / distance_mu};
-  Residuals residuals{.given = MedianEpipolarDistance_px(camera, given, rays) / camera.width_px};
+  Residuals residuals{.given = MedianEpipolarDistance_px(camera, *given, rays) / camera.width_px};
   residuals.best = residuals.given;
   if (residuals.given > kInexact) {
     const auto best = FindMotion(camera, rays, kNoiseIterations, config_.Seed(++pairs_seen_));
@@ -40,7 +39,7 @@ void PoseNoise::AddPair(const CameraModel& camera, const PoseCheck::AgreeingPair
     for (const PoseHypothesis& flip : FlipHypotheses()) {
       const CameraModel flipped = ReadCamera(flip, camera);
       const std::vector<RayMatch> flipped_rays = ToRays(flipped, pair.matches);
-      residuals.flipped.push_back(MedianEpipolarDistance_px(flipped, given, flipped_rays) / camera.width_px);
+      residuals.flipped.push_back(MedianEpipolarDistance_px(flipped, *given, flipped_rays) / camera.width_px);
     }
   }
   pairs_.push_back(residuals);
