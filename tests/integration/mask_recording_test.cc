@@ -109,6 +109,22 @@ TEST_F(MaskRecordingTest, AGripperWithoutAMaskDoesNotMoveTheMap) {
   EXPECT_LT(result.summary["evaluation"]["trajectory"]["ate_rmse_m"].get<double>(), 0.01) << result.process.out;
 }
 
+TEST_F(MaskRecordingTest, MasksOfOtherImagesAreNamed) {
+  std::vector<cv::Mat> masks;
+  for (const std::string& file : recording().Files("mask")) masks.push_back(cv::imread(file, cv::IMREAD_UNCHANGED));
+  recording().ChangeImages("mask", [&](const cv::Mat&, size_t k) { return masks[masks.size() - 1 - k]; });
+  EXPECT_THAT(Run().Codes(), Contains("masks_contradict_images"));
+}
+
+TEST_F(MaskRecordingTest, LateMasksAreNamed) {
+  std::vector<cv::Mat> masks;
+  for (const std::string& file : recording().Files("mask")) masks.push_back(cv::imread(file, cv::IMREAD_UNCHANGED));
+  recording().ChangeImages("mask", [&](const cv::Mat&, size_t k) { return masks[k < 4 ? 0 : k - 4]; });
+  const RunResult result = Run();
+  EXPECT_THAT(result.Codes(), Contains("masks_displaced"));
+  EXPECT_THAT(result.process.err + result.process.out, HasSubstr("4 frames before"));
+}
+
 TEST_F(MaskRecordingTest, TheValue255OfMasksIsIgnored) {
   recording().ChangeImages("mask", [](const cv::Mat& mask, size_t) {
     const cv::Mat before = ToLabels8(mask);

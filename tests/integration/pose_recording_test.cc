@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <utility>
 
 #include "tests/integration/recording_fixture.h"
 
@@ -150,6 +152,31 @@ TEST_F(PoseRecordingTest, DepthInAnotherUnit) {
   const RunResult result = Run({"--depth"});
   ExpectTheMap(result);
   EXPECT_THAT(result.Codes(), Contains("depth_contradicts_images"));
+}
+
+TEST_F(PoseRecordingTest, FlippedImages) {
+  for (const auto& [code, what] : {std::pair(1, "mirrored left to right"), std::pair(0, "mirrored top to bottom"),
+                                   std::pair(-1, "turned by 180 degrees")}) {
+    const testing_support::Recording flipped(recording().dir(), folder() / fmt::format("flipped{}", code));
+    for (const char* kind : {"rgb", "mask"}) {
+      flipped.ChangeImages(kind, [&](const cv::Mat& image, size_t) {
+        cv::Mat changed;
+        cv::flip(image, changed, code);
+        return changed;
+      });
+    }
+    const RunResult result = RunOn(flipped.dir(), {"--max-training", "1"});
+    EXPECT_EQ(result.objects(), 0u) << what;
+    EXPECT_THAT(result.Codes(), Contains("poses_contradict_images")) << what;
+    EXPECT_THAT(TerminalOf(result), HasSubstr(what));
+  }
+}
+
+TEST_F(PoseRecordingTest, ADistortionThatTheImagesDoNotHave) {
+  recording().Replace("camera.yaml", "^distortion:.*$", "distortion: [-0.4, 0, 0, 0, 0]");
+  const RunResult result = Run();
+  EXPECT_THAT(result.Codes(), Contains("calibration_contradicts_images"));
+  EXPECT_THAT(TerminalOf(result), HasSubstr("without distortion"));
 }
 
 }  // namespace romap::pose_recording_test

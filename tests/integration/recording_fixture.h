@@ -84,6 +84,7 @@ class RecordingTest : public ::testing::Test {
   void SetUp() override { recording_.emplace(SoundSequence(), folder_ / "recording"); }
 
   const testing_support::Recording& recording() const { return *recording_; }
+  const testing_support::TemporaryFolder& folder() const { return folder_; }
 
   // Replaces every pose of the sequence.
   template <class Change>

@@ -48,6 +48,34 @@ TEST(SessionLimitsTest, ASessionWithoutImagesHasNoUndistortionMaps) {
   EXPECT_LT(large->statistics.resident_bytes, first->statistics.resident_bytes + (size_t{60} << 20));
 }
 
+TEST(SessionLimitsTest, LiveSessionsAboveTheLoadAreRefused) {
+  ServerConfig config;
+  config.session.live_load = 1e-6;  // of all cores
+  LocalMappingService service(config);
+  SessionOptions options;
+  options.camera = testing_support::SmallCamera();
+  options.mode = FrameMode::kLive;
+  ASSERT_TRUE(service.CreateSession(options).ok());
+  const absl::Status refused = service.CreateSession(options).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(Message(refused), HasSubstr("the processor cannot take another live session: 1 of them"));
+  options.mode = FrameMode::kReplay;
+  EXPECT_TRUE(service.CreateSession(options).ok());
+}
+
+TEST(SessionLimitsTest, FinishedLiveSessionsNeedNoLoad) {
+  ServerConfig config;
+  config.session.live_load = 1e-6;
+  LocalMappingService service(config);
+  SessionOptions options;
+  options.camera = testing_support::SmallCamera();
+  options.mode = FrameMode::kLive;
+  const auto first = service.CreateSession(options);
+  ASSERT_TRUE(first.ok()) << first.status();
+  ASSERT_TRUE(service.FinishSession(first->id).ok());
+  EXPECT_TRUE(service.CreateSession(options).ok());
+}
+
 TEST(SessionLimitsTest, AnEmptySessionThatNobodyUsesIsDeleted) {
   ServerConfig config;
   config.session.abandon_after_s = 0.3;
