@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "common/angles.h"
@@ -27,8 +28,8 @@ constexpr double kMadToSigma = 1.4826;
 
 // With equal spreads there is no difference to see, e.g. in a narrow view or with noisy depths.
 constexpr size_t kMinRayPairs = 6;
-constexpr double kMaxRaySpreadRatio = 0.8;  // of the spreads along the ray and along the axis
-constexpr double kAlongRayShare = 0.8;      // of the pairs
+constexpr double kMaxRaySpreadRatio = 0.85;  // of the spreads along the ray and along the axis, median of the pairs
+constexpr double kAlongRayShare = 0.8;       // of the pairs have less spread along the ray
 
 // NaN: no depth at the pixel, or the point is not usable.
 double LogDepthRatio(const CameraModel& camera, const Motion& motion, double baseline_mu, const TwoViewMatch& match,
@@ -100,10 +101,15 @@ std::optional<double> DepthCheck::FindFactor() const {
 }
 
 bool DepthCheck::FitsBetterAlongRay() const {
+  if (pairs_.size() < kMinRayPairs) return false;
   size_t fitting = 0;
-  for (const Pair& pair : pairs_) fitting += pair.ray_spread < kMaxRaySpreadRatio * pair.axis_spread ? 1 : 0;
-  return pairs_.size() >= kMinRayPairs &&
-         static_cast<double>(fitting) >= kAlongRayShare * static_cast<double>(pairs_.size());
+  std::vector<double> ratios;
+  for (const Pair& pair : pairs_) {
+    fitting += pair.ray_spread < pair.axis_spread ? 1 : 0;
+    ratios.push_back(pair.ray_spread / std::max(pair.axis_spread, 1e-9));
+  }
+  return static_cast<double>(fitting) >= kAlongRayShare * static_cast<double>(pairs_.size()) &&
+         Median(std::move(ratios)) < kMaxRaySpreadRatio;
 }
 
 std::optional<Diagnostic> DepthCheck::Check() const {

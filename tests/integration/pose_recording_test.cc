@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "client/files/camera_yaml.h"
 #include "tests/integration/recording_fixture.h"
 
 namespace romap::pose_recording_test {
@@ -152,6 +153,23 @@ TEST_F(PoseRecordingTest, DepthInAnotherUnit) {
   const RunResult result = Run({"--depth"});
   ExpectTheMap(result);
   EXPECT_THAT(result.Codes(), Contains("depth_contradicts_images"));
+}
+
+TEST_F(PoseRecordingTest, DepthAlongTheRays) {
+  const CameraModel camera = files::ReadCameraYaml(recording().Path("camera.yaml"))->camera;
+  recording().ChangeImages("depth", [&](cv::Mat depth, size_t) {
+    for (int v = 0; v < depth.rows; ++v) {
+      for (int u = 0; u < depth.cols; ++u) {
+        auto& value = depth.at<uint16_t>(v, u);
+        value = cv::saturate_cast<uint16_t>(value * camera.Unproject(u, v).norm());
+      }
+    }
+    return depth;
+  });
+  const RunResult result = Run({"--depth"});
+  ExpectTheMap(result);
+  EXPECT_THAT(result.Codes(), Contains("depth_contradicts_images"));
+  EXPECT_THAT(TerminalOf(result), HasSubstr("along the viewing rays"));
 }
 
 TEST_F(PoseRecordingTest, FlippedImages) {
