@@ -1,7 +1,7 @@
 // The page of a session against a server that does what the test needs.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { objectOnScreen, openPage, until, viewState } from './support/browser.mjs';
+import { atRest, objectOnScreen, openPage, until, viewState } from './support/browser.mjs';
 import { ack, addMesh, objectUpdate, stripesPng } from './support/draco_scene.mjs';
 import { MockServer, statistics } from './support/mock_server.mjs';
 import { distDir } from './support/viewer_modules.mjs';
@@ -58,9 +58,8 @@ test('a live run grows from empty to finished', async (t) => {
   session.finish();
   await page.locator('.link-chip', { hasText: 'complete' }).waitFor();
   await page.locator('.top-bar .chip', { hasText: 'finished' }).waitFor();
-  const state = await viewState(page);
-  assert.equal(state.poses, 18);
-  assert.equal(state.points, 2);
+  await until(page, 'the points', () => window.romap.session.scene.points.count === 2);
+  assert.equal((await viewState(page)).poses, 18);
   await page.picture('live_finished');
   assert.deepEqual(page.problems, []);
   assert.deepEqual(page.foreign, []);
@@ -234,7 +233,7 @@ test('a phone shows the panel as a sheet with three heights', async (t) => {
   await until(page, ...meshesShown(4));
   const heights = [];
   for (let n = 0; n < 3; ++n) {
-    await page.waitForTimeout(300);
+    await atRest(page);
     heights.push((await page.locator('.panel').boundingBox()).height);
     await page.picture(`phone_${n}`);
     await page.locator('.panel .handle').click();

@@ -63,6 +63,15 @@ export async function until(page, what, done, argument, timeout = kWaitMs) {
   }
 }
 
+/** Waits for the end of all transitions. */
+export const atRest = (page) => page.evaluate(async () => {
+  const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+  await frame();
+  await frame();
+  const finite = document.getAnimations().filter((animation) => Number.isFinite(animation.effect.getComputedTiming().endTime));
+  await Promise.allSettled(finite.map((animation) => animation.finished));
+});
+
 /** Figures of the 3D view. Runs in the page. */
 export const viewState = (page) => page.evaluate(() => {
   const { scene, store, path: track } = window.romap.session;

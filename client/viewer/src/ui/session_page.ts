@@ -213,6 +213,7 @@ export class SessionPage implements Page {
     }
     if (status.kind === 'ended') {
       this.pollers.info.poke();
+      this.pollers.points.poke();
       this.pollers.trajectory.poke();
     }
     if (status.kind === 'gone') {
