@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -110,12 +111,13 @@ class ChartBuilder {
   // Adds a triangle to the neighboring chart with the most similar normal that it can be added to.
   bool AddToNeighbor(uint32_t face, uint32_t except) {
     std::array<std::pair<float, uint32_t>, 3> candidates;
+    candidates.fill({std::numeric_limits<float>::max(), kNoCluster});
     size_t count = 0;
     for (const uint32_t next : neighbors_[face]) {
       if (next == kNoFace || chart_of_[next] == kNoCluster || chart_of_[next] == except) continue;
       candidates[count++] = {-charts_[chart_of_[next]].chart.normal.dot(smooth_[face]), chart_of_[next]};
     }
-    std::sort(candidates.begin(), candidates.begin() + count);
+    std::sort(candidates.begin(), candidates.end());
     for (size_t i = 0; i < count; ++i) {
       if (TryAdd(face, candidates[i].second)) return true;
     }
