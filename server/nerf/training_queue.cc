@@ -9,9 +9,11 @@ namespace romap::nerf {
 TrainingQueue::TrainingQueue(const NerfConfig& config, int workers)
     : policy_(config, /*uses_clock=*/workers > 0), workers_(workers) {}
 
-TrainingSessionId TrainingQueue::AddSession(Sink sink) {
+TrainingSessionId TrainingQueue::AddSession(Sink sink, const TrainingOwner& owner) {
   auto session = std::make_unique<Session>();
   session->sink = std::move(sink);
+  session->owner = owner;
+  tenants_.try_emplace(owner.tenant);
   sessions_.emplace(next_session_, std::move(session));
   return next_session_++;
 }
@@ -28,7 +30,12 @@ const TrainingQueue::Session* TrainingQueue::FindSession(TrainingSessionId sessi
 
 std::unique_ptr<TrainingQueue::Session> TrainingQueue::ExtractSession(TrainingSessionId session) {
   auto node = sessions_.extract(session);
-  return node.empty() ? nullptr : std::move(node.mapped());
+  if (node.empty()) return nullptr;
+  const std::string& tenant = node.mapped()->owner.tenant;
+  if (std::ranges::none_of(sessions_, [&](const auto& entry) { return entry.second->owner.tenant == tenant; })) {
+    tenants_.erase(tenant);
+  }
+  return std::move(node.mapped());
 }
 
 void TrainingQueue::AddUpdate(TrainingSessionId session_id, ObjectViews update) {
@@ -52,37 +59,64 @@ std::shared_ptr<TrainingJob> TrainingQueue::RemoveObject(TrainingSessionId sessi
   return std::move(node.mapped());
 }
 
-std::optional<TrainingQueue::Lease> TrainingQueue::Next(Time now, std::optional<TrainingSessionId> only_session) {
-  Session* best_session = nullptr;
+// `runnable`: increased by the number of jobs that could be leased. Null: there is none.
+std::shared_ptr<TrainingJob> TrainingQueue::MostUrgentJob(const Session& session, Time now, int* runnable) const {
   std::shared_ptr<TrainingJob> best;
-  auto best_key = std::tuple(0, uint64_t{0}, std::pair(0.0, 0.0));
+  for (const auto& [object, job] : session.jobs) {
+    if (!policy_.IsRunnable(*job, session.finished, now)) continue;
+    ++*runnable;
+    if (!best || policy_.Urgency(*job) < policy_.Urgency(*best)) best = job;
+  }
+  return best;
+}
+
+void TrainingQueue::UpdateShares(const std::vector<Candidate>& candidates) {
+  std::set<std::string> waiting;  // tenants with candidates
+  for (const Candidate& candidate : candidates) {
+    tenants_.at(candidate.session->owner.tenant)
+        .among_sessions.Update(candidate.job != nullptr, &candidate.session->share);
+    if (candidate.job) waiting.insert(candidate.session->owner.tenant);
+  }
+  for (auto& [name, tenant] : tenants_) among_tenants_.Update(waiting.contains(name), &tenant.share);
+}
+
+double TrainingQueue::TenantClaim_s(const Session& session) const {
+  return FairShare::Claim_s(tenants_.at(session.owner.tenant).share);
+}
+
+std::optional<TrainingQueue::Lease> TrainingQueue::Next(Time now, std::optional<TrainingSessionId> only_session) {
+  std::vector<Candidate> candidates;
   int busy = 0;  // leased or runnable jobs
   for (const auto& [id, session] : sessions_) {
     if (session->closing || (only_session && id != *only_session)) continue;
     busy += session->leases;
-    for (const auto& [object, job] : session->jobs) {
-      if (!policy_.IsRunnable(*job, session->finished, now)) continue;
-      ++busy;
-      const auto key = std::tuple(session->leases, session->last_turn, policy_.Urgency(*job));
-      if (best && !(key < best_key)) continue;
-      best_session = session.get();
-      best = job;
-      best_key = key;
-    }
+    candidates.push_back({.session = session.get(), .job = MostUrgentJob(*session, now, &busy)});
   }
-  if (!best) return std::nullopt;
-  best->leased = true;
-  ++best_session->leases;
-  best_session->last_turn = ++turns_;
+  UpdateShares(candidates);
+  std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.job; });
+  if (candidates.empty()) return std::nullopt;
+  const Candidate& best = *std::ranges::min_element(candidates, {}, [&](const Candidate& candidate) {
+    const Session& session = *candidate.session;
+    return std::tuple(TenantClaim_s(session), FairShare::Claim_s(session.share), session.last_turn);
+  });
+  Session* session = best.session;
+  Tenant& tenant = tenants_.at(session->owner.tenant);
+  among_tenants_.BeginTurn(&tenant.share);
+  tenant.among_sessions.BeginTurn(&session->share);
+  best.job->leased = true;
+  ++session->leases;
+  session->last_turn = ++turns_;
   // If there are fewer jobs than workers, a job may use the cores of the idle workers.
   const int threads = std::max(1, workers_ / std::max(1, busy));
-  return Lease{best_session, best, std::exchange(best->pending_updates, {}),
-               policy_.IsComplete(*best, best_session->finished, now), threads};
+  return Lease{session, best.job, std::exchange(best.job->pending_updates, {}),
+               policy_.IsComplete(*best.job, session->finished, now), threads};
 }
 
-void TrainingQueue::Return(const Lease& lease) {
+void TrainingQueue::Return(const Lease& lease, double cost_s) {
   lease.job->leased = false;
   --lease.session->leases;
+  FairShare::EndTurn(cost_s, &lease.session->share);
+  FairShare::EndTurn(cost_s, &tenants_.at(lease.session->owner.tenant).share);
 }
 
 void TrainingQueue::Abandon(const Lease& lease) {
