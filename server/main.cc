@@ -17,12 +17,12 @@
 #include <variant>
 #include <vector>
 
+#include "common/build_info/build_info.h"
 #include "common/config.h"
 #include "common/exit_code.h"
 #include "common/host_port.h"
 #include "common/log_sink.h"
 #include "common/status.h"
-#include "common/version.h"
 #include "server/access/access_config.h"
 #include "server/access/authenticator.h"
 #include "server/access/token_command.h"
@@ -53,6 +53,7 @@ struct Config {
   http::HttpConfig http;
   access::AccessConfig access;
   std::string log_level = "info";
+  std::string log_format = "text";
   store::StoreConfig store;
   session::ServerConfig server;
 
@@ -69,6 +70,8 @@ struct Config {
                {.choices = {"trace", "debug", "info", "warning", "error", "critical", "off"},
                 .audience = Audience::kOperator,
                 .help = "Minimum severity of logged messages"});
+    fields.Add("format", &log_format,
+               {.choices = {"text", "json"}, .help = "json = an object per line, for programs that collect logs"});
     fields.Section("store");
     store.Fields(fields);
     server.Fields(fields);
@@ -118,7 +121,9 @@ std::variant<Flags, int> ParseFlags(int argc, char** argv) {
   app.add_flag("--expert", flags.expert, "With --dump-config: print all settings")->needs(dump);
   app.add_option("--log-level", log_level, "Minimum severity of logged messages. Same as --set log.level=LEVEL");
   app.add_option("--threads", threads, "Number of training threads. Same as --set nerf.training_threads=N");
-  app.set_version_flag("--version", fmt::format("romap-server {}", Version()));
+  bool verbose = false;
+  app.set_version_flag("--version", BuildInfo("romap-server", HasVerboseFlag(argc, argv)));
+  app.add_flag("--verbose", verbose, "With --version: also the versions of the libraries");
   access::TokenCommand token_command(&app, TokenFileOf);
   try {
     app.parse(argc, argv);
@@ -184,11 +189,12 @@ void RaiseFileLimit() {
   setrlimit(RLIMIT_NOFILE, &files);
 }
 
-void SetUpLogging(const std::string& level) {
+void SetUpLogging(const std::string& level, const std::string& format) {
   // Scripts read the address from standard output, so the log goes to standard error. A reader that ends must not end
   // the server.
   signal(SIGPIPE, SIG_IGN);
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>("romap-server", MakeLogSink(stderr)));
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "romap-server", MakeLogSink(stderr, format == "json" ? LogFormat::kJson : LogFormat::kText)));
   spdlog::set_level(spdlog::level::from_str(level));
   transport::RouteGrpcLogToSpdlog();
 }
@@ -246,7 +252,7 @@ int Main(int argc, char** argv) {
   }
 
   RaiseFileLimit();
-  SetUpLogging(config.log_level);
+  SetUpLogging(config.log_level, config.log_format);
   const sigset_t signals = BlockStopSignals();
   std::unique_ptr<store::Store> store;
   if (!config.store.ephemeral) {

@@ -8,11 +8,11 @@
 
 #include "client/cli/command.h"
 #include "client/cli/interrupt.h"
+#include "common/build_info/build_info.h"
 #include "common/exit_code.h"
 #include "common/log_sink.h"
 #include "common/printable.h"
 #include "common/status.h"
-#include "common/version.h"
 
 namespace romap::cli {
 int RunCli(int argc, const char* const* argv) {
@@ -22,7 +22,9 @@ int RunCli(int argc, const char* const* argv) {
   app.require_subcommand(1);
   app.fallthrough();  // accept --log-level after the command too
   app.footer(kExitCodeHelp);
-  app.set_version_flag("--version", fmt::format("romap {}", Version()));
+  bool verbose = false;
+  app.set_version_flag("--version", BuildInfo("romap", HasVerboseFlag(argc, argv)));
+  app.add_flag("--verbose", verbose, "With --version: also the versions of the libraries");
   std::string log_level = "warning";
   app.add_option("--log-level", log_level, "Minimum severity of log messages on stderr")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))

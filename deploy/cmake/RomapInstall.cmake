@@ -5,6 +5,7 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS romap-server RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT server)
 install(FILES deploy/server.yaml DESTINATION ${CMAKE_INSTALL_DATADIR}/romap COMPONENT server)
+install(FILES ${CMAKE_BINARY_DIR}/romap.spdx.json DESTINATION ${CMAKE_INSTALL_DOCDIR}-server COMPONENT server)
 install(FILES deploy/systemd/romap-server.service DESTINATION lib/systemd/system COMPONENT server)
 install(TARGETS romap RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT client)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "common/log_context.h"
 #include "common/status.h"
 #include "common/thread_priority.h"
 
@@ -29,9 +30,9 @@ TrainingPool::~TrainingPool() {
   workers_.clear();
 }
 
-TrainingPool::SessionId TrainingPool::AddSession(Sink sink) {
+TrainingPool::SessionId TrainingPool::AddSession(Sink sink, const TrainingOwner& owner) {
   std::lock_guard lock(mutex_);
-  return queue_.AddSession(std::move(sink));
+  return queue_.AddSession(std::move(sink), owner);
 }
 
 void TrainingPool::RemoveSession(SessionId session_id) {
@@ -105,9 +106,11 @@ void TrainingPool::TrainSlices(SessionId session, int count) {
 // Runs the slice of a lease without the lock, then returns the lease.
 void TrainingPool::RunLease(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
+  const LogContext context(lease.session->owner.session_id);
   std::string failure;
+  double cost_s = 0;
   try {
-    RunSlice(lease);
+    cost_s = RunSlice(lease);
   } catch (const std::exception& e) {  // from a library, or out of memory: only this object is lost
     failure = e.what();
   }
@@ -116,12 +119,13 @@ void TrainingPool::RunLease(TrainingQueue::Lease& lease, std::unique_lock<std::m
     spdlog::error("{}: training failed; object abandoned: {}", lease.job->object.ToString(), failure);
     queue_.Abandon(lease);
   }
-  queue_.Return(lease);
+  queue_.Return(lease, cost_s);
   work_changed_.notify_one();
   lease_returned_.notify_all();
 }
 
-void TrainingPool::RunSlice(TrainingQueue::Lease& lease) {
+// Returns the CPU time of the training.
+double TrainingPool::RunSlice(TrainingQueue::Lease& lease) {
   TrainingJob& job = *lease.job;
   if (!job.field) job.field = std::make_unique<ObjectField>(config_, job.object, job.object.value);
   ObjectField& field = *job.field;
@@ -141,7 +145,7 @@ void TrainingPool::RunSlice(TrainingQueue::Lease& lease) {
     budget_used |= converged;  // if the time is used up, there is no later slice that could send the result
     if (job.removed || lease.session->closing || !queue_.policy().ShouldSend(job, budget_used, Clock::now())) {
       if (budget_used) field.ReleaseScratch();
-      return;
+      return stats.BusySeconds();
     }
     job.sent_steps = job.steps;
     job.sent_time = Clock::now();
@@ -150,6 +154,7 @@ void TrainingPool::RunSlice(TrainingQueue::Lease& lease) {
   snapshot.converged = converged;
   if (budget_used) field.ReleaseScratch();
   lease.session->sink(std::move(snapshot));
+  return stats.BusySeconds();
 }
 
 void TrainingPool::ApplyUpdate(ObjectField& field, ObjectViews update) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -37,7 +38,7 @@ class TrainingPool {
   TrainingPool& operator=(const TrainingPool&) = delete;
 
   // Adds a session and returns its id. Calls with an unknown id have no effect.
-  SessionId AddSession(Sink sink);
+  SessionId AddSession(Sink sink, const TrainingOwner& owner = {});
   // Waits until no slice of the session runs and no call of its sink is in progress; none follows.
   void RemoveSession(SessionId session);
 
@@ -59,7 +60,7 @@ class TrainingPool {
  private:
   void RunWorker();
   void RunLease(TrainingQueue::Lease& lease, std::unique_lock<std::mutex>& lock);
-  void RunSlice(TrainingQueue::Lease& lease);
+  double RunSlice(TrainingQueue::Lease& lease);
   static void ApplyUpdate(ObjectField& field, ObjectViews update);
   TrainStats TrainField(ObjectField& field, const TrainingQueue::Lease& lease) const;
   void UpdateJob(TrainingJob& job, const TrainStats& stats) const;

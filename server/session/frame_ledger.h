@@ -28,6 +28,8 @@ class FrameLedger {
   FrameLedger(std::string session_id, MapState* map, ServiceCounters* counters = nullptr)
       : session_id_(std::move(session_id)), map_(map), counters_(counters) {}
 
+  const std::string& session_id() const { return session_id_; }
+
   void CountReceived(bool is_frame);
 
   // The acknowledgement of an accepted input.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/log_context.h"
 #include "common/status.h"
 #include "common/thread_priority.h"
 #include "server/session/mesh_encoding.h"
@@ -24,16 +25,16 @@ Mesher::~Mesher() {
   if (thread_.joinable()) thread_.join();
 }
 
-Mesher::SessionId Mesher::AddSession(Sink sink) {
+Mesher::SessionId Mesher::AddSession(Sink sink, const std::string& session_id) {
   std::lock_guard lock(mutex_);
   const SessionId session = next_session_++;
-  sinks_[session] = std::move(sink);
+  receivers_[session] = {std::move(sink), session_id};
   return session;
 }
 
 void Mesher::RemoveSession(SessionId session) {
   std::unique_lock lock(mutex_);
-  sinks_.erase(session);
+  receivers_.erase(session);
   last_offer_.erase(session);
   std::erase_if(waiting_, [&](const auto& entry) { return entry.first.first == session; });
   changed_.wait(lock, [&] { return busy_session_ != session; });
@@ -41,11 +42,11 @@ void Mesher::RemoveSession(SessionId session) {
 
 void Mesher::Offer(SessionId session, FieldSnapshot snapshot) {
   std::unique_lock lock(mutex_);
-  if (!sinks_.contains(session)) return;
+  if (!receivers_.contains(session)) return;
   if (threading_ == Threading::kCaller) {
-    const Sink sink = sinks_.at(session);
+    const Receiver receiver = receivers_.at(session);
     lock.unlock();
-    MakeMesh(sink, snapshot);
+    MakeMesh(receiver, snapshot);
     return;
   }
   WaitingSnapshot& slot = waiting_[{session, snapshot.object}];
@@ -69,10 +70,11 @@ bool Mesher::IsIdle(SessionId session) const {
                                                   [&](const auto& entry) { return entry.first.first == session; });
 }
 
-void Mesher::MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const {
+void Mesher::MakeMesh(const Receiver& receiver, const FieldSnapshot& snapshot) const {
+  const LogContext context(receiver.session_id);
   try {
     if (auto mesh = MakeMeshUpdate(snapshot, config_); mesh.ok()) {
-      sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
+      receiver.sink(*std::move(mesh), {snapshot.T_world_object, snapshot.S_new_first});
     } else {
       // Normal early in training, when the field has no surface yet. A later snapshot will have one.
       spdlog::debug("{}: no mesh after {} steps: {}", snapshot.object.ToString(), snapshot.steps,
@@ -111,11 +113,11 @@ void Mesher::Run() {
       continue;
     }
     busy_session_ = oldest->first.first;
-    const Sink sink = sinks_.at(busy_session_);
+    const Receiver receiver = receivers_.at(busy_session_);
     const FieldSnapshot snapshot = std::move(oldest->second.snapshot);
     waiting_.erase(oldest);
     lock.unlock();
-    MakeMesh(sink, snapshot);
+    MakeMesh(receiver, snapshot);
     lock.lock();
     busy_session_ = 0;
     changed_.notify_all();

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -42,7 +43,8 @@ class Mesher {
   Mesher(const mesh::MeshConfig& config, Threading threading, Waits waits);
   ~Mesher();
 
-  SessionId AddSession(Sink sink);
+  // `session_id`: for the log.
+  SessionId AddSession(Sink sink, const std::string& session_id = "");
   // Waits for a running call of this session's sink; none follows.
   void RemoveSession(SessionId session);
   // Calls with the id of a removed session have no effect.
@@ -61,18 +63,22 @@ class Mesher {
     FieldSnapshot snapshot;
   };
   using Waiting = std::map<Key, WaitingSnapshot>;
+  struct Receiver {
+    Sink sink;
+    std::string session_id;
+  };
 
   void Run();
   Clock::time_point DueTime(const Waiting::value_type& entry) const;
   Waiting::iterator FirstDue();
-  void MakeMesh(const Sink& sink, const FieldSnapshot& snapshot) const;
+  void MakeMesh(const Receiver& receiver, const FieldSnapshot& snapshot) const;
 
   const mesh::MeshConfig config_;
   const Threading threading_;
   const Waits waits_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::map<SessionId, Sink> sinks_;
+  std::map<SessionId, Receiver> receivers_;
   std::map<SessionId, Clock::time_point> last_offer_;
   Waiting waiting_;
   SessionId next_session_ = 1;

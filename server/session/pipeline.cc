@@ -189,10 +189,11 @@ Pipeline::Pipeline(const SessionOptions& options, const ServerConfig& config, ne
       sparse_mapper_(config.slam, &local_map_, BackgroundWork(options.mode, config.session),
                      {.direction_world = options.up_world, .estimate = options.estimate_up}),
       object_mapper_(config.objects) {
-  mesher_session_ =
-      mesher_->AddSession([this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); });
+  mesher_session_ = mesher_->AddSession(
+      [this](MeshUpdate mesh, const MeshPose& pose) { PublishMesh(std::move(mesh), pose); }, ledger_->session_id());
   try {
-    pool_session_ = pool_->AddSession([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); });
+    pool_session_ = pool_->AddSession([this](FieldSnapshot snapshot) { MeshField(std::move(snapshot)); },
+                                      {.session_id = ledger_->session_id(), .tenant = options.tenant});
   } catch (...) {
     mesher_->RemoveSession(mesher_session_);
     throw;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/log_context.h"
 #include "common/thread_time.h"
 
 namespace romap::session {
@@ -24,8 +25,8 @@ bool IsResent(const SessionInput& input) {
 
 }  // namespace
 
-Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger,
-                     Callbacks callbacks)
+Scheduler::Scheduler(const std::string& session_id, const SessionConfig& config, FrameMode mode, Pipeline* pipeline,
+                     FrameLedger* ledger, Callbacks callbacks)
     : config_(config),
       mode_(mode),
       pipeline_(pipeline),
@@ -34,13 +35,19 @@ Scheduler::Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipe
       inputs_(config.frame_queue),
       checked_(kCheckedQueue),
       steps_(config.mapping_queue) {
+  const auto start = [&](void (Scheduler::*run)()) {
+    return std::thread([this, run, session_id] {
+      const LogContext context(session_id);
+      (this->*run)();
+    });
+  };
   try {
     if (config_.single_thread) {
-      tracking_thread_ = std::thread([this] { RunSingleThread(); });
+      tracking_thread_ = start(&Scheduler::RunSingleThread);
     } else {
-      ingest_thread_ = std::thread([this] { RunIngest(); });
-      tracking_thread_ = std::thread([this] { RunTracking(); });
-      mapping_thread_ = std::thread([this] { RunMapping(); });
+      ingest_thread_ = start(&Scheduler::RunIngest);
+      tracking_thread_ = start(&Scheduler::RunTracking);
+      mapping_thread_ = start(&Scheduler::RunMapping);
     }
   } catch (...) {  // the process has no more threads or memory
     Stop();

@@ -42,7 +42,9 @@ class Scheduler {
 
   // Starts the threads. Throws std::system_error if one of them cannot be started. `pipeline` and `ledger` outlive the
   // scheduler.
-  Scheduler(const SessionConfig& config, FrameMode mode, Pipeline* pipeline, FrameLedger* ledger, Callbacks callbacks);
+  // Log messages of the threads name the session.
+  Scheduler(const std::string& session_id, const SessionConfig& config, FrameMode mode, Pipeline* pipeline,
+            FrameLedger* ledger, Callbacks callbacks);
   ~Scheduler() { Stop(); }
 
   // Queues an input. False after CloseInputs() or a failure.

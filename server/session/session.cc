@@ -39,7 +39,7 @@ Session::Session(std::string id, const SessionOptions& options, int64_t created_
                                  : std::make_unique<SessionStorage>(store_, id_, options.mode, StoreListener())),
       pipeline_(options, config, services.pool, services.mesher, &map_, &ledger_, &diagnostics_,
                 [this](const SessionInput& input) { OnAccepted(input); }),
-      scheduler_(config.session, options.mode, &pipeline_, &ledger_, SchedulerCallbacks()) {}
+      scheduler_(id_, config.session, options.mode, &pipeline_, &ledger_, SchedulerCallbacks()) {}
 
 Session::Session(std::string id, const SessionOptions& options, int64_t created_unix_ns, const ServerConfig& config,
                  const Services& services, std::unique_ptr<wire::RecordingWriter> recorder)

@@ -8,7 +8,10 @@
 
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
+
+#include "common/log_context.h"
 
 namespace romap::log_sink_test {
 
@@ -49,6 +52,41 @@ TEST_F(LogSinkTest, EscapesControlCharacters) {
   logger_->info("name {}", "\x1b[2J\nfake");
   const std::string line = Read();
   EXPECT_THAT(line, EndsWith("] [test] [info] name \\x1b[2J\\nfake\n"));
+}
+
+TEST_F(LogSinkTest, MessagesNameTheSessionOfTheThread) {
+  {
+    const LogContext outer("a1");
+    logger_->info("tracking lost");
+    const LogContext inner("b2");
+    logger_->info("session c3: deleted");
+  }
+  logger_->info("ready");
+  const std::string lines = Read();
+  EXPECT_THAT(lines, HasSubstr("] session a1: tracking lost\n"));
+  EXPECT_THAT(lines, HasSubstr("] session c3: deleted\n"));
+  EXPECT_THAT(lines, EndsWith("] ready\n"));
+}
+
+TEST_F(LogSinkTest, JsonHasAnObjectPerLine) {
+  logger_ = std::make_unique<spdlog::logger>("test", MakeLogSink(file_, LogFormat::kJson));
+  const LogContext context("a1");
+  logger_->warn("tracking \"lost\"\n\xff\x1b[2J");
+  logger_->info("session c3: deleted");
+  logger_->info(std::string(9000, '\x01'));
+  std::istringstream lines(Read());
+  std::vector<nlohmann::json> messages;
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LT(line.size(), 4096u);
+    messages.push_back(nlohmann::json::parse(line));
+  }
+  ASSERT_EQ(messages.size(), 3u);
+  EXPECT_EQ(messages[0]["message"], "tracking \"lost\"\n\ufffd\x1b[2J");
+  EXPECT_EQ(messages[0]["level"], "warning");
+  EXPECT_EQ(messages[0]["session"], "a1");
+  EXPECT_THAT(messages[0]["time"].get<std::string>(), ::testing::MatchesRegex("....-..-..T..:..:..\\....Z"));
+  EXPECT_EQ(messages[1]["session"], "c3");
+  EXPECT_EQ(messages[1]["message"], "deleted");
 }
 
 TEST_F(LogSinkTest, APipeThatNobodyReadsDropsMessages) {
