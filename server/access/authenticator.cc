@@ -11,6 +11,13 @@ bool Authenticator::NeedsToken() const {
   return had_tokens_;
 }
 
+std::shared_ptr<TenantLimits> Authenticator::LimitsOf(const std::string& tenant) const {
+  std::lock_guard lock(mutex_);
+  std::shared_ptr<TenantLimits>& limits = limits_[tenant];
+  if (!limits) limits = std::make_shared<TenantLimits>(config_);
+  return limits;
+}
+
 absl::StatusOr<Caller> Authenticator::Authenticate(std::string_view authorization) const {
   constexpr std::string_view kScheme = "Bearer ";
   if (!NeedsToken()) {
@@ -27,10 +34,10 @@ absl::StatusOr<Caller> Authenticator::Authenticate(std::string_view authorizatio
   std::optional<Identity> identity = tokens_.Find(token);
   if (!identity) return absl::UnauthenticatedError("the token is not valid: it is unknown or was revoked");
   const bool is_admin = identity->role == Role::kAdmin;
-  return Caller{
-      .service = std::make_shared<TenantService>(service_, *std::move(identity), config_.max_sessions_per_tenant),
-      .is_valid = [this, token = std::move(token)] { return tokens_.Find(token).has_value(); },
-      .is_admin = is_admin};
+  std::shared_ptr<TenantLimits> limits = LimitsOf(identity->tenant);
+  return Caller{.service = std::make_shared<TenantService>(service_, *std::move(identity), std::move(limits)),
+                .is_valid = [this, token = std::move(token)] { return tokens_.Find(token).has_value(); },
+                .is_admin = is_admin};
 }
 
 }  // namespace romap::access

@@ -4,12 +4,15 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 
 #include "common/mapping_service.h"
 #include "server/access/access_config.h"
+#include "server/access/tenant_limits.h"
 #include "server/access/token_store.h"
 
 namespace romap::access {
@@ -35,10 +38,14 @@ class Authenticator {
   absl::StatusOr<Caller> Authenticate(std::string_view authorization) const;
 
  private:
+  std::shared_ptr<TenantLimits> LimitsOf(const std::string& tenant) const;
+
   MappingService* const service_;
   const AccessConfig config_;
   const TokenStore tokens_;
   mutable std::atomic<bool> had_tokens_ = false;
+  mutable std::mutex mutex_;
+  mutable std::map<std::string, std::shared_ptr<TenantLimits>> limits_;  // by tenant; guarded by mutex_
 };
 
 }  // namespace romap::access

@@ -4,9 +4,28 @@
 #include <utility>
 
 #include "common/status.h"
+#include "server/access/tenant_stream.h"
 #include "server/access/token_store.h"
 
 namespace romap::access {
+namespace {
+
+// RESOURCE_EXHAUSTED: the sessions of the tenant need more on the disk. `max_bytes`: 0 = no limit.
+absl::Status CheckStoredBytes(MappingService& service, const std::string& tenant, double max_bytes) {
+  if (max_bytes <= 0) return absl::OkStatus();
+  ROMAP_ASSIGN_OR_RETURN(const std::vector<SessionInfo> sessions, service.ListSessions());
+  double stored_bytes = 0;
+  for (const SessionInfo& info : sessions) {
+    if (info.tenant == tenant) stored_bytes += static_cast<double>(info.stored_bytes);
+  }
+  if (stored_bytes < max_bytes) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      fmt::format("the sessions of the tenant {} need {:.2f} GiB on the disk, and {:.2f} GiB are allowed "
+                  "(access.max_stored_gib_per_tenant); delete sessions first",
+                  tenant, stored_bytes / 0x1p30, max_bytes / 0x1p30));
+}
+
+}  // namespace
 
 absl::Status TenantService::CheckRole(Role needed, const char* call) const {
   if (identity_.role >= needed) return absl::OkStatus();
@@ -33,7 +52,7 @@ absl::Status TenantService::CheckRoomForSession() {
     return info.tenant == identity_.tenant && info.state != SessionState::kFinished &&
            info.state != SessionState::kFailed;
   });
-  if (open < max_sessions_) return absl::OkStatus();
+  if (open < limits_->max_sessions) return CheckStoredBytes(*service_, identity_.tenant, limits_->max_stored_bytes);
   return absl::ResourceExhaustedError(
       fmt::format("the tenant {} has {} open sessions, as many as it may have (access.max_sessions_per_tenant); finish "
                   "or delete one first",
@@ -73,7 +92,12 @@ absl::Status TenantService::DeleteSession(const std::string& session_id) {
 absl::StatusOr<std::unique_ptr<MapStream>> TenantService::OpenMap(const std::string& session_id,
                                                                   const std::string& resume_token) {
   ROMAP_RETURN_IF_ERROR(CheckSession(Role::kOwner, "Map", session_id));
-  return service_->OpenMap(session_id, resume_token);
+  const auto check_room = [service = service_, tenant = identity_.tenant, max_bytes = limits_->max_stored_bytes] {
+    return CheckStoredBytes(*service, tenant, max_bytes);
+  };
+  ROMAP_RETURN_IF_ERROR(check_room());
+  ROMAP_ASSIGN_OR_RETURN(std::unique_ptr<MapStream> stream, service_->OpenMap(session_id, resume_token));
+  return std::make_unique<TenantStream>(std::move(stream), limits_, check_room);
 }
 
 absl::StatusOr<std::unique_ptr<EventStream>> TenantService::Watch(const std::string& session_id) {

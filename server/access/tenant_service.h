@@ -6,6 +6,7 @@
 
 #include "common/mapping_service.h"
 #include "server/access/identity.h"
+#include "server/access/tenant_limits.h"
 
 namespace romap::access {
 
@@ -14,9 +15,9 @@ namespace romap::access {
 // exist: NOT_FOUND.
 class TenantService : public MappingService {
  public:
-  // `service` outlives this object. `max_sessions`: that the tenant may have at a time.
-  TenantService(MappingService* service, Identity identity, int max_sessions)
-      : service_(service), identity_(std::move(identity)), max_sessions_(max_sessions) {}
+  // `service` outlives this object and its streams. `limits`: of the tenant.
+  TenantService(MappingService* service, Identity identity, std::shared_ptr<TenantLimits> limits)
+      : service_(service), identity_(std::move(identity)), limits_(std::move(limits)) {}
 
   absl::StatusOr<SessionInfo> CreateSession(const SessionOptions& options) override;
   absl::StatusOr<std::vector<SessionInfo>> ListSessions() override;
@@ -45,7 +46,7 @@ class TenantService : public MappingService {
 
   MappingService* const service_;
   const Identity identity_;
-  const int max_sessions_;
+  const std::shared_ptr<TenantLimits> limits_;
 };
 
 }  // namespace romap::access

@@ -22,6 +22,11 @@ class AuthenticatorTest : public ::testing::Test {
     const std::string token = tokens_.Create("a", tenant, role).value();
     return authenticator_.Authenticate("Bearer " + token).value().service;
   }
+  static AccessConfig TwoSessions() {
+    AccessConfig config;
+    config.max_sessions_per_tenant = 2;
+    return config;
+  }
   static std::string NewSession(MappingService& service) {
     return service.CreateSession({.name = "", .camera = SmallCamera()}).value().id;
   }
@@ -30,7 +35,7 @@ class AuthenticatorTest : public ::testing::Test {
   std::string path_ = folder_ / "tokens.json";
   testing_support::FakeMappingService fake_;
   TokenStore tokens_{path_};
-  Authenticator authenticator_{&fake_, path_, {.token_file = "", .max_sessions_per_tenant = 2}};
+  Authenticator authenticator_{&fake_, path_, TwoSessions()};
 };
 
 TEST_F(AuthenticatorTest, WithoutTokensEverybodyMayDoEverything) {
