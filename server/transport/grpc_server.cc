@@ -9,13 +9,16 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "common/host_port.h"
 #include "common/status.h"
 #include "server/transport/call_host.h"
 #include "server/transport/listener.h"
+#include "server/transport/malformed_requests.h"
 #include "server/transport/mapping_rpcs.h"
 #include "server/transport/tls_files.h"
 
@@ -74,6 +77,9 @@ class GrpcServer::Impl {
     using FromListener = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
     acceptor_ = builder.experimental().AddExternalConnectionAcceptor(FromListener::FROM_FD, credentials);
     builder.RegisterService(&rpcs_);
+    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+    interceptors.push_back(std::make_unique<MalformedRequests>());
+    builder.experimental().SetInterceptorCreators(std::move(interceptors));
     server_ = builder.BuildAndStart();
     if (!server_) return absl::UnavailableError("gRPC cannot start a server");
     address_ = fmt::format("{}:{}", address->host, listener_->port());
