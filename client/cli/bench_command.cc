@@ -3,10 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "client/bench/load_bench.h"
 #include "client/bench/paper_bench.h"
 #include "client/cli/command.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress.h"
+#include "client/cli/sequence_arguments.h"
+#include "client/cli/service_options.h"
+#include "client/files/text_file.h"
 #include "common/status.h"
 
 namespace romap::cli {
@@ -80,12 +84,64 @@ void AddPaperSubcommand(CLI::App& app, Command* chosen) {
   command->callback([options, chosen] { *chosen = [options] { return RunBench(*options); }; });
 }
 
+struct LoadCommand {
+  bench::LoadOptions load;
+  SequenceArguments sequence;
+  ServiceOptions service;
+  std::string json_file;
+};
+
+absl::Status RunLoad(const LoadCommand& command) {
+  ROMAP_ASSIGN_OR_RETURN(const files::Sequence sequence, command.sequence.Open());
+  ROMAP_ASSIGN_OR_RETURN(const std::unique_ptr<MappingService> service, command.service.Connect());
+  Progress progress("bench load");
+  ROMAP_ASSIGN_OR_RETURN(
+      const bench::LoadResults results,
+      bench::RunLoadBench(
+          sequence, *service, command.load,
+          [&](double fraction, const std::string& text) { progress.Show(fraction, text); }, Interrupted));
+  progress.Done();
+  fmt::print("{}", bench::ToText(results));
+  if (!command.json_file.empty()) ROMAP_RETURN_IF_ERROR(files::WriteFile(command.json_file, bench::ToJson(results)));
+  return Interrupted() ? absl::CancelledError("interrupted; these are the figures until then") : absl::OkStatus();
+}
+
+void AddLoadSubcommand(CLI::App& app, Command* chosen) {
+  auto options = std::make_shared<LoadCommand>();
+  CLI::App* command = app.add_subcommand(
+      "load", "Load a server with live clients and viewers, and measure latency, drops, fairness and memory");
+  options->sequence.AddSourceTo(*command);
+  options->service.AddTo(*command, /*offer_local=*/true);
+  bench::LoadOptions& load = options->load;
+  command->add_option("--clients", load.clients, "Number of clients, each with a session of its own")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--viewers", load.viewers, "Number of viewers that read all events")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
+  command->add_option("--stalled", load.stalled_viewers, "Number of viewers that never read")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
+  command->add_option("--rate", load.rate_hz, "Frames per second of each client")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command->add_option("--seconds", load.duration_s, "Duration; 1800 for a soak test")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  command->add_flag_callback(
+      "--no-poses", [&load] { load.pose_use = PoseUse::kIgnore; },
+      "Send no camera poses, so that the server tracks the cameras from the images");
+  command->add_option("--json", options->json_file, "Write all figures to this file");
+  command->callback([options, chosen] { *chosen = [options] { return RunLoad(*options); }; });
+}
+
 }  // namespace
 
 void AddBenchCommand(CLI::App& app, Command* chosen) {
   CLI::App* command = app.add_subcommand("bench", "Run benchmarks");
   command->require_subcommand(1);
   AddPaperSubcommand(*command, chosen);
+  AddLoadSubcommand(*command, chosen);
 }
 
 }  // namespace romap::cli
