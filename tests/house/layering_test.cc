@@ -39,6 +39,7 @@ std::vector<SourceFile> SourceFiles() {
 const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"common/", {"common/"}},
     {"common/wire/", {"common/", "romap/v1/"}},
+    {"common/build_info/", {"common/", "generated/"}},
     {"server/slam/", {"server/slam/", "common/"}},
     {"server/slam/features/", {"server/slam/features/", "server/slam/slam_config.h", "common/"}},
     {"server/slam/geometry/", {"server/slam/geometry/", "common/"}},
