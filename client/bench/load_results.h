@@ -51,10 +51,10 @@ struct ViewerLoad {
 struct LoadResults {
   double duration_s = 0;
   double rate_hz = 0;
-  std::vector<ClientLoad> clients;
-  std::vector<ViewerLoad> viewers;  // those that read
   int stalled_viewers = 0;
-  std::vector<MemorySample> memory;
+  std::vector<ClientLoad> clients = {};
+  std::vector<ViewerLoad> viewers = {};  // those that read
+  std::vector<MemorySample> memory = {};
 
   // Of the clients that got a session.
   double TrainingFairness() const;

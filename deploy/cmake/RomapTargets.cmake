@@ -143,14 +143,17 @@ function(romap_library name)
   endif()
 endfunction()
 
-# romap_tests(folder [SHARDS count] [MAY_SKIP filter] [LIBS targets...]): one GoogleTest program
+# romap_tests(folder [SHARDS count] [COST seconds] [MAY_SKIP filter] [LIBS targets...]): one GoogleTest program
 # `<folder with _>_test` of all *_test.cc in the current folder. It runs as `count` processes, each with its share of the
 # test cases, so that they run in parallel. A process per test case would spend more time on loading libraries than on
-# testing. Cases that may be skipped (a GoogleTest filter) are tests of their own, so that CTest shows it.
+# testing. CTest starts the most costly processes first. Cases that may be skipped (a GoogleTest filter) are tests of their own, so that CTest shows it.
 function(romap_tests name)
-  cmake_parse_arguments(ARG "" "SHARDS;MAY_SKIP" "LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "SHARDS;COST;MAY_SKIP" "LIBS" ${ARGN})
   if(NOT ARG_SHARDS)
     set(ARG_SHARDS 1)
+  endif()
+  if(NOT ARG_COST)
+    set(ARG_COST 1)
   endif()
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cc)
   if(NOT sources)
@@ -168,7 +171,7 @@ function(romap_tests name)
     math(EXPR index "${shard} - 1")
     set(test ${name}_test.${shard}_of_${ARG_SHARDS})
     add_test(NAME ${test} COMMAND ${name}_test --gtest_brief=1 --gtest_filter=-${ARG_MAY_SKIP})
-    set_tests_properties(${test} PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s}
+    set_tests_properties(${test} PROPERTIES TIMEOUT ${ROMAP_TEST_TIMEOUT_s} COST ${ARG_COST}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
   endforeach()
   if(ARG_MAY_SKIP)

@@ -39,7 +39,7 @@ class MalformedRequestsTest : public ::testing::Test {
 };
 
 TEST_F(MalformedRequestsTest, RequestsThatAreNoMessagesAreInvalid) {
-  for (const std::string& name : {"CreateSession", "GetSession", "DeleteSession", "PinSession", "Watch", "ExportMap"}) {
+  for (const std::string name : {"CreateSession", "GetSession", "DeleteSession", "PinSession", "Watch", "ExportMap"}) {
     const grpc::Status status = Call(name, "\xff\xff\xff\xff");
     EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << name;
     EXPECT_EQ(status.error_message(), "/romap.v1.Mapping/" + name + ": the request is not a valid message of its type");
