@@ -209,7 +209,7 @@ absl::StatusOr<LoadResults> RunLoadBench(const files::Sequence& sequence, Mappin
   }
   std::vector<std::unique_ptr<Client>> clients;
   std::vector<std::string> sessions;
-  LoadResults results{.rate_hz = options.rate_hz, .stalled_viewers = options.stalled_viewers};
+  LoadResults results{.duration_s = 0, .rate_hz = options.rate_hz, .stalled_viewers = options.stalled_viewers};
   const Clock::time_point start = Clock::now();
   const Clock::time_point end =
       start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.duration_s));

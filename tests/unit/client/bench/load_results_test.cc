@@ -39,7 +39,7 @@ TEST(LoadResultsTest, GrowthIgnoresTheFirstThird) {
 }
 
 TEST(LoadResultsTest, RefusedClientsAreShownAndDoNotCountForFairness) {
-  LoadResults results{.duration_s = 10, .rate_hz = 25};
+  LoadResults results{.duration_s = 10, .rate_hz = 25, .stalled_viewers = 0};
   results.clients.resize(3);
   results.clients[0].training_steps = results.clients[1].training_steps = 500;
   results.clients[2].refused = "the processor cannot take another live session";

@@ -27,7 +27,7 @@ class SchedulerTest : public PipelineFixture {
         .finished = [this] { finished_ = true; },
         .failed = [this](const char* stage,
                          const std::string& what) { failure_.set_value(std::string(stage) + ": " + what); }};
-    scheduler_ = std::make_unique<Scheduler>(config, mode, &pipeline_, &ledger_, std::move(callbacks));
+    scheduler_ = std::make_unique<Scheduler>("a", config, mode, &pipeline_, &ledger_, std::move(callbacks));
   }
 
   void ExpectAllFramesProcessed(bool single_thread) {
