@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -291,6 +292,12 @@ int Main(int argc, char** argv) {
   manager.reset();
   if (*page) (*page)->Shutdown();
   (*server)->Shutdown();
+  if (service.HasHangingSession()) {
+    // Its thread still uses the service.
+    service.StoreAll();
+    spdlog::error("ending without the threads that hang");
+    std::_Exit(kFailure);
+  }
   return 0;
 }
 

@@ -220,7 +220,12 @@ absl::Status LocalMappingService::DeleteSession(const std::string& session_id) {
       return NotFound("session '{}' does not exist", session_id);
     }
   }
-  if (session) session->Stop(NotFound("session '{}' was deleted", session_id));
+  if (session && session->hangs()) {
+    std::lock_guard lock(mutex_);
+    hanging_.push_back(session);
+  } else if (session) {
+    session->Stop(NotFound("session '{}' was deleted", session_id));
+  }
   if (store_) ROMAP_RETURN_IF_ERROR(store_->Remove(session_id));
   spdlog::info("session {}: deleted", session_id);
   return absl::OkStatus();
@@ -292,6 +297,22 @@ absl::StatusOr<CameraImage> LocalMappingService::NewestImage(const std::string& 
   return session->live_view().Image(max_side_px);
 }
 
+bool LocalMappingService::HasHangingSession() {
+  std::lock_guard lock(mutex_);
+  return !hanging_.empty() || std::ranges::any_of(sessions_, [](const auto& entry) { return entry.second->hangs(); });
+}
+
+void LocalMappingService::StoreAll() {
+  if (!store_) return;
+  std::map<std::string, std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    sessions = sessions_;
+  }
+  for (const auto& [id, session] : sessions) session->StoreChanges(/*complete=*/true);
+  if (const absl::Status status = store_->Flush(); !status.ok()) spdlog::error("store: {}", Message(status));
+}
+
 ServiceMetrics LocalMappingService::Metrics() const {
   ServiceMetrics metrics = counters_.Read();
   if (!store_) return metrics;
@@ -350,6 +371,7 @@ void LocalMappingService::KeepSessions() {
   while (!stopping_changed_.wait_for(lock, kPeriod, [&] { return stopping_; })) {
     lock.unlock();
     try {
+      CheckStages();
       DeleteAbandoned();
       if (store_) StoreChanges();
       const auto now = std::chrono::steady_clock::now();
@@ -362,6 +384,15 @@ void LocalMappingService::KeepSessions() {
     }
     lock.lock();
   }
+}
+
+void LocalMappingService::CheckStages() {
+  std::vector<std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    for (const auto& [id, session] : sessions_) sessions.push_back(session);
+  }
+  for (const auto& session : sessions) session->CheckStages();
 }
 
 void LocalMappingService::DeleteAbandoned() {
@@ -428,6 +459,7 @@ void LocalMappingService::Shelve(const std::string& session_id, std::shared_ptr<
   if (it == sessions_.end() || record == stored->end()) return;  // deleted meanwhile
   const bool is_open = session->state() == SessionState::kOpen;
   if (is_open && !session->IsIdle()) return;  // somebody uses it again
+  if (session->hangs()) hanging_.push_back(session);
   // Streams of an ended session keep it until they are closed.
   sessions_.erase(it);
   if (is_open) session->Stop(absl::UnavailableError("the session was unloaded; open the stream again"));

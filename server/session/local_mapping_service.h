@@ -50,6 +50,11 @@ class LocalMappingService : public MappingService {
 
   ServiceMetrics Metrics() const;
 
+  // A thread of a session hangs. Then the destructor does not return; the process must be ended without it.
+  bool HasHangingSession();
+  // Stores all changes and waits for the disk.
+  void StoreAll();
+
  private:
   // RESOURCE_EXHAUSTED: the processor cannot take another live session.
   absl::Status CheckLiveLoadLocked(const CameraModel& camera) const;
@@ -67,6 +72,7 @@ class LocalMappingService : public MappingService {
   // nobody uses on the shelf.
   void KeepSessions();
   void DeleteAbandoned();
+  void CheckStages();
   void StoreChanges();
   bool IsUnused(const std::string& session_id, const Session& session);
   void Shelve(const std::string& session_id, std::shared_ptr<Session> session);
@@ -80,7 +86,8 @@ class LocalMappingService : public MappingService {
   std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;  // in memory
   size_t sessions_in_creation_ = 0;
-  std::unique_ptr<SessionShelf> shelf_;  // null without a store
+  std::vector<std::shared_ptr<Session>> hanging_;  // that were deleted or shelved; they are never destroyed
+  std::unique_ptr<SessionShelf> shelf_;            // null without a store
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
   std::map<std::string, std::chrono::steady_clock::time_point> unused_since_;  // the keeper thread

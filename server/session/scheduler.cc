@@ -1,5 +1,7 @@
 #include "server/session/scheduler.h"
 
+#include <fmt/format.h>
+
 #include <exception>
 #include <optional>
 #include <utility>
@@ -117,6 +119,7 @@ void Scheduler::RunTracking() {
       if (stopping_) continue;
       const bool is_live = IsLive(input->arrival.input);
       Measure(is_live, [&] {
+        const StageWatch::Scope scope(&watch_, "tracking");
         pipeline_->Process(
             *input, [&](MappingStep step) { is_live ? ExecuteLive(std::move(step)) : ExecuteReplay(std::move(step)); });
       });
@@ -196,7 +199,10 @@ void Scheduler::RunStep(const QueuedStep& queued) {
   const MappingStep& step = queued.step;
   if (queued.is_live && step.is_keyframe) pipeline_->SetKeyframesWait(--keyframes_waiting_ > 0);
   if (queued.is_live && step.relocalizes) --lost_frames_waiting_;
-  if (!stopping_) Measure(queued.is_live, step.run);
+  if (!stopping_) {
+    const StageWatch::Scope scope(&watch_, "mapping");
+    Measure(queued.is_live, step.run);
+  }
   if (!queued.is_live && step.changes_local_map) {
     std::lock_guard lock(mutex_);
     --map_changes_waiting_;
@@ -225,6 +231,12 @@ void Scheduler::TrainToCompletion() {
     callbacks_.tick();
   }
   if (!stopping_) callbacks_.finished();
+}
+
+void Scheduler::Abandon(const StageHang& hang) {
+  stopping_ = true;  // a thread that goes on after all ends soon
+  Fail(hang.stage.c_str(), fmt::format("it did not end within {:.0f} s", hang.since_s));
+  EndMapping();
 }
 
 void Scheduler::Fail(const char* stage, const std::string& what) {

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -15,6 +16,7 @@
 #include "server/session/live_load.h"
 #include "server/session/pipeline.h"
 #include "server/session/session_config.h"
+#include "server/session/stage_watch.h"
 
 namespace romap::session {
 
@@ -54,6 +56,11 @@ class Scheduler {
   void EndRestoring() { restoring_ = false; }
   // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
+  // A stage that has run longer than `limit`, see StageWatch. Thread-safe.
+  std::optional<StageHang> FindHang(std::chrono::duration<double> limit) { return watch_.FindHang(limit); }
+  // Ends the processing as a failed stage does, without waiting for the threads. One of them hangs, so that Stop()
+  // would not return. Thread-safe.
+  void Abandon(const StageHang& hang);
   // Of the inputs of a live client.
   const LiveLoad& live_load() const { return live_load_; }
   // Ends and joins the threads without processing the waiting inputs or completing the training. Must not be called by
@@ -93,6 +100,7 @@ class Scheduler {
   const Callbacks callbacks_;
 
   LiveLoad live_load_;
+  StageWatch watch_;
   BoundedQueue<Arrival> inputs_;
   BoundedQueue<CheckedInput> checked_;
   BoundedQueue<QueuedStep> steps_;

@@ -218,6 +218,17 @@ void Session::OnFailed(const char* stage, const std::string& what) {
   map_.Close(Internal("session '{}': {}", id_, cause));
 }
 
+void Session::CheckStages() {
+  if (config_.stage_timeout_s <= 0 || hangs_) return;
+  const std::optional<StageHang> hang = scheduler_.FindHang(std::chrono::duration<double>(config_.stage_timeout_s));
+  if (!hang) return;
+  hangs_ = true;
+  stopping_ = true;
+  spdlog::error("session {}: {} hangs since {:.0f} s (session.stage_timeout_s), in {}", id_, hang->stage, hang->since_s,
+                hang->stack);
+  scheduler_.Abandon(*hang);
+}
+
 void Session::Stop(const absl::Status& status) {
   stopping_ = true;
   map_.Close(status);

@@ -82,6 +82,10 @@ class Session {
   void Finish();
   // Ends the threads without completing the training, and ends every stream with `status`. Called before deletion.
   void Stop(const absl::Status& status);
+  // Fails the session if one of its stages hangs (session.stage_timeout_s), and logs where.
+  void CheckStages();
+  // A thread of the session does not return: Stop() and the destructor would wait for it.
+  bool hangs() const { return hangs_; }
   // Stores what has changed. `complete`: also what is stored only now and then. Does nothing while it is restored.
   void StoreChanges(bool complete);
   void StoreState();
@@ -148,6 +152,7 @@ class Session {
   std::atomic<bool> finish_after_restoring_ = false;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> pinned_ = false;
+  std::atomic<bool> hangs_ = false;
   FrameLedger ledger_;
   DiagnosticLog diagnostics_;
   std::unique_ptr<SessionStorage> storage_;          // null: not stored

@@ -16,6 +16,7 @@ struct SessionConfig {
   double statistics_period_s = 0.5;
   double unload_after_s = 600;
   double abandon_after_s = 600;
+  double stage_timeout_s = 180;
   std::string record_dir;
   bool single_thread = false;
 
@@ -65,6 +66,13 @@ struct SessionConfig {
                 .min = 0,
                 .max = 1e6,
                 .help = "Time after which a session is deleted that got no frame and has no stream; 0 = never"});
+    fields.Add(
+        "stage_timeout_s", &stage_timeout_s,
+        {.unit = "s",
+         .min = 0,
+         .max = 1e6,
+         .help = "Time after which a stage that works on one frame counts as hanging, and its session as failed; "
+                 "0 = never"});
     fields.Add("record_dir", &record_dir,
                {.help = "Folder where the input of every session is recorded as <session id>.romaprec for romap "
                         "replay; empty = no recording"});

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -60,6 +61,32 @@ TEST_F(SchedulerTest, StopEndsWithoutFinishing) {
   EXPECT_FALSE(finished_);
   EXPECT_FALSE(scheduler_->Offer(testing_support::MakeFrame(1)));
   scheduler_->Stop();  // has no effect
+}
+
+// A callback on the mapping thread stands for a stage that does not return.
+TEST_F(SchedulerTest, AStageThatHangsIsFoundAndEndsTheProcessing) {
+  std::promise<void> mapping_begins, may_map, release;
+  bool is_first = true;
+  Start(FrameMode::kLive, /*single_thread=*/false, [&] {
+    if (!std::exchange(is_first, false)) return;
+    mapping_begins.set_value();
+    may_map.get_future().wait();
+  });
+  mapping_begins.get_future().wait();
+  EXPECT_TRUE(scheduler_->Offer(testing_support::MakeFrame(1)));
+  ledger_.WhenSettled([&] { release.get_future().wait(); });
+  may_map.set_value();
+  EXPECT_FALSE(scheduler_->FindHang(std::chrono::hours(1)));
+  std::optional<StageHang> hang;
+  EXPECT_TRUE(testing_support::Eventually(
+      [&] { return (hang = scheduler_->FindHang(std::chrono::milliseconds(50))).has_value(); }));
+  EXPECT_EQ(hang->stage, "mapping");
+  scheduler_->Abandon(*hang);
+  EXPECT_EQ(failure_.get_future().get(), "mapping: it did not end within 0 s");
+  EXPECT_FALSE(scheduler_->Offer(testing_support::MakeFrame(2)));
+  release.set_value();
+  scheduler_->Stop();
+  EXPECT_FALSE(finished_);
 }
 
 // The thread is blocked in the callback after the first frame while more frames arrive than the queue can hold.
