@@ -85,6 +85,13 @@ std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot) {
 
 void MapFileOptions::AddTo(CLI::App& command) {
   command.add_flag("--obj", obj, "Write an OBJ file with material and texture for each object, too");
+  command
+      .add_option("--as", formats,
+                  "Write the map for other tools, too: nerfstudio and colmap (images with the poses of the map, in "
+                  "OUT/dataset), kitti (OUT/trajectory_kitti.txt), usd (OUT/map.usda); several are separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"nerfstudio", "colmap", "kitti", "usd"}))
+      ->option_text("FORMAT,...");
 }
 
 absl::Status WriteMapFiles(const std::string& dir, const std::vector<MapObject>& objects,

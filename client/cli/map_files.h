@@ -33,7 +33,8 @@ std::vector<MapObject> DecodeObjects(const std::vector<ObjectSnapshot>& objects,
 std::vector<files::StampedPose> TrajectoryOf(const MapSnapshot& snapshot);
 
 struct MapFileOptions {
-  bool obj = false;  // OBJ files with material and texture, too
+  bool obj = false;                       // OBJ files with material and texture, too
+  std::vector<std::string> formats = {};  // of other tools, see WriteExports()
 
   void AddTo(CLI::App& command);
 };

@@ -9,8 +9,8 @@
 
 #include "client/cli/cuboid_outline.h"
 #include "client/cli/frame_image.h"
-#include "client/cli/mapped_frames.h"
 #include "client/cli/mesh_instance.h"
+#include "client/files/mapped_frames.h"
 #include "client/files/text_file.h"
 #include "client/pictures/pictures.h"
 
@@ -21,11 +21,11 @@ namespace fs = std::filesystem;
 constexpr size_t kCuboidFrames = 6;  // evenly spaced over the sequence
 
 // The frame in which the cuboid is largest; nullopt if it is never completely visible.
-std::optional<PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
-                                   const std::vector<PosedFrame>& frames) {
+std::optional<files::PosedFrame> BestView(const Cuboid& cuboid, const CameraModel& camera,
+                                          const std::vector<files::PosedFrame>& frames) {
   double best_area_px = 0;
-  std::optional<PosedFrame> best;
-  for (const PosedFrame& frame : frames) {
+  std::optional<files::PosedFrame> best;
+  for (const files::PosedFrame& frame : frames) {
     const auto outline = CuboidOutline(cuboid, camera, frame.T_world_camera);
     if (outline && outline->area() > best_area_px) {
       best_area_px = outline->area();
@@ -52,12 +52,12 @@ absl::Status WriteMapPictures(const std::string& dir, const files::Sequence& seq
   fs::remove_all(folder, error);
   ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder.string()));
 
-  const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
+  const std::vector<files::PosedFrame> frames = files::MappedFrames(sequence, trajectory);
   CameraModel camera = sequence.camera();
   std::vector<ObjectUpdate> updates;
   for (const MapObject& entry : objects) {
     updates.push_back(entry.object);
-    const std::optional<PosedFrame> view = BestView(entry.object.cuboid, camera, frames);
+    const std::optional<files::PosedFrame> view = BestView(entry.object.cuboid, camera, frames);
     if (!view) continue;
     ROMAP_ASSIGN_OR_RETURN(const FrameImage image, LoadFrameImage(sequence, view->index));
     ROMAP_RETURN_IF_ERROR(WriteImage(folder / (entry.file_stem + ".png"),
@@ -77,10 +77,10 @@ absl::Status WriteCuboidPictures(const std::string& folder, const files::Sequenc
                                  const std::vector<files::StampedPose>& trajectory,
                                  std::span<const ObjectUpdate> objects) {
   ROMAP_RETURN_IF_ERROR(files::MakeFolder(folder));
-  const std::vector<PosedFrame> frames = MappedFrames(sequence, trajectory);
+  const std::vector<files::PosedFrame> frames = files::MappedFrames(sequence, trajectory);
   const size_t count = std::min(kCuboidFrames, frames.size());
   for (size_t i = 0; i < count; ++i) {
-    const PosedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
+    const files::PosedFrame& frame = frames[(2 * i + 1) * frames.size() / (2 * count)];
     ROMAP_ASSIGN_OR_RETURN(FrameImage image, LoadFrameImage(sequence, frame.index));
     pictures::DrawCuboids(image.color_bgr, sequence.camera(), frame.T_world_camera, objects);
     const std::string name = fmt::format("cuboids_{:06d}.jpg", frame.index + 1);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/command.h"
+#include "client/cli/map_exports.h"
 #include "client/cli/map_files.h"
 #include "client/cli/map_pictures.h"
 #include "client/cli/run_stream.h"
@@ -123,6 +124,7 @@ absl::Status SaveMap(const RunOptions& options, const files::Sequence& sequence,
   const std::vector<MapObject> objects = DecodeObjects(ToSnapshots(collector), &faults);
   const std::vector<files::StampedPose> trajectory = result.trajectory.value_or(collector.Trajectory());
   ROMAP_RETURN_IF_ERROR(WriteMapFiles(options.out, objects, options.map_files));
+  ROMAP_RETURN_IF_ERROR(WriteExports(options.out, options.map_files.formats, objects, trajectory, &sequence));
   ROMAP_RETURN_IF_ERROR(files::WriteTrajectory((fs::path(options.out) / "trajectory.txt").string(), trajectory));
   RunSummary summary = Summarize(sequence, result, collector, objects);
   summary.faults.insert(summary.faults.end(), faults.begin(), faults.end());

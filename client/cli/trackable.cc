@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "client/cli/cuboid_outline.h"
-#include "client/cli/mapped_frames.h"
+#include "client/files/mapped_frames.h"
 #include "common/label_png.h"
 
 namespace romap::cli {
@@ -53,7 +53,7 @@ std::map<ObjectId, size_t> FirstTrackableFrames(const files::Sequence& sequence,
   std::map<ObjectId, size_t> first;
   std::map<ObjectId, std::vector<Eigen::Vector3d>>
       directions;  // unit vectors to the cameras of earlier frames in which the object was visible
-  for (const PosedFrame& frame : MappedFrames(sequence, trajectory)) {
+  for (const files::PosedFrame& frame : files::MappedFrames(sequence, trajectory)) {
     if (first.size() == objects.size()) break;
     const std::map<int, Region> regions = MaskRegions(sequence, frame.index);
     for (const MapObject& entry : objects) {

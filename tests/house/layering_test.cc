@@ -72,6 +72,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"server/main.cc", {"server/", "common/"}},
     {"client/files/", {"client/files/", "common/"}},
     {"client/importers/", {"client/importers/", "client/files/", "common/"}},
+    {"client/exports/", {"client/exports/", "client/files/", "common/"}},
     {"client/eval/", {"client/eval/", "client/files/", "common/"}},
     {"client/render/", {"client/render/", "common/"}},
     {"client/synth/", {"client/synth/", "client/render/", "client/files/", "common/"}},
@@ -153,6 +154,7 @@ std::string NamespaceOf(const std::string& path) {
       {"client/pictures/", "romap::pictures"},
       {"client/sdk/", "romap::client"},
       {"client/bench/", "romap::bench"},
+      {"client/exports/", "romap::exports"},
       {"client/cli/", "romap::cli"},
   };
   for (const auto& [folder, name] : kNamespaces) {

@@ -6,7 +6,7 @@
 #include "client/files/sequence.h"
 #include "client/files/tum.h"
 
-namespace romap::cli {
+namespace romap::files {
 
 struct PosedFrame {
   size_t index = 0;  // in the sequence
@@ -14,7 +14,6 @@ struct PosedFrame {
 };
 
 // The frames of a sequence that have a pose in `trajectory` (same timestamp), in order.
-std::vector<PosedFrame> MappedFrames(const files::Sequence& sequence,
-                                     const std::vector<files::StampedPose>& trajectory);
+std::vector<PosedFrame> MappedFrames(const Sequence& sequence, const std::vector<StampedPose>& trajectory);
 
-}  // namespace romap::cli
+}  // namespace romap::files
