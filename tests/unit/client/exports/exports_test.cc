@@ -25,7 +25,7 @@ using ::testing::Not;
 class ExportsTest : public ::testing::Test {
  protected:
   ExportsTest() {
-    testing_support::WriteTransformsLayout(testing_support::MakeSampleRecording(), folder_ / "in");
+    testing_support::WriteTransformsLayout(testing_support::MakeSample(), folder_ / "in");
     sequence_.emplace(Open(folder_ / "in"));
     for (size_t k = 0; k < sequence_->size(); k += 2) {
       const double angle = 0.2 + 0.1 * static_cast<double>(k);
