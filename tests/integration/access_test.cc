@@ -38,7 +38,7 @@ class AccessTest : public ::testing::Test {
   std::vector<std::string> ServerCommand(const std::string& address, std::vector<std::string> arguments = {}) {
     std::vector<std::string> command{ROMAP_SERVER, "--listen", address, "--http", "", "--data-dir", folder_ / "data"};
     command.insert(command.end(), arguments.begin(), arguments.end());
-    return integration::Quick(command);
+    return integration::WithLittleTraining(command);
   }
   ProcessResult Client(const std::string& command, std::vector<std::string> arguments) {
     std::vector<std::string> whole{ROMAP_CLIENT, command};

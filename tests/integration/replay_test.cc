@@ -53,7 +53,7 @@ class ReplayTest : public ::testing::Test {
         "run",   folder_ / "sequence", "--local",      "--set", "session.record_dir=" + (folder_ / "recordings"),
         "--out", folder_ / "map",      "--no-pictures"};
     arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
-    const testing_support::ProcessResult run = Romap(integration::Quick(arguments));
+    const testing_support::ProcessResult run = Romap(integration::WithLittleTraining(arguments));
     EXPECT_EQ(run.exit_code, 0) << run.err;
     const auto files = AllFiles(folder_ / "recordings");
     EXPECT_EQ(files.size(), 1U);
@@ -63,7 +63,7 @@ class ReplayTest : public ::testing::Test {
   void ExpectTwoEqualReplays(const std::string& recording) const {
     for (const char* out : {"first", "second"}) {
       const testing_support::ProcessResult replay =
-          Romap(integration::Quick({"replay", recording, "--out", folder_ / out}));
+          Romap(integration::WithLittleTraining({"replay", recording, "--out", folder_ / out}));
       ASSERT_EQ(replay.exit_code, 0) << replay.err;
       EXPECT_THAT(replay.out, HasSubstr("40 frames replayed"));
     }
@@ -93,7 +93,8 @@ TEST_F(ReplayTest, TwoReplaysWithLateMasksWriteTheSameBytes) {
 TEST_F(ReplayTest, ReplaysATruncatedRecordingUpToItsEnd) {
   const std::string recording = Record();
   fs::resize_file(recording, fs::file_size(recording) - 1000);
-  const testing_support::ProcessResult replay = Romap({"replay", recording, "--threads", "--out", folder_ / "out"});
+  const testing_support::ProcessResult replay =
+      Romap(integration::WithLittleTraining({"replay", recording, "--threads", "--out", folder_ / "out"}));
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
   EXPECT_THAT(replay.err, HasSubstr("the last record is truncated"));
   EXPECT_THAT(replay.out, HasSubstr("39 frames replayed"));

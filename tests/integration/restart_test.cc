@@ -33,10 +33,20 @@ class RestartTest : public ::testing::Test {
   }
   // The port of the first start is used again, because clients come back to it. The queue holds the whole sequence, so
   // that a slow machine drops no live frame.
-  void Start(const std::string& address) {
-    server_ = std::make_unique<BackgroundProcess>(
-        integration::Quick({ROMAP_SERVER, "--listen", address, "--http", "", "--data-dir", folder_ / "data", "--set",
-                            "session.frame_queue=64"}));
+  void Start(const std::string& address, bool little_training = false) {
+    const std::vector<std::string> command{ROMAP_SERVER,
+                                           "--listen",
+                                           address,
+                                           "--http",
+                                           "",
+                                           "--data-dir",
+                                           folder_ / "data",
+                                           "--set",
+                                           "session.frame_queue=64",
+                                           "--set",
+                                           "mesh.texture=false"};
+    server_ = std::make_unique<BackgroundProcess>(little_training ? integration::WithLittleTraining(command)
+                                                                  : integration::Quick(command));
     address_ = server_->WaitForLine("romap-server listening on ");
     ASSERT_NE(address_, "");
   }
@@ -121,6 +131,8 @@ TEST_F(RestartTest, ASecondServerOnTheDataFolderIsRefused) {
 }
 
 TEST_F(RestartTest, AMapThatCannotBeSavedStaysOnTheServer) {
+  server_.reset();
+  Start("127.0.0.1:0", /*little_training=*/true);
   std::filesystem::create_directories(folder_ / "map/trajectory.txt");  // a folder in the place of a file
   const ProcessResult run = RunProcess(RunCommand({"--frames", "20"}));
   EXPECT_NE(run.exit_code, 0);
