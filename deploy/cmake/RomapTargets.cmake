@@ -35,9 +35,9 @@ endif()
 
 # Hardening: checks of the library's preconditions, of copies and of the stack; no writable tables of addresses. GCC of
 # the distribution makes position-independent programs by default. Sanitizers check more, and do not go with all of it.
+add_compile_definitions($<$<COMPILE_LANGUAGE:CXX>:_GLIBCXX_ASSERTIONS>)
 if(NOT ROMAP_SANITIZER)
   add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-fstack-protector-strong> $<$<COMPILE_LANGUAGE:CXX>:-fstack-clash-protection>)
-  add_compile_definitions($<$<COMPILE_LANGUAGE:CXX>:_GLIBCXX_ASSERTIONS>)
   if(NOT CMAKE_BUILD_TYPE STREQUAL Debug)  # it needs optimization
     add_compile_definitions($<$<COMPILE_LANGUAGE:CXX>:_FORTIFY_SOURCE=2>)
   endif()

@@ -54,7 +54,7 @@ ConnectionLimits WithinFileLimit(ConnectionLimits limits) {
   rlimit files{};
   if (getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur == RLIM_INFINITY) return limits;
   const int64_t room = static_cast<int64_t>(files.rlim_cur) - kReservedFiles;
-  limits.total = static_cast<int>(std::clamp<int64_t>(room, 16, limits.total));
+  limits.total = static_cast<int>(std::min<int64_t>(limits.total, std::max<int64_t>(room, 16)));
   limits.per_peer = std::min(limits.per_peer, limits.total);
   return limits;
 }

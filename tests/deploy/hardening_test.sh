@@ -9,6 +9,7 @@ for program in "$@"; do
   grep -q 'GNU_RELRO' <<<"$header" || fail "has no RELRO"
   grep -Eq 'BIND_NOW|FLAGS.*NOW' <<<"$header" || fail "binds its symbols late"
   grep 'GNU_STACK' <<<"$header" | grep -q 'RWE' && fail "has an executable stack"
-  readelf -sW "$program" | grep -q '__stack_chk_fail' || fail "has no stack protector"
+  symbols=$(readelf --dyn-syms -W "$program")
+  grep -q '__stack_chk_fail' <<<"$symbols" || fail "has no stack protector"
 done
 exit 0

@@ -14,6 +14,7 @@
 #include "client/files/text_file.h"
 #include "client/importers/open_recording.h"
 #include "tests/support/foreign_layouts.h"
+#include "tests/support/streams.h"
 #include "tests/support/subprocess.h"
 
 namespace romap::exports::exports_test {
