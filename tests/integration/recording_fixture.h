@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -130,8 +131,9 @@ class RecordingTest : public ::testing::Test {
   }
 
  private:
-  // Rendered once for all tests of the process.
+  // Rendered once for all tests of the process, or by CTest for all processes (ROMAP_SOUND_SEQUENCE).
   static std::string SoundSequence() {
+    if (const char* rendered_before = std::getenv("ROMAP_SOUND_SEQUENCE")) return rendered_before;
     static const testing_support::TemporaryFolder* const folder = [] {
       static const testing_support::TemporaryFolder rendered;
       synth::SynthOptions options;
