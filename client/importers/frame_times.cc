@@ -27,8 +27,10 @@ void SetRateByTimes(RecordingContents* contents) {
 void SortByTime(RecordingContents* contents) {
   std::vector<RecordedFrame>& frames = contents->frames;
   std::ranges::stable_sort(frames, {}, &RecordedFrame::timestamp_ns);
-  const auto repeated = std::ranges::unique(frames, {}, &RecordedFrame::timestamp_ns);
-  frames.erase(repeated.begin(), repeated.end());
+  const auto is_same_time = [](const RecordedFrame& a, const RecordedFrame& b) {
+    return a.timestamp_ns == b.timestamp_ns;
+  };
+  frames.erase(std::unique(frames.begin(), frames.end(), is_same_time), frames.end());
 }
 
 }  // namespace romap::importers

@@ -337,7 +337,7 @@ void Store::Finish(std::deque<Write>& batch, Commitment& commitment) {
   }
   for (const auto& [session, durable] : commitment.durable) {
     if (commitment.removed.contains(session) || lacking.contains(session)) continue;
-    Notify(session, [&](const Listener& listener) { listener.durable(durable); });
+    Notify(session, [&durable = durable](const Listener& listener) { listener.durable(durable); });
   }
   for (Write& write : batch) {
     absl::Status status;
