@@ -4,6 +4,7 @@
 #
 #   deploy/setup.sh          the packages for the build
 #   deploy/setup.sh tests    also the packages for the tests
+#   deploy/setup.sh fuzz     also clang, for the fuzz targets
 set -euo pipefail
 
 packages=(
@@ -13,10 +14,13 @@ packages=(
   libmeshoptimizer-dev libstb-dev libdraco-dev libexif-dev libjpeg62-turbo-dev libpng-dev libspdlog-dev libfmt-dev libyaml-cpp-dev
   libcli11-dev nlohmann-json3-dev libtinygltf-dev libtinyobjloader-dev libutfcpp-dev libsqlitecpp-dev libsqlite3-dev libxxhash-dev libsodium-dev libssl-dev libsystemd-dev libevent-dev prometheus-cpp-dev
 )
-if [ "${1:-}" = tests ]; then
+if [ "${1:-}" = tests ] || [ "${1:-}" = fuzz ]; then
   packages+=(libgtest-dev libgmock-dev libbenchmark-dev libboost-context-dev chromium clang-format dpkg-dev file openssl
              python3-dev python3-grpcio python3-matplotlib python3-mypy python3-numpy python3-opencv python3-pip
              python3-protobuf python3-setuptools python3-venv python3-wheel)
+fi
+if [ "${1:-}" = fuzz ]; then
+  packages+=(clang libclang-rt-14-dev)
 fi
 # For the page and the JavaScript client. Another Node.js than that of the distribution will do, too.
 command -v node >/dev/null || packages+=(nodejs)

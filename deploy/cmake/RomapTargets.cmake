@@ -21,6 +21,12 @@ add_compile_options(-Wall -Wextra -pthread)
 if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
+if(ROMAP_FUZZ)
+  # What libFuzzer observes. The checks of the C++ library abort in the installed programs, so they must be able to fail
+  # here, too.
+  add_compile_options(-fsanitize=fuzzer-no-link)
+  add_compile_definitions($<$<COMPILE_LANGUAGE:CXX>:_GLIBCXX_ASSERTIONS>)
+endif()
 if(ROMAP_SANITIZER)
   add_compile_options(-fsanitize=${ROMAP_SANITIZER} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ROMAP_SANITIZER})
@@ -80,16 +86,25 @@ target_include_directories(romap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(romap_opencv INTERFACE opencv_core opencv_imgproc opencv_imgcodecs opencv_features2d
                                              opencv_calib3d)
 
+# Only GCC's precompiled headers go with ccache in the way that is set above.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  set(ROMAP_PRECOMPILE ON)
+else()
+  set(ROMAP_PRECOMPILE OFF)
+endif()
+
 # Eigen, OpenCV's matrices and Abseil would take five seconds of every compilation, so they are parsed only once. All
 # targets share the one precompiled header, so the compile definitions of these libraries must be the same in all
 # targets.
-file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled.cc CONTENT "")  # keeps its time, unlike file(WRITE)
-add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
-target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
-target_compile_options(romap_precompiled PRIVATE -fpch-preprocess)
-target_precompile_headers(romap_precompiled PRIVATE
-  <algorithm> <chrono> <cmath> <cstdint> <functional> <map> <memory> <mutex> <optional> <string> <thread> <vector>
-  <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>)
+if(ROMAP_PRECOMPILE)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled.cc CONTENT "")  # keeps its time, unlike file(WRITE)
+  add_library(romap_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cc)
+  target_link_libraries(romap_precompiled PRIVATE romap_opencv Eigen3::Eigen absl::status absl::statusor fmt::fmt)
+  target_compile_options(romap_precompiled PRIVATE -fpch-preprocess)
+  target_precompile_headers(romap_precompiled PRIVATE
+    <algorithm> <chrono> <cmath> <cstdint> <functional> <map> <memory> <mutex> <optional> <string> <thread> <vector>
+    <Eigen/Core> <Eigen/Geometry> <opencv2/core/mat.hpp> <absl/status/statusor.h> <fmt/format.h>)
+endif()
 
 # Tests also share GoogleTest. The speed of test code does not matter, so it is compiled with little optimization.
 set(ROMAP_TEST_OPTIMIZATION -O1)
@@ -97,7 +112,7 @@ set(ROMAP_TEST_TIMEOUT_s 300)
 if(ROMAP_SANITIZER)
   set(ROMAP_TEST_TIMEOUT_s 2400)
 endif()
-if(ROMAP_BUILD_TESTS)
+if(ROMAP_BUILD_TESTS AND ROMAP_PRECOMPILE)
   find_package(GTest CONFIG REQUIRED)
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled_tests.cc CONTENT "")
   add_library(romap_precompiled_tests OBJECT ${CMAKE_BINARY_DIR}/precompiled_tests.cc)
@@ -118,9 +133,11 @@ set(ROMAP_UNITY_SIZE 8)
 
 function(romap_precompile target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${ROMAP_UNITY} UNITY_BUILD_BATCH_SIZE ${ROMAP_UNITY_SIZE})
-  target_precompile_headers(${target} REUSE_FROM romap_precompiled)
   target_link_libraries(${target} PRIVATE fmt::fmt)
-  target_compile_options(${target} PRIVATE -fpch-preprocess)
+  if(ROMAP_PRECOMPILE)
+    target_precompile_headers(${target} REUSE_FROM romap_precompiled)
+    target_compile_options(${target} PRIVATE -fpch-preprocess)
+  endif()
 endfunction()
 
 # romap_library(name [PUBLIC targets...] [PRIVATE targets...] [SOURCES files...])
@@ -162,11 +179,14 @@ function(romap_tests name)
   add_executable(${name}_test ${sources})
   target_link_libraries(${name}_test PRIVATE ${ARG_LIBS} GTest::gmock_main fmt::fmt)
   set_target_properties(${name}_test PROPERTIES UNITY_BUILD ${ROMAP_UNITY} UNITY_BUILD_BATCH_SIZE ${ROMAP_UNITY_SIZE})
-  target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
   # GoogleTest's macros contain __FILE__, which would be different in every clone. The precompiled header does not get
   # this option, because it would contain the path itself.
   target_compile_options(${name}_test PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${CMAKE_SOURCE_DIR}/=>)
-  target_compile_options(${name}_test PRIVATE -fpch-preprocess ${ROMAP_TEST_OPTIMIZATION})
+  target_compile_options(${name}_test PRIVATE ${ROMAP_TEST_OPTIMIZATION})
+  if(ROMAP_PRECOMPILE)
+    target_precompile_headers(${name}_test REUSE_FROM romap_precompiled_tests)
+    target_compile_options(${name}_test PRIVATE -fpch-preprocess)
+  endif()
   foreach(shard RANGE 1 ${ARG_SHARDS})
     math(EXPR index "${shard} - 1")
     set(test ${name}_test.${shard}_of_${ARG_SHARDS})
