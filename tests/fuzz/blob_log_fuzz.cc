@@ -7,6 +7,7 @@
 #include "server/store/blob_log.h"
 #include "server/store/content_hash.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/fuzz/scratch_folder.h"
 #include "tests/support/streams.h"
 

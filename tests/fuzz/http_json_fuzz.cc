@@ -8,6 +8,7 @@
 #include "server/http/request_check.h"
 #include "server/http/route.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/quiet_protobuf.h"
 
 std::vector<std::string> romap::fuzz::Seeds() {
   return {R"({"name":"kitchen","camera":{"widthPx":640,"heightPx":480,"fxPx":500,"distortion":[0.1,0,0,0,0]}})",

@@ -18,6 +18,7 @@
 #include "server/http/request_reader.h"
 #include "server/http/route.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/quiet_protobuf.h"
 
 namespace romap::fuzz::http_request_fuzz {
 namespace {

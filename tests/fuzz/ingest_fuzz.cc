@@ -5,6 +5,7 @@
 #include "server/session/ingest.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/parts.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/fuzz/repair.h"
 #include "tests/fuzz/sample_images.h"
 

@@ -4,6 +4,7 @@
 
 #include "common/wire/recording.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/fuzz/scratch_folder.h"
 #include "tests/support/streams.h"
 

@@ -8,6 +8,7 @@
 #include "server/store/session_transfer.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/parts.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/fuzz/scratch_folder.h"
 #include "tests/support/streams.h"
 

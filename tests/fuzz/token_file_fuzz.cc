@@ -7,7 +7,7 @@
 
 std::vector<std::string> romap::fuzz::Seeds() {
   const ScratchFolder folder;
-  const access::TokenStore store(folder.Path("tokens.json"));
+  access::TokenStore store(folder.Path("tokens.json"));
   const std::string token = store.Create("arm-1", "lab", access::Role::kOwner).value();
   Require(store.Create("page", "lab", access::Role::kViewer).ok() && store.Find(token).has_value(),
           "a new token is valid");
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   folder.Write("good.json", good);
   fuzz::Require(!access::TokenStore(folder.Path("good.json")).Find(text).has_value(), "a foreign token is not valid");
 
-  const access::TokenStore store(folder.Write("tokens.json", text));
+  access::TokenStore store(folder.Write("tokens.json", text));
   const auto tokens = store.List();
   (void)store.Find("romap_00000000_00");
   (void)store.Find(text.substr(0, 80));

@@ -4,6 +4,7 @@
 #include "common/wire/sessions.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/parts.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/support/streams.h"
 
 namespace romap::fuzz::wire_events_fuzz {

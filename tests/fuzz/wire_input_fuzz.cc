@@ -3,6 +3,7 @@
 #include "common/wire/frame.h"
 #include "common/wire/sessions.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/quiet_protobuf.h"
 #include "tests/support/streams.h"
 
 namespace romap::fuzz::wire_input_fuzz {
