@@ -153,7 +153,12 @@ absl::StatusOr<std::string> BlobLog::Read(const std::string& folder, const BlobR
   const auto lost = [&](const char* what) {
     return absl::DataLossError(fmt::format("{}: the blob at byte {} {}", path, blob.offset, what));
   };
-  if (static_cast<uint64_t>(info.st_size) < blob.EndOffset()) return lost("is cut off");
+  // Not by the sum, which overflows for the numbers of a damaged catalog.
+  const auto file_bytes = static_cast<uint64_t>(info.st_size);
+  if (blob.length > file_bytes || blob.offset > file_bytes - blob.length ||
+      kHeaderBytes > file_bytes - blob.length - blob.offset) {
+    return lost("is cut off");
+  }
   std::string content(blob.length, '\0');
   size_t got = 0;
   while (got < content.size()) {

@@ -78,6 +78,18 @@ TEST_F(BlobLogTest, DetectsFlippedBitsAndMissingBytes) {
   EXPECT_EQ(BlobLog::Read(Folder(), second).status().code(), absl::StatusCode::kNotFound);
 }
 
+TEST_F(BlobLogTest, NumbersOfADamagedCatalogAreDataLoss) {
+  BlobLog log(Folder(), 0, 0);
+  BlobRef blob = log.Append("mask");
+  ASSERT_TRUE(log.Sync().ok());
+  constexpr uint64_t kMax = ~uint64_t{0};
+  for (const auto& [offset, length] : {std::pair{uint64_t{0}, kMax}, {kMax, uint64_t{4}}, {kMax - 40, uint64_t{10}}}) {
+    blob.offset = offset;
+    blob.length = length;
+    EXPECT_TRUE(absl::IsDataLoss(BlobLog::Read(Folder(), blob).status())) << offset << " " << length;
+  }
+}
+
 TEST_F(BlobLogTest, StartsANewSegmentWhenOneIsFull) {
   BlobLog log(Folder(), 0, uint64_t{64} << 20);
   const BlobRef blob = log.Append("next");
