@@ -1,5 +1,6 @@
 #include "server/transport/grpc_server.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
@@ -164,6 +165,9 @@ absl::Status CheckTlsFiles(const TransportConfig& config) {
 
 void RouteGrpcLogToSpdlog() {
   gpr_set_log_function([](gpr_log_func_args* args) { spdlog::debug("grpc: {}", args->message); });
+  // Its own handler writes a line to stderr for every text of a request that is not UTF-8, and waits for who reads it.
+  google::protobuf::SetLogHandler([](google::protobuf::LogLevel /*level*/, const char* /*file*/, int /*line*/,
+                                     const std::string& message) { spdlog::debug("protobuf: {}", message); });
 }
 
 }  // namespace romap::transport

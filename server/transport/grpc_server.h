@@ -44,7 +44,7 @@ class GrpcServer {
 // Whether the TLS files of the configuration can be used; OK if it has none. Errors as GrpcServer::Start().
 absl::Status CheckTlsFiles(const TransportConfig& config);
 
-// Redirects gRPC's log from stderr to spdlog at debug level, for the whole process.
+// Redirects the logs of gRPC and protobuf from stderr to spdlog at debug level, for the whole process.
 void RouteGrpcLogToSpdlog();
 
 }  // namespace romap::transport

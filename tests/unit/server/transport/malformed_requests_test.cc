@@ -46,6 +46,14 @@ TEST_F(MalformedRequestsTest, RequestsThatAreNoMessagesAreInvalid) {
   }
 }
 
+TEST_F(MalformedRequestsTest, TextsThatAreNotUtf8WriteNothingToStderr) {
+  RouteGrpcLogToSpdlog();
+  ::testing::internal::CaptureStderr();
+  const grpc::Status status = Call("GetSession", "\x0a\x01\xff");  // session_id
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
 TEST_F(MalformedRequestsTest, OtherErrorsStay) {
   EXPECT_TRUE(Call("ListSessions", "").ok());
   EXPECT_EQ(Call("GetSession", "").error_code(), grpc::StatusCode::NOT_FOUND);
