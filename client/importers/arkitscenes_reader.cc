@@ -4,6 +4,7 @@
 
 #include "client/files/text_file.h"
 #include "client/files/tum.h"
+#include "client/files/whole_number.h"
 #include "client/importers/any_image.h"
 #include "client/importers/depth_image.h"
 #include "client/importers/folder.h"
@@ -77,8 +78,8 @@ absl::StatusOr<std::vector<files::StampedPose>> ReadTrajectory(const std::string
 absl::StatusOr<CameraModel> ReadPincam(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const std::vector<double> p, ReadNumbers(path));
   if (p.size() != 6) return InvalidArgument("{}: expected 'width height fx fy cx cy'", path);
-  return CameraModel{.width_px = static_cast<int>(p[0]),
-                     .height_px = static_cast<int>(p[1]),
+  return CameraModel{.width_px = files::SideOf_px(p[0]),
+                     .height_px = files::SideOf_px(p[1]),
                      .fx_px = p[2],
                      .fy_px = p[3],
                      .cx_px = p[4] - 0.5,

@@ -23,10 +23,10 @@ absl::StatusOr<std::vector<InstancePng>> BopInstances(const std::string& source,
   std::vector<InstancePng> instances;
   const std::string key = std::to_string(image);
   for (size_t k = 0; k < ground_truth.size(); ++k) {
-    ROMAP_ASSIGN_OR_RETURN(const double object, JsonNumber(ground_truth[k], "obj_id", where));
+    ROMAP_ASSIGN_OR_RETURN(const int64_t object, JsonWhole(ground_truth[k], "obj_id", where));
     if (info.contains(key) && k < info[key].size() && info[key][k].value("px_count_visib", 1) == 0) continue;
-    instances.push_back({fmt::format("{}/mask_visib/{:06}_{:06}.png", source, image, k),
-                         fmt::format("obj_{}", static_cast<int64_t>(object))});
+    instances.push_back(
+        {fmt::format("{}/mask_visib/{:06}_{:06}.png", source, image, k), fmt::format("obj_{}", object)});
   }
   return instances;
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "client/files/whole_number.h"
 #include "client/importers/json_file.h"
 
 namespace romap::importers {
@@ -35,7 +36,7 @@ absl::StatusOr<cv::Mat> MaskOfRle(const Json& rle, const std::string& where) {
       runs.push_back(static_cast<uint32_t>(number));
     }
   }
-  absl::StatusOr<cv::Mat> mask = MaskOfRuns(runs, cv::Size(static_cast<int>(sides[1]), static_cast<int>(sides[0])));
+  absl::StatusOr<cv::Mat> mask = MaskOfRuns(runs, cv::Size(files::SideOf_px(sides[1]), files::SideOf_px(sides[0])));
   if (!mask.ok()) return InvalidArgument("{}: {}", where, Message(mask.status()));
   return mask;
 }
@@ -67,10 +68,10 @@ absl::StatusOr<EncodedMasks> LoadCocoImage(const CocoFile& file, const std::vect
   for (const size_t k : annotations) {
     const Json& annotation = file.root["annotations"][k];
     const std::string where = fmt::format("{}: annotation {}", file.path, k);
-    ROMAP_ASSIGN_OR_RETURN(const double category, JsonNumber(annotation, "category_id", where));
+    ROMAP_ASSIGN_OR_RETURN(const int64_t category, JsonWhole(annotation, "category_id", where));
     ROMAP_ASSIGN_OR_RETURN(const double score, JsonNumberOr(annotation, "score", 1, where));
     ROMAP_ASSIGN_OR_RETURN(cv::Mat pixels, MaskOfAnnotation(annotation, image_px, size_px, where));
-    const auto name = file.classes.find(static_cast<int64_t>(category));
+    const auto name = file.classes.find(category);
     if (name == file.classes.end()) {
       return InvalidArgument("{}: 'category_id' {} is not in 'categories'", where, category);
     }
@@ -129,26 +130,26 @@ absl::StatusOr<std::vector<NamedMasks>> ReadCocoMasks(const std::string& path, c
   ROMAP_ASSIGN_OR_RETURN(file->root, LoadJson(path));
   ROMAP_ASSIGN_OR_RETURN(const Json* const categories, JsonObjects(file->root, "categories", path));
   for (const Json& category : *categories) {
-    ROMAP_ASSIGN_OR_RETURN(const double id, JsonNumber(category, "id", path + ": categories"));
-    ROMAP_ASSIGN_OR_RETURN(file->classes[static_cast<int64_t>(id)], JsonText(category, "name", path + ": categories"));
+    ROMAP_ASSIGN_OR_RETURN(const int64_t id, JsonWhole(category, "id", path + ": categories"));
+    ROMAP_ASSIGN_OR_RETURN(file->classes[id], JsonText(category, "name", path + ": categories"));
   }
   ROMAP_ASSIGN_OR_RETURN(const Json* const annotations, JsonObjects(file->root, "annotations", path));
   std::map<int64_t, std::vector<size_t>> by_image;
   for (size_t k = 0; k < annotations->size(); ++k) {
-    ROMAP_ASSIGN_OR_RETURN(const double id,
-                           JsonNumber((*annotations)[k], "image_id", fmt::format("{}: annotation {}", path, k)));
-    by_image[static_cast<int64_t>(id)].push_back(k);
+    ROMAP_ASSIGN_OR_RETURN(const int64_t id,
+                           JsonWhole((*annotations)[k], "image_id", fmt::format("{}: annotation {}", path, k)));
+    by_image[id].push_back(k);
   }
   ROMAP_ASSIGN_OR_RETURN(const Json* const images, JsonObjects(file->root, "images", path));
   std::vector<NamedMasks> all;
   for (const Json& image : *images) {
     const std::string where = path + ": images";
-    ROMAP_ASSIGN_OR_RETURN(const double id, JsonNumber(image, "id", where));
+    ROMAP_ASSIGN_OR_RETURN(const int64_t id, JsonWhole(image, "id", where));
     ROMAP_ASSIGN_OR_RETURN(std::string name, JsonText(image, "file_name", where));
     ROMAP_ASSIGN_OR_RETURN(const int width_px, JsonSide(image, "width", where));
     ROMAP_ASSIGN_OR_RETURN(const int height_px, JsonSide(image, "height", where));
     const cv::Size image_px(width_px, height_px);
-    all.push_back({std::move(name), path, [file, indices = by_image[static_cast<int64_t>(id)], image_px, size_px] {
+    all.push_back({std::move(name), path, [file, indices = by_image[id], image_px, size_px] {
                      return LoadCocoImage(*file, indices, image_px, size_px);
                    }});
   }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <string_view>
 
 #include "client/files/text_file.h"
+#include "client/files/whole_number.h"
 #include "client/importers/folder.h"
 
 namespace romap::importers {
@@ -76,6 +78,9 @@ absl::StatusOr<ColmapImage> ColmapImageOf(const std::array<double, 7>& pose, int
   if (!(std::abs(rotation.norm() - 1) < 0.05)) {
     return InvalidArgument("{}: quaternion norm is {:.3f}; expected 1", where, rotation.norm());
   }
+  if (!std::ranges::all_of(pose, [](double number) { return std::isfinite(number); })) {
+    return InvalidArgument("{}: the pose is not finite", where);
+  }
   const SE3<Camera, World> T_camera_world(rotation, Eigen::Vector3d(pose[4], pose[5], pose[6]));
   return ColmapImage{std::move(name), camera_id, T_camera_world.Inverse()};
 }
@@ -137,9 +142,11 @@ absl::Status ReadTextCameras(const std::string& path, ColmapModel* model) {
       numbers.push_back(*number);
     }
     const std::vector<double> parameters(numbers.begin() + 3, numbers.end());
-    ROMAP_ASSIGN_OR_RETURN(model->cameras[static_cast<int64_t>(numbers[0])],
-                           ColmapCamera(line.fields[1], static_cast<uint64_t>(numbers[1]),
-                                        static_cast<uint64_t>(numbers[2]), parameters, where));
+    const auto id = files::WholeNumber(numbers[0]);
+    if (!id) return InvalidArgument("{}: the id '{}' is not a whole number", where, line.fields[0]);
+    ROMAP_ASSIGN_OR_RETURN(model->cameras[*id],
+                           ColmapCamera(line.fields[1], static_cast<uint64_t>(files::SideOf_px(numbers[1])),
+                                        static_cast<uint64_t>(files::SideOf_px(numbers[2])), parameters, where));
   }
   return absl::OkStatus();
 }
@@ -160,7 +167,9 @@ absl::StatusOr<ColmapImage> ParseImageLine(std::string_view line, const std::str
   if (line.empty() || end == std::string_view::npos) return InvalidArgument("{}: the name is missing", where);
   std::array<double, 7> pose{};
   std::copy_n(numbers.begin() + 1, pose.size(), pose.begin());
-  return ColmapImageOf(pose, static_cast<int64_t>(numbers[8]), std::string(line.substr(0, end + 1)), where);
+  const auto camera_id = files::WholeNumber(numbers[8]);
+  if (!camera_id) return InvalidArgument("{}: the camera '{}' is not a whole number", where, numbers[8]);
+  return ColmapImageOf(pose, *camera_id, std::string(line.substr(0, end + 1)), where);
 }
 
 // Each image has two lines; the second one, with its points, is empty if it has none.

@@ -4,6 +4,7 @@
 #include "client/files/csv.h"
 #include "client/files/text_file.h"
 #include "client/files/tum.h"
+#include "client/files/whole_number.h"
 #include "client/files/yaml_value.h"
 #include "client/importers/any_image.h"
 #include "client/importers/folder.h"
@@ -31,8 +32,8 @@ absl::StatusOr<EurocCamera> ReadEurocCamera(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const std::vector<double> size, files::YamlNumbers(root, "resolution", 2, path));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<double> k, files::YamlNumbers(root, "intrinsics", 4, path));
   ROMAP_ASSIGN_OR_RETURN(const std::vector<double> d, files::YamlNumbers(root, "distortion_coefficients", 4, path));
-  camera = {.width_px = static_cast<int>(size[0]),
-            .height_px = static_cast<int>(size[1]),
+  camera = {.width_px = files::SideOf_px(size[0]),
+            .height_px = files::SideOf_px(size[1]),
             .fx_px = k[0],
             .fy_px = k[1],
             .cx_px = k[2],

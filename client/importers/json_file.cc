@@ -3,9 +3,14 @@
 #include <cmath>
 
 #include "client/files/text_file.h"
+#include "client/files/whole_number.h"
 
 namespace romap::importers {
 namespace {
+
+// Far more than any format needs. Without a limit, functions that call themselves for each level, also those of the
+// library, would use up the stack.
+constexpr int kMaxJsonDepth = 64;
 
 bool AppendNumbers(const nlohmann::json& value, std::vector<double>* numbers) {
   if (value.is_number()) {
@@ -23,8 +28,15 @@ bool AppendNumbers(const nlohmann::json& value, std::vector<double>* numbers) {
 
 absl::StatusOr<nlohmann::json> LoadJson(const std::string& path) {
   ROMAP_ASSIGN_OR_RETURN(const std::string text, files::ReadTextFile(path));
+  bool is_too_deep = false;
+  const auto keep = [&](int depth, nlohmann::json::parse_event_t /*event*/, const nlohmann::json& /*value*/) {
+    is_too_deep = is_too_deep || depth > kMaxJsonDepth;
+    return !is_too_deep;
+  };
   try {
-    return nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+    nlohmann::json json = nlohmann::json::parse(text, keep, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+    if (is_too_deep) return InvalidArgument("{}: the JSON has more than {} levels", path, kMaxJsonDepth);
+    return json;
   } catch (const nlohmann::json::exception& e) {
     return InvalidArgument("{}: invalid JSON: {}", path, e.what());
   }
@@ -43,6 +55,13 @@ absl::StatusOr<double> JsonNumberOr(const nlohmann::json& object, const std::str
                                     const std::string& where) {
   if (!object.is_object() || !object.contains(key)) return fallback;
   return JsonNumber(object, key, where);
+}
+
+absl::StatusOr<int64_t> JsonWhole(const nlohmann::json& object, const std::string& key, const std::string& where) {
+  ROMAP_ASSIGN_OR_RETURN(const double number, JsonNumber(object, key, where));
+  const std::optional<int64_t> whole = files::WholeNumber(number);
+  if (!whole) return InvalidArgument("{}: '{}' is {}; expected a whole number", where, key, number);
+  return *whole;
 }
 
 absl::StatusOr<int> JsonSide(const nlohmann::json& object, const std::string& key, const std::string& where) {

@@ -19,6 +19,8 @@ absl::StatusOr<double> JsonNumber(const nlohmann::json& object, const std::strin
 // `fallback` if the key is missing.
 absl::StatusOr<double> JsonNumberOr(const nlohmann::json& object, const std::string& key, double fallback,
                                     const std::string& where);
+// As an integer.
+absl::StatusOr<int64_t> JsonWhole(const nlohmann::json& object, const std::string& key, const std::string& where);
 // An image side in pixels, also written as 1080.0.
 absl::StatusOr<int> JsonSide(const nlohmann::json& object, const std::string& key, const std::string& where);
 absl::StatusOr<std::string> JsonText(const nlohmann::json& object, const std::string& key, const std::string& where);

@@ -39,7 +39,7 @@ absl::StatusOr<std::map<uint32_t, std::string>> ReadAggregation(const std::strin
     ROMAP_ASSIGN_OR_RETURN(const nlohmann::json root, LoadJson(path));
     ROMAP_ASSIGN_OR_RETURN(const nlohmann::json* const groups, JsonObjects(root, "segGroups", path));
     for (const nlohmann::json& group : *groups) {
-      ROMAP_ASSIGN_OR_RETURN(const double id, JsonNumber(group, "objectId", path));
+      ROMAP_ASSIGN_OR_RETURN(const int64_t id, JsonWhole(group, "objectId", path));
       ROMAP_ASSIGN_OR_RETURN(classes[static_cast<uint32_t>(id) + 1], JsonText(group, "label", path));
     }
     break;

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "client/files/text_file.h"
+#include "client/files/whole_number.h"
 #include "client/files/yaml_value.h"
 #include "client/importers/folder.h"
 
@@ -26,8 +27,9 @@ absl::StatusOr<ClassNames> NamesOfDataYaml(const std::string& path) {
     }
   } else if (names && names.IsMap()) {
     for (const auto& entry : names) {
-      const auto id = entry.first.IsScalar() ? files::ParseNumber(entry.first.Scalar()) : std::nullopt;
-      if (id && entry.second.IsScalar()) result[static_cast<int64_t>(*id)] = entry.second.Scalar();
+      const auto number = entry.first.IsScalar() ? files::ParseNumber(entry.first.Scalar()) : std::nullopt;
+      const auto id = number ? files::WholeNumber(*number) : std::nullopt;
+      if (id && entry.second.IsScalar()) result[*id] = entry.second.Scalar();
     }
   }
   if (result.empty()) return InvalidArgument("{}: 'names' is missing; expected the names of the classes", path);
@@ -63,7 +65,8 @@ absl::StatusOr<MaskLayer> LayerOfLine(const files::TableLine& line, const ClassN
     if (!number) return InvalidArgument("{}:{}: '{}' is not a number", path, line.number, field);
     numbers.push_back(*number);
   }
-  const auto id = static_cast<int64_t>(numbers.front());
+  const std::optional<int64_t> id = files::WholeNumber(numbers.front());
+  if (!id) return InvalidArgument("{}:{}: class '{}' is not a whole number", path, line.number, line.fields.front());
   MaskLayer layer;
   if (numbers.size() % 2 == 0) {
     layer.score = std::clamp(numbers.back(), 0.0, 1.0);
@@ -78,8 +81,8 @@ absl::StatusOr<MaskLayer> LayerOfLine(const files::TableLine& line, const ClassN
     numbers[k] *= k % 2 == 0 ? size_px.width : size_px.height;
   }
   layer.pixels = FillPolygon(numbers, size_px);
-  const auto name = names.find(id);
-  layer.class_name = name == names.end() ? fmt::format("class_{}", id) : name->second;
+  const auto name = names.find(*id);
+  layer.class_name = name == names.end() ? fmt::format("class_{}", *id) : name->second;
   return layer;
 }
 
