@@ -37,8 +37,9 @@ for target in "${targets[@]}"; do
   timeout=10
   # libdraco reads up to 2^31 orientations of texture coordinates before it finds that they are too many.
   [ "$target" != draco ] || timeout=40
-  "$program" -max_total_time="$seconds" -timeout="$timeout" -report_slow_units="$timeout" -rss_limit_mb=2560 -malloc_limit_mb=1024 -max_len=16384 \
-    -print_final_stats=1 -artifact_prefix="$findings/" "$corpus" "${known[@]}" >"$log" 2>&1 || code=$?
+  "$program" -max_total_time="$seconds" -timeout="$timeout" -report_slow_units="$timeout" \
+    -rss_limit_mb=2560 -malloc_limit_mb=1024 -max_len=16384 -print_final_stats=1 -artifact_prefix="$findings/" \
+    "$corpus" "${known[@]}" >"$log" 2>&1 || code=$?
   found=$(find "$findings" -type f | wc -l)
   if [ "$code" -ne 0 ] || [ "$found" -ne 0 ]; then
     result=1
