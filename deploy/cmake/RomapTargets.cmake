@@ -22,10 +22,7 @@ if(ROMAP_WERROR)
   add_compile_options(-Werror)
 endif()
 if(ROMAP_FUZZ)
-  # What libFuzzer observes. The checks of the C++ library abort in the installed programs, so they must be able to fail
-  # here, too.
-  add_compile_options(-fsanitize=fuzzer-no-link)
-  add_compile_definitions($<$<COMPILE_LANGUAGE:CXX>:_GLIBCXX_ASSERTIONS>)
+  add_compile_options(-fsanitize=fuzzer-no-link)  # what libFuzzer observes
 endif()
 if(ROMAP_SANITIZER)
   add_compile_options(-fsanitize=${ROMAP_SANITIZER} -fno-omit-frame-pointer)

@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMutations = 4000;
-constexpr std::chrono::seconds kTimeForMutations{3};
+constexpr std::chrono::seconds kTimeForMutations{testing_support::kUnderSanitizer ? 3 : 1};
 constexpr size_t kMaxBytes = 65536;
 // A finding. Far above the second that a small input may take, because the machine may be busy.
 constexpr unsigned kMaxSeconds = testing_support::kUnderSanitizer ? 120 : 30;
