@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "common/file_status.h"
+#include "common/printable.h"
 #include "common/status.h"
 
 namespace romap {
@@ -97,6 +98,9 @@ std::string StoreValue(const ConfigField& field, const std::string& text) {
       }
     }
     std::string operator()(std::string* target) const {
+      if (Printable(text) != text) {
+        return fmt::format("{}: '{}' has control characters or is not UTF-8", field.name, Printable(text));
+      }
       const auto& choices = field.info.choices;
       if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
         return fmt::format("{}: '{}' is not {}", field.name, text, RangeText(field.info));

@@ -29,7 +29,11 @@ std::vector<std::string> SampleParts() {
   SessionOptions options;
   options.name = "kitchen";
   options.camera = testing_support::SmallCamera();
-  SessionInfo info{.id = "a", .name = "kitchen", .camera = options.camera, .state = SessionState::kFinished};
+  SessionInfo info;
+  info.id = "a";
+  info.name = "kitchen";
+  info.camera = options.camera;
+  info.state = SessionState::kFinished;
   FrameInput frame = testing_support::MakeFrame(1, "mug");
   frame.image = "raw";
   ObjectUpdate object;

@@ -21,6 +21,13 @@ FrameInput FullFrame() {
   return frame;
 }
 
+// An input: the kind of the message, 'm' or 's', and its bytes.
+std::string Tagged(char kind, const google::protobuf::Message& message) {
+  std::string input(1, kind);
+  message.AppendToString(&input);
+  return input;
+}
+
 // What was accepted must be accepted again, with the same result.
 template <class Message>
 void CheckRoundTrip(const Message& message) {
@@ -51,8 +58,9 @@ std::vector<std::string> romap::fuzz::Seeds() {
   options.camera = testing_support::SmallCamera();
   options.camera.distortion = {0.1, 0, 0, 0, 0.2};
   options.up_world = Eigen::Vector3d::UnitY();
-  return {"m" + start.SerializeAsString(), "m" + frame.SerializeAsString(), "m" + raw.SerializeAsString(),
-          "m" + masks.SerializeAsString(), "s" + wire::ToProto(options).SerializeAsString()};
+  using wire_input_fuzz::Tagged;
+  return {Tagged('m', start), Tagged('m', frame), Tagged('m', raw), Tagged('m', masks),
+          Tagged('s', wire::ToProto(options))};
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -90,6 +90,15 @@ TEST(ConfigTest, ValuesThatAreNotAMultipleAreRejected) {
   EXPECT_EQ(sample.width, 32);
 }
 
+TEST(ConfigTest, TextsWithControlCharactersOrBytesThatAreNotUtf8AreRejected) {
+  Sample sample;
+  for (const auto& [text, shown] : {std::pair<std::string, std::string>{"a\x80", "a\\x80"}, {"a\nb", "a\\nb"}}) {
+    const std::vector<std::string> assignments = {"mesh.kind=" + text};
+    EXPECT_EQ(Message(sample.Fields().Set(assignments)),
+              "--set mesh.kind: '" + shown + "' has control characters or is not UTF-8");
+  }
+}
+
 TEST(ConfigTest, FaultsOfValuesAndOfCombinationsAreReportedTogetherWithTheirOrigins) {
   const testing_support::TemporaryFolder folder;
   std::ofstream(folder / "a.yaml") << "nerf:\n  rate: 0.1\n  rays: 0\nmesh:\n  enabled: false\n";
