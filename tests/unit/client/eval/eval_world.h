@@ -124,11 +124,11 @@ std::vector<files::StampedPose> WithLocalScale(const std::vector<files::StampedP
 // Deterministic noise: the poses with normal errors of position (standard deviation per axis).
 inline std::vector<files::StampedPose> WithNoise(std::vector<files::StampedPose> poses, double sigma_m, uint32_t seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, sigma_m);
+  std::normal_distribution<double> normal;
   for (files::StampedPose& pose : poses) {
     const double x = normal(random), y = normal(random), z = normal(random);
     pose.T_world_camera = {pose.T_world_camera.rotation(),
-                           Eigen::Vector3d(pose.T_world_camera.translation() + Eigen::Vector3d(x, y, z))};
+                           Eigen::Vector3d(pose.T_world_camera.translation() + sigma_m * Eigen::Vector3d(x, y, z))};
   }
   return poses;
 }

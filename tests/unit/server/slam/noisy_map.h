@@ -29,10 +29,10 @@ class NoisyMap : public ::testing::Test {
   }
 
   Eigen::Vector3d Error(double sigma_mu) {
-    std::normal_distribution<double> normal(0, sigma_mu);
+    std::normal_distribution<double> normal;  // times sigma, which may be 0
     const double x_mu = normal(random_);
     const double y_mu = normal(random_);
-    return {x_mu, y_mu, normal(random_)};
+    return sigma_mu * Eigen::Vector3d(x_mu, y_mu, normal(random_));
   }
 
   MapKeyframe& AddKeyframe(double x_mu, double position_sigma_mu) {
