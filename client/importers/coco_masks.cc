@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "client/files/whole_number.h"
 #include "client/importers/json_file.h"

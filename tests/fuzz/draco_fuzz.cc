@@ -11,8 +11,10 @@ std::vector<std::string> romap::fuzz::Seeds() {
   plain.triangles = SampleMesh().triangles;
   std::vector<std::string> seeds;
   for (const int speed : {0, 5, 10}) {
-    seeds.push_back(EncodeDraco(SampleMesh(), {.speed = speed}).value());
     seeds.push_back(EncodeDraco(plain, {.speed = speed}).value());
+    // Below 4, texture coordinates are stored with orientations, of which libdraco reads up to 2^31 from a damaged
+    // stream before it checks their number. romap encodes with 5.
+    if (speed >= 4) seeds.push_back(EncodeDraco(SampleMesh(), {.speed = speed}).value());
   }
   return seeds;
 }
