@@ -67,6 +67,8 @@ int PortOf(int fd) {
                                              : reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 
+absl::Status ShuttingDown() { return absl::UnavailableError("the server is shutting down"); }
+
 absl::Status TooManyCalls() { return absl::ResourceExhaustedError("the server has too many requests; try again"); }
 
 }  // namespace
@@ -115,13 +117,19 @@ class HttpServer::Impl {
         },
         this);
     ROMAP_RETURN_IF_ERROR(Listen(*address));
-    loop_.Every(kViewerPeriod, [this] { viewers_->Pump(); });
-    loop_.Every(kFeedPeriod, [this] { feeds_->Pump(); });
+    // The loop runs a little longer than both.
+    loop_.Every(kViewerPeriod, [this] {
+      if (viewers_) viewers_->Pump();
+    });
+    loop_.Every(kFeedPeriod, [this] {
+      if (feeds_) feeds_->Pump();
+    });
     loop_.Every(kSweepPeriod, [this] {
       guard_.Sweep();
       if (bound_ != nullptr) evconnlistener_enable(evhttp_bound_socket_get_listener(bound_));
-      metrics_.SetGauges(
-          {.viewers = viewers_->size(), .connections = guard_.connections(), .mesh_cache_bytes = meshes_.bytes()});
+      metrics_.SetGauges({.viewers = viewers_ ? viewers_->size() : 0,
+                          .connections = guard_.connections(),
+                          .mesh_cache_bytes = meshes_.bytes()});
     });
     loop_.Start();
     is_running_ = true;
@@ -134,7 +142,7 @@ class HttpServer::Impl {
     // The workers' last answers need the loop; after it nothing uses the connections.
     loop_.Call([this] {
       evhttp_del_accept_socket(http_.get(), std::exchange(bound_, nullptr));
-      viewers_->EndAll(absl::UnavailableError("the server is shutting down"));
+      viewers_->EndAll(ShuttingDown());
     });
     pool_.Stop();
     loop_.Call([this] {
@@ -184,6 +192,7 @@ class HttpServer::Impl {
     absl::StatusOr<HttpRequest> request = ReadRequest(raw);
     const absl::Status status = request.ok() ? CheckRequest(*request, is_loopback_) : request.status();
     if (!status.ok()) return exchange->Respond(ErrorResponse(status));
+    if (!viewers_ || !feeds_) return exchange->Respond(ErrorResponse(ShuttingDown()));
     spdlog::debug("http: {}", Printable(request->path));
     if (request->path == "/metrics") return RespondFromWorker(std::move(exchange), *std::move(request), std::nullopt);
     if (!request->path.starts_with("/api/")) {
@@ -248,6 +257,7 @@ class HttpServer::Impl {
                 const ViewerOptions& options, absl::StatusOr<std::unique_ptr<EventStream>>& stream) {
     --opening_viewers_;
     if (!stream.ok()) return exchange->Respond(ErrorResponse(stream.status()));
+    if (!viewers_) return exchange->Respond(ErrorResponse(ShuttingDown()));
     viewers_->Add(exchange, *caller, options, *std::move(stream));
   }
 

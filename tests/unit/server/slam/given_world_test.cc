@@ -53,7 +53,7 @@ TEST_F(LatePosesTest, AFewPosesSuffice) {
   for (int next = StartWithoutPoses(); next < 70; ++next) {
     auto frame = Render(next);
     if (next % 15 != 0) frame->T_world_camera.reset();
-    EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
+    EXPECT_EQ(ProcessFrame(frame, Pose(next)), TrackingState::kTracking);
   }
   EXPECT_EQ(PosesIgnoredText(), "");
   EXPECT_NEAR(Error().second, 1, 0.02);
@@ -65,7 +65,7 @@ TEST_F(LatePosesTest, AFewPosesThatContradictTheImagesAreRefused) {
     const SE3<Camera, World> inverse = frame->T_world_camera->Inverse();
     frame->T_world_camera = SE3<World, Camera>(inverse.rotation(), inverse.translation());
     if (next % 15 != 0) frame->T_world_camera.reset();
-    EXPECT_EQ(ProcessFrame(frame), TrackingState::kTracking);
+    EXPECT_EQ(ProcessFrame(frame, Pose(next)), TrackingState::kTracking);
   }
   EXPECT_NE(PosesIgnoredText(), "");
 }

@@ -45,13 +45,13 @@ class TrackingTest : public ::testing::Test {
 
   std::shared_ptr<Frame> Render(int i) const { return world_.Render(static_cast<uint64_t>(i + 1), Pose(i)); }
 
-  TrackingState ProcessFrame(std::shared_ptr<const Frame> frame) {
+  // `truth`: of a frame without a pose, for Error().
+  TrackingState ProcessFrame(std::shared_ptr<const Frame> frame, const SE3<World, Camera>& truth = {}) {
     image_ = tracker_->Track(frame);
     mapped_ = mapper_->Process(image_);
     const TrackingState state = image_.tracked.state;
     if (state == TrackingState::kTracking || state == TrackingState::kRelocalized) {
-      // Tests in which not all frames have a pose do not compare with the truth.
-      frames_.push_back({mapped_.tracked, frame->T_world_camera.value_or(SE3<World, Camera>())});
+      frames_.push_back({mapped_.tracked, frame->T_world_camera.value_or(truth)});
       frames_.back().tracked.frame = nullptr;
     }
     return state;

@@ -34,7 +34,7 @@ SE3<World, Camera> LookFrom(double azimuth_rad, double elevation_rad, double dis
 // Cameras, and the segments that each sees of an object at the origin.
 class Scene {
  public:
-  explicit Scene(double noise_px = 0.5) : noise_px_(0, noise_px) {}
+  explicit Scene(double noise_px = 0.5) : noise_px_(noise_px) {}
 
   void AddCamera(double azimuth_rad, double elevation_rad) {
     T_world_camera_.push_back(LookFrom(azimuth_rad, elevation_rad));
@@ -124,12 +124,13 @@ class Scene {
     return TestCamera().Project(T_world_camera_[view].Inverse() * p_world);
   }
   Eigen::Vector2d Noisy(const Eigen::Vector2d& p_px) {
-    const double u = noise_px_(random_);
-    return p_px + Eigen::Vector2d(u, noise_px_(random_));
+    const double u = normal_(random_);
+    return p_px + noise_px_ * Eigen::Vector2d(u, normal_(random_));
   }
 
   std::mt19937 random_{5};
-  std::normal_distribution<double> noise_px_;
+  std::normal_distribution<double> normal_;
+  const double noise_px_;  // standard deviation; may be 0
   std::vector<SE3<World, Camera>> T_world_camera_;
   std::vector<std::vector<LineSegment>> segments_;
 };
