@@ -50,7 +50,10 @@ TEST(StageWatchTest, AHangIsReportedWithItsStackUntilItEnds) {
     EXPECT_TRUE(Eventually([&] { return (hang = watch.FindHang(milliseconds(20))).has_value(); }));
     EXPECT_EQ(hang->stage, "mapping");
     EXPECT_GT(hang->since_s, 0.02);
-    EXPECT_THAT(hang->stack, ::testing::HasSubstr("server_session_test"));
+    // ThreadSanitizer delivers no signal to a thread that waits.
+    if (!testing_support::kUnderSanitizer) {
+      EXPECT_THAT(hang->stack, ::testing::HasSubstr("server_session_test"));
+    }
   }
   EXPECT_FALSE(watch.FindHang(seconds(0)));
 }
