@@ -9,7 +9,7 @@ namespace {
 
 // Of a session with 640x480 px at 25 Hz. Tracking costs do not depend on the image size alone, so that the size counts
 // by its square root.
-constexpr double kUsualCores = 0.4;
+constexpr double kUsualCores = 0.9;
 constexpr double kUsual_mpx = 0.3072;
 constexpr int kRetry_s = 10;
 
