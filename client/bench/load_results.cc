@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "common/statistics.h"
 
 namespace romap::bench {
 namespace {
@@ -25,14 +25,13 @@ std::string ToText(const Percentiles& times) {
 
 }  // namespace
 
-Percentiles PercentilesOf(std::vector<double> values) {
+Percentiles PercentilesOf(const std::vector<double>& values) {
   if (values.empty()) return {};
-  std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    const double rank = std::ceil(share * static_cast<double>(values.size()));
-    return values[static_cast<size_t>(std::max(1.0, rank)) - 1];
-  };
-  return {.count = values.size(), .p50 = at(0.5), .p90 = at(0.9), .p99 = at(0.99), .max = values.back()};
+  return {.count = values.size(),
+          .p50 = LowerQuantile(values, 0.5),
+          .p90 = LowerQuantile(values, 0.9),
+          .p99 = LowerQuantile(values, 0.99),
+          .max = LowerQuantile(values, 1)};
 }
 
 double JainIndex(const std::vector<double>& amounts) {

@@ -12,7 +12,7 @@ struct Percentiles {
   size_t count = 0;
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
-Percentiles PercentilesOf(std::vector<double> values);
+Percentiles PercentilesOf(const std::vector<double>& values);
 
 // Jain's fairness index of non-negative amounts: 1 if all are equal, 1/n if one of n has everything. 1 without amounts
 // (Jain, Chiu, Hawe 1984).

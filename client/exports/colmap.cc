@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <iterator>
 
 #include "client/files/text_file.h"
@@ -27,8 +28,6 @@ std::string CameraText(const CameraModel& camera) {
                      camera.cx_px + 0.5, camera.cy_px + 0.5, distortion);
 }
 
-std::string WithoutFolder(const std::string& path) { return path.substr(path.rfind('/') + 1); }
-
 }  // namespace
 
 absl::Status WriteColmap(const std::string& folder, const CameraModel& camera, const std::vector<PosedImage>& images,
@@ -43,7 +42,7 @@ absl::Status WriteColmap(const std::string& folder, const CameraModel& camera, c
     const Eigen::Quaterniond& q = T_camera_world.rotation();
     const Eigen::Vector3d& t = T_camera_world.translation();
     fmt::format_to(std::back_inserter(text), "{} {} {} {} {} {} {} {} 1 {}\n\n", k + 1, q.w(), q.x(), q.y(), q.z(),
-                   t.x(), t.y(), t.z(), WithoutFolder(images[k].image));
+                   t.x(), t.y(), t.z(), std::filesystem::path(images[k].image).filename().string());
   }
   ROMAP_RETURN_IF_ERROR(files::WriteFile(model + "/images.txt", text));
   text = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";

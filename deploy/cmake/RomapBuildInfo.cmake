@@ -41,6 +41,20 @@ function(romap_package_version package result)
   set(${result} "${version}" PARENT_SCOPE)
 endfunction()
 
+# romap_add_part(id name version license purl): appends a part to `packages` and `described` of the caller, in SPDX.
+function(romap_add_part id name version license purl)
+  string(MAKE_C_IDENTIFIER "${id}" id)
+  string(REPLACE "_" "-" id "${id}")
+  set(packages "${packages},
+    {\"SPDXID\": \"SPDXRef-${id}\", \"name\": \"${name}\", \"versionInfo\": \"${version}\",
+     \"downloadLocation\": \"NOASSERTION\", \"filesAnalyzed\": false, \"licenseConcluded\": \"NOASSERTION\",
+     \"licenseDeclared\": \"${license}\", \"copyrightText\": \"NOASSERTION\",
+     \"externalRefs\": [{\"referenceCategory\": \"PACKAGE-MANAGER\", \"referenceType\": \"purl\",
+                       \"referenceLocator\": \"${purl}\"}]}" PARENT_SCOPE)
+  set(described "${described},
+    {\"spdxElementId\": \"SPDXRef-romap\", \"relationshipType\": \"DEPENDS_ON\", \"relatedSpdxElement\": \"SPDXRef-${id}\"}" PARENT_SCOPE)
+endfunction()
+
 function(romap_write_libraries)
   set(lines "")
   set(packages "")
@@ -56,20 +70,11 @@ function(romap_write_libraries)
       string(REGEX REPLACE "^[0-9]+:|[-+~].*$" "" version "${package_version}")
     endif()
     string(APPEND lines "    {\"${name}\", \"${version}\"},\n")
-    string(MAKE_C_IDENTIFIER "${package}" id)
-    string(REPLACE "_" "-" id "${id}")
     string(REPLACE "+" "%2B" purl "${package}@${package_version}")
-    string(APPEND packages ",
-    {\"SPDXID\": \"SPDXRef-${id}\", \"name\": \"${name}\", \"versionInfo\": \"${version}\",
-     \"downloadLocation\": \"NOASSERTION\", \"filesAnalyzed\": false, \"licenseConcluded\": \"NOASSERTION\",
-     \"licenseDeclared\": \"${license}\", \"copyrightText\": \"NOASSERTION\",
-     \"externalRefs\": [{\"referenceCategory\": \"PACKAGE-MANAGER\", \"referenceType\": \"purl\",
-                       \"referenceLocator\": \"pkg:deb/debian/${purl}?distro=debian-12\"}]}")
-    string(APPEND described ",
-    {\"spdxElementId\": \"SPDXRef-romap\", \"relationshipType\": \"DEPENDS_ON\", \"relatedSpdxElement\": \"SPDXRef-${id}\"}")
+    romap_add_part("${package}" "${name}" "${version}" "${license}" "pkg:deb/debian/${purl}?distro=debian-12")
   endforeach()
 
-  # The packages of the page, which is part of romap-server, with the hashes of the lock file.
+  # The packages of the page, which is part of romap-server.
   file(READ ${CMAKE_SOURCE_DIR}/client/viewer/package.json manifest)
   file(READ ${CMAKE_SOURCE_DIR}/client/viewer/package-lock.json lock)
   string(JSON count LENGTH "${manifest}" dependencies)
@@ -78,17 +83,8 @@ function(romap_write_libraries)
     string(JSON name MEMBER "${manifest}" dependencies ${index})
     string(JSON version GET "${lock}" packages "node_modules/${name}" version)
     string(JSON license GET "${lock}" packages "node_modules/${name}" license)
-    string(MAKE_C_IDENTIFIER "npm_${name}" id)
-    string(REPLACE "_" "-" id "${id}")
     string(REPLACE "@" "%40" purl "${name}")
-    string(APPEND packages ",
-    {\"SPDXID\": \"SPDXRef-${id}\", \"name\": \"${name}\", \"versionInfo\": \"${version}\",
-     \"downloadLocation\": \"NOASSERTION\", \"filesAnalyzed\": false, \"licenseConcluded\": \"NOASSERTION\",
-     \"licenseDeclared\": \"${license}\", \"copyrightText\": \"NOASSERTION\",
-     \"externalRefs\": [{\"referenceCategory\": \"PACKAGE-MANAGER\", \"referenceType\": \"purl\",
-                       \"referenceLocator\": \"pkg:npm/${purl}@${version}\"}]}")
-    string(APPEND described ",
-    {\"spdxElementId\": \"SPDXRef-romap\", \"relationshipType\": \"DEPENDS_ON\", \"relatedSpdxElement\": \"SPDXRef-${id}\"}")
+    romap_add_part("npm_${name}" "${name}" "${version}" "${license}" "pkg:npm/${purl}@${version}")
   endforeach()
 
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/libraries.inc CONTENT "${lines}")

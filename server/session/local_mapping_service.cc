@@ -144,6 +144,11 @@ absl::Status LocalMappingService::CheckLiveLoadLocked(const CameraModel& camera)
   return AdmitLiveSession(live, Megapixels(camera), config_.session.live_load * std::thread::hardware_concurrency());
 }
 
+std::map<std::string, std::shared_ptr<Session>> LocalMappingService::SessionsInMemory() {
+  std::lock_guard lock(mutex_);
+  return sessions_;
+}
+
 absl::StatusOr<std::shared_ptr<Session>> LocalMappingService::FindLocked(const std::string& session_id) {
   const auto it = sessions_.find(session_id);
   if (it != sessions_.end()) return it->second;
@@ -304,12 +309,7 @@ bool LocalMappingService::HasHangingSession() {
 
 void LocalMappingService::StoreAll() {
   if (!store_) return;
-  std::map<std::string, std::shared_ptr<Session>> sessions;
-  {
-    std::lock_guard lock(mutex_);
-    sessions = sessions_;
-  }
-  for (const auto& [id, session] : sessions) session->StoreChanges(/*complete=*/true);
+  for (const auto& [id, session] : SessionsInMemory()) session->StoreChanges(/*complete=*/true);
   if (const absl::Status status = store_->Flush(); !status.ok()) spdlog::error("store: {}", Message(status));
 }
 
@@ -387,12 +387,7 @@ void LocalMappingService::KeepSessions() {
 }
 
 void LocalMappingService::CheckStages() {
-  std::vector<std::shared_ptr<Session>> sessions;
-  {
-    std::lock_guard lock(mutex_);
-    for (const auto& [id, session] : sessions_) sessions.push_back(session);
-  }
-  for (const auto& session : sessions) session->CheckStages();
+  for (const auto& [id, session] : SessionsInMemory()) session->CheckStages();
 }
 
 void LocalMappingService::DeleteAbandoned() {
@@ -421,11 +416,7 @@ void LocalMappingService::DeleteAbandoned() {
 
 void LocalMappingService::StoreChanges() {
   if (!store_->AcceptsChanges()) return;  // they wait in the outboxes, where newer ones replace them
-  std::map<std::string, std::shared_ptr<Session>> sessions;
-  {
-    std::lock_guard lock(mutex_);
-    sessions = sessions_;
-  }
+  const std::map<std::string, std::shared_ptr<Session>> sessions = SessionsInMemory();
   for (const auto& [id, session] : sessions) {
     const bool is_unused = store::HasEnded(session->state()) || IsUnused(id, *session);
     session->StoreChanges(/*complete=*/is_unused);

@@ -58,6 +58,7 @@ class LocalMappingService : public MappingService {
  private:
   // RESOURCE_EXHAUSTED: the processor cannot take another live session.
   absl::Status CheckLiveLoadLocked(const CameraModel& camera) const;
+  std::map<std::string, std::shared_ptr<Session>> SessionsInMemory();
   // Null: it is on the shelf. NOT_FOUND: there is no such session.
   absl::StatusOr<std::shared_ptr<Session>> FindLocked(const std::string& session_id);
   absl::Status CheckStore() const;

@@ -1,8 +1,8 @@
 // Masks as COCO files: polygons and run lengths, with and without compression.
 
 #include "client/importers/coco_masks.h"
-#include "common/label_png.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/named_masks.h"
 #include "tests/fuzz/scratch_folder.h"
 #include "tests/support/foreign_layouts.h"
 
@@ -28,13 +28,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto mask = importers::MaskOfRuns(*runs, size_px);
     if (mask.ok()) fuzz::Require(mask->size() == size_px, "the mask has the size of the image");
   }
-  const auto masks = importers::ReadCocoMasks(folder.Write("coco.json", text), size_px);
-  if (!masks.ok()) return 0;
-  for (const importers::NamedMasks& image : *masks) {
-    const auto encoded = image.load();
-    if (!encoded.ok()) continue;
-    const auto labels = DecodeLabelPng(encoded->label_png);
-    fuzz::Require(labels.ok() && labels->size() == size_px, "the labels have the size of the camera");
-  }
+  fuzz::LoadMasks(importers::ReadCocoMasks(folder.Write("coco.json", text), size_px), size_px);
   return 0;
 }

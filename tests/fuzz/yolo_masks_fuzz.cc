@@ -1,9 +1,9 @@
 // Masks as YOLO segmentations, with the names of the classes. The input is a folder as one text (folder_text.h).
 
 #include "client/importers/yolo_masks.h"
-#include "common/label_png.h"
 #include "tests/fuzz/folder_text.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/named_masks.h"
 #include "tests/support/foreign_layouts.h"
 
 std::vector<std::string> romap::fuzz::Seeds() {
@@ -19,13 +19,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::ScratchFolder folder;
   fuzz::WriteFolder(fuzz::TextOf(data, size), folder);
   const cv::Size size_px(48, 36);
-  const auto masks = importers::ReadYoloMasks(folder.Path("labels"), size_px);
-  if (!masks.ok()) return 0;
-  for (const importers::NamedMasks& image : *masks) {
-    const auto encoded = image.load();
-    if (!encoded.ok()) continue;
-    const auto labels = DecodeLabelPng(encoded->label_png);
-    fuzz::Require(labels.ok() && labels->size() == size_px, "the labels have the size of the camera");
-  }
+  fuzz::LoadMasks(importers::ReadYoloMasks(folder.Path("labels"), size_px), size_px);
   return 0;
 }
