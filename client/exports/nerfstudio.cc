@@ -1,10 +1,8 @@
 #include "client/exports/nerfstudio.h"
 
-#include <fmt/format.h>
-
-#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "client/files/ply.h"
 #include "client/files/text_file.h"
 
 namespace romap::exports {
@@ -42,16 +40,15 @@ nlohmann::ordered_json MatrixJson(const SE3<World, Camera>& T_world_camera) {
   return rows;
 }
 
-std::string PlyText(const std::vector<ColoredPoint>& points) {
-  std::string text = fmt::format(
-      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
-      points.size());
+// Relative to the first one, because the writer takes vertices in single precision. `points` must not be empty.
+absl::Status WritePoints(const std::string& path, const std::vector<ColoredPoint>& points) {
+  const Eigen::Vector3d& origin = points.front().p_world;
+  Mesh cloud;
   for (const ColoredPoint& point : points) {
-    fmt::format_to(std::back_inserter(text), "{:.9g} {:.9g} {:.9g} {} {} {}\n", point.p_world.x(), point.p_world.y(),
-                   point.p_world.z(), point.color[0], point.color[1], point.color[2]);
+    cloud.vertices.push_back((point.p_world - origin).cast<float>());
+    cloud.colors.push_back(point.color);
   }
-  return text;
+  return files::WriteWorldPly(path, cloud, {1, Eigen::Quaterniond::Identity(), origin});
 }
 
 }  // namespace
@@ -62,7 +59,7 @@ absl::Status WriteNerfstudio(const std::string& folder, const CameraModel& camer
   nlohmann::ordered_json json = CameraJson(camera);
   if (!points.empty()) {
     json["ply_file_path"] = "points.ply";
-    ROMAP_RETURN_IF_ERROR(files::WriteFile(folder + "/points.ply", PlyText(points)));
+    ROMAP_RETURN_IF_ERROR(WritePoints(folder + "/points.ply", points));
   }
   json["frames"] = nlohmann::ordered_json::array();
   for (const PosedImage& image : images) {

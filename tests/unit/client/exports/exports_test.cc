@@ -11,6 +11,7 @@
 #include "client/exports/kitti.h"
 #include "client/exports/nerfstudio.h"
 #include "client/exports/usd.h"
+#include "client/files/ply.h"
 #include "client/files/text_file.h"
 #include "client/importers/open_recording.h"
 #include "tests/support/foreign_layouts.h"
@@ -77,7 +78,12 @@ TEST_F(ExportsTest, NerfstudioHasCamerasPosesImagesAndMasks) {
     ExpectSame(read, camera);
     EXPECT_EQ(read.Load(0)->label_png, sequence_->Load(frames_[0].index)->label_png);
   }
-  EXPECT_THAT(files::ReadFile(out + "/points.ply").value(), HasSubstr("\n1 2 3 10 20 30\n-1 0 0.5 255 0 1\n"));
+  const files::MeshFile cloud = files::ReadPly(out + "/points.ply").value();
+  ASSERT_EQ(cloud.mesh.vertices.size(), points_.size());
+  for (size_t k = 0; k < points_.size(); ++k) {
+    EXPECT_LT((cloud.Position(k) - points_[k].p_world).norm(), 1e-6);
+    EXPECT_EQ(cloud.mesh.colors[k], points_[k].color);
+  }
   // The camera looks along -z of its axes there.
   const auto json = nlohmann::json::parse(files::ReadFile(out + "/transforms.json").value());
   const Eigen::Vector3d forward = frames_[0].T_world_camera.rotation() * Eigen::Vector3d::UnitZ();
