@@ -295,7 +295,7 @@ int Main(int argc, char** argv) {
   if (service.HasHangingSession()) {
     // Its thread still uses the service.
     service.StoreAll();
-    spdlog::error("ending without the threads that hang");
+    spdlog::error("exiting without waiting for the thread that hangs");
     std::_Exit(kFailure);
   }
   return 0;

@@ -57,7 +57,10 @@ class Scheduler {
   // No more inputs. Returns immediately; `finished` is called after everything is processed.
   void CloseInputs() { inputs_.Close(); }
   // A stage that has run longer than `limit`, see StageWatch. Thread-safe.
-  std::optional<StageHang> FindHang(std::chrono::duration<double> limit) { return watch_.FindHang(limit); }
+  std::optional<StageHang> FindHang(std::chrono::duration<double> limit,
+                                    std::chrono::duration<double> confirmation = std::chrono::seconds(0)) {
+    return watch_.FindHang(limit, confirmation);
+  }
   // Ends the processing as a failed stage does, without waiting for the threads. One of them hangs, so that Stop()
   // would not return. Thread-safe.
   void Abandon(const StageHang& hang);

@@ -220,12 +220,14 @@ void Session::OnFailed(const char* stage, const std::string& what) {
 
 void Session::CheckStages() {
   if (config_.stage_timeout_s <= 0 || hangs_) return;
-  const std::optional<StageHang> hang = scheduler_.FindHang(std::chrono::duration<double>(config_.stage_timeout_s));
+  constexpr std::chrono::seconds kConfirmation{5};
+  const std::optional<StageHang> hang =
+      scheduler_.FindHang(std::chrono::duration<double>(config_.stage_timeout_s), kConfirmation);
   if (!hang) return;
   hangs_ = true;
   stopping_ = true;
-  spdlog::error("session {}: {} hangs since {:.0f} s (session.stage_timeout_s), in {}", id_, hang->stage, hang->since_s,
-                hang->stack);
+  spdlog::error("session {}: {} has been working on one frame for {:.0f} s (session.stage_timeout_s); its stack: {}",
+                id_, hang->stage, hang->since_s, hang->stack);
   scheduler_.Abandon(*hang);
 }
 

@@ -58,11 +58,16 @@ StageWatch::Scope::~Scope() {
 }
 
 // Under the lock, so that the stage cannot end, and its thread with it.
-std::optional<StageHang> StageWatch::FindHang(std::chrono::duration<double> limit) {
+std::optional<StageHang> StageWatch::FindHang(std::chrono::duration<double> limit,
+                                              std::chrono::duration<double> confirmation) {
   std::lock_guard lock(mutex_);
   const auto now = Clock::now();
-  const auto last = std::find_if(running_.rbegin(), running_.rend(),
-                                 [&](const Running& running) { return now - running.since > limit; });
+  for (Running& running : running_) {
+    if (!running.overdue_since && now - running.since > limit) running.overdue_since = now;
+  }
+  const auto last = std::find_if(running_.rbegin(), running_.rend(), [&](const Running& running) {
+    return running.overdue_since && now - *running.overdue_since >= confirmation;
+  });
   if (last == running_.rend()) return std::nullopt;
   return StageHang{.stage = last->stage,
                    .since_s = std::chrono::duration<double>(now - last->since).count(),

@@ -27,6 +27,7 @@ class StageWatch {
     const char* stage;
     pthread_t thread;
     Clock::time_point since;
+    std::optional<Clock::time_point> overdue_since = {};  // when FindHang() saw it first
   };
 
  public:
@@ -43,8 +44,10 @@ class StageWatch {
     std::list<Running>::iterator entry_;
   };
 
-  // The stage that began last among those that run longer than `limit`: the others may wait for it.
-  std::optional<StageHang> FindHang(std::chrono::duration<double> limit);
+  // The stage that began last among those that run longer than `limit`: the others may wait for it. Only if it still
+  // runs `confirmation` after an earlier call saw it so: a process that was suspended for a long time does not hang.
+  std::optional<StageHang> FindHang(std::chrono::duration<double> limit,
+                                    std::chrono::duration<double> confirmation = std::chrono::seconds(0));
 
  private:
   std::mutex mutex_;

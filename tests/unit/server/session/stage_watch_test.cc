@@ -58,6 +58,19 @@ TEST(StageWatchTest, AHangIsReportedWithItsStackUntilItEnds) {
   EXPECT_FALSE(watch.FindHang(seconds(0)));
 }
 
+// As after a suspension: the stage looks overdue once, and then ends.
+TEST(StageWatchTest, AStageThatEndsBeforeItIsConfirmedIsNoHang) {
+  StageWatch watch;
+  {
+    const StuckThread thread(&watch, "mapping");
+    std::this_thread::sleep_for(milliseconds(2));
+    EXPECT_FALSE(watch.FindHang(milliseconds(1), seconds(1000)));
+  }
+  const StuckThread next(&watch, "mapping");
+  EXPECT_FALSE(watch.FindHang(seconds(1000), seconds(0)));
+  EXPECT_TRUE(Eventually([&] { return watch.FindHang(milliseconds(1), milliseconds(20)).has_value(); }));
+}
+
 TEST(StageWatchTest, AmongSeveralTheOneThatBeganLastIsNamed) {
   StageWatch watch;
   const StuckThread waiting(&watch, "tracking");
